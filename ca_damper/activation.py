@@ -49,7 +49,8 @@ def periods_of(cycles: Cycles) -> Optional[Periods]:
     measured = cycles.record.shape[1]
     if measured < 2:
         return None
-    found = [period(series, ALIKE) for series in cycles.harmonic_by_cycle("x")]
+    series = cycles.harmonic_by_cycle("x")
+    found = [period(one, ALIKE) for one in series if np.isfinite(one).all()]
     lengths, counts = np.unique([one for one in found if one], return_counts=True)
     pairs = tuple(zip(map(int, lengths), map(int, counts)))
     return Periods(measured, ALIKE, pairs, len(found) - int(counts.sum()))

@@ -76,9 +76,15 @@ class Batch(LoadedScenes):
     structure : ModalMount, optional
         Places of structures given by their modes, see ``shake_structure``; None for a container of
         its own in each scene.
+    if_diverged : str, default "nan"
+        ``"nan"``: the other scenes go on where one diverges, its results are nan, and a warning
+        tells which. ``"raise"``: it ends all.
 
     Attributes
     ----------
+    diverged : ndarray
+        Scenes that have diverged, with those on one structure with them, bool, shape (scenes,);
+        ``divergences()`` tells when and why.
     run_seconds : float
         Wall time spent on stepping [s].
     compile_seconds : float
@@ -112,10 +118,11 @@ class Batch(LoadedScenes):
         excitation: Any = None,
         recorded_samples: int = 0,
         structure: Optional[ModalMount] = None,
+        if_diverged: str = "nan",
     ):
         self.asked_effects = choice("effects", effects, EFFECTS)
         filling, self.estimates = activated(filling, table, effects)
-        many = measured_cycles, rtol, atol, excitation, recorded_samples, structure
+        many = measured_cycles, rtol, atol, excitation, recorded_samples, structure, if_diverged
         super().__init__(filling, table, mount, *many)
         self.periods: Optional[Periods] = None
         self.launches, self.compile_seconds = Launches(self.count), 0.0
@@ -163,9 +170,10 @@ class Batch(LoadedScenes):
         check_finite_start(initial)
         self._tell_compiling("placing", 0.2)
         coupling.start(np.ascontiguousarray(initial))
-        self._started = True
+        self._started, self._told = True, 0
         self.time_origin[:] = 0.0
         self._check_divergence()
+        self._warn_of_divergence()
 
     def change(self, **numbers: Any) -> None:
         """Replace parameters of the scenes; ``start`` must follow.
@@ -242,7 +250,8 @@ class Batch(LoadedScenes):
         InputError
             A number is out of range, a cycle is not complete, or the excitation ends earlier.
         SimulationDiverged
-            A scene left the range in which its numbers mean anything.
+            All scenes left the range in which their numbers mean anything, or one with
+            ``if_diverged="raise"``.
         """
         transient = whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
         measured = whole("measured_cycles", measured_cycles, 0, self.measured_cycles)
@@ -252,7 +261,7 @@ class Batch(LoadedScenes):
         steps = self.steps_per_cycle.astype(np.int64)
         self._set_recorder((transient + measured) * steps, record_every)
         self._go((transient + measured) * steps, transient * steps, progress)
-        record = self.engine.coupling.read(measured)
+        record = self._read_cycles(measured)
         cycles = measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
         self.periods = periods_of(cycles)
         return cycles
@@ -279,12 +288,13 @@ class Batch(LoadedScenes):
         InputError
             A number is out of range, or a cycle is not complete.
         SimulationDiverged
-            A scene left the range in which its numbers mean anything.
+            All scenes left the range in which their numbers mean anything, or one with
+            ``if_diverged="raise"``.
         """
         counts = for_all("cycles", cycles, self.count, self.measured_cycles).astype(np.int64)
         self._check_cycle_is_full()
         self._go(counts * self.steps_per_cycle, np.zeros_like(counts), progress)
-        record = self.engine.coupling.read(int(counts.max()))
+        record = self._read_cycles(int(counts.max()))
         return tuple(one[:count].copy() for one, count in zip(record, counts))
 
     def advance(self, steps: Any, progress: Optional[Listener] = None) -> None:
@@ -302,7 +312,8 @@ class Batch(LoadedScenes):
         InputError
             A number is negative or not whole.
         SimulationDiverged
-            A scene left the range in which its numbers mean anything.
+            All scenes left the range in which their numbers mean anything, or one with
+            ``if_diverged="raise"``.
         """
         self._check_started()
         steps = for_all("steps", steps, self.count, _MOST_STEPS).astype(np.int64)
@@ -402,6 +413,7 @@ class Batch(LoadedScenes):
             run_seconds=self.run_seconds,
             order=getattr(self.filling, "order", None),
             certificate=self.certificate,
+            diverged=tuple(map(str, self.divergences())),
         )
 
     @property
@@ -416,6 +428,13 @@ class Batch(LoadedScenes):
         self.going_on = False
         self._compile()
         self._launch_until_done(steps, progress)
+        self._warn_of_divergence()
+
+    def _read_cycles(self, count: int) -> np.ndarray:
+        """Record of the first measured cycles, (scenes, cycles, columns); NaN of lost scenes."""
+        record: np.ndarray = self.engine.coupling.read(count).copy()
+        record[self.diverged] = np.nan
+        return record
 
     def _aim(self, steps: np.ndarray, before_measuring: np.ndarray) -> None:
         """Say how far every scene is to go."""
@@ -446,12 +465,20 @@ class Batch(LoadedScenes):
             done = launches.done
             launches.launch(total, self._advance, self._check_divergence)
             if done < 1.0 == launches.done:
-                launches.count(steps, self.table.column("particles"))
+                launches.count(self._steps_taken(), self.table.column("particles"))
             if progress is not None:
                 scene_steps = round(launches.done * total)
                 progress(BatchProgress(launches.done, launches.seconds, scene_steps))
             self.writer.save_if_needed()
             done = launches.done
+
+    def _steps_taken(self) -> np.ndarray:
+        """Steps of the present run so far, (scenes,)."""
+        engine = self.engine
+        taken: np.ndarray = engine.table.in_use(engine.coupling.step) - engine.table.in_use(
+            engine.coupling.begin
+        )
+        return taken.astype(np.int64)
 
     def _advance(self, share: float) -> None:
         self.engine.coupling.advance(share)

@@ -227,7 +227,8 @@ def damper_map(
     InputError
         An argument is out of its range, or the filling has no box to change.
     SimulationDiverged
-        A scene left the range in which its numbers mean anything.
+        All scenes left the range in which their numbers mean anything. Where some did, a warning
+        tells which, and their results are nan.
 
     Examples
     --------

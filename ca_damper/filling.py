@@ -48,6 +48,33 @@ class Action:
     carried: ti.f64
 
 
+@ti.dataclass
+class Blows:
+    """Blows of a filling on the container in a step, before any of them is carried out.
+
+    impulse: of those on floor and ceiling, on a container that they would not move, along x [N s].
+    struck: mass of what meets floor and ceiling [kg], which resists as if it were carried. rubbed:
+    mass of what side walls drag [kg]. carried: as of an Action.
+    """
+
+    impulse: ti.f64
+    struck: ti.f64
+    rubbed: ti.f64
+    carried: ti.f64
+
+
+@ti.dataclass
+class Recoil:
+    """How a container takes the blows of a step, with those on all that moves with it.
+
+    velocity: along x at the end of the step, after all blows on floors and ceilings [m/s]. share:
+    sum of the rubbed masses, each times the speed that a unit impulse on it gives the container.
+    """
+
+    velocity: ti.f64
+    share: ti.f64
+
+
 #: Places of a scene that an engine has at least.
 LEAST_PLACES = 256
 #: Places for particles in all scenes of a batch: they are counted in 32 bits.
@@ -169,6 +196,10 @@ class DeviceFilling(Protocol):
     Of its members ``uses`` and ``snapshot`` are Python, the others ti.funcs. ``table.dt`` may
     change between two steps, when a sweep goes on to its next frequency. It may have two further
     members for a certificate, in Python: see ``activation.py``.
+
+    One whose blows see how the container gives way takes ``advance`` apart, so that boxes on one
+    structure resolve theirs together: ``find_blows(s, step, motion)`` returns Blows, and
+    ``carry_out(s, step, motion, recoil)`` with a Recoil returns the Action.
     """
 
     def reset(self, s: int) -> None:

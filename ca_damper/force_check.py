@@ -33,7 +33,8 @@ def force_mismatch(
     given = -1j * o.base_amplitude * held + cycles.harmonic("f")
     given -= o.mass * push + (1j * omega * o.mass + o.damping) * shift
     x = cycles.harmonic("x")
-    return float(np.abs(given / (held - o.mass * omega**2) - x).max() / np.abs(x).max())
+    distance = np.abs(given / (held - o.mass * omega**2) - x)
+    return float(np.nanmax(distance) / np.nanmax(np.abs(x)))
 
 
 def checked_response(

@@ -134,7 +134,8 @@ def sweep_up_and_down(
     InputError
         An argument is out of its range.
     SimulationDiverged
-        A scene left the range in which its numbers mean anything.
+        All scenes left the range in which their numbers mean anything. Where some did, a warning
+        tells which, and their results are nan.
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
     check_run(transient_cycles, start, progress)

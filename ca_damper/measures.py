@@ -226,7 +226,9 @@ class Cycles:
         """Of the filling, -F / V = c + i w m [N s/m]; NaN where the container does not move."""
         force, speed = self.harmonic("f"), self.harmonic("v")
         still = speed == 0.0
-        return np.where(still, _NOT_A_NUMBER, 0.0 - force / np.where(still, 1.0, speed))
+        # A scene that diverged is NaN.
+        with np.errstate(invalid="ignore"):
+            return np.where(still, _NOT_A_NUMBER, 0.0 - force / np.where(still, 1.0, speed))
 
     @property
     def apparent_mass(self) -> np.ndarray:

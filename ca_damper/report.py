@@ -58,6 +58,8 @@ class Report:
         as a share of it, with a confidence of 95 %; None where it is not known.
     certificate : Certificate, optional
         When effects first acted, what was left out, what was audited.
+    diverged : tuple of str
+        A sentence for each scene that diverged, the first in time first; its results are nan.
     """
 
     method: str
@@ -78,6 +80,7 @@ class Report:
     order: Optional[int] = None
     sampling: Optional[tuple[int, float]] = None
     certificate: Optional[Certificate] = None
+    diverged: tuple[str, ...] = ()
 
     def __repr__(self):
         particles = f"{_range(self.particles)} particles"
@@ -132,6 +135,12 @@ class Report:
         """
         write_text(path, json.dumps(self.as_dict(), indent=1))
 
+    def _diverged_rows(self):
+        """Number of scenes that diverged, and the first of them."""
+        if not self.diverged:
+            return ()
+        return ("diverged", f"{len(self.diverged):,} of them, results nan"), ("", self.diverged[0])
+
     def _bound_row(self):
         """Bound of the step, and the step relative to it."""
         if self.step_bound is None:
@@ -149,6 +158,7 @@ class Report:
             *(self.certificate.rows() if self.certificate is not None else ()),
             ("scenes", f"{self.scenes:,} with {_range(self.particles)} particles"),
             ("simulated", f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s"),
+            *self._diverged_rows(),
             *self._bound_row(),
             ("momentum error", f"{self.momentum_error:.2g} of what was exchanged"),
             ("known of the error", step),

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 _MOST_SHOWN = 8
 #: In tables, of a peak at an end of the ratios, where its height cannot be known.
 OUTSIDE = "outside"
+#: Likewise, of a curve with a scene that diverged.
+DIVERGED = "diverged"
 #: Of the sampling error in a report.
 _CONFIDENCE = 0.95
 
@@ -149,7 +151,8 @@ class Response(Tabulated):
             middle, spread = np.median(ratio), 1e3 * rms
             cells = f"{middle:.4f}", f"{natural * middle:.4g}", f"{np.median(spread):.4g}"
             ends = f"{spread.min():.4g} to {spread.max():.4g}"
-            row = (*cells, ends) if math.isfinite(middle) else (OUTSIDE,) * 4
+            unknown = DIVERGED if np.isnan(self.rms[k]).any() else OUTSIDE
+            row = (*cells, ends) if math.isfinite(middle) else (unknown,) * 4
             found.append((f"{self.particles[k]}", *row))
         return found
 
@@ -291,7 +294,8 @@ def frequency_response(
     InputError
         An argument is out of its range, or the filling refuses a scene.
     SimulationDiverged
-        A scene left the range in which its numbers mean anything.
+        All scenes left the range in which their numbers mean anything. Where some did, a warning
+        tells which, and their results are nan.
 
     Examples
     --------
@@ -331,7 +335,7 @@ def _sampling(cycles):
 
     None where no mean is known: of a single cycle, or of a container at rest.
     """
-    highest = int(np.argmax(cycles.rms))
+    highest = int(np.nanargmax(cycles.rms))
     one = slice(highest, highest + 1)
     series = Cycles(cycles.frequency[one], cycles.steps[one], cycles.record[one]).rms_by_cycle[0]
     mean, error, freedom = mean_and_error(series)

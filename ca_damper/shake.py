@@ -78,7 +78,8 @@ class TimeHistory(Tabulated):
     def __repr__(self) -> str:
         axes = f"particles {listed(self.particles)}, {counted(len(self.seeds), 'seed')}"
         size = f"{counted(len(self.time_s), 'sample')} in {self.time_s[-1]:.6g} s"
-        return in_brief(self, self.label, axes, size, f"largest RMS {1e3 * self.rms.max():.4g} mm")
+        highest = f"largest RMS {1e3 * np.nanmax(self.rms):.4g} mm"
+        return in_brief(self, self.label, axes, size, highest)
 
     @property
     def relative(self) -> np.ndarray:
@@ -212,7 +213,8 @@ def shake(
     InputError
         An argument is out of its range.
     SimulationDiverged
-        A scene left the range in which its numbers mean anything.
+        All scenes left the range in which their numbers mean anything. Where some did, a warning
+        tells which, and their results are nan.
 
     Examples
     --------
@@ -268,11 +270,12 @@ class _Plan:
     def history(self, batch, cycles):
         """What the batch recorded."""
         series, shape = batch.time_series(), (len(self.particles), len(self.seeds))
+        sound = int(np.argmin(batch.diverged))
         highest = np.maximum(cycles.mean_of("x_max"), -cycles.mean_of("x_min"))
         return TimeHistory(
             *(self.filling.label, self.oscillator, self.excitation, self.particles, self.seeds),
-            time_s=series["time_s"][:, 0],
-            base=series["y"][:, 0],
+            time_s=series["time_s"][:, sound],
+            base=series["y"][:, sound],
             rms=cycles.rms.reshape(shape),
             peak=highest.reshape(shape),
             report=batch.report(),

@@ -85,7 +85,8 @@ class StructureHistory(Tabulated):
         number = len(self.boxes)
         axes = f"{number} box{'es' * (number > 1)}, {counted(len(self.seeds), 'seed')}"
         size = f"{counted(len(self.time_s), 'sample')} in {self.time_s[-1]:.6g} s"
-        return in_brief(self, self.label, axes, size, f"largest RMS {1e3 * self.rms.max():.4g} mm")
+        highest = f"largest RMS {1e3 * np.nanmax(self.rms):.4g} mm"
+        return in_brief(self, self.label, axes, size, highest)
 
     @property
     def relative(self) -> np.ndarray:
@@ -198,7 +199,8 @@ def shake_structure(
     InputError
         An argument is out of its range, or the step is too long for the highest mode.
     SimulationDiverged
-        A scene left the range in which its numbers mean anything.
+        All scenes left the range in which their numbers mean anything. Where some did, a warning
+        tells which, and their results are nan.
     """
     check_run(0, STARTS[0], progress)
     plan = _Plan(filling, structure, boxes, one_for_all(excitation), seeds, force_place)
@@ -290,6 +292,7 @@ class _Plan:
     def history(self, batch, cycles):
         """What the batch recorded."""
         series, group = batch.time_series(), self.mount.group
+        sound = int(np.argmin(batch.diverged))
         # A place is that of the first scene there.
         of_place = [self.mount.scene_places.index(i) for i in range(self.structure.place_count)]
         highest = np.maximum(cycles.mean_of("x_max"), -cycles.mean_of("x_min"))
@@ -300,7 +303,7 @@ class _Plan:
         )
         return StructureHistory(
             *(self.filling.label, self.structure, self.boxes, self.excitation, self.seeds),
-            *(series["time_s"][:, 0], series["y"][:, 0]),
+            *(series["time_s"][:, sound], series["y"][:, sound]),
             *(x[:, of_place], v[:, of_place], force[:, : len(self.boxes)], rms, peak),
             batch.report(),
         )

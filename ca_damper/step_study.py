@@ -62,7 +62,10 @@ class StepStudy:
             self.filling.check(self.particles, dt)
             while len(made) < repeats and sum(map(_run_seconds, made)) < enough:
                 made.append(self._response(dt=dt, seeds=self.seeds))
-            self.runs[dt] = made
+            if any(one.report and one.report.diverged for one in made):
+                self.failures[dt] = "diverged"
+            else:
+                self.runs[dt] = made
         except (InputError, SimulationDiverged) as error:
             self.failures[dt] = "refused" if isinstance(error, InputError) else "diverged"
 

@@ -66,7 +66,8 @@ def damper_batch(filling, options, particles, step, ratios, seeds, measured_cycl
     frequency, seed = np.meshgrid(np.array(ratios) * oscillator.natural_frequency, seeds)
     scenes = particles, seed.ravel(), step, frequency.ravel(), oscillator.base_amplitude
     made = FILLINGS[filling](**options)
-    return Batch(made, SceneTable(*scenes), measured_cycles=measured_cycles)
+    table = SceneTable(*scenes)
+    return Batch(made, table, measured_cycles=measured_cycles, if_diverged="raise")
 
 
 def absent(substeps, repeats):

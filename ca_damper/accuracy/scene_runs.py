@@ -97,7 +97,7 @@ class SceneRuns:
             structure = (o.base_amplitude, o.mass, o.stiffness, o.damping)
             frequency = ratios * o.natural_frequency
             table = SceneTable(self.particles, seeds, steps, frequency, *structure)
-            batch = Batch(self.filling, table, measured_cycles=CYCLES)
+            batch = Batch(self.filling, table, measured_cycles=CYCLES, if_diverged="raise")
             batch.start("rest")
             # Compiles, where no batch of this structure has done so.
             batch.advance(0)

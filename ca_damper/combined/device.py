@@ -108,6 +108,7 @@ class DeviceCombined:
         self.spheres.history.reset(s)
         search.note_motion(s, search.least[s] + back, search.most[s] + fore)
         bodies.floor[s] = motion.x + dt * (motion.v + 0.5 * dt * motion.a)
+        self.spheres.speed[s] = motion.v + dt * motion.a
         self.step[s] = self.step[s] + 1
 
     @ti.func

@@ -46,9 +46,11 @@ class MomentumAccount:
         """Error of momentum relative to the momentum exchanged, of the worst scene.
 
         momentum: of the fillings, (scenes,); at the start of the last step for carried particles.
+        NaN of scenes that do not count.
         """
         late, expected, exchanged = map(
             self.table.in_use, (self.late, self.expected, self.exchanged)
         )
         missing = np.abs(momentum + late - expected)
-        return float((missing / np.where(exchanged > 0.0, exchanged, np.inf)).max())
+        share = missing / np.where(exchanged > 0.0, exchanged, np.inf)
+        return float(np.fmax.reduce(share))

@@ -14,12 +14,14 @@ class GroupCoupling(Coupling):
     """Fillings of a group, in order, then their structure; as ``Coupling`` for one container.
 
     container: a ModalContainer. order[g]: first scene of the g-th group. before: motion of each
-    place at the beginning of a step.
+    place at the beginning of a step. wait: whether the fillings take a step in two parts, so that
+    the blows of all boxes are resolved together.
     """
 
     def __init__(self, table: SceneFields, *parts: Any):
         super().__init__(table, *parts)
         self.before = table.vector(3, ti.f64)
+        self.wait = hasattr(self.device, "find_blows")
 
     @ti.kernel
     def start(self, initial: _F64):
@@ -56,11 +58,8 @@ class GroupCoupling(Coupling):
         for each in range(s, end):
             motion = self.container.motion(each)
             self.before[each] = ti.Vector([motion.x, motion.v, motion.a])
-            action = Action(0.0, 0.0)
             self._record(each, motion)
-            if self.container.has_box(each):
-                action = self.device.advance(each, self.step[each], motion)
-            self.container.set_action(each, action)
+        self._set_actions(s)
         attempts = self.container.advance(s)
         for each in range(s, end):
             before, ours = self.before[each], 0
@@ -68,3 +67,27 @@ class GroupCoupling(Coupling):
                 ours = attempts
             action = Action(self.container.impulse[each], self.container.carried[each])
             self._book(each, Motion(before[0], before[1], before[2]), action, ours)
+
+    @ti.func
+    def _set_actions(self, s):
+        """Actions of the fillings of a group on their places; those without a box have none."""
+        end = s + self.container.boxes[None]
+        if ti.static(self.wait):
+            for each in range(s, end):
+                motion = self.container.motion(each)
+                blows = self.device.find_blows(each, self.step[each], motion)
+                self.container.set_blows(each, blows)
+            self.container.resolve(s)
+        for each in range(s, end):
+            motion = self.container.motion(each)
+            self.container.set_action(each, self._action(each, motion))
+
+    @ti.func
+    def _action(self, s, motion):
+        action = Action(0.0, 0.0)
+        if ti.static(self.wait):
+            recoil = self.container.recoil_of(s)
+            action = self.device.carry_out(s, self.step[s], motion, recoil)
+        else:
+            action = self.device.advance(s, self.step[s], motion)
+        return action

@@ -4,6 +4,7 @@ The engine is that of their structure: more or larger scenes, or other numbers, 
 and compile nothing. Those that are alive at once on one engine take turns.
 """
 
+import warnings
 from typing import Any, Optional
 
 import numpy as np
@@ -18,6 +19,7 @@ from ca_damper.engine.damper_engine import DamperEngine, borrow
 from ca_damper.engine.divergence import divergence
 from ca_damper.engine.modal_mount import ModalMount, checked_mount
 from ca_damper.engine.recorder import SAMPLED
+from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import Filling, check_filling, structure_of
 from ca_damper.scenes.scene_memory import SceneMemory
 from ca_damper.scenes.scene_numbers import SceneNumbers
@@ -26,7 +28,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
-from taichi_dem.kit.validation import instance, positive, whole
+from taichi_dem.kit.validation import choice, instance, positive, whole
 
 
 class LoadedScenes(Uncopied):
@@ -47,8 +49,10 @@ class LoadedScenes(Uncopied):
         excitation: Any = None,
         recorded_samples: int = 0,
         structure: Optional[ModalMount] = None,
+        if_diverged: str = "nan",
     ):
         runtime.session()
+        self.if_diverged = choice("if_diverged", if_diverged, ("nan", "raise"))
         self.filling = check_filling(filling)
         self.count = instance("table", table, SceneTable).count
         self.mount, self.modal = checked_mount(mount, structure)
@@ -74,6 +78,8 @@ class LoadedScenes(Uncopied):
         self._load_pace()
         self.time_origin = np.zeros(self.count)
         self._started = False
+        # Scenes of which a warning has told that they diverged.
+        self._told = 0
         # Steps of the last run if it was recorded, those between samples, and number of samples.
         self._recording: Optional[tuple[int, int, int]] = None
 
@@ -87,6 +93,13 @@ class LoadedScenes(Uncopied):
         if self.modal is not None:
             self.modal.check(numbers.table)
         return numbers
+
+    @property
+    def diverged(self) -> np.ndarray:
+        """Scenes that have diverged, and those on one structure with them, (scenes,) of bool."""
+        lost: np.ndarray = self._read_status()[2] != 0
+        group = 1 if self.modal is None else self.modal.group
+        return np.repeat(lost.reshape(-1, group).any(axis=1), group)
 
     @property
     def table(self) -> SceneTable:
@@ -132,11 +145,13 @@ class LoadedScenes(Uncopied):
         dict
             Arrays (scenes,) by name: time_s [s]; x [m], v [m/s], a [m/s^2] of the container; y [m]
             of the base; force [N], mean of the filling on the container in the last step; energy
-            [J] and momentum [kg m/s] of the particles.
+            [J] and momentum [kg m/s] of the particles. NaN but for the time where a scene has
+            diverged.
         """
         self._check_started()
         values = np.empty((len(measures.SAMPLE), self.count))
         self.engine.coupling.sample(values)
+        values[:, self.diverged] = np.nan
         return {"time_s": self.time_s, **dict(zip(measures.SAMPLE, values))}
 
     def time_series(self) -> dict[str, np.ndarray]:
@@ -146,7 +161,8 @@ class LoadedScenes(Uncopied):
         -------
         dict
             Arrays (samples, scenes) by name: time_s [s]; x [m], v [m/s] of the container; y [m] of
-            the base; force [N] of the filling on the container, mean since the sample before.
+            the base; force [N] of the filling on the container, mean since the sample before. All
+            of a scene that has diverged are NaN.
 
         Raises
         ------
@@ -164,7 +180,10 @@ class LoadedScenes(Uncopied):
         }
         # Counted back from the present, as the run may have gone on from a checkpoint.
         marks = self._read_status()[0] - steps + np.append(every * np.arange(count), steps)[:, None]
-        return {"time_s": self.time_origin + marks * self.table.column("dt"), **series}
+        series["time_s"] = self.time_origin + marks * self.table.column("dt")
+        for values in series.values():
+            values[:, self.diverged] = np.nan
+        return series
 
     def _set_recorder(self, steps: np.ndarray, every: int) -> None:
         """Record the next run of so many steps, (scenes,), every so many of them."""
@@ -231,7 +250,7 @@ class LoadedScenes(Uncopied):
 
     def _check_cycle_is_full(self) -> None:
         self._check_started()
-        position = self._read_status()[1]
+        position = np.where(self.diverged, 0, self._read_status()[1])
         if position.any():
             late = int(position.argmax())
             raise InputError(
@@ -245,10 +264,36 @@ class LoadedScenes(Uncopied):
         engine.clock.set(self.steps_per_cycle)
 
     def _check_divergence(self) -> None:
+        """Raise SimulationDiverged where no scene is left that goes on, or one may not be lost."""
+        diverged = self.diverged
+        if diverged.all() or (self.if_diverged == "raise" and diverged.any()):
+            raise self.divergences()[0]
+
+    def divergences(self) -> list[SimulationDiverged]:
+        """Tell which scenes have diverged, and when and why.
+
+        Returns
+        -------
+        list of SimulationDiverged
+            An exception for each, the first in time first; they are not raised.
+        """
         step, _, status = self._read_status()
-        if status.any():
-            # Scenes stop where they diverge: the first of them in time speaks for all.
-            time_s = self.time_s
-            s = int(np.argmin(np.where(status != 0, time_s, np.inf)))
-            found = int(status[s]), int(step[s]), float(time_s[s])
-            raise divergence(self.filling, self.table.row(s), *found)
+        # Scenes stop where they diverge.
+        time_s, filling, table = self.time_s, self.filling, self.table
+        lost = sorted(np.flatnonzero(status), key=lambda s: time_s[s])
+        return [
+            divergence(filling, table.row(s), int(status[s]), int(step[s]), float(time_s[s]))
+            for s in map(int, lost)
+        ]
+
+    def _warn_of_divergence(self) -> None:
+        """Warn of scenes that have diverged since the last warning."""
+        lost = int(np.count_nonzero(self.diverged))
+        if lost > self._told:
+            first = self.divergences()[0]
+            warnings.warn(
+                f"{lost} of {self.count} scenes diverged; their results are nan, and the others "
+                f"went on: {first}",
+                stacklevel=4,
+            )
+        self._told = lost

@@ -1,7 +1,8 @@
 """Boxes at places of a structure given by its modes; interface as that of ``container.py``.
 
 The modes of a group belong to its first scene, and RK45 takes them over a step at once: between
-``set_action`` of every scene and the motion after ``advance``.
+``set_action`` of every scene and the motion after ``advance``. Blows that wait for those of other
+boxes come before: ``set_blows`` of every box, then ``resolve``, then ``recoil_of`` each.
 """
 
 import numpy as np
@@ -12,7 +13,7 @@ from ca_damper.engine.container import MOST_ATTEMPTS, IntegratedContainer
 from ca_damper.engine.modal_mount import ModalMount
 from ca_damper.engine.signals import BASES, FORCES
 from ca_damper.excitation.excitation import Excitation, ExcitationKind
-from ca_damper.filling import Motion
+from ca_damper.filling import Action, Motion, Recoil
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
@@ -25,11 +26,13 @@ class ModalContainer(IntegratedContainer):
     Of the batch: group, boxes: scenes of a group, and those of them with a box; mass [kg],
     stiffness [N/m], damping [N s/m] of each mode, share: of the base's motion, pushed: by the force
     of the excitation. Of a scene: shape at its place; lift: what motion of the place adds to the
-    modes; residual; seen: motion of the place. Of a group, at its first scene: state, slope: modal
+    modes; residual; home: number in the group of the first scene at its place; seen: motion of the
+    place. Of a group, at its first scene: state, slope: modal
     coordinates and speeds, and their change; inverse of the modal masses [1/kg] with all that is
     carried; constant [N]: forces of the fillings on the modes, lag [kg]: by the acceleration of the
     base; elapsed: steps since the start; changed: whether slope and inverse are out of date;
-    scratch for forces on the modes (pull), their accelerations (gain) and motion (tried).
+    scratch for forces on the modes (pull), their accelerations (gain) and motion (tried). Of a box,
+    of the blows of a step: struck, rubbed [kg] of ``Blows``, speed_gain [m/s] and shared by all.
     """
 
     def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind, modes: int):
@@ -45,6 +48,9 @@ class ModalContainer(IntegratedContainer):
         self.state, self.slope = table.vector(2 * modes, ti.f64), table.vector(2 * modes, ti.f64)
         self.residual, self.seen = table.field(ti.f64), table.vector(3, ti.f64)
         self.elapsed, self.changed = table.field(ti.i32), table.field(ti.i32)
+        self.home = table.field(ti.i32)
+        self.struck, self.rubbed = table.field(ti.f64), table.field(ti.f64)
+        self.speed_gain, self.shared = table.field(ti.f64), table.field(ti.f64)
 
     def excite(self, excitation: Excitation, scenes: int) -> None:
         """Take over the excitation of a batch."""
@@ -59,7 +65,10 @@ class ModalContainer(IntegratedContainer):
         rows = mount.of_scenes()
         assign(self.boxes, len(mount.places))
         assign(self.group, len(rows))
-        every = rows[np.arange(self.table.scene_count) % len(rows)]
+        of_group = np.arange(self.table.scene_count) % len(rows)
+        every = rows[of_group]
+        homes = np.array([mount.scene_places.index(place) for place in mount.scene_places])
+        assign(self.home, homes[of_group])
         assign(self.shape, every[:, : self.modes])
         assign(self.lift, every[:, self.modes : -1])
         assign(self.residual, every[:, -1])
@@ -68,11 +77,6 @@ class ModalContainer(IntegratedContainer):
     def first(self, s):
         """First scene of the group of scene s."""
         return s - s % self.group[None]
-
-    @ti.func
-    def has_box(self, s):
-        """Whether there is a box at the place of scene s, and not the place alone."""
-        return s % self.group[None] < self.boxes[None]
 
     @ti.func
     def start(self, s, x, v):
@@ -123,6 +127,64 @@ class ModalContainer(IntegratedContainer):
         if action.impulse != self.impulse[s] or action.carried != self.carried[s]:
             self.impulse[s], self.carried[s] = action.impulse, action.carried
             self.changed[self.first(s)] = 1
+
+    @ti.func
+    def set_blows(self, s, blows):
+        """Take over blows of the filling of a scene that wait for those of the other boxes."""
+        self.struck[s], self.rubbed[s] = blows.struck, blows.rubbed
+        self.set_action(s, Action(blows.impulse, blows.carried))
+
+    @ti.func
+    def resolve(self, first):
+        """Resolve the blows of all boxes of a group together.
+
+        Blows on floors and ceilings come first, with all that is struck as if it were carried, and
+        then those on side walls, by grains of which none may drag the others on.
+        """
+        some, end = 0.0, first + self.boxes[None]
+        for s in range(first, end):
+            some += self.struck[s] + self.rubbed[s]
+            self.speed_gain[s], self.shared[s] = 0.0, 0.0
+        if some > 0.0:
+            self.changed[first] = 1
+            self._renew_inverse(first)
+            for s in range(first, end):
+                if self.rubbed[s] > 0.0:
+                    self._share(first, s)
+            for s in range(first, end):
+                self._carry(first, s, self.struck)
+            self._strike(first)
+            for s in range(first, end):
+                self.speed_gain[s] = self.table.dt[first] * self._at_place(first, s)
+
+    @ti.func
+    def recoil_of(self, s):
+        """How the box of a scene takes the blows of the step."""
+        free = self.seen[s][1] + self.seen[s][2] * self.table.dt[s]
+        return Recoil(free + self.speed_gain[s], self.shared[s])
+
+    @ti.func
+    def _share(self, first, s):
+        """Add what is rubbed in a box to the shares of all boxes."""
+        self._push(first, s)
+        for other in range(first, first + self.boxes[None]):
+            moved = self.rubbed[s] * ti.abs(self._at_place(first, other))
+            self.shared[other] = self.shared[other] + moved
+
+    @ti.func
+    def _push(self, first, s):
+        """Accelerations of the modes by a unit force at the place of a scene."""
+        for k in range(self.modes):
+            self.pull[first, k] = self.shape[s, k]
+        self._set_gain(first)
+
+    @ti.func
+    def _at_place(self, first, s):
+        """Acceleration of the place of a scene by those of the modes."""
+        result = 0.0
+        for k in range(self.modes):
+            result += self.shape[s, k] * self.gain[first, k]
+        return result
 
     @ti.func
     def advance(self, first):
@@ -178,16 +240,24 @@ class ModalContainer(IntegratedContainer):
         self.slope[first] = self._change(first, 0.0, self.state[first])
 
     @ti.func
-    def _renew_load(self, first):
-        """Forces on the modes, and the inverse of m + sum carried shape shape^T.
+    def _renew_inverse(self, first):
+        """Inverse of m + sum carried shape shape^T.
 
-        By one box after the other, with g = inverse shape: inverse - c g g^T / (1 + c shape.g)
+        By one place after the other, with g = inverse shape: inverse - c g g^T / (1 + c shape.g)
         (Sherman and Morrison, Ann. Math. Stat. 21 (1950) 124).
         """
         for i in range(self.modes):
             for j in range(self.modes):
                 self.inverse[first, i, j] = 0.0
             self.inverse[first, i, i] = 1.0 / self.mass[i]
+        for s in range(first, first + self.boxes[None]):
+            self._carry(first, s, self.carried)
+
+    @ti.func
+    def _renew_load(self, first):
+        """Forces on the modes, and the inverse of their masses."""
+        self._renew_inverse(first)
+        for i in range(self.modes):
             self.constant[first, i], self.lag[first, i] = 0.0, 0.0
         for s in range(first, first + self.boxes[None]):
             c, dt = self.carried[s], self.table.dt[first]
@@ -196,34 +266,40 @@ class ModalContainer(IntegratedContainer):
                 shape = self.shape[s, k]
                 self.constant[first, k] = self.constant[first, k] + force * shape
                 self.lag[first, k] = self.lag[first, k] + c * self.residual[s] * shape
-            if c > 0.0:
-                self._carry(first, s, c)
         self.changed[first] = 0
 
     @ti.func
-    def _carry(self, first, s, c):
-        """Add a mass at the place of a scene to the modal masses."""
-        for k in range(self.modes):
-            self.pull[first, k] = self.shape[s, k]
-        self._set_gain(first)
-        more = 1.0
-        for k in range(self.modes):
-            more += c * self.shape[s, k] * self.gain[first, k]
-        for i in range(self.modes):
-            for j in range(self.modes):
-                less = c / more * self.gain[first, i] * self.gain[first, j]
-                self.inverse[first, i, j] = self.inverse[first, i, j] - less
+    def _carry(self, first, s, masses: ti.template()):
+        """Add the masses of all boxes at a place to the modal masses, at the first of its boxes."""
+        c = 0.0
+        for other in range(s, first + self.boxes[None]):
+            if self.home[other] == s - first:
+                c += masses[other]
+        if c > 0.0:
+            self._push(first, s)
+            more = 1.0
+            for k in range(self.modes):
+                more += c * self.shape[s, k] * self.gain[first, k]
+            for i in range(self.modes):
+                for j in range(self.modes):
+                    less = c / more * self.gain[first, i] * self.gain[first, j]
+                    self.inverse[first, i, j] = self.inverse[first, i, j] - less
 
     @ti.func
-    def _see(self, first, t):
-        """Motion of all places at t in the step; its impacts are left out of the acceleration."""
-        base = self.excited_base.at(first, self._time(first), t)
+    def _strike(self, first):
+        """Accelerations of the modes by the impacts of the step."""
         for k in range(self.modes):
             struck = 0.0
             for s in range(first, first + self.boxes[None]):
                 struck += self.impulse[s] / self.table.dt[first] * self.shape[s, k]
             self.pull[first, k] = struck
         self._set_gain(first)
+
+    @ti.func
+    def _see(self, first, t):
+        """Motion of all places at t in the step; its impacts are left out of the acceleration."""
+        base = self.excited_base.at(first, self._time(first), t)
+        self._strike(first)
         for k in ti.static(range(self.modes)):
             self.gain[first, k] = self.slope[first][self.modes + k] - self.gain[first, k]
             self.tried[first, k] = self.state[first][k]

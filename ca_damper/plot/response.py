@@ -103,7 +103,7 @@ def picture_compared(path: FileName, curves: Any, oscillator: Oscillator) -> Non
             bars = [middle - 1e3 * rms.min(axis=1), 1e3 * rms.max(axis=1) - middle]
             look = {"color": style.colour, "marker": style.marker, "ms": 4, "lw": 1.2}
             axis.errorbar(ratios, middle, yerr=bars, label=style.label, **look)
-        top = 1.15e3 * max(rms.max() for _, rms in curves.values())
+        top = 1.15e3 * max(np.nanmax(rms) for _, rms in curves.values())
         _draw_empty(axis, oscillator, np.concatenate([ratios for ratios, _ in curves.values()]))
         axis.set(title="mean over seeds; bars: their range", ylim=(0.0, top))
         axis.legend()
@@ -151,7 +151,7 @@ def _shade(response, k):
 
 def _share_height(panels):
     """The same height for all, without the peak of the empty container."""
-    highest = max(line.get_ydata().max() for axis in panels for line in axis.lines[:-1])
+    highest = max(np.nanmax(line.get_ydata()) for axis in panels for line in axis.lines[:-1])
     for axis in panels:
         axis.set_ylim(0.0, 1.08 * highest)
 

@@ -27,7 +27,6 @@ from ca_damper.spheres.divergence_codes import (
     NOT_FINITE,
     OVERLAP,
     RUNAWAY,
-    WALL_IMPULSE_SHARE,
 )
 from ca_damper.spheres.effect_activity import FRICTION, PAIRS, WALLS, EffectActivity
 from ca_damper.spheres.expected_contacts import SEARCHES
@@ -49,8 +48,9 @@ class DeviceSpheres:
 
     crushed: whether spheres of a scene lay in each other by a radius when ``divergence_code``
     looked last. given: work of the walls on the spheres [J]. lost: most energy that contacts have
-    taken up to a look of late [J], but for a constant. held: energy of the pairs that touch [J], as
-    of a look.
+    taken up to a look of late [J], but for a constant. allowed: gain that errors of the impacts of
+    late explain [J]. held: energy of the pairs that touch [J], as of a look. speed: of the
+    container at the end of the last step [m/s].
     """
 
     def __init__(self, options: Any, table: SceneFields):
@@ -73,7 +73,8 @@ class DeviceSpheres:
         self.crushed = table.field(ti.i32)
         self.effect_activity = EffectActivity(table)
         self.given, self.lost = table.field(ti.f64), table.field(ti.f64)
-        self.held = table.field(ti.f64)
+        self.held, self.allowed = table.field(ti.f64), table.field(ti.f64)
+        self.speed = table.field(ti.f64)
         self.rotation.bind(self.bodies)
 
     def load(self, options: Any) -> None:
@@ -95,6 +96,7 @@ class DeviceSpheres:
         self.search.forget(s)
         self.search.clear(s)
         self.given[s], self.lost[s] = 0.0, -ti.math.inf
+        self.allowed[s], self.speed[s] = 0.0, 0.0
 
     @ti.func
     def advance(self, s, step, motion):
@@ -134,8 +136,9 @@ class DeviceSpheres:
         # The container recoils by dt force / M over the step; half of it on the way.
         recoil = dt * force * self.table.recoil[s]
         self.given[s] = self.given[s] + dt * force * (motion.v + 0.5 * (dt * motion.a - recoil))
+        self.speed[s] = motion.v + dt * motion.a - recoil
         if ti.static(self.history.remembers):
-            self.history.end(s, motion.v + dt * motion.a - recoil)
+            self.history.end(s, self.speed[s])
         self.bodies.floor[s] = motion.x + dt * (motion.v + 0.5 * dt * motion.a)
         return -dt * force
 
@@ -261,18 +264,23 @@ class DeviceSpheres:
 
     @ti.func
     def _gains(self, s):
-        """Whether contacts have created a good part of the energy present, which is impossible."""
-        body = self.bodies.body[None]
+        """Whether contacts have created a good part of the energy of late, which is impossible.
+
+        Seen from the container, as spheres that rest in the room meet a wall that comes to them.
+        """
+        body, speed = self.bodies.body[None], self.speed[s]
         weight = self.table.particles[s] * body.mass * body.pull[1]
-        energy, highest = self.held[s], 0.0
+        energy, shift = self.held[s], 0.0
         for i in range(self.bodies.first(s), self.bodies.last(s)):
-            own = self._own_energy(s, i)
-            energy += own
-            highest = ti.max(highest, own)
+            energy += self._own_energy(s, i)
+            mass, velocity = self.bodies.mass(i, body), self.bodies.velocity[i]
+            shift += mass * speed * (0.5 * speed - velocity[1])
         lost = self.given[s] - energy - weight * self.bodies.floor[s]
-        gain = ti.max(0.0, self.lost[s] - lost) * (1.0 - FORGOTTEN)
+        kept = 1.0 - FORGOTTEN
+        gain = ti.max(0.0, self.lost[s] - lost) * kept
         self.lost[s] = lost + gain
-        return gain > MOST_GAIN * energy + WALL_IMPULSE_SHARE * highest
+        self.allowed[s] = ti.max(MOST_GAIN * (energy + shift), self.allowed[s] * kept)
+        return gain > self.allowed[s]
 
     @ti.func
     def _note_pair(self, s, i, j, for_step, seen: ti.template()):

@@ -64,7 +64,7 @@ def rubbed(grains: NUMBERS, container: ti.f64, recoil: ti.f64, most: ti.f64):
     count = grains.shape[0]
     for k in range(count):
         slip = grains[k] - container
-        grains[k] -= dragged(slip, ti.min(most, most_drag(slip, count, recoil)))
+        grains[k] -= dragged(slip, ti.min(most, most_drag(slip, count * recoil)))
 
 
 @ti.kernel

@@ -30,6 +30,7 @@ from ca_damper.excitation import Excitation, SineForce
 from taichi_dem import Checkpoint
 from taichi_dem.kit.checkpoint import Interrupted
 from tests.ca_modes.frames import frame, two_storeys
+from tests.ca_oscillator.kicks import BAD_SEED, Kicks
 
 ROOT = Path(__file__).resolve().parents[2]
 BOXES = (Box(1, 20), Box(0, 7))
@@ -155,6 +156,18 @@ def test_a_lost_structure_is_told_in_words():
     """A start beyond any motion that means something."""
     with pytest.raises(SimulationDiverged, match="lost its container"):
         shaken(filling=RigidMass(), velocity=1e7)
+
+
+def test_a_lost_structure_does_not_end_the_others():
+    """All places of its group are nan, those of another seed have the bits that they have alone."""
+    given = {"filling": Kicks(1e-4, diverges_at=500), "boxes": [Box(1, 2), Box(0, 3)]}
+    with pytest.warns(UserWarning, match="2 of 4 scenes diverged"):
+        made = shaken(**given, seeds=[BAD_SEED, 5])
+    alone = shaken(**given, seeds=[5])
+    for name in ("x", "v", "force", "rms", "peak"):
+        assert np.isnan(getattr(made, name)[..., 0]).all()
+        assert np.array_equal(getattr(made, name)[..., 1], getattr(alone, name)[..., 0])
+    assert np.array_equal(made.time_s, alone.time_s)
 
 
 def test_a_history_is_written_with_a_column_a_place(tmp_path):

@@ -1,4 +1,4 @@
-"""Batches: the same bits in any company, bounded launches, divergence in words, Ctrl-C."""
+"""Batches: the same bits in any company, bounded launches, divergence of scenes, Ctrl-C."""
 
 import hashlib
 import json
@@ -19,12 +19,17 @@ from ca_damper import (
     RigidMass,
     SceneTable,
     SimulationDiverged,
+    excitation,
+    frequency_response,
     runtime,
+    shake,
+    sweep_up_and_down,
 )
 from ca_damper.engine import launches
 from ca_damper.progress import BatchProgress, Stages
 from ca_damper.scenes.clock import steps_per_cycle
 from ca_damper.scenes.table import dealt
+from taichi_dem import Checkpoint
 from taichi_dem.kit.progress.progress import Compiling
 from tests.ca_oscillator.kicks import BAD_SEED, CODE, Kicks
 from tests.scenes import ROOT
@@ -195,9 +200,9 @@ def test_driving_on_at_another_frequency():
         batch.run(1, 1)
 
 
-def diverging(**kicks):
-    seeds = [1, BAD_SEED, 2]
-    batch = Batch(Kicks(**kicks), SceneTable([4, 5, 6], seeds, 1e-3, 6.0, 0.6e-3))
+def diverging(if_diverged="raise", seeds=(1, BAD_SEED, 2), **kicks):
+    table = SceneTable([4, 5, 6][: len(seeds)], list(seeds), 1e-3, 6.0, 0.6e-3)
+    batch = Batch(Kicks(**kicks), table, measured_cycles=3, if_diverged=if_diverged)
     batch.start()
     return batch
 
@@ -235,6 +240,75 @@ def test_a_blow_beyond_all_bounds_is_divergence():
     batch.start()
     with pytest.raises(SimulationDiverged, match="lost its container"):
         batch.run(1, 0)
+
+
+ONE_OF_THREE = "1 of 3 scenes diverged; their results are nan.*particles = 5 and seed 13 at 6 Hz"
+
+
+def test_the_end_of_a_scene_does_not_end_the_others(tmp_path):
+    """They keep the bits that they have alone, also after a checkpoint; all is nan of the lost."""
+    kicks = {"strength": 1e-3, "diverges_at": 340}
+    file = tmp_path / "run.npz"
+    batch = diverging("nan", **kicks)
+    with batch.checkpointed(Checkpoint(file), None, {}) as writer:
+        with pytest.warns(UserWarning, match=ONE_OF_THREE):
+            first = batch.run(1, 3)
+        writer.save()
+    assert batch.diverged.tolist() == [False, True, False]
+    resumed = diverging("nan", **kicks)
+    with resumed.checkpointed(None, file, {}), pytest.warns(UserWarning, match=ONE_OF_THREE):
+        assert np.array_equal(resumed.run(1, 3).record, first.record, equal_nan=True)
+    for one in (batch, resumed):
+        one.drive(7.0)
+    second, again = batch.run(0, 2), resumed.run(0, 2)
+    each = batch.measure_each(1)
+    alone = Batch(Kicks(**kicks), SceneTable([4, 6], [1, 2], 1e-3, 6.0, 0.6e-3), measured_cycles=3)
+    alone.start()
+    wanted = alone.run(1, 3)
+    assert np.array_equal(first.record[[0, 2]], wanted.record)
+    alone.drive(7.0)
+    wanted = alone.run(0, 2)
+    for found in (second, again):
+        assert np.array_equal(found.record[[0, 2]], wanted.record)
+    for found in (first.record, second.record, again.record, each):
+        assert np.isnan(found[1]).all()
+    now, report = batch.sample(), batch.report()
+    for name, values in now.items():
+        assert np.isfinite(values).tolist() == [True, name == "time_s", True]
+    assert len(report.diverged) == 1
+    assert "1 of them, results nan" in str(report)
+    assert 340 < report.scene_steps - 2 * (4 * 167 + 3 * 143) <= 340 + 65
+
+
+def test_a_batch_ends_when_all_its_scenes_have():
+    batch = diverging("nan", seeds=(BAD_SEED, BAD_SEED), diverges_at=340)
+    with pytest.raises(SimulationDiverged, match="particles = 4 and seed 13"):
+        batch.run(10, 0)
+
+
+def test_results_over_several_scenes_are_nan_where_one_diverged():
+    """Responses, sweeps and histories, with the numbers of the others as they are alone."""
+    seeds, kicks = [1, BAD_SEED, 2], Kicks(strength=1e-3, diverges_at=340)
+    job = {"particles": 3, "ratios": [0.9, 1.0, 1.1], "measured_cycles": 3, "dt": 1e-3}
+    job["transient_cycles"] = 2
+    for call in (frequency_response, sweep_up_and_down):
+        with pytest.warns(UserWarning, match="of . scenes diverged"):
+            found = call(kicks, seeds=seeds, **job)
+        alone = call(kicks, seeds=[1, 2], **job)
+        some = (found, alone) if call is frequency_response else (found.down, alone.down)
+        assert ">diverged</td>" in some[0]._repr_html_()
+        assert np.isnan(some[0].rms[:, :, 1]).all()
+        assert np.array_equal(some[0].rms[:, :, [0, 2]], some[1].rms)
+        assert found.report.diverged
+    ground = excitation.sines([5.0], [1e-3], 0.6)
+    with pytest.warns(UserWarning, match="1 of 2 scenes diverged"):
+        history = shake(kicks, ground, particles=3, seeds=[BAD_SEED, 1], dt=1e-3)
+    alone = shake(kicks, ground, particles=3, seeds=[1], dt=1e-3)
+    assert np.isnan(history.x[..., 0]).all()
+    for name in ("time_s", "base"):
+        assert np.array_equal(getattr(history, name), getattr(alone, name))
+    assert np.array_equal(history.x[..., 1], alone.x[..., 0])
+    assert "nan" not in repr(history)
 
 
 def test_launches_are_bounded_and_progress_is_told():

@@ -84,7 +84,7 @@ def members_asked(path, owner):
     ("owner", "contract", "optional"),
     [
         ("filling", Filling, {"structure", "activated", "clearance", "with_clearance"}),
-        ("device", DeviceFilling, {"load", "first_steps", "audit"}),
+        ("device", DeviceFilling, {"load", "first_steps", "audit", "find_blows", "carry_out"}),
     ],
 )
 def test_the_package_asks_for_no_more_than_the_contract_has(owner, contract, optional):

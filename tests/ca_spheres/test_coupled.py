@@ -102,3 +102,21 @@ def test_energy_from_contacts_of_three_steps_is_noticed_before_anything_runs_awa
 def test_softer_spheres_bear_the_longer_step():
     # E^(-2/5): a hundredth of the modulus lets the step be 6.3 times as long.
     assert shaken(1e-4, young=5e6, wall_young=5e6).sample()["energy"][0] < 0.01
+
+
+# Frequency [Hz] and amplitude of the base [m]: drawn scenes in which a check fell on a landing.
+LANDINGS = np.array(
+    [(5.97066538709373, 5.352711049774064e-3), (6.106328791200859, 5.743200113844745e-3)]
+)
+
+
+@pytest.mark.parametrize("restitution", [0.75, 1.0])
+def test_spheres_that_land_together_do_not_diverge(restitution):
+    """Six beside each other, thrown by the structure, and one that loses no energy."""
+    count = 6 if restitution < 1.0 else 1
+    start = [(0.0035 + 0.0066 * k, 0.003) for k in range(count)]
+    spheres = Spheres(start=start, restitution=restitution, wall_restitution=restitution)
+    batch = Batch(spheres, SceneTable(count, 1, 2e-5, *LANDINGS.T))
+    batch.start()
+    batch.run(4, 0)
+    assert batch.sample()["energy"].max() < count * 2e-3

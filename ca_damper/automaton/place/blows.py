@@ -1,4 +1,7 @@
-"""Blows of a step carried out: grains with grains, then all blows on the container together."""
+"""Blows of a step carried out: grains with grains, then all blows on the container together.
+
+Sums over grains are whole numbers, so that they do not depend on their order.
+"""
 
 from typing import Any
 
@@ -15,23 +18,31 @@ from ca_damper.automaton.place.disc_blows import (
     most_drag,
     speed_change,
 )
+from ca_damper.filling import Blows, Recoil
 from ca_damper.random_numbers import LINE as LINE_DRAW
 from ca_damper.random_numbers import bits, unit
 from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented
-class Blows:
-    """Carry out the encounters of a step; no two of them change the same grain."""
+class Collisions:
+    """Carry out the collisions of a step; no two of them change the same grain.
+
+    Of a step, (scenes,): count: of the grains that meet the container, ends: of them on floor and
+    ceiling, approaches: their velocities seen from it, joined: velocity that it gave to grains that
+    came to rest [quanta].
+    """
 
     def __init__(self, table: SceneFields, components: Any):
         self.table, self.cells, self.heap = table, components.cells, components.resting
         self.parameters, self.event_counts = components.parameters, components.event_counts
         self.contacts = Contacts(table, components)
+        self.count, self.ends = table.field(ti.i32), table.field(ti.i32)
+        self.approaches, self.joined = table.field(ti.i64), table.field(ti.i64)
 
     @ti.func
-    def resolve(self, s, step, shared, pull, pressed, carried):
-        """All blows; returns the velocity along x that the container gave to grains [quanta].
+    def find(self, s, step, shared, pull, pressed, carried):
+        """Carry out all but the blows on the container, and note those.
 
         carried: velocity [m/s] that a grain has where it joins or leaves the heap in this step.
         """
@@ -51,7 +62,8 @@ class Blows:
                 else:
                     self.event_counts.note(s, PAIRS)
                     self.meet(s, shared, cell, other, kind, carried)
-        return impulse + self.strike_container(s, kept)
+        self.joined[s] = impulse
+        self.note_blows(s, kept)
 
     @ti.func
     def meet(self, s, shared, cell, other, kind, carried):
@@ -77,34 +89,45 @@ class Blows:
         self.cells.accelerate(s, other, -change)
 
     @ti.func
-    def strike_container(self, s, count):
-        """All blows on the container; returns the velocity along x that it gave [quanta].
-
-        Sums are whole numbers, so that they do not depend on the order of the grains.
-        """
-        ends, sides, approaches = 0, 0, ti.cast(0, ti.i64)
+    def note_blows(self, s, count):
+        """Note the blows on the container, the first events of those found."""
+        ends, approaches = 0, ti.cast(0, ti.i64)
         for k in range(count):
             cell, _, kind = self.contacts.read(s, k)
             self.event_counts.note(s, WALLS)
             if kind == END:
                 ends += 1
                 approaches += quanta(self.approach(s, cell))
+        self.count[s], self.ends[s], self.approaches[s] = count, ends, approaches
+
+    @ti.func
+    def blows(self, s):
+        """Blows on the container."""
+        mass, sides = self.parameters.mass[None], self.count[s] - self.ends[s]
+        approaches = QUANTUM * ti.cast(self.approaches[s], ti.f64)
+        impulse = mass * (1.0 + self.parameters.wall[None]) * approaches
+        return Blows(impulse, mass * self.ends[s], mass * sides, mass * self.heap.count(s))
+
+    @ti.func
+    def recoil(self, s):
+        """Recoil of a container on its own."""
+        recoil = self.parameters.mass[None] * self.table.recoil[s]
+        recoil = recoil / (1.0 + recoil * self.heap.held[s])
+        total, share = QUANTUM * ti.cast(self.approaches[s], ti.f64), self.parameters.wall[None]
+        after = common_velocity(self.cells.container[s], total, self.ends[s], recoil, share)
+        return Recoil(after, (self.count[s] - self.ends[s]) * recoil)
+
+    @ti.func
+    def strike_container(self, s, recoil):
+        """Carry out the blows on the container; returns the impulse of the step on it [N s]."""
+        gained = self.joined[s]
+        for k in range(self.count[s]):
+            cell, _, kind = self.contacts.read(s, k)
+            if kind == END:
+                gained += self.rebound(s, cell, recoil.velocity)
             else:
-                sides += 1
-        impulse = ti.cast(0, ti.i64)
-        if count > 0:
-            mass = self.parameters.mass[None]
-            recoil = mass * self.table.recoil[s]
-            recoil = recoil / (1.0 + recoil * self.heap.held[s])
-            total, share = QUANTUM * ti.cast(approaches, ti.f64), self.parameters.wall[None]
-            after = common_velocity(self.cells.container[s], total, ends, recoil, share)
-            for k in range(count):
-                cell, _, kind = self.contacts.read(s, k)
-                if kind == END:
-                    impulse += self.rebound(s, cell, after)
-                else:
-                    impulse += self.brush(s, cell, after, sides, recoil)
-        return impulse
+                gained += self.brush(s, cell, recoil)
+        return -self.parameters.mass[None] * QUANTUM * ti.cast(gained, ti.f64)
 
     @ti.func
     def since(self, s, cell):
@@ -152,12 +175,13 @@ class Blows:
         self.cells.travelled[s, upper] = self.cells.travelled[s, upper] + push
 
     @ti.func
-    def brush(self, s, cell, after, sides, recoil):
+    def brush(self, s, cell, recoil):
         """Leave a side wall, which drags the grain towards the velocity of the container."""
-        velocity, slip = self.cells.across.velocity[s, cell], self.cells.speed[s, cell] - after
+        velocity = self.cells.across.velocity[s, cell]
+        slip = self.cells.speed[s, cell] - recoil.velocity
         push = (1.0 + self.parameters.wall[None]) * velocity
         most = ti.min(
-            self.parameters.wall_friction[None] * ti.abs(push), most_drag(slip, sides, recoil)
+            self.parameters.wall_friction[None] * ti.abs(push), most_drag(slip, recoil.share)
         )
         gain = -dragged(slip, most)
         self.cells.accelerate(s, cell, ti.Vector([-push, gain]))

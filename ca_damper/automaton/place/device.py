@@ -9,9 +9,8 @@ import taichi as ti
 from ca_damper.automaton.components import Parameters
 from ca_damper.automaton.conflict_resolution import ConflictResolution
 from ca_damper.automaton.event_counts import EventCounts
-from ca_damper.automaton.impulse_balance import QUANTUM
 from ca_damper.automaton.lattice_device import LatticeDevice
-from ca_damper.automaton.place.blows import Blows
+from ca_damper.automaton.place.blows import Collisions
 from ca_damper.automaton.place.changes import Changes
 from ca_damper.automaton.place.grains import Grains
 from ca_damper.automaton.place.heap import Heap
@@ -58,8 +57,8 @@ class PlaceAutomaton(LatticeDevice):
         components = assemble(options, table)
         placement = DrawnCells if options.start is None else NamedCells
         super().__init__(table, components, placement(table, components.cells, UP))
-        self.transport, self.blows = PlaceTransport(components), Blows(table, components)
-        self.changes = Changes(table, components)
+        self.transport, self.changes = PlaceTransport(components), Changes(table, components)
+        self.collisions = Collisions(table, components)
 
     @ti.func
     def reset(self, s):
@@ -69,7 +68,27 @@ class PlaceAutomaton(LatticeDevice):
 
     @ti.func
     def advance(self, s, step, motion):
-        """One step: the lattice follows, grains fly, meet, and change cells."""
+        """One step of a container on its own."""
+        self._meet(s, step, motion)
+        return self.carry_out(s, step, motion, self.collisions.recoil(s))
+
+    @ti.func
+    def find_blows(self, s, step, motion):
+        """First part of a step; returns the blows on the container."""
+        self._meet(s, step, motion)
+        return self.collisions.blows(s)
+
+    @ti.func
+    def carry_out(self, s, step, motion, recoil):
+        """Second part of a step: blows on the container, and changes of cells."""
+        impulse = self.collisions.strike_container(s, recoil)
+        shared = stream(self.table.seed[s], step)
+        self.changes.change_all(s, step, shared, self.table.dt[s])
+        return Action(impulse, self.parameters.mass[None] * self.resting.count(s))
+
+    @ti.func
+    def _meet(self, s, step, motion):
+        """The lattice follows, grains fly and meet."""
         dt = self.table.dt[s]
         pull = self.parameters.gravity[None] * dt
         shared = stream(self.table.seed[s], step)
@@ -81,10 +100,7 @@ class PlaceAutomaton(LatticeDevice):
         if not pressed:
             self.resting.release_all(s, motion.v)
         self.transport.fly_all(s, dt, pull, motion)
-        impulse = self.blows.resolve(s, step, shared, pull, pressed, motion.v - pull)
-        self.changes.change_all(s, step, shared, dt)
-        mass = self.parameters.mass[None]
-        return Action(-mass * QUANTUM * ti.cast(impulse, ti.f64), mass * self.resting.count(s))
+        self.collisions.find(s, step, shared, pull, pressed, motion.v - pull)
 
     @ti.func
     def energy(self, s):

@@ -76,10 +76,10 @@ def common_velocity(velocity, approaches, blows, recoil, restitution):
 
 
 @ti.func
-def most_drag(slip, blows, recoil):
+def most_drag(slip, share):
     """Largest friction [m/s] of one of n grains at the side walls: with more they would drag on.
 
     At this limit grains of one slip and the container have one velocity afterwards. slip: velocity
-    seen from the container [m/s]. recoil: m / M.
+    seen from the container [m/s]. share: n m / M, or that of a Recoil.
     """
-    return ti.abs(slip) / (1.0 + blows * recoil)
+    return ti.abs(slip) / (1.0 + share)
