@@ -19,7 +19,7 @@ from typing import Any, Optional
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.errors import InputError, Portable
 from taichi_dem.kit.files import renamed_when_done
 from taichi_dem.kit.sealed_file import read_sealed, write_sealed
 from taichi_dem.kit.validation import FileName, path_name, plain_fields, positive, shown, whole
@@ -134,7 +134,7 @@ STOP_SIGNALS = tuple(
 )
 
 
-class Interrupted(KeyboardInterrupt):
+class Interrupted(Portable, KeyboardInterrupt):
     """Ctrl-C or another stop signal, after the run has been saved.
 
     time_s: where the run stands. path: of the checkpoint. number: of the signal.
@@ -143,9 +143,6 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, time_s: float, path: FileName, number: int = signal.SIGINT):
         super().__init__(f"interrupted at t = {time_s:.6g} s, saved in {path}")
         self.time_s, self.path, self.number = time_s, os.fspath(path), number
-
-    def __reduce__(self):
-        return type(self), (self.time_s, self.path, self.number)
 
 
 class StopRequests:

@@ -12,6 +12,7 @@ from operator import attrgetter
 from typing import Any, Callable, NamedTuple
 
 from taichi_dem.kit import runtime
+from taichi_dem.kit.checkpoint import Interrupted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress_bar import hide_bars
 from taichi_dem.kit.provenance import commit, machine
@@ -89,6 +90,10 @@ def seed_of(seed: int, number: int) -> int:
     return int.from_bytes(hashlib.sha256(f"{seed} {number}".encode()).digest()[:4], "big") >> 1
 
 
+class Leave(BaseException):
+    """Raised where a process has been told to end: no end of its job."""
+
+
 def run_job(work: Work, row: Row) -> Record:
     """Run one job; an error of its function is part of the record."""
     started = time.perf_counter()
@@ -98,7 +103,7 @@ def run_job(work: Work, row: Row) -> Record:
     except (InputError, SimulationDiverged) as failure:
         error = _in_one_line(failure)
     except Exception as failure:
-        error, final = f"{type(failure).__name__}: {_in_one_line(failure)}", False
+        error, final = _named(failure), False
     return _record(values, error, final, time.perf_counter() - started)
 
 
@@ -113,7 +118,13 @@ def run_in_worker(work: Work, row: Row, arch: str) -> Record:
     runtime.start(arch, threads=1)
     runtime.check_thread("job of a sweep")
     hide_bars()
-    return run_job(work, row)
+    try:
+        return run_job(work, row)
+    except (Leave, Interrupted):
+        raise
+    except BaseException as failure:
+        # Such as SystemExit of a program's parser: it would end the process, and the row with it.
+        return failed(_named(failure))
 
 
 def failed(error: str) -> Record:
@@ -138,9 +149,17 @@ def _checked_values(values, row):
     return {name: plain_value(f"result {name}", value) for name, value in values.items()}
 
 
+def _named(failure):
+    words = _in_one_line(failure)
+    return f"{type(failure).__name__}: {words}" if words else type(failure).__name__
+
+
 def _in_one_line(failure):
     """Words of an exception, as a table and a file can hold them: names of files may be no text."""
-    words = " ".join(str(failure).replace("\0", r"\0").split())
+    try:
+        words = " ".join(str(failure).replace("\0", r"\0").split())
+    except Exception as broken:
+        words = f"its text cannot be read: {type(broken).__name__}"
     return words.encode(errors="backslashreplace").decode()
 
 
