@@ -7,6 +7,7 @@ import sys
 from argparse import Action, ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from inspect import getfile, unwrap
+from pathlib import Path
 from typing import Any
 
 from taichi_dem.kit import runtime
@@ -50,7 +51,8 @@ def run_sweep(
         journal = Journal(options.out, f"experiments/{name}")
         folders = [os.path.join(options.out, f"row_{k}") for k in range(len(table))]
         cells = zip([script] * len(table), map(json.dumps, lines), folders)
-        jobs = jobs_of(run_row, [dict(zip(_OF_JOBS, row)) for row in cells], 0)
+        rows: list[Row] = [dict(zip(_OF_JOBS, row)) for row in cells]
+        jobs = jobs_of(run_row, rows, 0, _files(script, lines))
         for job in jobs:
             if not os.path.exists(_summary_of(job)):
                 journal.forget(job)
@@ -85,6 +87,12 @@ def run_row(row: Row) -> dict[str, Any]:
         for name, one in figures.items()
         if one["value"] is not None
     }
+
+
+def _files(script, lines):
+    """Files on which rows depend: scripts in the folder of the job's, and those in arguments."""
+    scripts = map(str, Path(script).parent.glob("*.py"))
+    return [*scripts, *(word for line in lines for text in line for word in text.split("="))]
 
 
 def _summary_of(job: Job) -> str:

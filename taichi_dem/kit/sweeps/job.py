@@ -2,12 +2,11 @@
 
 import hashlib
 import importlib
-import inspect
 import json
 import os
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from operator import attrgetter
 from typing import Any, Callable, NamedTuple
 
@@ -16,6 +15,7 @@ from taichi_dem.kit.checkpoint import Interrupted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress_bar import hide_bars
 from taichi_dem.kit.provenance import commit, machine
+from taichi_dem.kit.sweeps.dependencies import Dependencies, named_file
 from taichi_dem.kit.sweeps.rows import ADDED, SEED, Row, Value, plain_value
 from taichi_dem.kit.validation import shown
 from taichi_dem.kit.version import __version__
@@ -41,10 +41,11 @@ class Record(NamedTuple):
 
 
 class Job(NamedTuple):
-    """row: with its seed. digest: of all that its result depends on."""
+    """row: with its seed. digest: of the function and the row. files: named there, by digest."""
 
     row: Row
     digest: str
+    files: dict[str, str]
 
 
 def checked_work(work: Any) -> str:
@@ -78,11 +79,25 @@ def identity_of(work: Any) -> str:
     return f"{module}:{path}"
 
 
-def jobs_of(work: Any, rows: Sequence[Row], seed: int) -> list[Job]:
-    """A job for each row; a row without a column seed gets one from the sweep's and its number."""
-    depends = [identity_of(work), _source_digest(work), __version__]
-    seeded = [{**row, SEED: row.get(SEED, seed_of(seed, k))} for k, row in enumerate(rows)]
-    return [Job(row, _digest([*depends, row])) for row in seeded]
+def jobs_of(work: Any, rows: Sequence[Row], seed: int, files: Iterable[str] = ()) -> list[Job]:
+    """A job for each row; a row without a column seed gets one from the sweep's and its number.
+
+    files: on which all jobs depend, beside those that the function and a row name.
+    """
+    seen = Dependencies(work)
+    depends = [identity_of(work), seen.digest, __version__]
+    known = dict(seen.files)
+    for path in files:
+        known.update(named_file(path, known))
+    common, jobs = dict(known), []
+    for number, given in enumerate(rows):
+        row = {**given, SEED: given.get(SEED, seed_of(seed, number))}
+        own: dict[str, str] = {}
+        for value in row.values():
+            own.update(named_file(value, known) if isinstance(value, str) else {})
+        known.update(own)
+        jobs.append(Job(row, _digest([*depends, row]), {**common, **own}))
+    return jobs
 
 
 def seed_of(seed: int, number: int) -> int:
@@ -165,14 +180,6 @@ def _in_one_line(failure):
 
 def _main_file():
     return getattr(sys.modules["__main__"], "__file__", None) or ""
-
-
-def _source_digest(work):
-    """Digest of the text of a function; "" where it has none."""
-    try:
-        return hashlib.sha256(inspect.getsource(work).encode()).hexdigest()
-    except (OSError, TypeError):
-        return ""
 
 
 def _digest(content):
