@@ -16,7 +16,7 @@ import sys
 import sysconfig
 import types
 from collections.abc import Iterable, Iterator
-from typing import Any, Callable
+from typing import Any
 
 import numpy as np
 
@@ -48,13 +48,13 @@ _LONGEST_PATH, _MOST = 4096, 100_000
 
 
 class Dependencies:
-    """What the results of a function depend on.
+    """What the results of a function, or a value, depend on.
 
     digest: of code and values. files: those named in them, digest of the content by path. unseen:
     sentences on what is not covered.
     """
 
-    def __init__(self, work: Callable):
+    def __init__(self, work: Any):
         self.files: dict[str, str] = {}
         self._unseen: dict[str, None] = {}
         self._known: dict[int, str] = {}
