@@ -7,7 +7,6 @@ Nothing here depends on the physics.
 import hashlib
 import json
 import math
-import numbers
 import os
 import signal
 import threading
@@ -22,7 +21,16 @@ from numpy.typing import ArrayLike
 from taichi_dem.kit.errors import InputError, Portable
 from taichi_dem.kit.files import renamed_when_done
 from taichi_dem.kit.sealed_file import read_sealed, write_sealed
-from taichi_dem.kit.validation import FileName, path_name, plain_fields, positive, shown, whole
+from taichi_dem.kit.validation import (
+    FileName,
+    is_real,
+    is_whole,
+    path_name,
+    plain_fields,
+    positive,
+    shown,
+    whole,
+)
 from taichi_dem.kit.version import __version__, taichi_version
 
 #: Of the file; another one cannot be read.
@@ -194,9 +202,9 @@ def identity_of(value: Any) -> str:
     """
     if isinstance(value, (bool, np.bool_)):
         return repr(bool(value))
-    if isinstance(value, numbers.Integral) and abs(int(value)) > 2**53:
+    if is_whole(value) and abs(int(value)) > 2**53:
         return repr(int(value))
-    if isinstance(value, numbers.Real):
+    if is_real(value):
         return repr(float(value))
     if isinstance(value, np.ndarray):
         return f"array {digest(value)}"

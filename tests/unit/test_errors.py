@@ -14,6 +14,7 @@ from ca_damper.accuracy.steady_runs import BudgetSpent
 from taichi_dem.kit import timeout
 from taichi_dem.kit.allocation import CapacityError
 from taichi_dem.kit.checkpoint import Interrupted
+from taichi_dem.kit.children import Terminated
 from taichi_dem.kit.errors import InputError, Portable, SimulationDiverged
 from taichi_dem.kit.sweeps.job import Leave
 
@@ -38,6 +39,7 @@ MADE = (
     BudgetSpent(12.5),
     timeout._Ended(),
     Leave(),
+    Terminated(15),
     Portable("words"),
 )
 WAYS = {

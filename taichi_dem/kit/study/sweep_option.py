@@ -10,7 +10,7 @@ from inspect import getfile, unwrap
 from pathlib import Path
 from typing import Any
 
-from taichi_dem.kit import runtime
+from taichi_dem.kit import children, runtime
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, write_csv, write_text
 from taichi_dem.kit.sweeps.job import Job, jobs_of
@@ -67,18 +67,12 @@ def run_row(row: Row) -> dict[str, Any]:
     """
     script, arguments, out = (str(row[name]) for name in _OF_JOBS)
     line = [sys.executable, script, *json.loads(arguments), f"--out={out}"]
-    pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(line, stdin=subprocess.DEVNULL, **pipes) as process:
-        try:
-            said, errors = process.communicate()
-        except BaseException:
-            process.terminate()
-            raise
-    if process.returncode != 0:
+    done = children.run(line, stdin=subprocess.DEVNULL)
+    if done.returncode != 0:
         kinds = {2: InputError, 3: SimulationDiverged}
-        words = (errors.strip().splitlines() or [f"exit code {process.returncode}"])[-1]
-        raise kinds.get(process.returncode, RuntimeError)(words)
-    write_text(os.path.join(out, "output.txt"), said)
+        words = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+        raise kinds.get(done.returncode, RuntimeError)(words)
+    write_text(os.path.join(out, "output.txt"), done.stdout)
     with open(os.path.join(out, "summary.json"), encoding="utf-8") as file:
         figures = json.load(file)["figures"]
     # No figure has the name of a column of the job or of the provenance.

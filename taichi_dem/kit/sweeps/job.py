@@ -16,7 +16,7 @@ from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress_bar import hide_bars
 from taichi_dem.kit.provenance import commit, machine
 from taichi_dem.kit.sweeps.dependencies import Dependencies, named_file
-from taichi_dem.kit.sweeps.rows import ADDED, SEED, Row, Value, plain_value
+from taichi_dem.kit.sweeps.rows import ADDED, SEED, Row, Value, plain_text, plain_value
 from taichi_dem.kit.validation import shown
 from taichi_dem.kit.version import __version__
 
@@ -161,6 +161,7 @@ def _checked_values(values, row):
                 "a result must have a name that is no column of the table and none of "
                 f"{', '.join(ADDED)}, got {shown(name)}"
             )
+        plain_text("the name of a result", name)
     return {name: plain_value(f"result {name}", value) for name, value in values.items()}
 
 

@@ -1,8 +1,11 @@
 """Processes of this machine that run the jobs of a sweep; one that is lost loses nothing."""
 
 import multiprocessing
+import os
 import signal
 import sys
+import threading
+import time
 from collections import Counter, deque
 from collections.abc import Generator, Iterable
 from multiprocessing import connection
@@ -163,6 +166,7 @@ def _serve(link, name, arch):
     # handler, since programs that a job starts would inherit that it is ignored.
     signal.signal(signal.SIGINT, lambda *_: None)
     signal.signal(signal.SIGTERM, _leave)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
         work = imported_work(name)
         link.send(("ready", None))
@@ -185,3 +189,12 @@ def _serve(link, name, arch):
 
 def _leave(*_):
     raise Leave
+
+
+def _end_with_parent():
+    """End this process where that of the sweep has ended, however: nobody waits for its row."""
+    parent: Any = multiprocessing.parent_process()
+    connection.wait([parent.sentinel])
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(_ENDING)
+    os._exit(128 + signal.SIGTERM)
