@@ -5,7 +5,7 @@ import csv
 import os
 import platform
 import re
-import tempfile
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from typing import Optional
 
@@ -45,8 +45,12 @@ def output_folder(path: FileName) -> str:
         os.makedirs(path, exist_ok=True)
         if _claims is not None:
             _claim(path, _claims)
-        with tempfile.TemporaryFile(dir=path) as handle:
-            handle.write(b"x")
+        # Runs that begin at once must not take away each other's file.
+        own = f".write-test-{threading.get_ident()}.{_HOST}-{os.getpid()}.part"
+        probe = os.path.join(path, own)
+        with open(probe, "w") as handle:
+            handle.write("x")
+        os.remove(probe)
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"output folder {path} must be writable: {reason}") from None

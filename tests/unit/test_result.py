@@ -436,10 +436,9 @@ def test_a_series_name_that_is_no_file_of_its_folder_is_refused(beam, tmp_path, 
 
 
 def test_numpy_text_names_a_folder_as_any_text(beam, tmp_path):
+    names = []
     for kind in (str, np.str_):
-        beam.write(kind(tmp_path / kind.__name__))
-    one, other = (
-        sorted(str(path.relative_to(tmp_path / name)) for path in (tmp_path / name).rglob("*"))
-        for name in ("str", "str_")
-    )
-    assert [name.replace("str_", "str") for name in other] == one and len(one) > 5
+        folder = tmp_path / f"of {kind.__name__}" / "run"
+        beam.write(kind(folder))
+        names.append(sorted(str(path.relative_to(folder)) for path in folder.rglob("*")))
+    assert names[0] == names[1] and len(names[0]) > 5
