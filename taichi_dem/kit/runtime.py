@@ -140,18 +140,22 @@ def stop() -> None:
 
 
 def clear() -> None:
-    """Free the memory of all engines; simulations and batches made so far become invalid.
+    """Free all engines with fields and kernels; simulations and batches so far become invalid.
 
-    Kernels compile anew afterwards; Taichi itself goes on. Does nothing before the first start.
+    Taichi is started anew with the same settings, as it keeps each kernel until then: fields of
+    your own become invalid too. Does nothing before the first start.
     """
     global _session
-    if _session is None:
+    if _session is None or _current is None:
         return
     check_session(_session, "session")
     for forget in _on_clear:
         forget()
     _session.cleared = True
-    _session = Session()
+    with _turn:
+        ti.reset()
+        _initialise(_current)
+        _session = Session()
 
 
 def when_cleared(forget: Callable[[], object]) -> None:
