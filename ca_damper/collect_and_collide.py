@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import shown
+from taichi_dem.kit.validation import float_array, shown
 
 _HALVINGS = 60
 
@@ -118,7 +118,7 @@ def _phase(ratio):
 
 def _positive(name, value):
     try:
-        numbers = np.asarray(value, dtype=np.float64)
+        numbers = float_array(value)
     except (TypeError, ValueError):
         numbers = np.array(np.nan)
     if not (np.isfinite(numbers) & (numbers > 0.0)).all():

@@ -13,8 +13,34 @@ import numpy as np
 import taichi as ti
 from numpy.typing import ArrayLike
 
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import FloatOrArray
 from taichi_dem.kit.validation import plain_fields, positive
+
+#: Rounding of the square of a natural frequency, of some ten operations.
+ROUNDED = 16.0 * np.finfo(float).eps
+
+
+def check_steady(what: str, unheld: Any, frequency: np.ndarray) -> None:
+    """Raise InputError where nothing bounds the motion at one of the frequencies [Hz]."""
+    if np.any(unheld):
+        at = np.broadcast_to(frequency, np.shape(unheld))[unheld].flat[0]
+        raise InputError(
+            f"{what} without damping has no steady state at its natural frequency, got "
+            f"{at:.6g} Hz: give it damping, or take another frequency"
+        )
+
+
+def check_modes(matrix: np.ndarray, own: np.ndarray, omega: np.ndarray) -> None:
+    """The same where a matrix of the modes (..., modes, modes) holds against no motion.
+
+    own, omega (..., 1): natural frequencies and those asked for [rad/s].
+    """
+    # Each mode by its own scale, so that only one without damping leaves a small value.
+    scale = 1.0 / np.hypot(own, omega)
+    least = np.linalg.svd(matrix * scale[..., None] * scale[..., None, :], compute_uv=False)
+    unheld = least.min(axis=-1) <= ROUNDED * len(own)
+    check_steady("a structure", unheld, omega[..., 0] / (2.0 * np.pi))
 
 
 @dataclass(frozen=True)
@@ -103,10 +129,22 @@ class Oscillator:
         -------
         complex or ndarray
             Ratio of the displacements [-].
+
+        Raises
+        ------
+        InputError
+            At the natural frequency without damping, where there is no steady state.
         """
+        held, left, unheld = self._forces(frequency, added_mass)
+        check_steady("an oscillator", unheld, np.asarray(frequency, dtype=np.float64))
+        return held / left
+
+    def _forces(self, frequency: ArrayLike, added_mass: FloatOrArray) -> tuple[Any, Any, Any]:
+        """Forces per displacement that hold and that are left over, and where none is left."""
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)
         held = self.stiffness + 1j * omega * self.damping
-        return held / (held - (self.mass + added_mass) * omega**2)
+        left = held - (self.mass + added_mass) * omega**2
+        return held, left, (self.damping == 0.0) & (np.abs(left) <= ROUNDED * np.abs(held))
 
     def scaled(self, mass: float, base_amplitude: float) -> "Oscillator":
         """Return an oscillator of the same frequency and damping ratio.
@@ -138,7 +176,7 @@ class Oscillator:
         -------
         tuple of (float, float)
             Ratio of the frequency to the natural one of the empty container [-], and RMS
-            displacement [m].
+            displacement [m], infinite without damping.
 
         Notes
         -----
@@ -149,8 +187,7 @@ class Oscillator:
         # The same without a difference of equals, and without a division by zero damping.
         own = math.sqrt(2.0 / (math.sqrt(1.0 + 8.0 * square) + 1.0))
         ratio = own * math.sqrt(self.mass / mass)
-        high = abs(self.transfer(ratio * self.natural_frequency, added_mass))
-        return ratio, float(self.base_amplitude * high / math.sqrt(2.0))
+        return ratio, float(self.rms(ratio * self.natural_frequency, added_mass))
 
     def rms(self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0) -> Any:
         """RMS displacement of the steady state.
@@ -165,9 +202,13 @@ class Oscillator:
         Returns
         -------
         float or ndarray
-            RMS displacement [m].
+            RMS displacement [m], infinite at the natural frequency without damping.
         """
-        return self.base_amplitude * abs(self.transfer(frequency, added_mass)) / np.sqrt(2.0)
+        held, left, unheld = self._forces(frequency, added_mass)
+        if np.any(unheld):
+            gain = np.where(unheld, np.inf, np.abs(held) / np.where(unheld, 1.0, np.abs(left)))
+            return np.multiply(self.base_amplitude, gain) / np.sqrt(2.0)
+        return self.base_amplitude * abs(held / left) / np.sqrt(2.0)
 
     def right_hand_side(self, frequency: float) -> Callable[[float, Any], np.ndarray]:
         """d(x, v)/dt of the empty container, for ``rk45.solve``.
@@ -210,6 +251,11 @@ class Oscillator:
         -------
         tuple of (float or ndarray, float or ndarray)
             Displacement [m] and velocity [m/s].
+
+        Raises
+        ------
+        InputError
+            As of ``transfer``.
         """
         x = self.base_amplitude * self.transfer(frequency, added_mass)
         sag = gravity * np.asarray(added_mass) / self.stiffness

@@ -21,6 +21,7 @@ from typing import Any, Optional
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ca_damper.oscillator import check_modes
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import LARGEST, SMALLEST, positive, shown, whole
@@ -209,6 +210,11 @@ class ModalStructure:
         -------
         ndarray
             Ratio of the displacements [-], shape (..., places).
+
+        Raises
+        ------
+        InputError
+            At the natural frequency of a mode without damping.
         """
         omega, added = self._asked(frequency, added_masses)
         held = (2.0 * np.pi * self.frequencies) ** 2 + 1j * omega * self._damping
@@ -232,7 +238,7 @@ class ModalStructure:
         Returns
         -------
         ndarray
-            Displacement over force [m/N], shape (..., places).
+            Displacement over force [m/N], shape (..., places); refused as by ``transfer``.
         """
         omega, added = self._asked(frequency, added_masses)
         row = self.shapes[whole("place", place, 0, self.place_count - 1)]
@@ -261,6 +267,8 @@ class ModalStructure:
         own = (2.0 * np.pi * self.frequencies) ** 2 - omega**2 + 1j * omega * self._damping
         more = (self.shapes.T * added) @ self.shapes
         matrix = own[..., None] * np.eye(self.mode_count) - omega[..., None] ** 2 * more
+        if not self.damping_ratios.all():
+            check_modes(matrix, 2.0 * np.pi * self.frequencies, omega)
         return np.linalg.solve(matrix, pull[..., None])[..., 0] @ self.shapes.T
 
 

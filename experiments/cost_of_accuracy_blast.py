@@ -120,9 +120,7 @@ def reference_of(scene, options, folder):
     """(Outcome of the reference, whether it was kept from before)."""
     # Swept until nothing changes by a thousandth, not a twentieth, of the largest speed.
     method = ImplicitDashpots(options.reference, sweeps=(6, 50), tolerance=1e-3)
-    mesh = scene.mesh
-    settings = (method, options.until, mesh.points.tobytes(), mesh.tetrahedra.tobytes())
-    place = folder / "references", "implicit", settings, ("taichi_dem",)
+    place = folder / "references", "implicit", (scene, method, options.until), ("taichi_dem",)
     with ProgressBar("reference") as bar:
         job = {"driver": options.driver, "progress": bar}
         made = partial(outcome.outcome_of, scene, method, options.until, **job)

@@ -98,7 +98,7 @@ def sweep_of(name, options, bar):
     cycles = dict(zip(("transient_cycles", "measured_cycles"), options.cycles))
     job = {"ratios": options.ratios, "start": "rigid", "progress": bar, **cycles}
     made = StepStudy(name, filling, PARTICLES, options.seeds, **job)
-    settings = filling, OSCILLATOR, options.ratios, options.cycles, finest, count
+    settings = filling, PARTICLES, OSCILLATOR, options.ratios, options.cycles, finest, count
     place = os.path.join(options.out, "references"), name, settings, ("ca_damper",)
     made.reference, kept = study.cached(*place, lambda: made.make_reference(finest, count))
     made.compile_s += 0.0 if kept else made.reference["compile_s"]

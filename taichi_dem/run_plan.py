@@ -1,6 +1,5 @@
 """When a run is sampled, photographed, observed and reported; all of these are observers of it."""
 
-import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Optional, Union
@@ -8,7 +7,7 @@ from typing import Any, Optional, Union
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import LEAST_SHARE, Listener, Progress
-from taichi_dem.kit.validation import progress_option, shown
+from taichi_dem.kit.validation import is_whole, progress_option, shown
 from taichi_dem.observers import Every, Observer, ObserverCalls, checked_observers
 from taichi_dem.output.record import Recorder
 from taichi_dem.scene import Scene
@@ -155,8 +154,7 @@ class _Reporter:
 
 
 def _check_count(name, value, least):
-    wanted = isinstance(value, numbers.Integral) and not isinstance(value, bool)
-    if not wanted or not least <= value <= _MOST_RECORDS:
+    if not is_whole(value) or not least <= value <= _MOST_RECORDS:
         raise InputError(
             f"{name} must be a whole number of at least {least} and at most {_MOST_RECORDS}, "
             f"got {shown(value)}"

@@ -17,7 +17,7 @@ import numpy as np
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import finite, positive, shown
+from taichi_dem.kit.validation import finite, float_array, positive, shown
 
 #: Nodes of a signal: fewer determine no spline with "not a knot", more find no memory.
 LEAST_NODES, MOST_NODES = 4, 2**24
@@ -170,7 +170,7 @@ def _inner(right):
 def _nodes(name, values):
     """A copy of finite numbers (nodes,) that refuses to be written."""
     try:
-        nodes = np.array(values, dtype=np.float64)
+        nodes = float_array(values)
     except (TypeError, ValueError):
         nodes = np.empty(0)
     if nodes.ndim != 1 or not LEAST_NODES <= len(nodes) <= MOST_NODES:

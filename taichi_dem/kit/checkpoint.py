@@ -7,7 +7,6 @@ Nothing here depends on the physics.
 import hashlib
 import json
 import math
-import numbers
 import os
 import signal
 import threading
@@ -19,10 +18,19 @@ from typing import Any, Optional
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.errors import InputError, Portable
 from taichi_dem.kit.files import renamed_when_done
 from taichi_dem.kit.sealed_file import read_sealed, write_sealed
-from taichi_dem.kit.validation import FileName, path_name, plain_fields, positive, shown, whole
+from taichi_dem.kit.validation import (
+    FileName,
+    is_real,
+    is_whole,
+    path_name,
+    plain_fields,
+    positive,
+    shown,
+    whole,
+)
 from taichi_dem.kit.version import __version__, taichi_version
 
 #: Of the file; another one cannot be read.
@@ -134,7 +142,7 @@ STOP_SIGNALS = tuple(
 )
 
 
-class Interrupted(KeyboardInterrupt):
+class Interrupted(Portable, KeyboardInterrupt):
     """Ctrl-C or another stop signal, after the run has been saved.
 
     time_s: where the run stands. path: of the checkpoint. number: of the signal.
@@ -143,9 +151,6 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, time_s: float, path: FileName, number: int = signal.SIGINT):
         super().__init__(f"interrupted at t = {time_s:.6g} s, saved in {path}")
         self.time_s, self.path, self.number = time_s, os.fspath(path), number
-
-    def __reduce__(self):
-        return type(self), (self.time_s, self.path, self.number)
 
 
 class StopRequests:
@@ -197,9 +202,9 @@ def identity_of(value: Any) -> str:
     """
     if isinstance(value, (bool, np.bool_)):
         return repr(bool(value))
-    if isinstance(value, numbers.Integral) and abs(int(value)) > 2**53:
+    if is_whole(value) and abs(int(value)) > 2**53:
         return repr(int(value))
-    if isinstance(value, numbers.Real):
+    if is_real(value):
         return repr(float(value))
     if isinstance(value, np.ndarray):
         return f"array {digest(value)}"

@@ -1,15 +1,23 @@
 """Exceptions that a user of the package may meet."""
 
+import copyreg
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
 
-class InputError(ValueError):
+class Portable(BaseException):
+    """Base of exceptions that other processes raise again, whatever their ``__init__`` asks for."""
+
+    def __reduce__(self):
+        return copyreg.__newobj__, (type(self), *self.args), vars(self)  # type: ignore[attr-defined]
+
+
+class InputError(Portable, ValueError):
     """Invalid input; the sentence names the argument, its value and the allowed range."""
 
 
-class SimulationDiverged(RuntimeError):
+class SimulationDiverged(Portable, RuntimeError):
     """The run left the range in which its numbers mean anything.
 
     Attributes

@@ -5,6 +5,7 @@ import csv
 import os
 import platform
 import re
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from typing import Optional
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import FileName, path_name, shown
+from taichi_dem.kit.validation import FileName, folder_name, path_name
 
 try:
     import fcntl
@@ -39,16 +40,14 @@ def output_folder(path: FileName) -> str:
     belongs to this process.
     Raises InputError when it cannot be made or written to, or belongs to another.
     """
-    name = os.fspath(path) if isinstance(path, (str, os.PathLike)) else ""
-    if not isinstance(name, str) or not name or "\0" in name:
-        raise InputError(f"output folder must be the name of a folder, got {shown(path)}")
-    path = os.path.expanduser(name)
+    path = folder_name("output folder", path)
     try:
         os.makedirs(path, exist_ok=True)
-        # First: runs that begin at once would take away each other's test file.
         if _claims is not None:
             _claim(path, _claims)
-        probe = os.path.join(path, ".write-test")
+        # Runs that begin at once must not take away each other's file.
+        own = f".write-test-{threading.get_ident()}.{_HOST}-{os.getpid()}.part"
+        probe = os.path.join(path, own)
         with open(probe, "w") as handle:
             handle.write("x")
         os.remove(probe)
@@ -136,6 +135,9 @@ def renamed_when_done(path: FileName) -> Iterator[str]:
         os.replace(temporary, path)
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror or error}") from None
+    except UnicodeEncodeError as error:
+        text = error.object[error.start : error.end]
+        raise InputError(f"cannot write {path}: it would hold {text!a}, no text of UTF-8") from None
     finally:
         if os.path.exists(temporary):
             os.remove(temporary)

@@ -53,6 +53,8 @@ class Settings:
 _current: Optional[Settings] = None
 _session: Optional["Session"] = None
 _on_clear: list[Callable[[], object]] = []
+#: Threads that start or stop Taichi at once do so one after the other.
+_turn = threading.RLock()
 
 
 class Session(Uncopied):
@@ -107,15 +109,16 @@ def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False)
     global _current, _session
     wanted = _checked(arch, threads, debug)
     _check_process()
-    if _current and _session and impl.get_runtime().prog is _session.program:
-        if wanted != _current:
-            raise InputError(
-                f"Taichi already runs with {_current}, asked for {wanted}: call stop()"
-            )
+    with _turn:
+        if _current and _session and impl.get_runtime().prog is _session.program:
+            if wanted != _current:
+                raise InputError(
+                    f"Taichi already runs with {_current}, asked for {wanted}: call stop()"
+                )
+            return _current
+        _initialise(wanted)
+        _current, _session = wanted, Session()
         return _current
-    _initialise(wanted)
-    _current, _session = wanted, Session()
-    return _current
 
 
 def stop() -> None:
@@ -128,26 +131,31 @@ def stop() -> None:
     """
     global _current, _session
     _check_process()
-    others = {thread.ident for thread in threading.enumerate()} - {threading.get_ident()}
-    if _session is not None and _session.thread in others:
-        check_thread("session")
-    ti.reset()
-    _current = _session = None
+    with _turn:
+        others = {thread.ident for thread in threading.enumerate()} - {threading.get_ident()}
+        if _session is not None and _session.thread in others:
+            check_thread("session")
+        ti.reset()
+        _current = _session = None
 
 
 def clear() -> None:
-    """Free the memory of all engines; simulations and batches made so far become invalid.
+    """Free all engines with fields and kernels; simulations and batches so far become invalid.
 
-    Kernels compile anew afterwards; Taichi itself goes on. Does nothing before the first start.
+    Taichi is started anew with the same settings, as it keeps each kernel until then: fields of
+    your own become invalid too. Does nothing before the first start.
     """
     global _session
-    if _session is None:
+    if _session is None or _current is None:
         return
     check_session(_session, "session")
     for forget in _on_clear:
         forget()
     _session.cleared = True
-    _session = Session()
+    with _turn:
+        ti.reset()
+        _initialise(_current)
+        _session = Session()
 
 
 def when_cleared(forget: Callable[[], object]) -> None:

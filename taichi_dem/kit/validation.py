@@ -25,6 +25,8 @@ SMALLEST, LARGEST = 1e-60, 1e60
 AUTO = "auto"
 #: Letters of a value that a sentence quotes.
 _QUOTED = 80
+#: Bytes of the name of a file beside its number and ending: file systems take 255.
+_STEM = 200
 
 
 def shown(value: Any) -> str:
@@ -46,7 +48,7 @@ def plain(value: Any) -> Any:
         return tuple(map(plain, value))
     if isinstance(value, (bool, int, float)) and type(value) in (bool, int, float):
         return value
-    if isinstance(value, numbers.Integral):
+    if is_whole(value):
         return int(value)
     return float(value) if finite(value) else value
 
@@ -57,9 +59,28 @@ def plain_fields(owner: Any) -> None:
         object.__setattr__(owner, field.name, plain(getattr(owner, field.name)))
 
 
+def is_real(value: Any) -> bool:
+    """Whether a value is a real number: no truth value, and no duration, which has a unit."""
+    # NumPy says of a duration that it is a whole number.
+    return isinstance(value, numbers.Real) and not isinstance(value, (bool, np.timedelta64))
+
+
+def is_whole(value: Any) -> bool:
+    """Whether a value is a whole number."""
+    return isinstance(value, numbers.Integral) and is_real(value)
+
+
+def float_array(values: Any) -> np.ndarray:
+    """A copy of real numbers in 64 bits. Raises TypeError or ValueError for anything else."""
+    given = np.asarray(values)
+    if given.dtype.kind not in "biufO":
+        raise TypeError(f"no real numbers: {given.dtype}")
+    return np.array(given, dtype=np.float64)
+
+
 def finite(value: Any) -> bool:
-    """Whether a value is a real number, no truth value, and finite as a float."""
-    if not isinstance(value, numbers.Real) or isinstance(value, bool):
+    """Whether a value is a real number and finite as a float."""
+    if not is_real(value):
         return False
     try:
         return math.isfinite(float(value))
@@ -99,8 +120,7 @@ def fraction(name: str, value: Any) -> float:
 
 def whole(name: str, value: Any, least: int, most: int) -> int:
     """The value as an int; InputError unless it is a whole number from least to most."""
-    integral = isinstance(value, numbers.Integral) and not isinstance(value, bool)
-    if not integral or not least <= value <= most:
+    if not is_whole(value) or not least <= value <= most:
         raise InputError(
             f"{name} must be a whole number from {least} to {most}, got {shown(value)}"
         )
@@ -161,10 +181,33 @@ def path_name(name: str, value: Any) -> str:
 
     InputError unless it can be the name of a file or folder.
     """
+    return _path(name, value, "file")
+
+
+def folder_name(name: str, value: Any) -> str:
+    """The same of a folder."""
+    return _path(name, value, "folder")
+
+
+def _path(name, value, kind):
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else ""
     if not isinstance(text, str) or not text or "\0" in text:
-        raise InputError(f"{name} must be the name of a file, got {shown(value)}")
-    return os.path.expanduser(text)
+        raise InputError(f"{name} must be the name of a {kind}, got {shown(value)}")
+    # Python's own text: os.path cannot join np.str_, which is text and bytes at once.
+    return os.path.expanduser(str.__str__(text))
+
+
+def file_stem(name: str, value: Any) -> str:
+    """The value; InputError unless it is a name for files of one folder, without their ending."""
+    text = str.__str__(value) if isinstance(value, str) else ""
+    if not text.isprintable() or not text.strip(". ") or len(text.encode()) > _STEM:
+        text = ""
+    if not text or any(one in text for one in "/\\:") or text.startswith("."):
+        raise InputError(
+            f"{name} must be a name for files of one folder, without /, \\, : and a leading dot, "
+            f"of at most {_STEM} bytes, got {shown(value)}"
+        )
+    return text
 
 
 def several(name: str, values: Any, check: Callable[[str, Any], Checked]) -> tuple[Checked, ...]:

@@ -163,3 +163,14 @@ def test_arrays_of_a_structure_are_its_own():
     assert made.masses[0, 0] == 2.0
     with pytest.raises(ValueError, match="read-only"):
         made.shapes[0, 0] = 1.0
+
+
+@pytest.mark.parametrize("mode", range(3))
+def test_a_mode_without_damping_has_no_steady_state_at_its_frequency(mode):
+    shares = np.where(np.arange(3) == mode, 0.0, 0.02)
+    made = ModalStructure.from_matrices(MASSES, STIFFNESS, shares)
+    own = made.frequencies
+    for ask in (made.transfer, lambda frequency: made.force_transfer(frequency, 0)):
+        assert np.isfinite(ask(np.delete(own, mode))).all()
+        with pytest.raises(InputError, match=f"no steady state .*, got {own[mode]:.6g} Hz"):
+            ask(own)

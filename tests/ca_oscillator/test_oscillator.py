@@ -82,3 +82,21 @@ def test_bad_numbers_are_named(name, value):
 def test_mass_and_stiffness_must_not_vanish(name):
     with pytest.raises(InputError, match=f"{name} must be a positive finite number, got 0"):
         Oscillator(**{name: 0.0})
+
+
+def test_without_damping_nothing_bounds_the_motion_at_the_natural_frequency():
+    """K - M w^2 is zero but for rounding there: the amplitude is infinite, and no state is steady.
+
+    A share of damping of 1e-13 bounds it by 1 / (2 z).
+    """
+    rng = np.random.default_rng(1)
+    for mass, stiffness, added in 10.0 ** rng.uniform(-3.0, 3.0, (100, 3)):
+        o = Oscillator(mass, stiffness, 0.0)
+        own = o.natural_frequency
+        assert o.peak(added)[1] == o.rms(own) == np.inf
+        assert np.isinf(o.rms([0.5 * own, own])).tolist() == [False, True]
+        for ask in (o.transfer, o.steady_state):
+            with pytest.raises(InputError, match=r"^an oscillator without damping has no steady"):
+                ask(np.array([0.5 * own, own]))
+        hardly = Oscillator(mass, stiffness, 2e-13 * math.sqrt(stiffness * mass))
+        assert abs(hardly.transfer(own)) <= 0.5e13 * (1.0 + 1e-9)

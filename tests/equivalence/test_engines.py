@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import taichi as ti
+from taichi.lang import impl
 
 from taichi_dem import (
     CONCRETE,
@@ -251,8 +252,11 @@ def test_clear_gives_memory_back_and_refuses_what_was_made_before():
     simulation = Simulation(Scene(bar(1.0, 0.1, (400, 1, 1)), CONCRETE), Uniform())
     simulation.start()
     assert allocation.field_bytes() > before
+    assert impl.get_runtime().get_num_compiled_functions() > 0
     runtime.clear()
     assert ENGINES.count == 0
+    # Taichi frees no kernel while its program lives.
+    assert impl.get_runtime().get_num_compiled_functions() == 0
     for call in (lambda: simulation.advance_to(1), simulation.report, simulation.reset):
         with pytest.raises(InputError, match=r"simulation has been given back by runtime.clear"):
             call()

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 from pathlib import Path
 
 from ca_damper import RigidMass, frequency_response
@@ -53,6 +54,17 @@ def damper_rows(folder, killed=False):
     return parameter_grid(particles=[0, 2, 5, 9], ratio=[0.9, 0.97], killed=[str(mark)])
 
 
+class Mute(Exception):
+    """Other processes can neither make it, keep what it holds, nor read its text."""
+
+    def __init__(self, one, other):
+        super().__init__(one)
+        self.other = lambda: other
+
+    def __str__(self):
+        raise KeyError(self.args[0])
+
+
 def bad(row):
     """Fail in the way that the row says."""
     if row["how"] == "input":
@@ -61,6 +73,12 @@ def bad(row):
         raise SimulationDiverged("the run diverged at 1 s")
     if row["how"] == "bug":
         return {"x": row["not there"]}
+    if row["how"] == "mute":
+        raise Mute(1, 2)
+    if row["how"] == "exits":
+        sys.exit("no such option")
+    if row["how"] == "interrupts":
+        raise KeyboardInterrupt
     if row["how"] == "leaves":
         os._exit(79)
     if row["how"] == "no file":
@@ -68,6 +86,16 @@ def bad(row):
     if row["how"] == "killed":
         os.kill(os.getpid(), signal.SIGKILL)
     return {"x": 1.0} if row["how"] == "well" else row["how"]
+
+
+#: Ways of ``bad`` that raise what ends a process or cannot reach another one, and what is said.
+RAISED = ["mute", "exits", "interrupts", "well"]
+SAID = [
+    "Mute: its text cannot be read: KeyError",
+    "SystemExit: no such option",
+    "KeyboardInterrupt",
+    "",
+]
 
 
 def odd(row):

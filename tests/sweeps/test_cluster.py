@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import InputError, sweep
+from taichi_dem.kit.sweeps import cluster as workers
 from tests.sweeps import jobs
 from tests.sweeps.test_sweep import QUIET, assert_same_bits, serial
 
@@ -36,6 +37,25 @@ def test_a_job_runs_elsewhere_with_one_thread_and_its_failure_is_a_row(client):
     assert found["threads"].tolist() == [1, 1, 1, 1] and os.getpid() not in found["pid"]
     failures = sweep(jobs.bad, {"how": ["input", "well", "bug"]}, client=client, **QUIET)
     assert_same_bits(failures, serial(jobs.bad, {"how": ["input", "well", "bug"]}))
+
+
+def test_what_a_row_raises_or_kills_is_an_error_of_that_row_alone(client):
+    found = sweep(jobs.bad, {"how": [*jobs.RAISED, "killed"]}, client=client, **QUIET)
+    assert found["error"].tolist() == [*jobs.SAID, "its worker was lost 4 times"]
+
+
+def test_a_client_whose_workers_are_all_lost_is_a_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr(workers, "_NO_WORKER", 2.0)
+    options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": ":0"}
+    with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
+
+        def lose(progress):
+            if progress.done == 3:
+                cluster.scale(0)
+
+        with pytest.raises(InputError, match=r"^the client must have a worker, got none for 2 s"):
+            sweep(jobs.squared, {"x": range(2000)}, client=client, out=tmp_path, progress=lose)
+    assert len(list((tmp_path / "jobs").iterdir())) >= 3
 
 
 def test_a_client_that_is_gone_is_a_sentence_and_keeps_what_is_finished(tmp_path):

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import InputError, parameter_grid
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.sweeps.job import run_job
 from taichi_dem.kit.sweeps.rows import checked_rows
 
 ROWS = [{"x": 1, "y": 0.5, "w": "a"}, {"x": 2, "y": 1e-300, "w": "b c"}]
@@ -118,3 +120,20 @@ def test_frames_that_would_lose_a_column_or_are_none_are_refused():
 def test_text_with_an_underscore_is_no_number(tmp_path):
     (tmp_path / "t.csv").write_text("x,y\n1_000,2024_01\n")
     assert checked_rows(tmp_path / "t.csv") == [{"x": "1_000", "y": "2024_01"}]
+
+
+@pytest.mark.parametrize("name", ["x\udcff", "x\0"])
+def test_a_name_that_no_file_holds_is_refused_before_it_is_kept(tmp_path, name):
+    with pytest.raises(InputError, match=r"^the name of a column must be text without NUL"):
+        checked_rows({name: [1]})
+    record = run_job(lambda row: {name: 1.0}, {"x": 1})
+    assert record.error.startswith("the name of a result must be text without NUL that UTF-8")
+    with pytest.raises(InputError, match=r"^cannot write .*no text of UTF-8$"):
+        write_csv(tmp_path / "a.csv", {"x\udcff": [1.0]})
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("value", [np.timedelta64(5, "ns"), np.datetime64("2020-01-01", "ns")])
+def test_a_duration_or_date_is_no_number(value):
+    with pytest.raises(InputError, match="x of row 0 must be a number or text, got"):
+        checked_rows([{"x": value}])

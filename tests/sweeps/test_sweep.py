@@ -128,6 +128,11 @@ def test_failures_are_rows_and_only_what_may_end_otherwise_is_run_again(tmp_path
     assert len(list((tmp_path / "jobs").iterdir())) == 5
 
 
+def test_no_exception_of_a_row_ends_its_process_or_the_others():
+    found = sweep(jobs.bad, {"how": jobs.RAISED}, workers=1, **QUIET)
+    assert found["error"].tolist() == jobs.SAID
+
+
 def test_results_that_no_table_holds_are_sentences():
     found = serial(jobs.odd, {"how": ["list", "name", "key", "none"]})
     assert found["error"].tolist() == [

@@ -407,3 +407,38 @@ def test_broken_bonds_are_counted_in_whole_numbers():
         ticks = panels[1].get_yticks()
         plt.close("all")
         assert np.array_equal(ticks, np.round(ticks))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../x",
+        "a/b",
+        "/x",
+        "a\\b",
+        "c:x",
+        "",
+        ".",
+        "..",
+        ".x",
+        "a\nb",
+        "x\0",
+        "x\udcff",
+        201 * "x",
+        3,
+    ],
+)
+def test_a_series_name_that_is_no_file_of_its_folder_is_refused(beam, tmp_path, name):
+    folder = tmp_path / "inner"
+    with pytest.raises(InputError, match=r"^name must be a name for files of one folder, .*, got"):
+        write_paraview(folder, beam.model, beam.frames, name)
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def test_numpy_text_names_a_folder_as_any_text(beam, tmp_path):
+    names = []
+    for kind in (str, np.str_):
+        folder = tmp_path / f"of {kind.__name__}" / "run"
+        beam.write(kind(folder))
+        names.append(sorted(str(path.relative_to(folder)) for path in folder.rglob("*")))
+    assert names[0] == names[1] and len(names[0]) > 5

@@ -106,3 +106,28 @@ def test_kernels_reach_the_cache_though_a_class_that_has_them_is_still_referred_
     script = held + "kept = Optional[FixedStep]\n" + _SILENT_START
     answers(tmp_path, script, TI_OFFLINE_CACHE_FILE_PATH=str(tmp_path))
     assert list(tmp_path.glob("*.tic"))
+
+
+_THREADS = """
+import json, sys, threading
+from taichi_dem import runtime
+from taichi_dem.kit.runtime import ti
+
+begun, got, init, stdout = [], [], ti.init, sys.stdout
+ti.init = lambda *given, **more: (begun.append(1), init(*given, **more))
+together = threading.Barrier(4)
+
+def start():
+    together.wait()
+    got.append(runtime.start(threads=1))
+
+threads = [threading.Thread(target=start) for _ in range(4)]
+[one.start() for one in threads]
+[one.join() for one in threads]
+assert sys.stdout is stdout
+print(json.dumps([len(begun), len(got), len(set(map(id, got)))]))
+"""
+
+
+def test_threads_that_start_it_at_once_start_it_once(tmp_path):
+    assert answers(tmp_path, _THREADS) == [1, 4, 1]

@@ -9,6 +9,7 @@ from typing import Any, Callable
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, write_text
+from taichi_dem.kit.sweeps.dependencies import Dependencies
 
 
 def cached(
@@ -16,7 +17,7 @@ def cached(
 ) -> tuple[dict, bool]:
     """Result of ``compute()``, a JSON-like dict, from a file if it was computed before.
 
-    settings: everything else the result depends on, by its repr. packages: names of those whose
+    settings: everything else the result depends on, by its content. packages: names of those whose
     sources it depends on. The file's name holds a digest of both: a change of either computes
     anew. Returns (result, whether it came from the file).
     """
@@ -37,7 +38,7 @@ def cached(
 
 def digest(settings: Any, packages: Iterable[str]) -> str:
     """Twelve letters that change with the settings and with any source of the packages."""
-    made = hashlib.sha256(repr(settings).encode())
+    made = hashlib.sha256(Dependencies(settings).digest.encode())
     for package in packages:
         root = Path(str(importlib.util.find_spec(package).origin)).parent  # type: ignore[union-attr]
         for path in sorted(root.rglob("*.py")):

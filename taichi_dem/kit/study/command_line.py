@@ -5,6 +5,7 @@ import contextlib
 import functools
 import os
 import re
+import signal
 import sys
 import time
 import warnings
@@ -15,6 +16,7 @@ from typing import Any, Callable, NoReturn, Optional
 
 from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
+from taichi_dem.kit.children import Terminated, ending_children
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, older_files, output_folder
 from taichi_dem.kit.progress.lasting_output import lasting_output
@@ -292,18 +294,21 @@ def say(words: str) -> None:
 def exit_code(work: Callable[[], Optional[int]]) -> int:
     """Exit code of a program that does work(): 0 done, or what work returns.
 
-    2 bad input, 3 diverged, 130 interrupted by Ctrl-C, 128 + its number by another signal that left
-    a checkpoint: each with one line on stderr. The reader of the output may leave before its end
-    (``| head -1``): the files are still written.
+    2 bad input, 3 diverged, 130 interrupted by Ctrl-C, 128 + its number by another signal, which
+    also ends the processes of ``children.run``: each with one line on stderr. The reader of the
+    output may leave before its end (``| head -1``): the files are still written.
     """
     with lasting_output():
         try:
-            return work() or 0
+            with ending_children():
+                return work() or 0
         except (InputError, SimulationDiverged) as error:
             code, words = (2 if isinstance(error, InputError) else 3), str(error)
         except Interrupted as error:
             code, words = 128 + error.number, f"{error}: go on with --resume"
         except KeyboardInterrupt:
             code, words = 130, "interrupted"
+        except Terminated as error:
+            code, words = 128 + error.number, f"ended by {signal.Signals(error.number).name}"
         say(words)
         return code

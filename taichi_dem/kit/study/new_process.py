@@ -2,7 +2,6 @@
 
 import json
 import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
@@ -10,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Callable
 
-from taichi_dem.kit import runtime
+from taichi_dem.kit import children, runtime
 from taichi_dem.kit.errors import InputError
 
 _CHILD = """
@@ -55,8 +54,7 @@ def _answer(job: dict, title: str, environment: Mapping[str, str]) -> Any:
         with open(path, "w", encoding="utf-8") as handle:
             json.dump(job, handle)
         line = [sys.executable, "-c", _CHILD, path]
-        options: Any = {"capture_output": True, "text": True, "env": {**os.environ, **environment}}
-        done = subprocess.run(line, **options)
+        done = children.run(line, env={**os.environ, **environment})
     if done.returncode != 0:
         raise InputError(f"the run {title} ended with: {done.stderr.strip()[-300:]}")
     return json.loads(done.stdout.splitlines()[-1])

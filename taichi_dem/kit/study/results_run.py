@@ -2,13 +2,13 @@
 
 import json
 import os
-import subprocess
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Union
 
+from taichi_dem.kit import children
 from taichi_dem.kit.files import output_folder, write_text
 from taichi_dem.kit.study.results_page import CAPTION, RUN, Entry
 
@@ -46,7 +46,7 @@ def run_entry(scripts: Union[str, Path], entry: Entry, root: str, quick: bool = 
     line = [sys.executable, os.path.join(scripts, f"{entry.name}.py"), *entry.options.split()]
     line += ["--out", folder, *(["--quick"] if quick else [])]
     started = time.perf_counter()
-    done = subprocess.run(line, capture_output=True, text=True)
+    done = children.run(line)
     note = {"seconds": time.perf_counter() - started, "output": done.stdout}
     write_text(os.path.join(folder, RUN), json.dumps(note, indent=1))
     if done.returncode == 0:

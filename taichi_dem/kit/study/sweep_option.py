@@ -7,9 +7,10 @@ import sys
 from argparse import Action, ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from inspect import getfile, unwrap
+from pathlib import Path
 from typing import Any
 
-from taichi_dem.kit import runtime
+from taichi_dem.kit import children, runtime
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, write_csv, write_text
 from taichi_dem.kit.sweeps.job import Job, jobs_of
@@ -50,7 +51,8 @@ def run_sweep(
         journal = Journal(options.out, f"experiments/{name}")
         folders = [os.path.join(options.out, f"row_{k}") for k in range(len(table))]
         cells = zip([script] * len(table), map(json.dumps, lines), folders)
-        jobs = jobs_of(run_row, [dict(zip(_OF_JOBS, row)) for row in cells], 0)
+        rows: list[Row] = [dict(zip(_OF_JOBS, row)) for row in cells]
+        jobs = jobs_of(run_row, rows, 0, _files(script, lines))
         for job in jobs:
             if not os.path.exists(_summary_of(job)):
                 journal.forget(job)
@@ -65,18 +67,12 @@ def run_row(row: Row) -> dict[str, Any]:
     """
     script, arguments, out = (str(row[name]) for name in _OF_JOBS)
     line = [sys.executable, script, *json.loads(arguments), f"--out={out}"]
-    pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(line, stdin=subprocess.DEVNULL, **pipes) as process:
-        try:
-            said, errors = process.communicate()
-        except BaseException:
-            process.terminate()
-            raise
-    if process.returncode != 0:
+    done = children.run(line, stdin=subprocess.DEVNULL)
+    if done.returncode != 0:
         kinds = {2: InputError, 3: SimulationDiverged}
-        words = (errors.strip().splitlines() or [f"exit code {process.returncode}"])[-1]
-        raise kinds.get(process.returncode, RuntimeError)(words)
-    write_text(os.path.join(out, "output.txt"), said)
+        words = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+        raise kinds.get(done.returncode, RuntimeError)(words)
+    write_text(os.path.join(out, "output.txt"), done.stdout)
     with open(os.path.join(out, "summary.json"), encoding="utf-8") as file:
         figures = json.load(file)["figures"]
     # No figure has the name of a column of the job or of the provenance.
@@ -85,6 +81,12 @@ def run_row(row: Row) -> dict[str, Any]:
         for name, one in figures.items()
         if one["value"] is not None
     }
+
+
+def _files(script, lines):
+    """Files on which rows depend: scripts in the folder of the job's, and those in arguments."""
+    scripts = map(str, Path(script).parent.glob("*.py"))
+    return [*scripts, *(word for line in lines for text in line for word in text.split("="))]
 
 
 def _summary_of(job: Job) -> str:

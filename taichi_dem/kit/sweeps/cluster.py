@@ -1,6 +1,7 @@
 """Workers of a Dask cluster that run the jobs of a sweep."""
 
-from collections import deque
+import time
+from collections import Counter, deque
 from collections.abc import Generator, Iterable
 from typing import Any
 
@@ -8,6 +9,11 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.optional import optional
 from taichi_dem.kit.sweeps.job import Job, Record, Work, failed, run_in_worker
 from taichi_dem.kit.validation import shown
+
+#: Time without any worker after which none is expected any more, and between looks [s].
+_NO_WORKER, _LOOK, _PAUSE = 60.0, 1.0, 0.01
+#: Time in which a result comes, unless its worker was lost with it [s]; runs after such a loss.
+_ANSWER, TRIES = 30.0, 3
 
 
 def check_client(client: Any) -> None:
@@ -28,7 +34,7 @@ def run_on_cluster(
     So Dask, which counts how often a job was on a worker that died, blames no job that only waited.
     Raises InputError when the client is lost, or workers cannot run the function.
     """
-    waiting, ended = deque(jobs), _dask().as_completed()
+    waiting, ended, tries = deque(jobs), _dask().as_completed(), Counter[str]()
     active: dict[Any, Job] = {}
     try:
         while waiting or active:
@@ -37,11 +43,37 @@ def run_on_cluster(
                 future = _submitted(client, work, job, arch)
                 active[future] = job
                 ended.add(future)
+            _wait(ended, client, active)
             future = next(ended)
-            yield active.pop(future), _record_of(future)
+            job, record = active.pop(future), _record_of(future)
+            if record is None:
+                future.cancel()
+                tries[job.digest] += 1
+                if tries[job.digest] < TRIES:
+                    waiting.appendleft(job)
+                    continue
+                record = failed(f"its result was lost with its worker {TRIES} times")
+            yield job, record
     finally:
         if client.status == "running":
             client.cancel(list(active))
+
+
+def _wait(ended, client, active):
+    """Wait until a future has ended. Raises InputError where no worker is left to end one."""
+    there = looked = time.perf_counter()
+    while not ended.has_ready():
+        time.sleep(_PAUSE)
+        now = time.perf_counter()
+        if now - looked > _LOOK:
+            looked = now
+            there = now if _worker_count(client) else there
+        if now - there > _NO_WORKER:
+            raise InputError(
+                f"the client must have a worker, got none for {_NO_WORKER:.0f} s: the last ones "
+                f"were lost by one of the rows {shown([job.row for job in active.values()])}; "
+                "a Nanny, which dask worker starts by default, replaces workers"
+            )
 
 
 def _dask():
@@ -56,15 +88,17 @@ def _submitted(client, work, job, arch):
 
 
 def _record_of(future):
-    """Record of a future that has ended, one way or another."""
+    """Record of a future that has ended, one way or another; None where it was lost since."""
     if future.status in ("cancelled", "lost"):
         raise _client_lost(future.status)
     try:
-        error = future.exception()
+        error = future.exception(timeout=_ANSWER)
+        if error is None:
+            return future.result(timeout=_ANSWER)
+    except _dask().TimeoutError:
+        return None
     except (OSError, RuntimeError) as broken:
         raise _client_lost(broken) from None
-    if error is None:
-        return future.result()
     if isinstance(error, _dask().KilledWorker):
         # Dask allows a number of failures, 3 unless it is told otherwise.
         return failed(f"its worker was lost {error.allowed_failures + 1} times")

@@ -2,20 +2,21 @@
 
 import hashlib
 import importlib
-import inspect
 import json
 import os
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from operator import attrgetter
 from typing import Any, Callable, NamedTuple
 
 from taichi_dem.kit import runtime
+from taichi_dem.kit.checkpoint import Interrupted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress_bar import hide_bars
 from taichi_dem.kit.provenance import commit, machine
-from taichi_dem.kit.sweeps.rows import ADDED, SEED, Row, Value, plain_value
+from taichi_dem.kit.sweeps.dependencies import Dependencies, named_file
+from taichi_dem.kit.sweeps.rows import ADDED, SEED, Row, Value, plain_text, plain_value
 from taichi_dem.kit.validation import shown
 from taichi_dem.kit.version import __version__
 
@@ -40,10 +41,11 @@ class Record(NamedTuple):
 
 
 class Job(NamedTuple):
-    """row: with its seed. digest: of all that its result depends on."""
+    """row: with its seed. digest: of the function and the row. files: named there, by digest."""
 
     row: Row
     digest: str
+    files: dict[str, str]
 
 
 def checked_work(work: Any) -> str:
@@ -77,16 +79,34 @@ def identity_of(work: Any) -> str:
     return f"{module}:{path}"
 
 
-def jobs_of(work: Any, rows: Sequence[Row], seed: int) -> list[Job]:
-    """A job for each row; a row without a column seed gets one from the sweep's and its number."""
-    depends = [identity_of(work), _source_digest(work), __version__]
-    seeded = [{**row, SEED: row.get(SEED, seed_of(seed, k))} for k, row in enumerate(rows)]
-    return [Job(row, _digest([*depends, row])) for row in seeded]
+def jobs_of(work: Any, rows: Sequence[Row], seed: int, files: Iterable[str] = ()) -> list[Job]:
+    """A job for each row; a row without a column seed gets one from the sweep's and its number.
+
+    files: on which all jobs depend, beside those that the function and a row name.
+    """
+    seen = Dependencies(work)
+    depends = [identity_of(work), seen.digest, __version__]
+    known = dict(seen.files)
+    for path in files:
+        known.update(named_file(path, known))
+    common, jobs = dict(known), []
+    for number, given in enumerate(rows):
+        row = {**given, SEED: given.get(SEED, seed_of(seed, number))}
+        own: dict[str, str] = {}
+        for value in row.values():
+            own.update(named_file(value, known) if isinstance(value, str) else {})
+        known.update(own)
+        jobs.append(Job(row, _digest([*depends, row]), {**common, **own}))
+    return jobs
 
 
 def seed_of(seed: int, number: int) -> int:
     """Seed of row ``number`` of a sweep, a whole number below 2^31."""
     return int.from_bytes(hashlib.sha256(f"{seed} {number}".encode()).digest()[:4], "big") >> 1
+
+
+class Leave(BaseException):
+    """Raised where a process has been told to end: no end of its job."""
 
 
 def run_job(work: Work, row: Row) -> Record:
@@ -98,7 +118,7 @@ def run_job(work: Work, row: Row) -> Record:
     except (InputError, SimulationDiverged) as failure:
         error = _in_one_line(failure)
     except Exception as failure:
-        error, final = f"{type(failure).__name__}: {_in_one_line(failure)}", False
+        error, final = _named(failure), False
     return _record(values, error, final, time.perf_counter() - started)
 
 
@@ -113,7 +133,13 @@ def run_in_worker(work: Work, row: Row, arch: str) -> Record:
     runtime.start(arch, threads=1)
     runtime.check_thread("job of a sweep")
     hide_bars()
-    return run_job(work, row)
+    try:
+        return run_job(work, row)
+    except (Leave, Interrupted):
+        raise
+    except BaseException as failure:
+        # Such as SystemExit of a program's parser: it would end the process, and the row with it.
+        return failed(_named(failure))
 
 
 def failed(error: str) -> Record:
@@ -135,25 +161,26 @@ def _checked_values(values, row):
                 "a result must have a name that is no column of the table and none of "
                 f"{', '.join(ADDED)}, got {shown(name)}"
             )
+        plain_text("the name of a result", name)
     return {name: plain_value(f"result {name}", value) for name, value in values.items()}
+
+
+def _named(failure):
+    words = _in_one_line(failure)
+    return f"{type(failure).__name__}: {words}" if words else type(failure).__name__
 
 
 def _in_one_line(failure):
     """Words of an exception, as a table and a file can hold them: names of files may be no text."""
-    words = " ".join(str(failure).replace("\0", r"\0").split())
+    try:
+        words = " ".join(str(failure).replace("\0", r"\0").split())
+    except Exception as broken:
+        words = f"its text cannot be read: {type(broken).__name__}"
     return words.encode(errors="backslashreplace").decode()
 
 
 def _main_file():
     return getattr(sys.modules["__main__"], "__file__", None) or ""
-
-
-def _source_digest(work):
-    """Digest of the text of a function; "" where it has none."""
-    try:
-        return hashlib.sha256(inspect.getsource(work).encode()).hexdigest()
-    except (OSError, TypeError):
-        return ""
 
 
 def _digest(content):

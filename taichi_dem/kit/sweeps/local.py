@@ -1,8 +1,11 @@
 """Processes of this machine that run the jobs of a sweep; one that is lost loses nothing."""
 
 import multiprocessing
+import os
 import signal
 import sys
+import threading
+import time
 from collections import Counter, deque
 from collections.abc import Generator, Iterable
 from multiprocessing import connection
@@ -10,7 +13,7 @@ from typing import Any, Optional
 
 from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.sweeps.job import Job, Record, failed, imported_work, run_in_worker
+from taichi_dem.kit.sweeps.job import Job, Leave, Record, failed, imported_work, run_in_worker
 
 #: Runs of a job whose process was lost each time, and starts of a process that ended each time.
 TRIES = 3
@@ -162,7 +165,8 @@ def _serve(link, name, arch):
     # Ctrl-C reaches all processes of a terminal: the sweep ends this one when it has been heard. A
     # handler, since programs that a job starts would inherit that it is ignored.
     signal.signal(signal.SIGINT, lambda *_: None)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    signal.signal(signal.SIGTERM, _leave)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
         work = imported_work(name)
         link.send(("ready", None))
@@ -175,7 +179,22 @@ def _serve(link, name, arch):
         link.send(("refused", str(error)))
     except (ImportError, AttributeError) as error:
         link.send(("refused", f"function {name} cannot be imported by other processes: {error}"))
+    except Leave:
+        sys.exit(128 + signal.SIGTERM)
     except (EOFError, OSError):
         # The sweep itself was killed.
         return
     runtime.stop()
+
+
+def _leave(*_):
+    raise Leave
+
+
+def _end_with_parent():
+    """End this process where that of the sweep has ended, however: nobody waits for its row."""
+    parent: Any = multiprocessing.parent_process()
+    connection.wait([parent.sentinel])
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(_ENDING)
+    os._exit(128 + signal.SIGTERM)

@@ -6,7 +6,6 @@ A row is a dict of column name to number or text.
 import csv
 import itertools
 import math
-import numbers
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Union
@@ -14,7 +13,7 @@ from typing import Any, Union
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import FileName, path_name, shown
+from taichi_dem.kit.validation import FileName, is_whole, path_name, shown
 
 #: A value of a table.
 Value = Union[bool, int, float, str]
@@ -119,21 +118,22 @@ def read_rows(path: FileName, typed: bool = True) -> list[Row]:
 
 def plain_value(name: str, value: Any) -> Value:
     """A number or text as Python has it; InputError, which calls it by name, for anything else."""
-    if isinstance(value, np.generic):
+    if isinstance(value, np.generic) and value.dtype.kind not in "mM":
+        # A duration or date would become a number without its unit.
         value = value.item()
     if isinstance(value, bool):
         return value
     if isinstance(value, float):
         return float(value)
     if isinstance(value, str):
-        return _plain_text(name, value)
-    if isinstance(value, numbers.Integral) and -_MOST_WHOLE <= int(value) < _MOST_WHOLE:
+        return plain_text(name, value)
+    if is_whole(value) and -_MOST_WHOLE <= int(value) < _MOST_WHOLE:
         return int(value)
     raise InputError(f"{name} must be a number or text, got {shown(value)}")
 
 
-def _plain_text(name, text):
-    """Text that files and arrays hold as it is; InputError for other text."""
+def plain_text(name: str, text: str) -> str:
+    """Text that files and arrays hold as it is; InputError, which calls it by name, for other."""
     if "\0" in text or text.encode(errors="replace").decode() != text:
         raise InputError(f"{name} must be text without NUL that UTF-8 can hold, got {text[:40]!a}")
     return str(text)
@@ -198,6 +198,7 @@ def _check_columns(first, row, number):
                 f"a column of a table must have a name other than {', '.join(ADDED)}, "
                 f"got {shown(name)}"
             )
+        plain_text("the name of a column", name)
         if name not in first:
             raise InputError(f"row {number} has the unknown column {name!r}, which row 0 lacks")
     for name in first:

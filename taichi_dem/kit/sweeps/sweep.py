@@ -12,6 +12,7 @@ from taichi_dem.kit.files import claiming
 from taichi_dem.kit.progress.progress import Counted, Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.sweeps.cluster import check_client, run_on_cluster
+from taichi_dem.kit.sweeps.dependencies import Dependencies
 from taichi_dem.kit.sweeps.job import Job, Record, Work, checked_work, identity_of, jobs_of
 from taichi_dem.kit.sweeps.journal import Journal
 from taichi_dem.kit.sweeps.local import leave_unless_main, run_locally
@@ -54,7 +55,8 @@ def sweep(
         A ``dask.distributed.Client`` whose workers run the rows instead; each has one thread.
     out : path, optional
         Folder that keeps each finished row. The same call later runs only rows that are missing
-        or changed, or whose function or package changed.
+        or changed, or for which the function changed, what it calls, names or closes over in the
+        user's files, a file that it or the row names, or the version of the package.
     seed : int
         Seed from which those of the rows follow, a whole number from 0 to 2^63.
     progress : "auto", function or None
@@ -63,7 +65,8 @@ def sweep(
     Returns
     -------
     SweepTable
-        A row for each row of the table, in its order, with provenance.
+        A row for each row of the table, in its order, with provenance; its attribute ``unseen``
+        says of what a change is not noticed.
 
     Raises
     ------
@@ -87,7 +90,7 @@ def sweep(
     count = _processes(workers, client)
     journal = Journal(out, identity_of(function))
     records = run_missing(function, jobs, journal, count=count, client=client, progress=progress)
-    made = SweepTable(jobs, records, SEED in rows[0])
+    made = SweepTable(jobs, records, SEED in rows[0], Dependencies(function).unseen)
     if journal.folder:
         made.write_csv(os.path.join(journal.folder, RESULTS))
     return made

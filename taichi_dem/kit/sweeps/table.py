@@ -31,9 +31,13 @@ class SweepTable(Table):
         What running them left.
     seeded : bool
         Whether the input has a column of seeds.
+    unseen : sequence of str
+        What the key of a row does not cover.
 
     Attributes
     ----------
+    unseen : tuple of str
+        What a change of would not run finished rows again, such as files of a computed name.
     provenance : dict of str to ndarray
         Seed of each row, version of the package, commit of its sources or "unknown", machine, and
         seconds on the wall [s].
@@ -44,7 +48,13 @@ class SweepTable(Table):
     >>> table["displacement_mm"].mean(), table.provenance["seconds"].sum()  # doctest: +SKIP
     """
 
-    def __init__(self, jobs: Sequence[Job], records: Sequence[Record], seeded: bool):
+    def __init__(
+        self,
+        jobs: Sequence[Job],
+        records: Sequence[Record],
+        seeded: bool,
+        unseen: Sequence[str] = (),
+    ):
         given = [name for name in jobs[0].row if name != SEED or seeded]
         results = dict.fromkeys(name for record in records for name in record.values)
         columns = {name: _column([job.row[name] for job in jobs]) for name in given}
@@ -52,6 +62,7 @@ class SweepTable(Table):
             columns[name] = _column([record.values.get(name) for record in records])
         columns["error"] = np.array([record.error for record in records], dtype=str)
         super().__init__(columns)
+        self.unseen = tuple(unseen)
         self.provenance = {SEED: _column([job.row[SEED] for job in jobs])}
         for name in _OF_RECORDS:
             self.provenance[name] = _column([getattr(record, name) for record in records])
