@@ -45,9 +45,9 @@ _ENTRY = Entry(
     question="How does a block of concrete break when a hole in it is blasted?",
     look="",
     time="20 s",
-    quick="15 s",
+    quick="10 s",
     pictures=("cracks.png", "view.html", "blast.gif"),
-    figures=("hole_radial*", "monitor*", "broken_faces", "ledger*"),
+    figures=("hole_radial*", "monitor*", "broken_faces", "ledger*", "injected*"),
 )
 
 
@@ -92,8 +92,19 @@ def figures_of(result: Result) -> dict[str, tuple]:
         for place, paper in (("hole_radial", None), ("monitor", paper_mm))
         if f"{place}_displacement_mm" in history
     }
+    # Of a scene without contact nothing is injected.
+    spent = {
+        name: (1e-3 * float(history[column][-1]), "kJ")
+        for name, column in (("gas_work_kJ", "gas_work_J"), ("injected_kJ", "injected_J"))
+        if column in history
+    }
+    shared = report.interpenetration
+    if shared is not None:
+        spent["most_shared_percent"] = 100.0 * shared.share, "%"
+        spent["deeply_shared_pairs"] = shared.deep, "1"
     return {
         **moved,
+        **spent,
         "broken_faces": (report.broken_faces, "1"),
         "ledger_residual_fraction": (report.energy_residual_fraction, "1"),
         "linear_momentum_error": (report.linear_momentum_error, "1"),

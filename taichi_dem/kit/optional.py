@@ -27,6 +27,4 @@ def optional(module: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError:
-        raise InputError(
-            f"{module} must be installed for this: pip install {module}"
-        ) from None
+        raise InputError(f"{module} must be installed for this: pip install {module}") from None

@@ -1,4 +1,4 @@
-"""Every command of the pages runs when it is pasted into a new shell after the two of the set-up."""
+"""Every command of the pages runs when pasted into a new shell after the two of the set-up."""
 
 import importlib
 import re

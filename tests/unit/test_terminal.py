@@ -126,8 +126,9 @@ def test_a_paragraph_is_as_wide_as_the_terminal_but_no_wider_than_a_page(shown, 
 
 
 def entry(**fields):
-    texts = {"name": "x", "part": "", "question": "Why?", "look": "", "time": "15 s", "quick": "9 s"}
-    return Entry(**{**texts, "pictures": ("b.png", "a.gif"), **fields})
+    texts = {"name": "x", "part": "", "question": "Why?", "look": ""}
+    times = {"time": "15 s", "quick": "9 s"}
+    return Entry(**{**texts, **times, "pictures": ("b.png", "a.gif"), **fields})
 
 
 @pytest.mark.parametrize(
