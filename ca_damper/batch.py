@@ -402,6 +402,7 @@ class Batch(LoadedScenes):
             run_seconds=self.run_seconds,
             order=getattr(self.filling, "order", None),
             certificate=self.certificate,
+            excitation=self.excitation.in_words(),
         )
 
     @property
