@@ -414,6 +414,7 @@ class Batch(LoadedScenes):
             order=getattr(self.filling, "order", None),
             certificate=self.certificate,
             diverged=tuple(map(str, self.divergences())),
+            excitation=self.excitation.in_words(),
         )
 
     @property

@@ -7,7 +7,7 @@ import numpy as np
 from ca_damper import measures
 from ca_damper.excitation.excitation import Excitation, excitation_of
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import LARGEST, choice, progress_option, shown, whole
+from taichi_dem.kit.validation import LARGEST, choice, progress_option, shown, told_apart, whole
 
 #: Motion of the container at the beginning of a run.
 STARTS = ("rest", "empty", "rigid")
@@ -100,7 +100,8 @@ def check_within(excitation: Excitation, ends: np.ndarray) -> None:
     late = ends > excitation.duration(len(ends)) * (1.0 + 1e-9)
     if late.any():
         s = int(np.flatnonzero(late)[0])
+        got, most = told_apart(ends[s], excitation.duration(len(ends))[s])
         raise InputError(
-            f"a run must end within its excitation of {excitation.duration(len(ends))[s]:.6g} s, "
-            f"got {ends[s]:.6g} s in scene {s}: run fewer cycles, or shorter windows"
+            f"a run must end within its excitation of {most} s, got {got} s in scene {s}: run "
+            "fewer cycles, or shorter windows"
         )

@@ -4,6 +4,7 @@ The frequency changes at the end of a cycle, when the base passes its middle: it
 takes up its new speed at once.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Optional, Union
@@ -17,6 +18,8 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.progress import Stages
 from ca_damper.report import Report
 from ca_damper.response import Grid, Response
+from ca_damper.steady_state import half_width
+from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.optional import optional
@@ -26,6 +29,10 @@ from taichi_dem.kit.validation import AUTO, FileName
 
 if TYPE_CHECKING:
     from ca_damper.plot.response_plots import SweepPlots
+
+
+# Half-width of the RMS by its cycles, beside the measures.
+_ERROR = "rms_error"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,19 +47,57 @@ class Sweep:
         Response of the downward sweep.
     report : Report, optional
         Figures and cost of both.
+    up_error : ndarray, optional
+        Half-width of the upward RMS by its cycles [m], of the shape of the RMS; infinite where the
+        mean still changes or has too few cycles to tell, None where it was not measured.
+    down_error : ndarray, optional
+        The same of the downward sweep [m].
     """
 
     up: Response
     down: Response
     report: Optional[Report] = None
+    up_error: Optional[np.ndarray] = None
+    down_error: Optional[np.ndarray] = None
 
     def __repr__(self):
-        return in_brief(self, self.up.axes_in_words(), "up and down")
+        shows = self.shows_hysteresis
+        told = f"hysteresis beyond chance at {shows.sum()} of {shows.size} frequencies"
+        return in_brief(self, self.up.axes_in_words(), "up and down", told)
 
     @property
     def hysteresis(self) -> np.ndarray:
         """Difference of the RMS, (down - up) / larger of both [-], (particles, ratios, seeds)."""
         return (self.down.rms - self.up.rms) / np.maximum(self.down.rms, self.up.rms)
+
+    @property
+    def hysteresis_error(self) -> np.ndarray:
+        """Half-width of the mean of ``hysteresis`` over the seeds [-], (particles, ratios).
+
+        It holds at all frequencies of a particle number together, with a confidence of 95 %: that
+        from seed to seed, or by the cycles of the means where it is larger. Infinite where a mean
+        still changes, or was not measured in ``LEAST_TESTED`` cycles or two seeds.
+        """
+        count, places = len(self.up.seeds), len(self.up.ratios)
+        by_cycles = np.sqrt((self._share_by_cycles**2).sum(axis=2)) / count
+        if count < 2:
+            return by_cycles
+        t = t_quantile(1.0 - 0.05 / places, count - 1)
+        return np.maximum(by_cycles, t * self.hysteresis.std(axis=2, ddof=1) / math.sqrt(count))
+
+    @property
+    def shows_hysteresis(self) -> np.ndarray:
+        """Whether the mean over the seeds is beyond chance, (particles, ratios)."""
+        return np.abs(self.hysteresis.mean(axis=2)) > self.hysteresis_error
+
+    @property
+    def _share_by_cycles(self):
+        """Half-width of the hysteresis of each seed by its cycles, (particles, ratios, seeds)."""
+        if self.up_error is None or self.down_error is None:
+            unknown = np.inf if len(self.up.seeds) < 2 else 0.0
+            return np.full(self.up.rms.shape, unknown)
+        size = np.maximum(self.down.rms, self.up.rms)
+        return np.hypot(self.up_error, self.down_error) / size
 
     def to_xarray(self) -> Any:
         """As ``Response.to_xarray``, over direction ("up", "down") too.
@@ -154,7 +199,9 @@ def sweep_up_and_down(
                 cycles = batch.run(transient_cycles, measured_cycles, tell)
                 way.record(k, batch, cycles)
             writer.save()
-    return Sweep(way.up.response(), way.down.response(), batch.report())
+    up, down = way.up, way.down
+    report, errors = batch.report(), (up.values[_ERROR], down.values[_ERROR])
+    return Sweep(up.response(), down.response(), report, *errors)
 
 
 class _Way:
@@ -197,14 +244,20 @@ class _Collected:
     def __init__(self, grid):
         self.grid = grid
         self.steps = np.zeros(len(grid.ratios), dtype=np.int32)
-        self.values = {name: np.empty(grid.shape) for name in MEASURE_UNITS}
+        self.values = {name: np.empty(grid.shape) for name in (*MEASURE_UNITS, _ERROR)}
 
     def record(self, k, batch, cycles):
         """Record the measures at ratio number k."""
         particles, _, seeds = self.grid.shape
         self.steps[k] = batch.steps_per_cycle[0]
-        for name, value in self.grid.measures(cycles).items():
+        found = {**self.grid.measures(cycles), _ERROR: self._errors(cycles)}
+        for name, value in found.items():
             self.values[name][:, k] = value.reshape(particles, seeds)
+
+    def _errors(self, cycles):
+        """Half-widths of the RMS [m], at all frequencies together, (scenes,)."""
+        confidence = 1.0 - 0.05 / len(self.grid.ratios)
+        return np.array([half_width(row, confidence) for row in cycles.rms_by_cycle])
 
     def saved(self):
         """Data for a checkpoint, arrays by name."""
@@ -213,8 +266,9 @@ class _Collected:
     def resume(self, saved):
         """Restore the data that ``saved`` returned."""
         self.steps = saved["steps"]
-        self.values = {name: saved[name] for name in MEASURE_UNITS}
+        self.values = {name: saved[name] for name in self.values}
 
     def response(self):
         """All of them."""
-        return self.grid.response(self.steps, self.values)
+        measures = {name: self.values[name] for name in MEASURE_UNITS}
+        return self.grid.response(self.steps, measures)

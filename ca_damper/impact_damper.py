@@ -13,6 +13,13 @@ ceiling at -u and the floor at u, so J = 2 m u. It meets the ceiling at x0 = x(0
 (v + J / M) + u = e (u - v), so v = u (e - 1 - 2 m / M) / (1 + e). Of the forced motion
 X sin(w t + phase) it follows that X sin(phase) = x0 - J q(0) and w X cos(phase) = v - J q'(0-);
 squares add up to X^2: a quadratic equation for u.
+
+Small changes of a motion follow the Jacobian of its map from blow to blow. Changed are the place x
+and speed v of the container, the velocity p of the grain, all after a blow, and the time t of the
+blow. At T/2 those of x and v have grown to free(T/2) (dx - x' dt, dv - v' dt), that of the grain's
+place to dx + dp T/2 + u dt. The next blow is later by the gap between both over the speed at which
+they meet. It changes velocities by (1 + e) times that speed, shared by the masses; then all but the
+time turns over.
 """
 
 import math
@@ -24,7 +31,7 @@ import numpy as np
 
 from ca_damper.oscillator import Oscillator
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import between, plain_fields, positive
+from taichi_dem.kit.validation import between, plain_fields, positive, told_apart
 
 #: Points of half a cycle: an odd number, for Simpson's rule.
 _POINTS = 401
@@ -61,9 +68,9 @@ class ImpactDamper:
 
     Examples
     --------
-    >>> damper = ImpactDamper(Oscillator(), 2e-3, 0.75, 0.02, frequency=6.0)
-    >>> round(float(damper.speeds[0]), 3)
-    0.65
+    >>> damper = ImpactDamper(Oscillator(), 8e-3, 0.75, 0.012, frequency=6.0)
+    >>> [(round(float(u), 3), damper.is_stable(u)) for u in damper.speeds]
+    [(0.192, True)]
     """
 
     oscillator: Oscillator
@@ -79,7 +86,8 @@ class ImpactDamper:
         between("restitution", self.restitution, 0.0, 1.0)
         ratio = self.oscillator.damping_ratio
         if not ratio < 1.0:
-            raise InputError(f"damping_ratio of the oscillator must be below 1, got {ratio:.6g}")
+            got, bound = told_apart(ratio, 1.0)
+            raise InputError(f"damping_ratio of the oscillator must be below {bound}, got {got}")
 
     @property
     def mass_ratio(self) -> float:
@@ -157,10 +165,14 @@ class ImpactDamper:
         ndarray
             Displacement [m] and velocity [m/s].
         """
+        free = 2.0 * self.particle_mass * u * self.free(t) @ self._after
+        return self._forced_motion(u, t) + free
+
+    def _forced_motion(self, u, t):
+        """Forced part of the container's displacement [m] and velocity [m/s]."""
         sine, cosine = self._forced @ [u, 1.0]
         c, s = math.cos(self.omega * t), math.sin(self.omega * t)
-        forced = np.array([sine * c + cosine * s, self.omega * (cosine * c - sine * s)])
-        return forced + 2.0 * self.particle_mass * u * self.free(t) @ self._after
+        return np.array([sine * c + cosine * s, self.omega * (cosine * c - sine * s)])
 
     def position(self, u: float, t: float) -> float:
         """Position of the grain at that time.
@@ -203,8 +215,25 @@ class ImpactDamper:
         sign = 1.0 if round((since - t) / self.half_cycle) % 2 == 0 else -1.0
         return sign * np.array([self.motion(u, t), [self.position(u, t), -u]])
 
-    def is_possible(self, u: float) -> bool:
-        """Whether the grain flies from wall to wall without another impact.
+    def multipliers(self, u: float) -> np.ndarray:
+        """Factors by which small changes of the motion grow from blow to blow.
+
+        Parameters
+        ----------
+        u : float
+            Speed of the grain [m/s].
+
+        Returns
+        -------
+        ndarray
+            Four complex eigenvalues of the Jacobian of the map from blow to blow, that of the
+            largest magnitude first.
+        """
+        found = np.linalg.eigvals(self._jacobian(u))
+        return found[np.argsort(-np.abs(found), kind="stable")]
+
+    def is_stable(self, u: float) -> bool:
+        """Whether small changes of the motion die away.
 
         Parameters
         ----------
@@ -214,8 +243,46 @@ class ImpactDamper:
         Returns
         -------
         bool
-            True where it does.
+            True where all ``multipliers`` lie inside the unit circle.
         """
+        return bool(np.abs(self.multipliers(u)).max() < 1.0)
+
+    def _jacobian(self, u):
+        """Jacobian (4, 4) of the map from blow to blow, of x, v, p and t as at the top."""
+        half, x, v, p, t = self.half_cycle, *np.eye(4)
+        left, arrived = (np.array([self.motion(u, at)[1], self._pull(u, at)]) for at in (0.0, half))
+        place, speed = self.free(half) @ (np.array([x, v]) - np.outer(left, t))
+        meeting = -u - arrived[0]
+        later = (place - (x + half * p + u * t)) / meeting
+        place, speed = place + arrived[0] * later, speed + arrived[1] * later
+        blow = (1.0 + self.restitution) * (p - speed) / (1.0 + self.mass_ratio)
+        return np.array([-place, -speed - self.mass_ratio * blow, blow - p, later])
+
+    def _pull(self, u, t):
+        """Acceleration of the container [m/s^2], between the blows."""
+        own, forced = self.oscillator, self._forced_motion(u, t)
+        x, v = self.motion(u, t) - forced
+        free = -(own.stiffness * x + own.damping * v) / own.mass
+        return float(free - self.omega**2 * forced[0])
+
+    def is_possible(self, u: float) -> bool:
+        """Whether the motion can last: small changes die away, and nothing else is hit.
+
+        Parameters
+        ----------
+        u : float
+            Speed of the grain [m/s].
+
+        Returns
+        -------
+        bool
+            True where the motion is stable, and the grain flies from wall to wall without another
+            impact.
+        """
+        return self.is_stable(u) and self._flies_freely(u)
+
+    def _flies_freely(self, u):
+        """Whether the grain stays between the walls from blow to blow."""
         times = np.linspace(0.0, self.half_cycle, _POINTS)
         places = [self.position(u, t) - self.motion(u, t)[0] for t in times]
         return bool(np.abs(places).max() < 0.5 * self.clearance * (1.0 + 1e-6))

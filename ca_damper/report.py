@@ -12,6 +12,8 @@ from taichi_dem.kit.validation import FileName
 
 #: Evaluations of the right-hand side in an attempt of RK45; the first slope is the last one's.
 RK45_STAGES = 6
+# Signals that a table describes.
+_MOST_TOLD = 4
 
 
 @dataclass(frozen=True)
@@ -55,11 +57,16 @@ class Report:
         Order of the error in the step; None where the filling declares none.
     sampling : tuple of (int, float), optional
         Number of cycles that means were taken over, and half-width of the mean of the highest RMS
-        as a share of it, with a confidence of 95 %; None where it is not known.
+        as a share of it, with a confidence of 95 %; None where it is not known, as it is not of a
+        mean that still changes.
     certificate : Certificate, optional
         When effects first acted, what was left out, what was audited.
     diverged : tuple of str
         A sentence for each scene that diverged, the first in time first; its results are nan.
+    excitation : tuple of str, default ()
+        What acts beside the sine of the base, and what was done to samples of it, in words.
+    transient : str, default ""
+        Why the mean of the highest RMS is not known, in words.
     """
 
     method: str
@@ -81,6 +88,8 @@ class Report:
     sampling: Optional[tuple[int, float]] = None
     certificate: Optional[Certificate] = None
     diverged: tuple[str, ...] = ()
+    excitation: tuple[str, ...] = ()
+    transient: str = ""
 
     def __repr__(self):
         particles = f"{_range(self.particles)} particles"
@@ -103,6 +112,8 @@ class Report:
             cycles, share = self.sampling
             known = f"known to {100.0 * share:.2g} %"
             parts.append(f"highest RMS, a mean over {counted(cycles, 'cycle')}, {known}")
+        elif self.transient:
+            parts.append(f"highest RMS not known: {self.transient}")
         return "; ".join(parts)
 
     def as_dict(self) -> dict[str, Any]:
@@ -141,6 +152,11 @@ class Report:
             return ()
         return ("diverged", f"{len(self.diverged):,} of them, results nan"), ("", self.diverged[0])
 
+    def _further_excitations(self):
+        """Number of the signals that a table has no room for."""
+        more = len(self.excitation) - _MOST_TOLD
+        return (("", f"and {more} more, listed in report.excitation"),) if more > 0 else ()
+
     def _bound_row(self):
         """Bound of the step, and the step relative to it."""
         if self.step_bound is None:
@@ -149,10 +165,12 @@ class Report:
         return (("step bound by", f"{why}: {most:.3g} s, {self.dt_s[1] / most:.2g} of it taken"),)
 
     def __str__(self):
-        """A table of some twelve lines, and one for each effect that acted or was left out."""
+        """A table of some twelve lines, and one for each effect and signal."""
         step, *others = self.known_error.split("; ")
         rows = [
             ("method", f"{self.method}, container on the {self.mount}"),
+            *(("excitation", words) for words in self.excitation[:_MOST_TOLD]),
+            *self._further_excitations(),
             ("effects", ", ".join(self.effects) or "none"),
             *(("", f"{use.effect}: {use}") for use in self.effect_activity),
             *(self.certificate.rows() if self.certificate is not None else ()),

@@ -16,8 +16,7 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.report import Report
 from ca_damper.scenes.clock import automatic_dt, steps_per_cycle
 from ca_damper.scenes.table import SceneTable
-from ca_damper.steady_state import mean_and_error
-from taichi_dem.kit.accuracy.student import t_quantile
+from ca_damper.steady_state import LEAST_TESTED, change_of_halves, half_width
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.data_table import Table, Tabulated, dataset
 from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded
@@ -313,7 +312,7 @@ def frequency_response(
         with batch.checkpointed(checkpoint, resume, {"job": job}) as writer:
             cycles = batch.run(transient_cycles, measured_cycles, report_progress)
             writer.save()
-    report = replace(batch.report(), sampling=_sampling(cycles))
+    report = replace(batch.report(), **_sampling(cycles))
     return _by_amplitude(grid, batch.steps_per_cycle, grid.measures(cycles), report)
 
 
@@ -331,17 +330,26 @@ def _by_amplitude(grid, steps, values, report):
 
 
 def _sampling(cycles):
-    """Number of cycles, and half-width of the mean RMS in the scene where it is highest, a share.
+    """What is known of the mean RMS in the scene where it is highest, by name for a Report.
 
-    None where no mean is known: of a single cycle, or of a container at rest.
+    sampling: number of cycles, and half-width as a share. transient: why that is not known. None
+    of them of a single cycle, or of a container at rest.
     """
     highest = int(np.nanargmax(cycles.rms))
     one = slice(highest, highest + 1)
     series = Cycles(cycles.frequency[one], cycles.steps[one], cycles.record[one]).rms_by_cycle[0]
-    mean, error, freedom = mean_and_error(series)
-    if not mean > 0.0 or not math.isfinite(error):
-        return None
-    return len(series), t_quantile(_CONFIDENCE, freedom) * error / mean
+    mean = float(series.mean())
+    if not mean > 0.0 or len(series) < 2:
+        return {}
+    if len(series) < LEAST_TESTED:
+        few = counted(len(series), "cycle")
+        return {"transient": f"a mean over {few}, {LEAST_TESTED} show whether it still changes"}
+    change, may_be_chance = change_of_halves(series)
+    if not may_be_chance:
+        way = "grows" if change > 0.0 else "falls"
+        share, all_of_them = f"{100.0 * abs(change):.2g} %", counted(len(series), "cycle")
+        return {"transient": f"it {way} by {share} from half to half of {all_of_them}"}
+    return {"sampling": (len(series), half_width(series, _CONFIDENCE) / mean)}
 
 
 class Grid:

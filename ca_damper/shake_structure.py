@@ -24,7 +24,7 @@ from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, FileName, instance, positive, shown, whole
+from taichi_dem.kit.validation import AUTO, FileName, instance, positive, shown, told_apart, whole
 
 # Between the seeds of two boxes: larger than the seeds that users count, and prime.
 _BETWEEN_BOXES = 15_485_863
@@ -242,9 +242,10 @@ class _Plan:
             most = positive("dt", dt)
             longest = 1.0 / (LEAST_STEPS_PER_CYCLE * highest)
             if most > longest * (1.0 + 1e-12):
+                got, bound = told_apart(most, longest)
                 raise InputError(
-                    f"dt must be at most {longest:.3g} s, {LEAST_STEPS_PER_CYCLE} steps to a cycle "
-                    f"of the highest mode of {highest:.6g} Hz, got {most:g}: keep fewer modes, or "
+                    f"dt must be at most {bound} s, {LEAST_STEPS_PER_CYCLE} steps to a cycle "
+                    f"of the highest mode of {highest:.6g} Hz, got {got}: keep fewer modes, or "
                     "take shorter steps"
                 )
         self.window = window(run_duration(self.excitation, duration), most, interval)

@@ -13,7 +13,7 @@ from typing import Any, Optional, Union
 import numpy as np
 
 from ca_damper.accuracy.error_reduction import STEP_ORDER, Reduction
-from ca_damper.accuracy.error_sources import shortfall
+from ca_damper.accuracy.error_sources import ONE_SEED, shortfall
 from ca_damper.accuracy.goal_estimate import Estimate, response_of
 from ca_damper.accuracy.job import Job
 from ca_damper.accuracy.plan import DamperPlan, checked_plan
@@ -201,6 +201,8 @@ def _answer(job: Job, done: Reduction, found: Estimate) -> Answer:
         found_value = {"value": first.value, "parts": parts}
         return BranchedAnswer(**base, **found_value, shortfall=words, branches=branches)
     words = shortfall(found, job.tolerance, done.ended)
+    if job.is_drawn and len(done.seeds) == 1:
+        words = "; ".join(filter(None, (words, ONE_SEED)))
     made = Answer(**base, value=value, parts=parts, shortfall=words)
     return replace(made, cost_curve=tuple(_expenses(job, done, made)))
 

@@ -2,24 +2,34 @@
 
 The beginning is cut off where the standard error of the mean of the rest is least (the rule MSER of
 simulation practice). The halves of the rest are then compared by a t test; the spread of their
-means is that of an autoregressive series of first order, estimated from values less their trend, so
-that a drift cannot hide itself. Where they differ, the means of three thirds give the limit of an
-exponential approach and how far it is. A change that takes longer than the series is not seen.
+means is that from seed to seed where there are enough of them. Of few seeds it is that of an
+autoregressive series of first order, estimated from values less their trend, so that a drift cannot
+hide itself. Where they differ, the means of three thirds give the limit of an exponential approach
+and how far it is. Seeds that change or differ by more than their cycles tell go on. A change that
+takes longer than the series is not seen.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from taichi_dem.kit.accuracy.student import t_outside
+from taichi_dem.kit.accuracy.branches import LEAST_SEEDS
+from taichi_dem.kit.accuracy.student import f_outside, t_outside, t_quantile
 
 #: Fewer cycles are never called steady.
 LEAST_CYCLES = 32
+#: Fewer cycles have no halves that could be compared.
+LEAST_TESTED = 8
+#: Cycles after which seeds that differ by more than their cycles tell are taken as they are: they
+#: may all leave motions that look steady for hundreds of cycles.
+LONG_CYCLES = 512
 #: Batches of a window; each half has half of them.
 BATCHES = 8
 #: Share of steady series that the test of the halves sends on.
 FALSE_ALARMS = 0.05
+# Share of groups of steady seeds that are said to wander.
+_RARELY = 0.01
 # A transient that ends later may not have ended: as a share of the series.
 _LATEST = 0.4
 # What is cut off beside the transient, as the inverse of a share of the rest: its last remains.
@@ -37,8 +47,9 @@ class SteadyPart:
     """The steady part of a series, from cycle ``begin`` on.
 
     is_steady: whether it is one. mean: over it. error: standard error of the mean, with its degrees
-    of freedom. drift: how far the mean is from the limit of a slow approach; 0 where none shows,
-    infinite where no limit can be seen. more: cycles to go on by before asking again.
+    of freedom. drift: how far the mean is from the limit of a slow approach, infinite where no
+    limit can be seen; where none shows, how far that of the later half is off, of enough seeds.
+    more: cycles to go on by before asking again.
     """
 
     is_steady: bool
@@ -53,19 +64,48 @@ class SteadyPart:
 def steady_part(
     series: np.ndarray, allowed: float = 0.0, false_alarms: float = FALSE_ALARMS
 ) -> SteadyPart:
-    """Steady part of the values of successive cycles, (cycles,).
+    """Steady part of the values of successive cycles, (cycles,), or of their mean over the seeds.
 
-    allowed: drift that does not matter, as a share of the mean. false_alarms: share of steady
-    series that are sent on, of 128 cycles or more that are correlated by up to 0.5 from cycle to
-    cycle; twice as many at 0.8.
+    series: of one seed, (cycles,), or of several over the same cycles, (seeds, cycles). allowed:
+    drift that does not matter, as a share of the mean. false_alarms: share of steady series that
+    are sent on, of 128 cycles or more that are correlated by up to 0.5 from cycle to cycle; twice
+    as many at 0.8.
     """
-    x = np.asarray(series, dtype=np.float64)
+    rows = np.atleast_2d(np.asarray(series, dtype=np.float64))
+    x = rows.mean(axis=0)
     if len(x) < LEAST_CYCLES:
         return _part(x, 0, math.inf, LEAST_CYCLES - len(x), False)
-    begin = _least_error(x)
-    if begin < _LATEST * len(x) and not _halves_differ(x[begin:], false_alarms):
-        return _part(x, begin + (len(x) - begin) // _MARGIN, 0.0, 0, True)
-    return _approach(x, max(allowed, _ROUNDING))
+    begin, allowed = _least_error(x), max(allowed, _ROUNDING)
+    rest = rows[:, begin:]
+    if _seeds_wander(rest, allowed) or (len(x) < LONG_CYCLES and _seeds_differ(rest, allowed)):
+        part = _approach(x, allowed)
+        return replace(part, is_steady=False, more=max(part.more, len(x)))
+    if begin < _LATEST * len(x) and not _halves_differ(rest, false_alarms):
+        return _part(x, begin + (len(x) - begin) // _MARGIN, _drift(rest), 0, True)
+    return _approach(x, allowed)
+
+
+def change_of_halves(series: np.ndarray) -> tuple[float, bool]:
+    """Change of a mean from the first to the second half, and whether it may be chance.
+
+    series: of values of at least ``LEAST_TESTED`` cycles, (cycles,). The change is a share of the
+    mean.
+    """
+    rows = np.asarray(series, dtype=np.float64)[None]
+    change = float((_means_of_halves(rows) @ [-1.0, 1.0])[0])
+    mean = float(rows.mean())
+    return change / mean if mean else 0.0, not _halves_differ(rows, FALSE_ALARMS)
+
+
+def half_width(series: np.ndarray, confidence: float) -> float:
+    """Half-width of the bar of a mean over cycles, (cycles,); infinite where it still changes.
+
+    So it is of fewer cycles than LEAST_TESTED, which cannot tell.
+    """
+    if len(series) < LEAST_TESTED or not change_of_halves(series)[1]:
+        return math.inf
+    _, error, freedom = mean_and_error(series)
+    return t_quantile(confidence, freedom) * error
 
 
 def period(series: np.ndarray, tolerance: float) -> int:
@@ -121,16 +161,77 @@ def _least_error(x):
     return int(np.argmin(error[::-1][: latest + 1]))
 
 
-def _halves_differ(x, false_alarms):
-    """Whether the means of both halves differ by more than chance."""
-    (first, second), length = batch_means(x, 2)
-    change = abs(second - first)
-    if change <= _ROUNDING * abs(second):
+def _halves_differ(rows, false_alarms):
+    """Whether the means of both halves, over the seeds, differ by more than chance."""
+    halves = _means_of_halves(rows)
+    changes = halves @ [-1.0, 1.0]
+    change = abs(float(changes.mean()))
+    if change <= _ROUNDING * abs(float(halves[:, 1].mean())):
         return False
-    halves = [_error_off_trend(half) for half in np.split(x[len(x) - 2 * length :], 2)]
-    error = math.hypot(*(error for error, _ in halves))
-    freedom = sum(freedom for _, freedom in halves)
+    error, freedom = _error_of_change(rows, changes)
     return error == 0.0 or t_outside(change / error, freedom) < false_alarms
+
+
+def _seeds_wander(rows, allowed):
+    """Whether seeds change from half to half, each its own way, by more than their cycles tell.
+
+    They then go from motion to motion so slowly that their cycles show a few of them only, however
+    steady each looks: means of more seeds over as many cycles would miss what comes later.
+    """
+    changes = _means_of_halves(rows) @ [-1.0, 1.0]
+    known = [_error_off_trend(half) for half in _halves(rows)]
+    square = sum(error**2 for error, _ in known) / len(rows)
+    return _spread_shows(changes, rows, allowed, square, sum(free for _, free in known))
+
+
+def _seeds_differ(rows, allowed):
+    """Whether the means of seeds differ by more than their cycles tell: each has its own motion."""
+    known = [mean_and_error(row) for row in rows]
+    square = sum(error**2 for _, error, _ in known) / len(rows)
+    means = np.array([mean for mean, _, _ in known])
+    return _spread_shows(means, rows, allowed, square, sum(free for _, _, free in known))
+
+
+def _spread_shows(values, rows, allowed, square, freedom):
+    """Whether a value of each seed varies by more than its mean error square tells, and matters."""
+    count = len(values)
+    if count < LEAST_SEEDS:
+        return False
+    spread = float(values.std(ddof=1))
+    if spread <= allowed * abs(float(rows.mean())):
+        return False
+    ratio = spread**2 / square if square > 0.0 else math.inf
+    return f_outside(ratio, count - 1, freedom) < _RARELY
+
+
+def _drift(rows):
+    """By how much the later half of the cycles is off the mean over all, of enough seeds."""
+    if len(rows) < LEAST_SEEDS:
+        return 0.0
+    return 0.5 * abs(float((_means_of_halves(rows) @ [-1.0, 1.0]).mean()))
+
+
+def _means_of_halves(rows):
+    """Means of both halves of the cycles of each seed, (seeds, 2)."""
+    return np.array([batch_means(row, 2)[0] for row in rows])
+
+
+def _halves(rows):
+    """First and second half of each row, whose first value is left over where they are odd."""
+    return [half for row in rows for half in np.split(row[len(row) % 2 :], 2)]
+
+
+def _error_of_change(rows, changes):
+    """Standard error of the mean change from half to half, and its degrees of freedom.
+
+    It is that from seed to seed where there are enough: a seed may leave one motion for another at
+    any time, of which its cycles before tell nothing.
+    """
+    count = len(rows)
+    if count >= LEAST_SEEDS:
+        return float(changes.std(ddof=1)) / math.sqrt(count), count - 1
+    known = [_error_off_trend(half) for half in _halves(rows)]
+    return math.hypot(*(error for error, _ in known)) / count, sum(free for _, free in known)
 
 
 def _error_off_trend(x):

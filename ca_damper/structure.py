@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from ca_damper.oscillator import check_modes
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import LARGEST, SMALLEST, positive, shown, whole
+from taichi_dem.kit.validation import LARGEST, SMALLEST, positive, shown, told_apart, whole
 
 #: Most places of a structure.
 MOST_PLACES = 1000
@@ -371,9 +371,9 @@ def _check_definite(name: str, matrix: np.ndarray) -> None:
     uneven = np.abs(matrix - matrix.T)
     i, j = map(int, np.unravel_index(uneven.argmax(), uneven.shape))
     if uneven[i, j] > _SYMMETRIC_TO * np.abs(matrix).max():
+        one, other = told_apart(matrix[i, j], matrix[j, i], 6)
         raise InputError(
-            f"{name} must be a symmetric matrix, got {matrix[i, j]:g} at [{i}, {j}] and "
-            f"{matrix[j, i]:g} at [{j}, {i}]"
+            f"{name} must be a symmetric matrix, got {one} at [{i}, {j}] and {other} at [{j}, {i}]"
         )
     # Scaled to a diagonal of ones, so that units and unequal places do not count.
     diagonal = np.diag(matrix)
@@ -393,8 +393,8 @@ def _check_orthonormal(products: np.ndarray) -> None:
     wrong = np.abs(products - np.eye(len(products)))
     i, j = sorted(map(int, np.unravel_index(wrong.argmax(), wrong.shape)))
     if not wrong[i, j] <= ORTHONORMAL_TO:
-        wanted = 1 if i == j else 0
+        got, wanted = told_apart(products[i, j], 1.0 if i == j else 0.0)
         raise InputError(
             f"shapes must be orthonormal, shapes^T masses shapes = 1 within {ORTHONORMAL_TO:g}, "
-            f"got {products[i, j]:.6g} in place of {wanted} for modes {i} and {j}"
+            f"got {got} in place of {wanted} for modes {i} and {j}"
         )

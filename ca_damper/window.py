@@ -8,7 +8,7 @@ from ca_damper.checks import MOST_SEED
 from ca_damper.excitation.excitation import Excitation, excitation_of
 from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE, MOST_STEPS_PER_CYCLE
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import positive, several, shown, whole
+from taichi_dem.kit.validation import positive, several, shown, told_apart, whole
 
 
 class Window(NamedTuple):
@@ -29,10 +29,8 @@ def window(duration: float, dt: float, interval: Any) -> Window:
     every = math.ceil(duration / (samples * dt) * (1.0 - 1e-12))
     every = max(every, math.ceil(LEAST_STEPS_PER_CYCLE / samples))
     if samples * every > MOST_STEPS_PER_CYCLE:
-        raise InputError(
-            f"duration must be at most {MOST_STEPS_PER_CYCLE * dt:.4g} s in steps of {dt:.3g} "
-            f"s, got {duration:g}"
-        )
+        got, most = told_apart(duration, MOST_STEPS_PER_CYCLE * dt)
+        raise InputError(f"duration must be at most {most} s in steps of {dt:.3g} s, got {got}")
     return Window(duration, samples, every, duration / (samples * every))
 
 

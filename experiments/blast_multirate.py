@@ -22,6 +22,7 @@ from taichi_dem import At, InputError, Multirate, Uniform, plot, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import styles_of
+from taichi_dem.kit.validation import told_apart
 from taichi_dem.output.hole_monitor import HoleMonitor
 from taichi_dem.output.run_costs import RunCosts, level_columns, level_shares
 
@@ -102,7 +103,8 @@ def run(options):
     early = 2e-5 if options.quick else 5e-5
     options.early = options.early or min(early, options.until)
     if options.early > options.until:
-        raise InputError(f"early must be at most until, {options.until:g} s, got {options.early:g}")
+        got, most = told_apart(options.early, options.until)
+        raise InputError(f"early must be at most until, {most} s, got {got}")
     scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     runs = {
         name: [follow(name, options, scene) for _ in range(options.repeats)] for name in METHODS

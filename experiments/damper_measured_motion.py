@@ -44,7 +44,7 @@ options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 
 def run(options):
     """Shake all fillings, compare, picture."""
-    motion = excitation.from_csv(options.record).scaled(options.scale)
+    motion = excitation.from_csv(options.record, correct_baseline=True).scaled(options.scale)
     folder = study.begin(options)
     made = {"empty": shake(Empty(), motion, particles=0, seeds=1, progress=None)}
     for filling in FILLINGS:

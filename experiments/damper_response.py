@@ -180,10 +180,11 @@ def show_peaks(responses):
 
 
 def figures_of(responses, sweeps):
-    """Largest hysteresis of each filling, and the seconds of its runs."""
+    """Largest hysteresis of each filling beyond chance, and the seconds of its runs."""
     figures = {}
     for label, sweep in sweeps.items():
-        for n, most in zip(sweep.up.particles, np.abs(sweep.hysteresis).max(axis=(1, 2))):
+        seen = np.where(sweep.shows_hysteresis, np.abs(sweep.hysteresis.mean(axis=2)), 0.0)
+        for n, most in zip(sweep.up.particles, seen.max(axis=1)):
             figures[f"hysteresis_{label}_N{n}"] = study.figure(float(most), "1")
         spent = responses[label].report.run_seconds + sweep.report.run_seconds
         figures[f"run_seconds_{label}"] = study.figure(spent, "s")

@@ -27,6 +27,7 @@ from _multirate import TABLE, Impact, caption, figures_of, write
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.validation import told_apart
 from taichi_dem.mesh.shapes import bar, placed_together
 from taichi_dem.simulate import run_simulation
 
@@ -79,9 +80,9 @@ def run(options):
     """Hit the bar with every method, compare, picture."""
     slowest = 2.0 * GAP / options.until
     if options.speed < slowest:
+        got, least = told_apart(options.speed, slowest)
         raise dem.InputError(
-            f"speed must be at least {slowest:g} m/s, at which the fragment crosses its gap of "
-            f"{1e6 * GAP:g} um in half of {options.until:g} s, got {options.speed:g}"
+            f"speed must be at least {least} m/s, for {1e6 * GAP:g} um by half of until, got {got}"
         )
     at = study.output_paths(options.out)
     impacts = [hit(name, options) for name in options.methods]

@@ -16,7 +16,7 @@ from taichi_dem.diagnostics.energy_balance import TERMS
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
-from taichi_dem.kit.validation import choice, finite, flag, positive, shown, whole, word
+from taichi_dem.kit.validation import choice, finite, flag, positive, shown, told_apart, whole, word
 from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.output.fragments import fragment_of_body
 from taichi_dem.output.hole_monitor import HoleMonitor
@@ -342,8 +342,10 @@ def _cut_by_cylinder(radius, group, model):
     nearest, farthest = corners.min(axis=1), corners.max(axis=1)
     cut = np.flatnonzero((nearest < radius) & (radius < farthest))
     if not len(cut):
+        is_near = radius <= nearest.min()
+        got, limit = told_apart(radius, nearest.min() if is_near else farthest.max())
         raise InputError(
-            f"distance must be that of a body from the axis of {group}, from {nearest.min():.3g} "
-            f"to {farthest.max():.3g} m, got {radius:.3g}"
+            f"distance must be that of a body from the axis of {group}, "
+            f"{'above' if is_near else 'below'} {limit} m, got {got}"
         )
     return cut

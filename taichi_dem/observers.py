@@ -14,7 +14,7 @@ from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Pace
 from taichi_dem.kit.uncopied import Uncopied
-from taichi_dem.kit.validation import plain_fields, positive, shown, whole
+from taichi_dem.kit.validation import plain_fields, positive, shown, told_apart, whole
 from taichi_dem.methods import Method
 from taichi_dem.output.record import Frame, Recorder
 from taichi_dem.simulation import Simulation
@@ -102,10 +102,8 @@ class Every:
         distance = (self.time_s or float(self.steps or 1)) / unit
         if last > _MOST_CALLS * distance:
             least = last * unit / _MOST_CALLS
-            raise InputError(
-                f"{name} must be at least {least:.3g} for {_MOST_CALLS} calls, "
-                f"got {distance * unit:g}"
-            )
+            got, bound = told_apart(distance * unit, least)
+            raise InputError(f"{name} must be at least {bound} for {_MOST_CALLS} calls, got {got}")
         count = math.floor(last / distance * (1.0 + 1e-12))
         return {min(last, round(k * distance)) for k in range(count + 1)} | {last}
 
@@ -164,7 +162,8 @@ class At:
         """
         for time in self.times_s:
             if round(time / dt) > last:
-                raise InputError(f"times_s must lie in [0, {last * dt:.6g}] s, got {time:g}")
+                got, most = told_apart(time, last * dt)
+                raise InputError(f"times_s must lie in [0, {most}] s, got {got}")
         return {round(time / dt) for time in self.times_s}
 
 

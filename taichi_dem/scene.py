@@ -15,7 +15,7 @@ from taichi_dem.kit.display import counted, embedded, in_brief, titled
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.pictures import png, write_picture
-from taichi_dem.kit.validation import FileName, between, finite, positive, shown
+from taichi_dem.kit.validation import FileName, between, finite, positive, shown, told_apart
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
@@ -269,9 +269,8 @@ def _motion_of(scene):
     motion = initial_motion(scene.mesh, scene.velocity, scene.spin)
     fastest = length(motion["velocity"]).max() if motion else 0.0
     if fastest > scene.max_speed:
-        raise InputError(
-            f"velocity must be at most max_speed, {scene.max_speed:g} m/s, got {fastest:g} m/s"
-        )
+        got, most = told_apart(fastest, scene.max_speed, 6)
+        raise InputError(f"velocity must be at most max_speed, {most} m/s, got {got} m/s")
     return {name: _locked(rows) for name, rows in motion.items()}
 
 

@@ -16,7 +16,7 @@ from typing import Optional, Union
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import FileName, direction, finite, positive, shown
+from taichi_dem.kit.validation import FileName, direction, finite, positive, shown, told_apart
 from taichi_dem.mesh.drawn_out import drawn_out
 from taichi_dem.mesh.filled import MOST_BODIES, filled_surface
 from taichi_dem.mesh.mesh import Mesh
@@ -230,15 +230,15 @@ def _element(element, smallest, volume):
     """Length of an edge [m], checked against the shape."""
     element = positive("element", element)
     if element > smallest * (1.0 + _ON):
+        got, most = told_apart(element, smallest)
         raise InputError(
-            f"element must be at most the smallest length of the shape, {smallest:g} m, "
-            f"got {element:g}"
+            f"element must be at most the smallest length of the shape, {most} m, got {got}"
         )
     if _PER_CUBE * volume / element**3 > MOST_BODIES:
         least = (_PER_CUBE * volume / MOST_BODIES) ** (1.0 / 3.0)
+        got, bound = told_apart(element, least)
         raise InputError(
-            f"element must be at least {least:.3g} m, for {MOST_BODIES} tetrahedra at most, "
-            f"got {element:g}"
+            f"element must be at least {bound} m, for {MOST_BODIES} tetrahedra at most, got {got}"
         )
     return element
 

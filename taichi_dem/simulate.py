@@ -15,7 +15,7 @@ from taichi_dem.kit.files import claiming, output_folder
 from taichi_dem.kit.progress.progress import Listener, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, Owner, RunSnapshot, opened
-from taichi_dem.kit.validation import AUTO, FileName, instance
+from taichi_dem.kit.validation import AUTO, FileName, instance, told_apart
 from taichi_dem.measured_speedup import speedup_of_run
 from taichi_dem.methods import Method, check_method
 from taichi_dem.observers import Observer, RunView
@@ -189,10 +189,8 @@ def _opened(scene, method, checkpoint, resume, last):
     begin = int(np.asarray(arrays.get("field/state.tick", 0)).max(initial=0)) if arrays else 0
     if begin > last * MACRO_TICKS:
         seconds = method.dt0 / MACRO_TICKS
-        raise InputError(
-            f"until must be at least {begin * seconds:.6g} s, where {resume} begins, "
-            f"got {last * method.dt0:.6g}"
-        )
+        got, least = told_apart(last * method.dt0, begin * seconds)
+        raise InputError(f"until must be at least {least} s, where {resume} begins, got {got}")
     return arrays
 
 

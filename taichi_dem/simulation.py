@@ -33,7 +33,7 @@ from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
-from taichi_dem.kit.validation import choice, instance, positive, whole
+from taichi_dem.kit.validation import choice, instance, positive, told_apart, whole
 from taichi_dem.methods import Method, check_method
 from taichi_dem.scene import Scene
 from taichi_dem.stability.step_control import counted_criteria
@@ -477,9 +477,9 @@ def macro_steps(until: float, dt0: float) -> int:
     """Number of largest steps that reach a time [s]; InputError unless it can be counted to."""
     steps = positive("until", until) / dt0
     if steps > MOST_STEPS:
+        got, most = told_apart(until, MOST_STEPS * dt0)
         raise InputError(
-            f"until must be at most {MOST_STEPS * dt0:.3g} s, {MOST_STEPS} largest steps of "
-            f"{dt0:g} s, got {until:g}"
+            f"until must be at most {most} s, {MOST_STEPS} largest steps of {dt0:g} s, got {got}"
         )
     return max(1, math.ceil(steps - 1e-9))
 

@@ -22,6 +22,7 @@ from ca_damper.goals import Goal
 from taichi_dem.kit.accuracy.branches import clusters_of
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import told_apart
 
 #: Order of the step's error: contacts begin and end within a step, and so do an automaton's
 #: events, which is of first order whatever integrates the motion between them.
@@ -90,8 +91,11 @@ class Reduction:
             self.ended = f"within budget_s of {self.job.budget_s:g} s"
             if found:
                 self._restore(state)
-            else:
-                found = self._first(spent)
+            # What was run since then may show a drift.
+            last = self._so_far()
+            found = last if self._is_told(last) else found
+            if not found:
+                self._refuse_budget(spent)
         return found
 
     def _is_told(self, found):
@@ -127,20 +131,20 @@ class Reduction:
         drift = _DRIFT * self.job.tolerance
         self.steady.go_on(self._keys(), drift, _LEAST_CYCLES, self.window)
 
-    def _first(self, spent):
-        """Estimates of scenes that are not steady; InputError where some have not begun."""
+    def _so_far(self):
+        """Estimates of scenes that need not be steady; none where some have not begun."""
         keys = self._keys() if self.is_placed else []
-        found = []
-        if keys and min(map(self.runs.cycles, keys)) >= _LEAST_CYCLES:
-            for key in keys:
-                self.steady.check_steady(key, _DRIFT * self.job.tolerance)
-            found = self._estimates()
-        if not self._is_told(found):
-            raise InputError(
-                "budget_s must leave time for the pilot and one value: at least "
-                f"{1.5 * spent.needed:.2g} s here, got {self.job.budget_s:g}"
-            ) from None
-        return found
+        if not keys or min(map(self.runs.cycles, keys)) < _LEAST_CYCLES:
+            return []
+        self.steady.check_steady(keys, _DRIFT * self.job.tolerance)
+        return self._estimates()
+
+    def _refuse_budget(self, spent):
+        got, least = told_apart(self.job.budget_s, 1.5 * spent.needed, 2)
+        raise InputError(
+            f"budget_s must leave time for the pilot and one value: at least {least} s here, "
+            f"got {got}"
+        ) from None
 
     def ratios_of(self, goal: Goal) -> tuple[float, ...]:
         """Frequency ratios that a goal is made of."""
@@ -283,11 +287,13 @@ class Reduction:
         return True
 
     def _more_seeds(self, factor):
+        """Take more seeds, and longer runs of all: seeds of a slow change differ by where it is."""
         count = min(_MOST_SEEDS, math.ceil(len(self.seeds) * factor))
         if self.job.fixed is not None or count <= len(self.seeds):
             self.ended = f"with {len(self.seeds)} seeds"
             return False
         self.seeds = tuple(range(1, count + 1))
+        self.window = math.ceil(self.window * math.sqrt(factor))
         return True
 
 

@@ -29,6 +29,12 @@ def largest_source(found: Estimate) -> str:
     return max(sources, key=lambda name: float(np.max(sources[name])))
 
 
+#: Why one seed of a filling that draws is no answer.
+ONE_SEED = (
+    "the spread from seed to seed was not measured and is not in the bar: two seeds or more show it"
+)
+
+
 def shortfall(found: Estimate, tolerance: float, ended: str) -> str:
     """Why a bar is wider than asked, and what would help; "" if it is not.
 

@@ -16,13 +16,11 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.response import Response
 from ca_damper.steady_state import BATCHES, correlation_factor
 from taichi_dem.kit.accuracy.answer import ErrorParts, Values
-from taichi_dem.kit.accuracy.student import f_outside, t_quantile
+from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.display import by_fields
 
-# Seeds are said to differ where chance would make their variance so large in this share of cases.
-_SEEDS_ALIKE = 0.2
-# Differences that are rounding, as a share of the value, and values, as one of their unit's size.
-_ROUNDING, _ZERO = 1e-9, 1e-12
+# Values that are rounding, as a share of one of their unit's size.
+_ZERO = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,24 +51,24 @@ class SeedValues:
 
     @property
     def apart(self) -> np.ndarray:
-        """Standard error of the mean from seed to seed where seeds differ, 0 elsewhere."""
+        """Standard error of the mean from seed to seed, (places,); 0 for one seed.
+
+        It holds the sampling of their cycles, which is not counted again.
+        """
         count = len(self.values)
         if count < 2:
             return np.zeros_like(self.variance)
-        between = self.values.var(axis=0, ddof=1)
-        rounding = (_ROUNDING * np.abs(self.mean)) ** 2
-        differ = [
-            b > r and (w == 0.0 or f_outside(b / w, count - 1, self.freedom) < _SEEDS_ALIKE)
-            for b, w, r in zip(between, self.variance, rounding)
-        ]
-        return np.where(differ, np.sqrt(between / count), 0.0)
+        return self.values.std(axis=0, ddof=1) / math.sqrt(count)
 
     def bars(self, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-        """Half-widths (sampling, chance), (places,) each."""
+        """Half-widths (sampling, chance), (places,) each.
+
+        chance: by which the spread of the seeds is more than that of their sampling.
+        """
         sampling = t_quantile(confidence, self.freedom) * self.sampling
-        if len(self.values) < 2:
-            return np.hypot(sampling, self.drift), np.zeros_like(sampling)
-        total = t_quantile(confidence, len(self.values) - 1) * self.apart
+        total = self.apart
+        if len(self.values) > 1:
+            total = t_quantile(confidence, len(self.values) - 1) * total
         chance = np.sqrt(np.maximum(total**2 - sampling**2, 0.0))
         return np.hypot(sampling, self.drift), chance
 

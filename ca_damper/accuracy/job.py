@@ -8,11 +8,13 @@ from ca_damper.accuracy.plan import DamperPlan
 from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
+from taichi_dem.kit.accuracy.branches import LEAST_SEEDS
 
 # First coarse step by the filling's own and by its bound, which is that of safe runs.
 _OF_DEFAULT, _OF_BOUND = 1.5, 1.4
 # Seeds to begin with: so many particles in all, as few of them often have several steady motions.
-_FEWEST_SEEDS, _MANY_SEEDS, _PARTICLES = 3, 8, 80
+# Fewer than LEAST_SEEDS may agree by luck where there are two motions: three do in one of four.
+_MANY_SEEDS, _PARTICLES = 8, 80
 # Range of a search by the peak of the rigid mass and by the natural frequency.
 _BELOW, _ABOVE = 0.95, 1.04
 
@@ -51,12 +53,16 @@ class Job:
         """Seeds to begin with; one of a filling that draws nothing."""
         if self.fixed is not None:
             return self.fixed
-        if self.particles == 0 or isinstance(self.filling, (Empty, RigidMass)):
+        if not self.is_drawn:
             return (1,)
-        if self.plan is not None:
-            return tuple(range(1, 1 + self.plan.seeds))
-        several = math.ceil(_PARTICLES / self.particles)
-        return tuple(range(1, 1 + min(_MANY_SEEDS, max(_FEWEST_SEEDS, several))))
+        several = math.ceil(_PARTICLES / self.particles) if self.plan is None else self.plan.seeds
+        most = max(_MANY_SEEDS, several) if self.plan is not None else _MANY_SEEDS
+        return tuple(range(1, 1 + min(most, max(LEAST_SEEDS, several))))
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether seeds make a difference."""
+        return self.particles > 0 and not isinstance(self.filling, (Empty, RigidMass))
 
     def search_range(self) -> tuple[float, float]:
         """Range in which to look for a peak first."""

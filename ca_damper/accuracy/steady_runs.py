@@ -1,7 +1,11 @@
-"""Scenes that go on until each is steady, as far as a budget allows."""
+"""Scenes that go on until they are steady, as far as a budget allows.
+
+The seeds of one frequency and step go on together, each for as many cycles: one that stopped where
+it looks steady would stop in the quieter of several motions more often than it takes it.
+"""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -49,53 +53,71 @@ class SteadyRuns:
         return min(map(self.runs.cycles, keys)) >= _MOST_CYCLES
 
     def go_on(self, keys: Iterable[SceneKey], drift: float, least: int, window: int) -> None:
-        """Let scenes go on until each is steady for a window of cycles.
+        """Let scenes go on until all seeds are steady for a window of cycles.
 
         drift: that does not matter, as a share of the value. least: cycles of each scene.
         Raises BudgetSpent before runs that would take too long.
         """
-        scenes = tuple(keys)
+        groups = _groups(keys)
         while True:
-            more = {key: self._missing(key, drift, least, window) for key in scenes}
-            more = {key: count for key, count in more.items() if count > 0}
+            more: dict[SceneKey, int] = {}
+            for group in groups:
+                more.update(self._missing(group, drift, least, window))
             if not more:
                 return
-            self._check_budget(more)
-            self.runs.go_on(more)
+            self._go_within_budget(more)
 
-    def _check_budget(self, more: Mapping[SceneKey, int]) -> None:
-        """Raise BudgetSpent where runs would take too long; two cycles tell their speed."""
-        if self.budget_s == math.inf:
-            return
-        if not self.runs.steps:
-            for _ in range(2):
-                self.runs.go_on(dict.fromkeys(more, 1))
-        needed = self.runs.cpu_s + self.runs.seconds(more)
-        if needed > self.budget_s:
-            raise BudgetSpent(needed)
+    def _go_within_budget(self, more: dict[SceneKey, int]) -> None:
+        """Let scenes go on by so many cycles; BudgetSpent where they would take too long.
 
-    def _missing(self, key, drift, least, window):
-        """Cycles that a scene has to go on by before it can be judged, or is good enough."""
-        gone = self.runs.cycles(key)
-        if gone < least:
-            return least - gone
-        part = self.check_steady(key, drift)
-        if gone >= _MOST_CYCLES:
-            return 0
-        if not part.is_steady:
-            return min(_rounded(part.more), _MOST_CYCLES - gone)
-        return min(_rounded(1.25 * (window - (gone - part.begin))), _MOST_CYCLES - gone)
+        The first two of the cycles tell the speed: nothing is run that would not be without budget.
+        """
+        if self.budget_s < math.inf:
+            for _ in range(0 if self.runs.steps else 2):
+                first = {key: 1 for key, count in more.items() if count > 0}
+                self.runs.go_on(first)
+                more = {key: count - first.get(key, 0) for key, count in more.items()}
+            needed = self.runs.cpu_s + self.runs.seconds(more)
+            if needed > self.budget_s:
+                raise BudgetSpent(needed)
+        self.runs.go_on(more)
 
-    def check_steady(self, key: SceneKey, drift: float) -> SteadyPart:
-        """Check by all of its cycles from when on a scene is steady."""
-        series = [*self.runs.series(key), *self.further(key)]
-        part = self.parts[key] = _steady(series, drift)
+    def _missing(self, group, drift, least, window):
+        """Cycles by which seeds have to go on before they can be judged, or are good enough."""
+        gone = max(least, *map(self.runs.cycles, group))
+        late = {key: gone - self.runs.cycles(key) for key in group if self.runs.cycles(key) < gone}
+        if late:
+            return late
+        part = self._check(group, drift)
+        more = 1.25 * (window - (gone - part.begin)) if part.is_steady else part.more
+        count = min(_rounded(more), _MOST_CYCLES - gone)
+        return dict.fromkeys(group, count) if count > 0 else {}
+
+    def check_steady(self, keys: Iterable[SceneKey], drift: float) -> None:
+        """Check by the cycles that all seeds have from when on they are steady."""
+        for group in _groups(keys):
+            self._check(group, drift)
+
+    def _check(self, group, drift):
+        shortest = min(map(self.runs.cycles, group))
+        series = [(*self.runs.series(key), *self.further(key)) for key in group]
+        rows = [np.stack([one[:shortest] for one in seeds]) for seeds in zip(*series)]
+        part = _steady(rows, drift)
+        self.parts.update(dict.fromkeys(group, part))
         return part
 
 
+def _groups(keys: Iterable[SceneKey]) -> list[list[SceneKey]]:
+    """Scenes that differ by their seeds alone."""
+    groups: dict[tuple[float, float], list[SceneKey]] = {}
+    for key in keys:
+        groups.setdefault((key.ratio, key.dt), []).append(key)
+    return list(groups.values())
+
+
 def _steady(series: Sequence[np.ndarray], drift: float) -> SteadyPart:
-    """Steady part of the first series, where the others are steady too; each (cycles,)."""
-    parts = [steady_part(row, drift) for row in series if np.isfinite(row).all()]
+    """Steady part of the first series, where the others are too; each (seeds, cycles)."""
+    parts = [steady_part(rows, drift) for rows in series if np.isfinite(rows).all()]
     first = parts[0]
     shares = [part.drift / abs(part.mean) for part in parts if part.mean != 0.0]
     return replace(

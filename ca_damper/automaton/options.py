@@ -14,7 +14,16 @@ from ca_damper.contracts import check_members, members_of
 from ca_damper.filling import Structure
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, flag, fraction, plain_fields, positive, shown, whole
+from taichi_dem.kit.validation import (
+    choice,
+    flag,
+    fraction,
+    plain_fields,
+    positive,
+    shown,
+    told_apart,
+    whole,
+)
 
 RULES = ("paper", "place")
 #: Options that only the rules of the paper have; the others want these values.
@@ -302,9 +311,10 @@ class Automaton:
         """
         rows = clearance / self.width + particles / self.columns
         if abs(rows - round(rows)) > 1e-6:
+            got, _ = told_apart(rows, round(rows), 4)
             raise InputError(
                 f"clearances above {particles} particles must leave whole cells of "
-                f"{self.width:g} m, got {clearance:g}: {rows:.4g} rows"
+                f"{self.width:g} m, got {clearance:g}: {got} rows"
             )
         return replace(self, rows=round(rows))
 
@@ -317,9 +327,10 @@ class Automaton:
             )
         positive("dt", dt)
         if not dt < self.longest_dt:
+            got, most = told_apart(dt, self.longest_dt, 6)
             raise InputError(
-                f"dt must lie in (0, {self.longest_dt:g}) s, in which no particle crosses a cell "
-                f"of {self.width:g} m at v_max = {self.v_max:g} m/s, got {dt:g}"
+                f"dt must lie in (0, {most}) s, in which no particle crosses a cell "
+                f"of {self.width:g} m at v_max = {self.v_max:g} m/s, got {got}"
             )
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:

@@ -26,7 +26,7 @@ COLUMNS = {
 
 
 def from_csv(
-    path: FileName, column: Optional[str] = None, *, correct_baseline: bool = True
+    path: FileName, column: Optional[str] = None, *, correct_baseline: bool = False
 ) -> Signal:
     """Signal from a CSV file, such as a measured motion of a base.
 
@@ -40,9 +40,9 @@ def from_csv(
         CSV file.
     column : str, optional
         Column to take; needed where there are several of them.
-    correct_baseline : bool, default True
+    correct_baseline : bool, default False
         For an acceleration: subtract a straight line so that the motion ends at rest where it
-        began, as in ``from_samples``.
+        began, as in ``from_samples``; right for a record with an offset, wrong for a shock.
 
     Returns
     -------

@@ -172,6 +172,22 @@ class Excitation:
         """
         return f"base {_identity(self.base)}, force {_identity(self.force)}"
 
+    def in_words(self) -> tuple[str, ...]:
+        """What acts on base and container, and what was done to samples of it.
+
+        Returns
+        -------
+        tuple of str
+            A part of a sentence for each Signal and for a SineForce.
+        """
+        told = []
+        for role, value, unit in (("base", self.base, "m"), ("force", self.force, "N")):
+            given = (value,) if isinstance(value, (Signal, SineForce)) else value or ()
+            for one in {id(one): one for one in given}.values():
+                words = one.in_words(unit) if isinstance(one, Signal) else shown(one)
+                told.append(f"{role} {words}")
+        return tuple(told)
+
     def duration(self, scenes: int) -> np.ndarray:
         """Time up to which each scene is excited.
 

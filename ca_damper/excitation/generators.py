@@ -13,7 +13,7 @@ from ca_damper.excitation.samples import OF
 from ca_damper.excitation.signal import MOST_NODES, Signal, spline
 from taichi_dem.kit.elementary import sines_and_cosines
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, finite, positive, several, shown, whole
+from taichi_dem.kit.validation import choice, finite, positive, several, shown, told_apart, whole
 
 #: Nodes in a cycle of the highest frequency, unless the user gives a step.
 NODES_A_CYCLE = 40
@@ -198,9 +198,10 @@ def random_vibration(
     end = float(time[-1])
     lines = np.arange(math.ceil(points[0] * end - 1e-9), math.floor(points[-1] * end + 1e-9) + 1)
     if not len(lines):
+        got, least = told_apart(duration, 1.0 / (points[-1] - points[0]))
         raise InputError(
-            f"duration must be at least {1.0 / (points[-1] - points[0]):.3g} s, so that lines of "
-            f"the spectrum lie between {points[0]:g} and {points[-1]:g} Hz, got {duration:g}"
+            f"duration must be at least {least} s, so that lines of the spectrum lie between "
+            f"{points[0]:g} and {points[-1]:g} Hz, got {got}"
         )
     amplitude = np.sqrt(2.0 * _between(points, levels, lines / end) / end)
     if of == "acceleration":
@@ -227,15 +228,13 @@ def _grid(duration, highest, step):
     duration = positive("duration", duration)
     step = 1.0 / (NODES_A_CYCLE * highest) if step is None else positive("step", step)
     if step > 1.0 / (4.0 * highest):
+        got, most = told_apart(step, 1.0 / (4.0 * highest))
         raise InputError(
-            f"step must be at most {1.0 / (4.0 * highest):.3g} s, a quarter of the shortest cycle, "
-            f"got {step:g}"
+            f"step must be at most {most} s, a quarter of the shortest cycle, got {got}"
         )
     if duration / step > MOST_NODES - 3:
-        raise InputError(
-            f"duration must be at most {(MOST_NODES - 3) * step:.3g} s in steps of {step:.3g} s, "
-            f"got {duration:g}"
-        )
+        got, most = told_apart(duration, (MOST_NODES - 3) * step)
+        raise InputError(f"duration must be at most {most} s in steps of {step:.3g} s, got {got}")
     count = max(4, 2 * math.ceil(0.5 * duration / step * (1.0 - 1e-12)))
     return duration / count * np.arange(count + 1)
 

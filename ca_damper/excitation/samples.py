@@ -6,24 +6,27 @@ sinc^4(f) 3 / (2 + cos(2 pi f)), f by the sampling rate, is then within 1.5 % of
 the sampling rate.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ca_damper.excitation.signal import LEAST_NODES, Signal, end_slope, integral, spline
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, flag, float_array, shown
+from taichi_dem.kit.validation import choice, flag, float_array, shown, told_apart
 
 #: What samples are of: the signal itself or its second derivative.
 OF = ("value", "acceleration")
 #: Distance of a time from the even grid, as a share of the step: times may be rounded.
 _UNEVEN = 0.1
+#: Distance that is rounding, as a share of the largest time.
+_ROUNDED = 1e-12
 #: Samples that a cycle needs, and the share of the power in slower cycles.
 SAMPLES_A_CYCLE, POWER_SHARE = 4.0, 0.99
 
 
 def from_samples(
-    time_s: Any, values: Any, *, of: str = "value", correct_baseline: bool = True
+    time_s: Any, values: Any, *, of: str = "value", correct_baseline: bool = False
 ) -> Signal:
     """Signal through measured samples; its own time counts from the first of them.
 
@@ -36,9 +39,10 @@ def from_samples(
     of : str, default "value"
         ``"value"``: of the signal itself, such as a displacement [m] or a force [N].
         ``"acceleration"``: of its second derivative [m/s^2], which is integrated twice from rest.
-    correct_baseline : bool, default True
+    correct_baseline : bool, default False
         Subtract from an acceleration the straight line that lets the motion end at rest where it
-        began; without it, small offsets integrate to large drifts.
+        began: of a record with an offset, which integrates to a large drift. A shock changes the
+        speed for good, and this line would take that away. A report says what was done.
 
     Returns
     -------
@@ -69,13 +73,16 @@ def checked_signal(
     times: np.ndarray, samples: np.ndarray, of: str, correct_baseline: bool, label: str
 ) -> Signal:
     """Signal of samples as ``from_samples``, for columns of finite numbers."""
-    step = _even_step(times)
+    step, evened = _even_step(times)
     _check_spectrum(step, samples)
     if of == "value":
-        return spline(step, samples, label)
-    return (
-        _at_rest_again(step, samples, label) if correct_baseline else integral(step, samples, label)
-    )
+        made, treated = spline(step, samples, label), ""
+    elif correct_baseline:
+        made, treated = _at_rest_again(step, samples, label)
+    else:
+        made = integral(step, samples, label)
+        treated = "integrated twice from rest, no base line taken off"
+    return replace(made, treated="; ".join(filter(None, (evened, treated))))
 
 
 def _column(name, values):
@@ -91,14 +98,16 @@ def _column(name, values):
 
 
 def _even_step(times):
-    """Step of evenly spaced times; InputError that names the first one that is not."""
+    """Step of evenly spaced times, and by how much they were evened, in words.
+
+    InputError that names the first one that is not even.
+    """
     steps = np.diff(times)
     usual = float(np.median(steps))
     if (steps <= 0.0).any():
         k = int(np.flatnonzero(steps <= 0.0)[0]) + 1
-        raise InputError(
-            f"times must ascend, got {times[k]:g} s after {times[k - 1]:g} s in sample {k + 1}"
-        )
+        late, early = told_apart(times[k], times[k - 1], 6)
+        raise InputError(f"times must ascend, got {late} s after {early} s in sample {k + 1}")
     if (steps > 1.5 * usual).any():
         k = int(np.flatnonzero(steps > 1.5 * usual)[0]) + 1
         raise InputError(
@@ -113,7 +122,8 @@ def _even_step(times):
             f"times must be even to {_UNEVEN:g} of their step of {step:g} s, got {times[k]:g} s in "
             f"sample {k + 1}, {late[k]:.3g} s off"
         )
-    return step
+    is_even = late.max() <= _ROUNDED * max(step, abs(times[0]), abs(times[-1]))
+    return step, "" if is_even else f"times evened by up to {late.max():.2g} s"
 
 
 def _check_spectrum(step, samples):
@@ -130,14 +140,15 @@ def _check_spectrum(step, samples):
     most = float(frequency[np.searchsorted(np.cumsum(power), POWER_SHARE * total)])
     # To within the width of the window's lobe.
     if most > 1.0 / (SAMPLES_A_CYCLE * step) + 2.0 / (count * step):
+        got, longest = told_apart(step, 1.0 / (SAMPLES_A_CYCLE * most))
         raise InputError(
-            f"the step of the samples must be at most {1.0 / (SAMPLES_A_CYCLE * most):.3g} s, as "
-            f"{100 * POWER_SHARE:g} % of their power reaches to {most:.4g} Hz, got {step:.3g} s"
+            f"the step of the samples must be at most {longest} s, as {100 * POWER_SHARE:g} % of "
+            f"their power reaches to {most:.4g} Hz, got {got} s"
         )
 
 
 def _at_rest_again(step, samples, label):
-    """Double integral less that of the line a + b t that lets it end at rest in zero.
+    """Double integral less that of the line a + b t that lets it end at rest in zero, and words.
 
     At the end T the line has the speed a T + b T^2 / 2 and the place a T^2 / 2 + b T^3 / 6.
     """
@@ -146,4 +157,8 @@ def _at_rest_again(step, samples, label):
     slope = 6.0 * (speed * total - 2.0 * place) / total**3
     offset = speed / total - 0.5 * slope * total
     line = offset + slope * step * np.arange(len(samples))
-    return integral(step, samples - line, label)
+    treated = (
+        "integrated twice from rest, less a base line of acceleration from "
+        f"{line[0]:.3g} to {line[-1]:.3g} m/s^2 that takes {speed:.3g} m/s and {place:.3g} m away"
+    )
+    return integral(step, samples - line, label), treated

@@ -21,6 +21,8 @@ from taichi_dem.kit.validation import finite, float_array, positive, shown
 
 #: Nodes of a signal: fewer determine no spline with "not a knot", more find no memory.
 LEAST_NODES, MOST_NODES = 4, 2**24
+# What is rounding, as a share of the largest value.
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,8 @@ class Signal:
         Second derivative at the nodes, shape (nodes,).
     label : str, default "signal"
         Description in words.
+    treated : str, default ""
+        What was done to samples before the signal was made of them, in words.
 
     Raises
     ------
@@ -55,6 +59,7 @@ class Signal:
     value: np.ndarray
     bend: np.ndarray
     label: str = "signal"
+    treated: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "step", positive("step", self.step))
@@ -102,7 +107,7 @@ class Signal:
         Parameters
         ----------
         factor : float
-            Factor.
+            Factor; ``treated`` stays that of the samples before.
 
         Returns
         -------
@@ -116,8 +121,33 @@ class Signal:
         """
         if not finite(factor):
             raise InputError(f"factor must be a finite number, got {shown(factor)}")
-        label = f"{factor:g} times {self.label}"
-        return Signal(self.step, float(factor) * self.value, float(factor) * self.bend, label)
+        label, times = f"{factor:g} times {self.label}", float(factor)
+        return Signal(self.step, times * self.value, times * self.bend, label, self.treated)
+
+    def in_words(self, unit: str) -> str:
+        """What acts on a structure: origin, length, what was done to samples, and both ends.
+
+        Parameters
+        ----------
+        unit : str
+            Unit of the value.
+
+        Returns
+        -------
+        str
+            A part of a sentence.
+        """
+        values, slopes, _ = self.at(np.array([0.0, self.duration]))
+        size = _ROUNDING * np.abs(self.value).max()
+        values, slopes = _unless_tiny(values, size), _unless_tiny(slopes, size / self.step)
+        ends = (f"at {y:.3g} {unit} and {v:.3g} {unit}/s" for y, v in zip(values, slopes))
+        done = f"{self.treated}; " if self.treated else ""
+        return f"{self.label}, {self.duration:.4g} s; {done}begins {{}}, ends {{}}".format(*ends)
+
+
+def _unless_tiny(values, size):
+    """Values, 0 for those that are rounding."""
+    return np.where(np.abs(values) <= size, 0.0, values)
 
 
 def spline(step: float, value: np.ndarray, label: str) -> Signal:

@@ -9,7 +9,7 @@ from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import positive
+from taichi_dem.kit.validation import positive, told_apart
 
 #: Fewer would leave first harmonics, and the series of ``oscillator``, to chance.
 LEAST_STEPS_PER_CYCLE = 40
@@ -28,9 +28,9 @@ def steps_per_cycle(frequency: float, largest_dt: float) -> int:
     if not LEAST_STEPS_PER_CYCLE <= count <= MOST_STEPS_PER_CYCLE:
         low = 1.0 / (frequency * MOST_STEPS_PER_CYCLE)
         high = 1.0 / (frequency * LEAST_STEPS_PER_CYCLE)
-        raise InputError(
-            f"dt must lie in [{low:.3g}, {high:.3g}] s at {frequency:g} Hz, got {largest_dt:g}"
-        )
+        got, bound = told_apart(largest_dt, low if largest_dt < low else high)
+        low_s, high_s = (bound, f"{high:.3g}") if largest_dt < low else (f"{low:.3g}", bound)
+        raise InputError(f"dt must lie in [{low_s}, {high_s}] s at {frequency:g} Hz, got {got}")
     return count
 
 

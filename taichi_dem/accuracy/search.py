@@ -15,6 +15,7 @@ from taichi_dem.kit.accuracy.branches import BranchedAnswer, branches_of, cluste
 from taichi_dem.kit.accuracy.step_error import StepError, step_error
 from taichi_dem.kit.accuracy.student import mean_and_deviation, t_quantile
 from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.validation import told_apart
 
 #: Halvings of the step until one is stable, and from there on; of one refinement.
 _MOST_COARSE, _MOST_FINE, _MOST_AT_ONCE = 6, 7, 2
@@ -98,9 +99,8 @@ class Search:
                 raise SimulationDiverged(self.runs.failure)
         first, needed = self.levels[0], self.runs.seconds + 2.0 * self.runs.cost[self.levels[0]]
         if needed > self.budget:
-            raise InputError(
-                f"budget_s must leave time for two runs, {needed:.2g} s here, got {self.budget:g}"
-            )
+            got, least = told_apart(self.budget, needed, 2)
+            raise InputError(f"budget_s must leave time for two runs, {least} s here, got {got}")
         if self._single(first + 1) is None:
             raise SimulationDiverged(self.runs.failure)
         self.levels.append(first + 1)

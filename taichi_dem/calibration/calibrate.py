@@ -17,7 +17,7 @@ from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.elasticity.moduli import POISSON, bond_moduli, checked_poisson, elastic_constants
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import between, instance, positive, whole
+from taichi_dem.kit.validation import between, instance, positive, told_apart, whole
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.stability.elastic_report import element_sizes
@@ -283,10 +283,8 @@ def _out_of_reach(targets, found, tolerance, poisson):
     if not missed or poisson not in POISSON:
         return ()
     side = "at most" if poisson == POISSON[1] else "at least"
-    return (
-        f"poisson must be {side} {found.poisson:.3g}, which bonds give in this mesh, "
-        f"got {targets.poisson:g}",
-    )
+    got, bound = told_apart(targets.poisson, found.poisson)
+    return (f"poisson must be {side} {bound}, which bonds give in this mesh, got {got}",)
 
 
 def _strengths(material, run, targets, tolerance):

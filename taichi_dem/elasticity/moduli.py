@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import finite, positive, shown
+from taichi_dem.kit.validation import finite, positive, shown, told_apart
 
 #: E_t / E_n, then 3 K / E_n and G over that of uniform tractions: means over five periodic Delaunay
 #: meshes of 990 to 1900 tetrahedra about points that repel each other, which differ among each
@@ -68,9 +68,9 @@ def elastic_constants(normal: float, shear: float) -> tuple[float, float]:
     normal, shear = positive("normal", normal), positive("shear", shear)
     ratio, (least, most) = shear / normal, (_MEASURED[0, 0], _MEASURED[-1, 0])
     if not least <= ratio <= most:
-        raise InputError(
-            f"shear must be from {least:g} to {most:g} times the normal modulus, got {ratio:g}"
-        )
+        got, bound = told_apart(ratio, least if ratio < least else most)
+        side = "at least" if ratio < least else "at most"
+        raise InputError(f"shear must be {side} {bound} times the normal modulus, got {got}")
     return normal * _young_at(ratio), _poisson_at(ratio)
 
 

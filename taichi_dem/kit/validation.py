@@ -1,6 +1,7 @@
 """Checks of user input: the value is returned, or InputError names it and the allowed range."""
 
 import dataclasses
+import decimal
 import math
 import numbers
 import os
@@ -27,6 +28,8 @@ AUTO = "auto"
 _QUOTED = 80
 #: Bytes of the name of a file beside its number and ending: file systems take 255.
 _STEM = 200
+# Digits by which any two numbers differ.
+_MOST_DIGITS = 17
 
 
 def shown(value: Any) -> str:
@@ -37,6 +40,22 @@ def shown(value: Any) -> str:
         # Python prints no whole number of more than 4300 digits.
         text = f"a whole number of {value.bit_length()} bits"
     return text if len(text) <= _QUOTED else f"{text[: _QUOTED - 3]}..."
+
+
+def told_apart(value: float, bound: float, digits: int = 3) -> tuple[str, str]:
+    """A refused value and the bound that it misses, in the fewest digits that tell them apart.
+
+    digits: of the bound at least; the value has six. The bound is rounded away from the value, so
+    that it is allowed as it reads.
+    """
+    given, limit = float(value), float(bound)
+    side = decimal.ROUND_FLOOR if given > limit else decimal.ROUND_CEILING
+    for count in range(digits, _MOST_DIGITS):
+        if given == limit or f"{given:.{count}g}" != f"{limit:.{count}g}":
+            rounding = decimal.Context(prec=count, rounding=side)
+            inward = float(rounding.create_decimal(repr(limit)))
+            return f"{given:.{max(count, 6)}g}", f"{inward:.{count}g}"
+    return repr(given), repr(limit)
 
 
 def plain(value: Any) -> Any:
@@ -107,7 +126,12 @@ def positive(name: str, value: Any, zero_allowed: bool = False) -> float:
 def between(name: str, value: Any, least: float, most: float) -> float:
     """The value as a float; InputError unless it is a number from least to most."""
     if not finite(value) or not least <= float(value) <= most:
-        raise InputError(f"{name} must be a number from {least:g} to {most:g}, got {shown(value)}")
+        low, high = f"{least:g}", f"{most:g}"
+        if finite(value) and value < least:
+            low = told_apart(value, least, 6)[1]
+        elif finite(value):
+            high = told_apart(value, most, 6)[1]
+        raise InputError(f"{name} must be a number from {low} to {high}, got {shown(value)}")
     return float(value)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
-from taichi_dem.kit.validation import FileName, path_name, positive
+from taichi_dem.kit.validation import FileName, path_name, positive, told_apart
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.gmsh import session
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
@@ -69,9 +69,10 @@ def _refuse_too_many(name, element, scale, volume):
     volume = volume * scale**3
     least = (_PER_CUBE * volume / MOST_BODIES) ** (1.0 / 3.0)
     if element < least:
+        got, bound = told_apart(element, least)
         raise InputError(
-            f"element must be at least {least:.3g} m, for {MOST_BODIES} tetrahedra at most in the "
-            f"{volume:.3g} m^3 of {name}, got {element:g}"
+            f"element must be at least {bound} m, for {MOST_BODIES} tetrahedra at most in the "
+            f"{volume:.3g} m^3 of {name}, got {got}"
         )
 
 

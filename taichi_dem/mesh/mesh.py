@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import FileName, flag, shown, word
+from taichi_dem.kit.validation import FileName, flag, shown, told_apart, word
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.body_groups import checked_body_groups
 from taichi_dem.mesh.checked_groups import checked_groups
@@ -405,7 +405,8 @@ def _refuse_extent(points):
     """Refuse a mesh so small that its inertia falls to zero."""
     extent = np.ptp(points, axis=0).max()
     if extent < _LEAST_EXTENT:
-        raise InputError(f"points must span at least {_LEAST_EXTENT:g} m, got {extent:.3g} m")
+        got, least = told_apart(extent, _LEAST_EXTENT)
+        raise InputError(f"points must span at least {least} m, got {got} m")
 
 
 def _refuse_coincident(points):

@@ -31,6 +31,7 @@ from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.accuracy.steady_runs import BudgetSpent
 from ca_damper.progress import BatchProgress, OpenEnded
 from taichi_dem.kit.accuracy.answer import ErrorParts
+from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.progress.progress import Progress
 from tests.processes import users_environment
 
@@ -92,6 +93,28 @@ def test_the_same_question_has_the_same_bits_and_the_same_runs():
     assert (first.plan.pilot_s, first.plan.final_s > 0.0) == (0.0, True)
 
 
+def test_a_budget_that_is_not_reached_changes_no_bit():
+    plain, paid = grains(), grains(budget_s=1e6)
+    assert (plain.value, plain.parts, plain.shortfall) == (paid.value, paid.parts, paid.shortfall)
+    assert np.array_equal(plain.result.rms, paid.result.rms)
+    assert plain.plan.method == paid.plan.method
+
+
+def test_seeds_that_differ_widen_the_bar_as_student_says(monkeypatch):
+    """The bar holds t standard errors of the seeds' mean, whatever their cycles tell."""
+    monkeypatch.setattr(MODULE, "SceneRuns", OwnMotions)
+    for seeds in (3, 6, 12):
+        answer = grains(0.1, seeds=seeds)
+        own = answer.result.rms[0, 0]
+        half = t_quantile(0.95, seeds - 1) * own.std(ddof=1) / math.sqrt(seeds)
+        assert math.hypot(answer.parts.chance, answer.parts.sampling) >= 0.95 * half
+
+
+def test_one_seed_says_that_the_spread_is_not_in_its_bar():
+    alone = grains(0.1, seeds=1)
+    assert not alone.reached and "spread from seed to seed was not measured" in alone.shortfall
+
+
 def test_a_smaller_tolerance_has_a_smaller_bar_and_costs_more_cycles():
     wide, narrow = grains(0.1), grains(0.004)
     assert wide.reached and narrow.reached and narrow.error <= 0.004 * narrow.value
@@ -150,6 +173,14 @@ class TwoMotions:
         return {**found, "rms": less * found["rms"]}
 
 
+class OwnMotions(TwoMotions):
+    """Stands for runs of a filling of which each seed swings by a share of its own."""
+
+    def measures(self, key, *rest):
+        found = self.runs.measures(key, *rest)
+        return {**found, "rms": (1.0 + 0.01 * (7 * key.seed % 13)) * found["rms"]}
+
+
 def test_several_steady_motions_come_as_branches(monkeypatch):
     """Three seeds differ by more than 1 %: twelve make two clusters of 8 and 4."""
     monkeypatch.setattr(MODULE, "SceneRuns", TwoMotions)
@@ -163,7 +194,7 @@ def test_several_steady_motions_come_as_branches(monkeypatch):
 
 
 def test_a_budget_that_ends_before_further_seeds_gives_the_answer_of_those_before(monkeypatch):
-    """Seeds of two motions ask for more of them; the second round is not paid any more."""
+    """Seeds that differ ask for more of them; the second round is not paid any more."""
     rounds, go_steady = [], Reduction._make_steady
 
     def once(reduction):
@@ -172,7 +203,7 @@ def test_a_budget_that_ends_before_further_seeds_gives_the_answer_of_those_befor
             raise BudgetSpent(9.0)
         go_steady(reduction)
 
-    monkeypatch.setattr(MODULE, "SceneRuns", TwoMotions)
+    monkeypatch.setattr(MODULE, "SceneRuns", OwnMotions)
     monkeypatch.setattr(Reduction, "_make_steady", once)
     answer = grains(0.01, budget_s=5.0)
     assert len(rounds[1]) > len(rounds[0]) and answer.result.seeds == rounds[0]
@@ -194,7 +225,8 @@ def test_a_budget_that_ends_after_a_round_without_a_number_gives_the_round_befor
     monkeypatch.setattr(Reduction, "_estimates", lost)
     asked = {"particles": 20, "goal": goals.peak_rms(), "tolerance": 1e-4, **QUIET}
     answer = solve_response(Automaton(), seeds=3, budget_s=50.0, **asked)
-    assert len(rounds) == 2 and math.isfinite(answer.error) and answer.error > 0.0
+    # The last looks once more at what there is.
+    assert len(rounds) == 3 and math.isfinite(answer.error) and answer.error > 0.0
     assert "within budget_s of 50 s" in answer.shortfall
 
 

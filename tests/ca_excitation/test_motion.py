@@ -107,7 +107,7 @@ def test_a_container_on_a_moving_base_moves_as_the_signal():
 def test_an_acceleration_drives_the_base_by_its_double_integral():
     """A constant pull: linear in time, which the spline holds without an error."""
     time = np.arange(0.0, 1.0001, 0.01)
-    motion = excitation.from_samples(time, time, of="acceleration", correct_baseline=False)
+    motion = excitation.from_samples(time, time, of="acceleration")
     made = shake(Empty(), motion, particles=0, seeds=1)
     assert made.base == pytest.approx(made.time_s**3 / 6.0, abs=1e-15)
 

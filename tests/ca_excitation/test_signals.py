@@ -60,8 +60,8 @@ def test_an_acceleration_is_integrated_exactly_between_its_samples():
 def test_a_corrected_baseline_ends_at_rest_where_it_began():
     time = np.arange(0.0, 4.0, 0.01)
     pull = np.sin(OMEGA * time) + 0.05 + 0.02 * time
-    raw = excitation.from_samples(time, pull, of="acceleration", correct_baseline=False)
-    made = excitation.from_samples(time, pull, of="acceleration")
+    raw = excitation.from_samples(time, pull, of="acceleration")
+    made = excitation.from_samples(time, pull, of="acceleration", correct_baseline=True)
     assert abs(raw.value[-1]) > 0.3
     value, slope, _ = made.at(np.array([made.duration]))
     assert abs(value[0]) < 1e-12 and abs(slope[0]) < 1e-12
@@ -136,7 +136,7 @@ def test_a_file_is_read_by_the_units_of_its_columns(tmp_path):
     head = "time_ms,displacement_m,acceleration_g\n"
     rows = [(1e3 * t, y, y) for t, y in GOOD]
     both = written(tmp_path / "b.csv", rows, head)
-    pull = excitation.from_csv(both, "acceleration_g", correct_baseline=False)
+    pull = excitation.from_csv(both, "acceleration_g")
     assert pull.bend == pytest.approx([9.80665 * y for _, y in GOOD])
     with pytest.raises(InputError, match="column must say which"):
         excitation.from_csv(both)

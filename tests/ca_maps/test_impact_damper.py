@@ -42,6 +42,71 @@ def test_the_motion_obeys_the_equation_of_the_container(case):
     assert path.y[-1] == pytest.approx(sign * made.motion(u, made.half_cycle), rel=1e-8)
 
 
+def next_blow(made, u, state):
+    """(x, v, grain's velocity, time) after the next blow, turned over; its time by Newton."""
+    x, v, grain, begin = state
+    gap, t = np.array([x, v]) - made.motion(u, begin), made.half_cycle
+    for _ in range(8):
+        place, speed = made.motion(u, t) + made.free(t - begin) @ gap
+        t -= (x + grain * (t - begin) - place + made.clearance) / (grain - speed)
+    change = (1.0 + made.restitution) * (grain - speed) / (1.0 + made.mass_ratio)
+    after = -speed - made.mass_ratio * change
+    return np.array([-place, after, change - grain, t - made.half_cycle])
+
+
+def drawn(count):
+    """Dampers at random, and the speeds at which their grains could fly freely."""
+    rng = np.random.default_rng(76)
+    for _ in range(count):
+        numbers = rng.uniform([0.01, 0.2, 2e-3, 5.0], [0.5, 0.95, 40e-3, 7.0])
+        made = damper(*numbers)
+        for u in made.speeds:
+            if made._flies_freely(u):
+                yield made, u
+
+
+def differences(made, u, size):
+    """Jacobian of the map from blow to blow by central differences."""
+    state = np.array([*made.motion(u, 0.0), -u, 0.0])
+    assert next_blow(made, u, state) == pytest.approx(state, abs=1e-9)
+    columns = [
+        (next_blow(made, u, state + step) - next_blow(made, u, state - step)) / (2.0 * step.sum())
+        for step in size * np.diag([1e-7, 1e-6, 1e-6, 1e-7])
+    ]
+    return np.array(columns).T
+
+
+def test_small_changes_grow_from_blow_to_blow_by_the_multipliers():
+    """The Jacobian of 76 dampers by differences, of second order: half the size, a third is left.
+
+    Rounding of 1e-16 by 1e-7 is 1e-9 of the largest entry, and some of it the next order.
+    """
+    for made, u in drawn(76):
+        wide, near = differences(made, u, 1.0), differences(made, u, 0.5)
+        left = np.abs(wide - near) + 1e-7 * np.abs(near).max()
+        assert (np.abs(made._jacobian(u) - near) <= left).all()
+
+
+def test_a_motion_that_small_changes_leave_is_not_possible():
+    """Pushed by 1e-6 of its speed, it comes back or leaves in 200 blows as multipliers say."""
+    counts = {True: 0, False: 0}
+    for made, u in drawn(300):
+        largest = abs(made.multipliers(u)[0])
+        assert made.is_stable(u) == made.is_possible(u) == (largest < 1.0)
+        if 0.9 < largest < 1.1:
+            continue
+        state = exact = np.array([*made.motion(u, 0.0), -u, 0.0])
+        state = state * (1.0 + 1e-6)
+        for _ in range(200):
+            state = next_blow(made, u, state)
+            if not np.abs(state - exact).max() < 1e-2 * u:
+                break
+        left = not np.abs(state - exact).max() < 1e-6 * u
+        assert left == (largest > 1.0), (made, u)
+        counts[left] += 1
+    assert min(counts.values()) > 10
+
+
 @pytest.mark.parametrize(
     "name, value", [("particle_mass", 0.0), ("clearance", -1.0), ("frequency", np.nan)]
 )

@@ -7,6 +7,7 @@ import numpy as np
 
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import told_apart
 
 #: Largest page [bytes].
 MOST_BYTES = 30_000_000
@@ -49,9 +50,8 @@ def select_frames(
     most = int((MOST_BYTES / _BASE64 - other_bytes) // max(1, frame_bytes))
     if most < 2:
         size = _BASE64 * (2 * frame_bytes + other_bytes) / 1e6
-        raise InputError(
-            f"scene must fit a page of {MOST_BYTES / 1e6:.0f} MB, got {size:.0f} MB for two frames"
-        )
+        got, room = told_apart(size, MOST_BYTES / 1e6)
+        raise InputError(f"scene must fit a page of {room} MB, got {got} MB for two frames")
     if len(kept) > most:
         notes.append(
             f"{most:,} of {len(kept):,} frames shown: a page has at most {MOST_BYTES // 10**6} MB."
