@@ -24,7 +24,7 @@ import numpy as np
 
 from ca_damper.oscillator import Oscillator
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import between, plain_fields, positive
+from taichi_dem.kit.validation import LARGEST, between, instance, plain_fields, positive
 
 #: Points of half a cycle: an odd number, for Simpson's rule.
 _POINTS = 401
@@ -77,6 +77,7 @@ class ImpactDamper:
         for name in ("particle_mass", "clearance", "frequency"):
             positive(name, getattr(self, name))
         between("restitution", self.restitution, 0.0, 1.0)
+        instance("oscillator", self.oscillator, Oscillator)
         ratio = self.oscillator.damping_ratio
         if not ratio < 1.0:
             raise InputError(f"damping_ratio of the oscillator must be below 1, got {ratio:.6g}")
@@ -139,6 +140,7 @@ class ImpactDamper:
         own = self.oscillator
         decay, square = 0.5 * own.damping / own.mass, own.stiffness / own.mass
         turn = math.sqrt(square - decay * decay)
+        t = between("t", t, -LARGEST, LARGEST)
         c, s = math.cos(turn * t), math.sin(turn * t) / turn
         return math.exp(-decay * t) * np.array([[c + decay * s, s], [-square * s, c - decay * s]])
 
@@ -157,6 +159,7 @@ class ImpactDamper:
         ndarray
             Displacement [m] and velocity [m/s].
         """
+        u, t = between("u", u, -LARGEST, LARGEST), between("t", t, -LARGEST, LARGEST)
         sine, cosine = self._forced @ [u, 1.0]
         c, s = math.cos(self.omega * t), math.sin(self.omega * t)
         forced = np.array([sine * c + cosine * s, self.omega * (cosine * c - sine * s)])
@@ -177,6 +180,7 @@ class ImpactDamper:
         float
             Position [m], counted from where the middle of the box is at x = 0.
         """
+        u, t = between("u", u, -LARGEST, LARGEST), between("t", t, -LARGEST, LARGEST)
         return 0.5 * u * self.half_cycle - u * t
 
     def start(self, u: float) -> Any:
@@ -196,7 +200,7 @@ class ImpactDamper:
         -----
         The phase of the forced motion is then that of the transfer function.
         """
-        sine, cosine = self._forced @ [u, 1.0]
+        sine, cosine = self._forced @ [between("u", u, -LARGEST, LARGEST), 1.0]
         turn = np.angle(self.oscillator.transfer(self.frequency)) - math.atan2(sine, cosine)
         since = turn / self.omega
         t = since % self.half_cycle

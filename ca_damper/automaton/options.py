@@ -278,6 +278,7 @@ class Automaton:
         float
             Clearance [m].
         """
+        whole("particles", particles, 0, 2**31 - 1)
         return self.width * (self.rows - particles / self.columns)
 
     def with_clearance(self, particles: int, clearance: float) -> "Automaton":
@@ -300,7 +301,8 @@ class Automaton:
         InputError
             The box would end within a cell.
         """
-        rows = clearance / self.width + particles / self.columns
+        whole("particles", particles, 0, 2**31 - 1)
+        rows = positive("clearance", clearance, True) / self.width + particles / self.columns
         if abs(rows - round(rows)) > 1e-6:
             raise InputError(
                 f"clearances above {particles} particles must leave whole cells of "

@@ -12,7 +12,7 @@ import numpy as np
 
 from ca_damper.excitation.signal import LEAST_NODES, Signal, end_slope, integral, spline
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, flag, shown
+from taichi_dem.kit.validation import choice, flag, real_numbers, shown
 
 #: What samples are of: the signal itself or its second derivative.
 OF = ("value", "acceleration")
@@ -79,11 +79,8 @@ def checked_signal(
 
 
 def _column(name, values):
-    try:
-        column = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        column = np.empty(0)
-    if column.ndim != 1 or len(column) < LEAST_NODES or not np.isfinite(column).all():
+    column = real_numbers(name, values)
+    if column.ndim != 1 or len(column) < LEAST_NODES:
         raise InputError(
             f"{name} must be at least {LEAST_NODES} finite numbers, got {shown(values)}"
         )

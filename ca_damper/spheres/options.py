@@ -267,6 +267,7 @@ class Spheres:
         float
             Clearance [m].
         """
+        whole("particles", particles, 0, 2**31 - 1)
         return self.height - self.diameter * particles / self.lattice[0]
 
     def with_clearance(self, particles: int, clearance: float) -> "Spheres":
@@ -284,8 +285,9 @@ class Spheres:
         Spheres
             The same options with another height.
         """
-        layers = particles / self.lattice[0]
-        return replace(self, height=self.diameter * layers + clearance)
+        layers = whole("particles", particles, 0, 2**31 - 1) / self.lattice[0]
+        free = positive("clearance", clearance, zero_allowed=True)
+        return replace(self, height=self.diameter * layers + free)
 
     def check(self, particles: int, dt: float) -> None:
         """Refuse an invalid number of spheres or step [s].

@@ -117,7 +117,7 @@ class Match:
         bool
             True where the target is met.
         """
-        return abs(self.misfit) <= tolerance
+        return abs(self.misfit) <= positive("tolerance", tolerance, zero_allowed=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.effects.pressure import FacePressure
 from taichi_dem.kit.elementary import sine_and_cosine
-from taichi_dem.kit.validation import positive, word
+from taichi_dem.kit.validation import positive, real_numbers, word
 from taichi_dem.materials import Material
 
 
@@ -112,7 +112,7 @@ class GasPressure(FacePressure):
         ndarray
             Pressure [Pa].
         """
-        times = np.ascontiguousarray(times, dtype=np.float64) - self.start
+        times = np.ascontiguousarray(real_numbers("times", times)) - self.start
         pressure = np.zeros_like(times)
         _sample(self.peak, self.rise, self.decay_ratio, times, pressure)
         return pressure
