@@ -237,7 +237,8 @@ class Result(RunExports):
 
         Examples
         --------
-        >>> result = simulate(scene, until=1e-4, frames=20)  # doctest: +SKIP
+        >>> method = ImplicitDashpots()
+        >>> result = simulate(scene, method=method, until=1e-4, frames=20)  # doctest: +SKIP
         >>> result.show("blast.html")  # doctest: +SKIP
         """
         # Imported here, so that matplotlib loads only where something is shown.
