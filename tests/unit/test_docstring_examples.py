@@ -242,7 +242,7 @@ def test_examples_call_what_is_there_as_it_may_be_called():
         ("simulate(scene, until=1e-4)", "missing a required argument: 'method'"),
         ("simulate(scene, method=Uniform(1e-7), until=1e-4).shows()", "Result has no shows"),
         ("run = result.frame(1, 2)", "too many positional arguments"),
-        ("simulate(blast, method=1, until=1e-4)", "no name blast"),
+        ("simulate(shot, method=1, until=1e-4)", "no name shot"),
         ("result.plot.energy(where='x')", "got an unexpected keyword argument 'where'"),
         ("from taichi_dem import nothing", "taichi_dem has no nothing"),
     ],
