@@ -14,6 +14,7 @@ from ca_damper.contracts import check_members, members_of
 from ca_damper.filling import Structure
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.likely_units import GRAIN, GRAIN_MASS, in_unit
 from taichi_dem.kit.validation import choice, flag, fraction, plain_fields, positive, shown, whole
 
 RULES = ("paper", "place")
@@ -136,6 +137,8 @@ class Automaton:
             fraction(name, getattr(self, name))
         for name in ("width", "particle_mass", "v_max"):
             positive(name, getattr(self, name))
+        in_unit("width", self.width, GRAIN)
+        in_unit("particle_mass", self.particle_mass, GRAIN_MASS, self.particle_mass / self.width**3)
         for name in ("gravity", "static_threshold"):
             positive(name, getattr(self, name), zero_allowed=True)
         choice("rules", self.rules, RULES)

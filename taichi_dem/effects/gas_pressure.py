@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.effects.pressure import FacePressure
 from taichi_dem.kit.elementary import sine_and_cosine
+from taichi_dem.kit.likely_units import BLAST_RISE, PRESSURE, in_unit
 from taichi_dem.kit.validation import positive, real_numbers, word
 from taichi_dem.materials import Material
 
@@ -76,8 +77,8 @@ class GasPressure(FacePressure):
         start: float = 0.0,
     ):
         self.group = word("group", group)
-        self.peak = positive("peak", peak)
-        self.rise = positive("rise", rise)
+        self.peak = in_unit("peak", positive("peak", peak), PRESSURE)
+        self.rise = in_unit("rise", positive("rise", rise), BLAST_RISE)
         self.decay_ratio = positive("decay_ratio", decay_ratio)
         self.start = positive("start", start, zero_allowed=True)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done, write_text
+from taichi_dem.kit.likely_units import EDGE, in_unit
 from taichi_dem.kit.timeout import run_with_timeout
 from taichi_dem.kit.validation import FileName, path_name, positive
 from taichi_dem.mesh.cell_groups import body_groups_of, volumes_of
@@ -38,6 +39,7 @@ from taichi_dem.mesh.gmsh_names import keyed_by_dimension, made_name, physical_n
 from taichi_dem.mesh.mesh import Mesh, checked_mesh, welded_numbers
 from taichi_dem.mesh.parts_in_files import unbonded_places
 from taichi_dem.mesh.split import folded_or_flat, shape_of, tetrahedra_in, triangles_in
+from taichi_dem.mesh.tetrahedra import edge_lengths
 
 #: Time that a reader may take [s], and what it reads at the slowest [byte/s]: some of meshio's wait
 #: for ever for the rest of a file that was cut off.
@@ -103,6 +105,8 @@ def read_mesh(
     except InputError as error:
         cells = _cell_at_fault(raw) if "tetrahedra " in str(error) else ""
         raise InputError(f"mesh file {path}: {error}{cells}") from None
+    edge = np.median(edge_lengths(mesh.points, mesh.tetrahedra))
+    in_unit(f"median edge of mesh file {path} at scale={scale:g}", float(edge), EDGE)
     told = [cells_dropped(printed), *parts_dropped(raw, unread)]
     told.append(unbonded_places(mesh.points, mesh.tetrahedra))
     told = [sentence for sentence in told if sentence]
