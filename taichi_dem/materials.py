@@ -19,7 +19,7 @@ from taichi_dem.elasticity.bond_rules import (
 )
 from taichi_dem.elasticity.moduli import bond_moduli
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.likely_units import ANGLE, DENSITY, ENERGY, MODULUS, STRENGTH, in_unit
+from taichi_dem.kit.likely_units import ANGLE, DENSITY, MODULUS, STRENGTH, in_unit
 from taichi_dem.kit.validation import LARGEST, SMALLEST, finite, plain_fields, positive, shown
 
 #: Fields whose number tells by its size when another unit is meant.
@@ -27,7 +27,6 @@ _QUANTITIES = {
     "density": DENSITY,
     "tensile_strength": STRENGTH,
     "cohesion": STRENGTH,
-    "fracture_energy": ENERGY,
 }
 _MAY_BE_ZERO = frozenset(
     {"normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"}

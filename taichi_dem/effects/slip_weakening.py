@@ -7,7 +7,6 @@ import taichi as ti
 
 from taichi_dem.effects.base import HARMLESS, NEAR, Effect
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.likely_units import ENERGY, in_unit
 from taichi_dem.kit.types import vec2
 from taichi_dem.kit.validation import positive
 from taichi_dem.materials import Material
@@ -59,8 +58,7 @@ class SlipWeakening(Effect):
     releases = True
 
     def __init__(self, fracture_energy: float):
-        checked = positive("fracture_energy", fracture_energy)
-        self.fracture_energy = in_unit("fracture_energy", checked, ENERGY)
+        self.fracture_energy = positive("fracture_energy", fracture_energy)
 
     def check_material(self, material: Material) -> None:
         """Raise InputError for a material without cohesion, or too stiff for the energy."""

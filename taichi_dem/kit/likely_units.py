@@ -27,16 +27,14 @@ class Quantity(NamedTuple):
     others: tuple[tuple[float, float, str], ...]
 
 
-#: Rocks, concrete, ice and metals have 0.5 to 20 g/cm^3.
-DENSITY = Quantity("kg/m^3", ((0.5, 25.0, "g/cm^3"),))
+#: Ice, concrete, rocks and metals have 0.9 to 8.9 g/cm^3; a foam some 15 kg/m^3.
+DENSITY = Quantity("kg/m^3", ((0.8, 9.0, "g/cm^3"),))
 #: Rocks have 1 to 200 GPa; rubber 1e6 Pa, gels some 1e3 Pa.
 MODULUS = Quantity("Pa", ((0.5, 1e3, "GPa"),))
 #: Rocks have 0.1 to 300 MPa; loose soil some 1e3 Pa.
 STRENGTH = Quantity("Pa", ((0.1, 1e3, "MPa"),))
 #: Blasts and blows have 5 to 1000 MPa; 1 is the load of many a linear question.
 PRESSURE = Quantity("Pa", ((5.0, 1e3, "MPa"),))
-#: Rocks have 1 to 300 J/m^2, that is 0.001 to 0.3 N/mm.
-ENERGY = Quantity("J/m^2", ((1e-3, 0.5, "N/mm"),))
 #: Friction angles are 5 to 60 degrees.
 ANGLE = Quantity("degrees", ((0.05, 1.5, "radians"),))
 #: Gas rises within 0.01 to 1 ms, or 10 to 1000 us.

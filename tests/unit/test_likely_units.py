@@ -15,7 +15,7 @@ from tests.bad_input.options import ROCK
 
 #: How many of the unit on the left are one of the unit on the right.
 FACTOR = {
-    **{("kg/m^3", "g/cm^3"): 1e3, ("Pa", "GPa"): 1e9, ("Pa", "MPa"): 1e6, ("J/m^2", "N/mm"): 1e3},
+    **{("kg/m^3", "g/cm^3"): 1e3, ("Pa", "GPa"): 1e9, ("Pa", "MPa"): 1e6},
     **{("degrees", "radians"): 180.0 / np.pi, ("s", "ms"): 1e-3, ("s", "us"): 1e-6},
     **{("m", "mm"): 1e-3, ("m/s^2", "mm/s^2"): 1e-3, ("kg", "g"): 1e-3},
 }
@@ -40,7 +40,6 @@ CASES = [
     (lambda x: effects.Pressure("left", x), "values", 10.0, "Pa", "MPa"),
     (lambda x: effects.Pressure.triangle("left", x, 1e-5, 1e-5), "values", -30.0, "Pa", "MPa"),
     (lambda x: effects.Gravity((0.0, x, 0.0)), "acceleration", -9810.0, "m/s^2", "mm/s^2"),
-    (lambda x: effects.SlipWeakening(x), "fracture_energy", 0.1, "J/m^2", "N/mm"),
     (lambda x: rock(young=x), "young", 30.0, "Pa", "GPa"),
     (lambda x: rock(friction_angle=x), "friction_angle", 0.6, "degrees", "radians"),
     (lambda x: rock(density=x), "density", 2.35, "kg/m^3", "g/cm^3"),
