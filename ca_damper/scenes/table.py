@@ -8,7 +8,9 @@ from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import LARGEST, SMALLEST, choice, positive, shown, whole
 
-_WHOLE, _MAY_BE_ZERO = ("particles", "seed"), ("base_amplitude", "damping")
+_WHOLE = ("particles", "seed")
+#: A container that is not driven stands still: only a Batch needs its cycles.
+_MAY_BE_ZERO = ("frequency", "base_amplitude", "damping")
 #: Scenes of a table, and the largest seed.
 _MOST_SCENES, _MOST_SEED = 2**24, 2**31 - 1
 
