@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ca_damper.measures import MEASURE_UNITS
 from taichi_dem.kit.data_table import Table, Tabulated
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.optional import optional
+from taichi_dem.kit.validation import choice
 
 if TYPE_CHECKING:
     from ca_damper.response import Response
@@ -58,6 +60,7 @@ class AmplitudeResponse(Tabulated):
         ndarray
             Values, shape (amplitudes, particles, ratios, seeds), in the unit of the measure.
         """
+        choice("name", name, MEASURE_UNITS)
         return np.stack([getattr(one, name) for one in self.responses])
 
     def peaks(self) -> tuple[np.ndarray, np.ndarray]:

@@ -37,7 +37,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import claiming
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
-from taichi_dem.kit.validation import choice, whole
+from taichi_dem.kit.validation import choice, shown, whole
 
 _MOST_STEPS = 2**31 - 1
 
@@ -424,6 +424,8 @@ class Batch(LoadedScenes):
 
     def _go(self, steps: np.ndarray, before_measuring: np.ndarray, progress: Any) -> None:
         """Take every scene a number of steps on, in launches of bounded length."""
+        if not (progress is None or callable(progress)):
+            raise InputError(f"progress must be a function or None, got {shown(progress)}")
         if not self.going_on:
             self._aim(steps, before_measuring)
         self.going_on = False

@@ -31,8 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import by_fields
-from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import float_array, shown
+from taichi_dem.kit.validation import SMALLEST, real_numbers
 
 _HALVINGS = 60
 
@@ -97,7 +96,9 @@ def collect_and_collide(amplitude: ArrayLike, gap: ArrayLike) -> CollectAndColli
     >>> round(float(made.energy), 12)
     4.0
     """
-    size, way = np.broadcast_arrays(_positive("amplitude", amplitude), _positive("gap", gap))
+    size, way = np.broadcast_arrays(
+        real_numbers("amplitude", amplitude, SMALLEST), real_numbers("gap", gap, SMALLEST)
+    )
     ratio = way / size
     phase = _phase(np.minimum(ratio, np.pi))
     phase = np.where(ratio <= np.pi, phase, np.nan)
@@ -114,13 +115,3 @@ def _phase(ratio):
         above = middle - np.sin(middle) > ratio
         low, high = np.where(above, low, middle), np.where(above, middle, high)
     return high
-
-
-def _positive(name, value):
-    try:
-        numbers = float_array(value)
-    except (TypeError, ValueError):
-        numbers = np.array(np.nan)
-    if not (np.isfinite(numbers) & (numbers > 0.0)).all():
-        raise InputError(f"{name} must be positive numbers, got {shown(value)}")
-    return numbers

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import shown
+from taichi_dem.kit.validation import real_numbers, shown
 
 #: Fewer samples between two extremes do not show where they are.
 _LEAST_SAMPLES = 8
@@ -43,8 +43,8 @@ def logarithmic_decrement(x: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     >>> round(float(decrement[0]), 4)
     0.02
     """
-    series = np.asarray(x, dtype=np.float64)
-    if series.ndim != 1 or not np.isfinite(series).all():
+    series = real_numbers("x", x)
+    if series.ndim != 1:
         raise InputError(f"x must be a series of finite numbers, got {shown(x)}")
     extremes = _extremes(series)
     if len(extremes) < 4:

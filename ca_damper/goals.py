@@ -15,7 +15,7 @@ import numpy as np
 from ca_damper.response import Response
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, positive, several, shown, word
+from taichi_dem.kit.validation import choice, instance, positive, several, shown, word
 
 #: "value": at given frequencies. "extreme": of the curve, which is followed to its peak. "curve":
 #: a value for each of the given frequencies.
@@ -97,6 +97,7 @@ class Goal:
         InputError
             The function returns another shape.
         """
+        instance("response", response, Response)
         found = np.asarray(self.function(response), dtype=np.float64)
         if found.ndim not in (1, 2) or len(found) != len(response.seeds) or found.size == 0:
             raise InputError(

@@ -31,7 +31,7 @@ import numpy as np
 
 from ca_damper.oscillator import Oscillator
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import between, plain_fields, positive, told_apart
+from taichi_dem.kit.validation import LARGEST, between, instance, plain_fields, positive, told_apart
 
 #: Points of half a cycle: an odd number, for Simpson's rule.
 _POINTS = 401
@@ -84,6 +84,7 @@ class ImpactDamper:
         for name in ("particle_mass", "clearance", "frequency"):
             positive(name, getattr(self, name))
         between("restitution", self.restitution, 0.0, 1.0)
+        instance("oscillator", self.oscillator, Oscillator)
         ratio = self.oscillator.damping_ratio
         if not ratio < 1.0:
             got, bound = told_apart(ratio, 1.0)
@@ -147,6 +148,7 @@ class ImpactDamper:
         own = self.oscillator
         decay, square = 0.5 * own.damping / own.mass, own.stiffness / own.mass
         turn = math.sqrt(square - decay * decay)
+        t = between("t", t, -LARGEST, LARGEST)
         c, s = math.cos(turn * t), math.sin(turn * t) / turn
         return math.exp(-decay * t) * np.array([[c + decay * s, s], [-square * s, c - decay * s]])
 
@@ -165,6 +167,7 @@ class ImpactDamper:
         ndarray
             Displacement [m] and velocity [m/s].
         """
+        u, t = between("u", u, -LARGEST, LARGEST), between("t", t, -LARGEST, LARGEST)
         free = 2.0 * self.particle_mass * u * self.free(t) @ self._after
         return self._forced_motion(u, t) + free
 
@@ -189,6 +192,7 @@ class ImpactDamper:
         float
             Position [m], counted from where the middle of the box is at x = 0.
         """
+        u, t = between("u", u, -LARGEST, LARGEST), between("t", t, -LARGEST, LARGEST)
         return 0.5 * u * self.half_cycle - u * t
 
     def start(self, u: float) -> Any:
@@ -208,7 +212,7 @@ class ImpactDamper:
         -----
         The phase of the forced motion is then that of the transfer function.
         """
-        sine, cosine = self._forced @ [u, 1.0]
+        sine, cosine = self._forced @ [between("u", u, -LARGEST, LARGEST), 1.0]
         turn = np.angle(self.oscillator.transfer(self.frequency)) - math.atan2(sine, cosine)
         since = turn / self.omega
         t = since % self.half_cycle

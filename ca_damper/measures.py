@@ -20,6 +20,7 @@ from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.types import FloatOrArray
 from taichi_dem.kit.units import unit_of
+from taichi_dem.kit.validation import choice, real_numbers
 
 #: Summed over the steps of a cycle; _cos and _sin: times cos(w t) and sin(w t).
 SUMS = ("x", "x_squared", "x_cos", "x_sin", "v_cos", "v_sin", "f", "f_cos", "f_sin")
@@ -115,6 +116,7 @@ class Cycles:
         ndarray
             Means, shape (scenes,).
         """
+        choice("name", name, COLUMNS)
         return self.record[:, :, COLUMNS.index(name)].mean(axis=1)
 
     def per_step(self, name: str) -> np.ndarray:
@@ -145,6 +147,7 @@ class Cycles:
         ndarray
             Amplitudes, shape (scenes,).
         """
+        choice("name", name, ("x", "v", "f"))
         amplitude = 2.0 * (self.per_step(f"{name}_cos") - 1j * self.per_step(f"{name}_sin"))
         if name != "f":
             return amplitude
@@ -164,6 +167,7 @@ class Cycles:
         ndarray
             Amplitudes, shape (scenes, cycles).
         """
+        choice("name", name, ("x", "v"))
         cosine, sine = (
             self.record[:, :, COLUMNS.index(f"{name}_{part}")] for part in ("cos", "sin")
         )
@@ -269,6 +273,8 @@ class Cycles:
         The base moves as y = -i y0 and pulls the container with K (y - x) + C (y' - x'). In the
         steady state, dashpot and filling together take what the base gives.
         """
+        base_amplitude = real_numbers("base_amplitude", base_amplitude)
+        stiffness, damping = real_numbers("stiffness", stiffness), real_numbers("damping", damping)
         base = -1j * base_amplitude * np.ones(len(self.omega))
         stretch, speed = base - self.harmonic("x"), 1j * self.omega * base
         drag = speed - self.harmonic("v")
@@ -296,6 +302,7 @@ class Cycles:
         -----
         The energy in motion is that of the container and the apparent mass m at the largest speed.
         """
+        mass = real_numbers("mass", mass, 0.0)
         return self.apparent_damping / (self.omega * (mass + self.apparent_mass))
 
     def damping_ratio(
@@ -317,8 +324,9 @@ class Cycles:
         ndarray
             Damping ratio [-].
         """
+        mass, stiffness = real_numbers("mass", mass, 0.0), real_numbers("stiffness", stiffness, 0.0)
         critical = 2.0 * np.sqrt(stiffness * (mass + self.apparent_mass))
-        return (damping + self.apparent_damping) / critical
+        return (real_numbers("damping", damping, 0.0) + self.apparent_damping) / critical
 
 
 def history_dataset(

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import FloatOrArray
-from taichi_dem.kit.validation import plain_fields, positive
+from taichi_dem.kit.validation import plain_fields, positive, real_numbers
 
 #: Rounding of the square of a natural frequency, of some ten operations.
 ROUNDED = 16.0 * np.finfo(float).eps
@@ -113,6 +113,7 @@ class Oscillator:
         float or ndarray
             Energy [J].
         """
+        x, v, y = (real_numbers(*one) for one in (("x", x), ("v", v), ("y", y)))
         return 0.5 * (self.mass * v**2 + self.stiffness * (x - y) ** 2)
 
     def transfer(self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0) -> Any:
@@ -141,9 +142,9 @@ class Oscillator:
 
     def _forces(self, frequency: ArrayLike, added_mass: FloatOrArray) -> tuple[Any, Any, Any]:
         """Forces per displacement that hold and that are left over, and where none is left."""
-        omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)
+        omega = 2.0 * np.pi * real_numbers("frequency", frequency)
         held = self.stiffness + 1j * omega * self.damping
-        left = held - (self.mass + added_mass) * omega**2
+        left = held - (self.mass + real_numbers("added_mass", added_mass)) * omega**2
         return held, left, (self.damping == 0.0) & (np.abs(left) <= ROUNDED * np.abs(held))
 
     def scaled(self, mass: float, base_amplitude: float) -> "Oscillator":
@@ -161,7 +162,7 @@ class Oscillator:
         Oscillator
             The scaled oscillator.
         """
-        share = mass / self.mass
+        share = positive("mass", mass) / self.mass
         return Oscillator(mass, share * self.stiffness, share * self.damping, base_amplitude)
 
     def peak(self, added_mass: float = 0.0) -> tuple[float, float]:
@@ -182,7 +183,7 @@ class Oscillator:
         -----
         For a damping ratio z, the peak lies at r with r^2 = (sqrt(1 + 8 z^2) - 1) / (4 z^2).
         """
-        mass = self.mass + added_mass
+        mass = self.mass + positive("added_mass", added_mass, zero_allowed=True)
         square = self.damping**2 / (4.0 * self.stiffness * mass)
         # The same without a difference of equals, and without a division by zero damping.
         own = math.sqrt(2.0 / (math.sqrt(1.0 + 8.0 * square) + 1.0))
@@ -223,7 +224,7 @@ class Oscillator:
         callable
             Function of time [s] and state (x [m], v [m/s]).
         """
-        omega = 2.0 * np.pi * frequency
+        omega = 2.0 * np.pi * positive("frequency", frequency, zero_allowed=True)
 
         def slope(t: float, state: Any) -> np.ndarray:
             y, rate = np.sin(omega * t), omega * np.cos(omega * t)
@@ -258,7 +259,7 @@ class Oscillator:
             As of ``transfer``.
         """
         x = self.base_amplitude * self.transfer(frequency, added_mass)
-        sag = gravity * np.asarray(added_mass) / self.stiffness
+        sag = real_numbers("gravity", gravity) * np.asarray(added_mass) / self.stiffness
         return x.imag - sag, 2.0 * np.pi * np.asarray(frequency) * x.real
 
 

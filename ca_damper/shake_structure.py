@@ -24,7 +24,16 @@ from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, FileName, instance, positive, shown, told_apart, whole
+from taichi_dem.kit.validation import (
+    AUTO,
+    FileName,
+    instance,
+    positive,
+    real_numbers,
+    shown,
+    told_apart,
+    whole,
+)
 
 # Between the seeds of two boxes: larger than the seeds that users count, and prime.
 _BETWEEN_BOXES = 15_485_863
@@ -322,15 +331,11 @@ def _of_places(name, value, structure):
     """Motion at the beginning, (places,); InputError unless it is a sum of the modes."""
     places = structure.place_count
     try:
-        given = np.asarray(value)
-        motion = np.broadcast_to(given, places).astype(np.float64)
-        fits = given.dtype.kind in "iuf" and bool(np.isfinite(motion).all())
-    except (TypeError, ValueError):
-        fits = False
-    if not fits:
+        motion = np.broadcast_to(real_numbers(name, value), places)
+    except ValueError:
         raise InputError(
             f"{name} must be a finite number or {places}, one for each place, got {shown(value)}"
-        )
+        ) from None
     left = motion - structure.shapes @ structure.modal(motion)
     if np.abs(left).max() > _OUTSIDE_MODES * np.abs(motion).max():
         raise InputError(

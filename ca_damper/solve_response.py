@@ -162,7 +162,8 @@ def _range(ratios):
     """(lowest, highest) of a range, or None."""
     if ratios is None:
         return None
-    two = isinstance(ratios, (list, tuple, np.ndarray)) and len(ratios) == 2
+    listed = isinstance(ratios, (list, tuple, np.ndarray)) and getattr(ratios, "ndim", 1) == 1
+    two = listed and len(ratios) == 2
     if not two or not all(map(finite, ratios)) or not 0.0 < ratios[0] < ratios[1]:
         raise InputError(
             "ratios must be None or two numbers (lowest, highest) with 0 < lowest < highest, "

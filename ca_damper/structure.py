@@ -24,7 +24,15 @@ from numpy.typing import ArrayLike
 from ca_damper.oscillator import check_modes
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import LARGEST, SMALLEST, positive, shown, told_apart, whole
+from taichi_dem.kit.validation import (
+    LARGEST,
+    SMALLEST,
+    positive,
+    real_numbers,
+    shown,
+    told_apart,
+    whole,
+)
 
 #: Most places of a structure.
 MOST_PLACES = 1000
@@ -193,8 +201,16 @@ class ModalStructure:
         -------
         ndarray
             Modal coordinates [kg^1/2 m], shape (..., modes).
+
+        Raises
+        ------
+        InputError
+            The motion has another shape, or a value is no finite number.
         """
-        return np.asarray(motion) @ self.masses @ self.shapes
+        moved = real_numbers("motion", motion)
+        if moved.shape[-1:] != (self.place_count,):
+            raise InputError(f"motion must have shape (..., {self.place_count}), got {moved.shape}")
+        return moved @ self.masses @ self.shapes
 
     def transfer(self, frequency: ArrayLike, added_masses: Any = None) -> np.ndarray:
         """Complex ratio x / y of all places in the steady state.
@@ -251,7 +267,7 @@ class ModalStructure:
 
     def _asked(self, frequency: Any, added_masses: Any) -> tuple[np.ndarray, np.ndarray]:
         """Angular frequencies (..., 1) and added masses (places,)."""
-        omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[..., None]
+        omega = 2.0 * np.pi * real_numbers("frequency", frequency)[..., None]
         if added_masses is None:
             return omega, np.zeros(self.place_count)
         added = _array("added_masses", added_masses, 1)

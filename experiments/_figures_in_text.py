@@ -1,4 +1,4 @@
-"""Figures in the pages: kept from the runs whose pictures the pages show, and filled in by a script.
+"""Figures in the pages: kept from the runs whose pictures the pages show, filled in by a script.
 
 A figure in a page stands between two comments, the first of which says what it is:
 

@@ -16,7 +16,17 @@ from taichi_dem.diagnostics.energy_balance import TERMS
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
-from taichi_dem.kit.validation import choice, finite, flag, positive, shown, told_apart, whole, word
+from taichi_dem.kit.validation import (
+    choice,
+    finite,
+    flag,
+    instance,
+    positive,
+    shown,
+    told_apart,
+    whole,
+    word,
+)
 from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.output.fragments import fragment_of_body
 from taichi_dem.output.hole_monitor import HoleMonitor
@@ -103,6 +113,7 @@ class Goal:
         InputError
             The scene lacks a group or a body.
         """
+        instance("scene", scene, Scene)
         if self.check is not None:
             self.check(scene)
 
@@ -124,7 +135,7 @@ class Goal:
         InputError
             The function gives no finite number.
         """
-        found: Any = self.function(result)
+        found: Any = self.function(instance("result", result, Result))
         single = isinstance(found, (np.ndarray, np.generic)) and found.size == 1
         value: Any = found.item() if single else found
         if not finite(value):
@@ -254,13 +265,13 @@ def peak_particle_velocity(distance: float, group: str = "hole") -> Goal:
         The distance is not positive. (``check_scene`` refuses one that cuts no body.)
     """
     positive("distance", distance)
-    bodies = partial(_cut_by_cylinder, distance, group)
+    bodies, has_group = partial(_cut_by_cylinder, distance, group), _has_group(group)
 
     def found(result):
         return result.peak_speed[bodies(result.model)].mean()
 
     def check(scene):
-        _has_group(group)(scene)
+        has_group(scene)
         bodies(Model(scene.mesh, scene.body_materials, scene.effects))
 
     return Goal(f"peak velocity at {distance:g} m", "m/s", found, "extreme", check=check)

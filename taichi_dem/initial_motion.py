@@ -101,9 +101,9 @@ def _numbers(found):
         array = np.array(found)
     except (TypeError, ValueError, OverflowError):
         return np.zeros(0)
-    if array.dtype.kind not in "iuf" or not (np.abs(array) <= LARGEST).all():
-        return np.zeros(0)
-    return array.astype(np.float64)
+    # In 64 bits first: in 32 the limit itself would be infinite.
+    numbers = array.astype(np.float64) if array.dtype.kind in "iuf" else np.zeros(0)
+    return numbers if (np.abs(numbers) <= LARGEST).all() else np.zeros(0)
 
 
 def _middle(mesh, centre, bodies):

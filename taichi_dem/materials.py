@@ -19,8 +19,15 @@ from taichi_dem.elasticity.bond_rules import (
 )
 from taichi_dem.elasticity.moduli import bond_moduli
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.likely_units import ANGLE, DENSITY, MODULUS, STRENGTH, in_unit
 from taichi_dem.kit.validation import LARGEST, SMALLEST, finite, plain_fields, positive, shown
 
+#: Fields whose number tells by its size when another unit is meant.
+_QUANTITIES = {
+    "density": DENSITY,
+    "tensile_strength": STRENGTH,
+    "cohesion": STRENGTH,
+}
 _MAY_BE_ZERO = frozenset(
     {"normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"}
 )
@@ -96,6 +103,8 @@ class Material:
             value = getattr(self, field.name)
             if not isinstance(value, _RULES.get(field.name, ())):
                 _check_number(field.name, value)
+            if field.name in _QUANTITIES:
+                in_unit(field.name, value, _QUANTITIES[field.name])
         if not isinstance(self.normal_stiffness, BondRule):
             check_energy(self)
 
@@ -160,6 +169,7 @@ class Material:
         0.7
         """
         normal, shear = bond_moduli(young, poisson)
+        in_unit("young", young, MODULUS)
         ratio = positive("damping_ratio", damping_ratio, zero_allowed=True)
         return cls(
             density=density,
@@ -230,7 +240,7 @@ def _checked_angle(angle: Any) -> float:
         raise InputError(
             f"friction_angle must be a number from 0 to below 90 degrees, got {shown(angle)}"
         )
-    return float(angle)
+    return in_unit("friction_angle", float(angle), ANGLE)
 
 
 def _check_number(name, value):

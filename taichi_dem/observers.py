@@ -14,7 +14,7 @@ from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Pace
 from taichi_dem.kit.uncopied import Uncopied
-from taichi_dem.kit.validation import plain_fields, positive, shown, told_apart, whole
+from taichi_dem.kit.validation import instance, plain_fields, positive, shown, told_apart, whole
 from taichi_dem.methods import Method
 from taichi_dem.output.record import Frame, Recorder
 from taichi_dem.simulation import Simulation
@@ -133,7 +133,8 @@ class At:
     def __post_init__(self):
         plain_fields(self)
         times = self.times_s
-        if isinstance(times, (str, bytes)) or not hasattr(times, "__iter__"):
+        listed = hasattr(times, "__iter__") and getattr(times, "ndim", 1) == 1
+        if isinstance(times, (str, bytes, dict, set)) or not listed:
             raise InputError(f"times_s must be a sequence of times in s, got {shown(times)}")
         checked = tuple(positive("times_s", time, zero_allowed=True) for time in times)
         object.__setattr__(self, "times_s", checked)
@@ -213,6 +214,11 @@ class Collector:
     view : RunView or None
         View of the last call, for one more look at a run that diverged.
 
+    Raises
+    ------
+    InputError
+        The times are no Every or At, or what is to be read is no function.
+
     Examples
     --------
     >>> cost = Collector(Every(samples=10), cpu=lambda view: view.cpu_seconds)
@@ -221,7 +227,10 @@ class Collector:
     """
 
     def __init__(self, when: Union[Every, At], **read: Callable[["RunView"], Any]):
-        self.when, self.read = when, read
+        self.when, self.read = instance("when", when, (Every, At)), read
+        for name, function in read.items():
+            if not callable(function):
+                raise InputError(f"{name} must be a function of a RunView, got {shown(function)}")
         self.rows: dict[str, list] = {name: [] for name in read}
         self.view: Optional[RunView] = None
 

@@ -16,7 +16,7 @@ from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import counted, embedded, in_brief, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, remove_files, write_csv, write_text
-from taichi_dem.kit.validation import FileName
+from taichi_dem.kit.validation import FileName, shown
 from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.output.export.run_exports import RunExports
@@ -126,8 +126,23 @@ class Result(RunExports):
         -------
         ndarray
             Displacement [m], shape (frames, 3).
+
+        Raises
+        ------
+        InputError
+            There is no such body, or none is chosen.
         """
-        ways = (frame.displacement[bodies].T for frame in self.frames)
+        numbers = np.arange(self.model.body_count)
+        try:
+            chosen = numbers[np.atleast_1d(bodies)]
+        except (IndexError, ValueError):
+            chosen = numbers[:0]
+        if not chosen.size:
+            raise InputError(
+                f"bodies must be numbers from 0 to {len(numbers) - 1} or a mask of "
+                f"{len(numbers)}, got {shown(bodies)}"
+            )
+        ways = (frame.displacement[chosen].T for frame in self.frames)
         return np.array([[along.mean() for along in way] for way in ways]).reshape(-1, 3)
 
     @property
@@ -225,7 +240,8 @@ class Result(RunExports):
 
         Examples
         --------
-        >>> result = simulate(scene, until=1e-4, frames=20)  # doctest: +SKIP
+        >>> method = ImplicitDashpots()
+        >>> result = simulate(scene, method=method, until=1e-4, frames=20)  # doctest: +SKIP
         >>> result.show("blast.html")  # doctest: +SKIP
         """
         # Imported here, so that matplotlib loads only where something is shown.

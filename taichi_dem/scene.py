@@ -15,7 +15,16 @@ from taichi_dem.kit.display import counted, embedded, in_brief, titled
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.pictures import png, write_picture
-from taichi_dem.kit.validation import FileName, between, finite, positive, shown, told_apart
+from taichi_dem.kit.validation import (
+    FileName,
+    between,
+    finite,
+    flag,
+    positive,
+    shown,
+    told_apart,
+    word,
+)
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
@@ -176,6 +185,7 @@ class Scene:
         Effect or None
             None where none is listed.
         """
+        word("role", role)
         return next((effect for effect in self.effects if effect.role == role), None)
 
     def damped(self, touching: bool = True) -> bool:
@@ -191,6 +201,7 @@ class Scene:
         bool
             True where one acts.
         """
+        flag("touching", touching)
         material = self.body_materials
         roles = {effect.role for effect in self.effects if effect.name}
         bonds = "dashpot" in roles and material.has_bond_damping
@@ -209,6 +220,7 @@ class Scene:
         bool
             True where it is listed.
         """
+        word("name", name)
         return any(effect.name == name for effect in self.effects)
 
 

@@ -16,6 +16,7 @@ from typing import Optional, Union
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.likely_units import EDGE, in_unit
 from taichi_dem.kit.validation import FileName, direction, finite, positive, shown, told_apart
 from taichi_dem.mesh.drawn_out import drawn_out
 from taichi_dem.mesh.filled import MOST_BODIES, filled_surface
@@ -240,7 +241,7 @@ def _element(element, smallest, volume):
         raise InputError(
             f"element must be at least {bound} m, for {MOST_BODIES} tetrahedra at most, got {got}"
         )
-    return element
+    return in_unit("element", element, EDGE)
 
 
 def _corners(x, y):

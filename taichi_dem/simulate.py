@@ -15,7 +15,7 @@ from taichi_dem.kit.files import claiming, output_folder
 from taichi_dem.kit.progress.progress import Listener, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, Owner, RunSnapshot, opened
-from taichi_dem.kit.validation import AUTO, FileName, instance, told_apart
+from taichi_dem.kit.validation import AUTO, FileName, instance, told_apart, word
 from taichi_dem.measured_speedup import speedup_of_run
 from taichi_dem.methods import Method, check_method
 from taichi_dem.observers import Observer, RunView
@@ -105,6 +105,7 @@ def simulate(
     """
     instance("scene", scene, Scene)
     check_method(method)
+    word("title", title)
     last = macro_steps(until, method.dt0)
     plan = RunPlan(last, method.dt0, samples, frames, observers, progress)
     receivers = _checked_receivers(plan, scene)

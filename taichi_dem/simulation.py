@@ -33,7 +33,7 @@ from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
-from taichi_dem.kit.validation import choice, instance, positive, told_apart, whole
+from taichi_dem.kit.validation import choice, flag, instance, positive, shown, told_apart, whole
 from taichi_dem.methods import Method, check_method
 from taichi_dem.scene import Scene
 from taichi_dem.stability.step_control import counted_criteria
@@ -113,6 +113,7 @@ class Simulation(Uncopied):
         self.scene, self.method, self.solves = scene, method, method.solves
         self.model = Model(scene.mesh, scene.body_materials, scene.effects)
         name = driver_name(driver, self.model.bond_count)
+        flag("brute_force", brute_force)
         structure = Structure(scene.effects, method, brute_force, scene.on_demand)
         self.loan = ENGINES.borrow(structure, capacity_of(self.model), self.model, "simulation")
         self._take_parts()
@@ -303,6 +304,8 @@ class Simulation(Uncopied):
         """
         runtime.check_session(self.loan.session, "simulation")
         end = whole("macro_step", macro_step, 0, MOST_STEPS) * MACRO_TICKS
+        if not (on_call is None or callable(on_call)):
+            raise InputError(f"on_call must be a function or None, got {shown(on_call)}")
         self.start()
         while self.state.tick[None] < end:
             with self._undivided("it stepped"), self._timed():
@@ -406,6 +409,7 @@ class Simulation(Uncopied):
         InputError
             The simulation was not started.
         """
+        flag("brief", brief)
         counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
         if self.energy_balance is None:
             raise InputError("report must be asked for once the simulation was started, got none")

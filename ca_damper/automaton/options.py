@@ -14,6 +14,7 @@ from ca_damper.contracts import check_members, members_of
 from ca_damper.filling import Structure
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.likely_units import GRAIN, GRAIN_MASS, in_unit
 from taichi_dem.kit.validation import (
     choice,
     flag,
@@ -145,6 +146,8 @@ class Automaton:
             fraction(name, getattr(self, name))
         for name in ("width", "particle_mass", "v_max"):
             positive(name, getattr(self, name))
+        in_unit("width", self.width, GRAIN)
+        in_unit("particle_mass", self.particle_mass, GRAIN_MASS, self.particle_mass / self.width**3)
         for name in ("gravity", "static_threshold"):
             positive(name, getattr(self, name), zero_allowed=True)
         choice("rules", self.rules, RULES)
@@ -287,6 +290,7 @@ class Automaton:
         float
             Clearance [m].
         """
+        whole("particles", particles, 0, 2**31 - 1)
         return self.width * (self.rows - particles / self.columns)
 
     def with_clearance(self, particles: int, clearance: float) -> "Automaton":
@@ -309,7 +313,8 @@ class Automaton:
         InputError
             The box would end within a cell.
         """
-        rows = clearance / self.width + particles / self.columns
+        whole("particles", particles, 0, 2**31 - 1)
+        rows = positive("clearance", clearance, True) / self.width + particles / self.columns
         if abs(rows - round(rows)) > 1e-6:
             got, _ = told_apart(rows, round(rows), 4)
             raise InputError(

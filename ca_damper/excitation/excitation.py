@@ -9,7 +9,7 @@ import numpy as np
 from ca_damper.excitation.signal import Signal
 from taichi_dem.kit.checkpoint import identity_of
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import shown
+from taichi_dem.kit.validation import LARGEST, choice, shown, whole
 
 
 class ExcitationKind(NamedTuple):
@@ -71,6 +71,7 @@ class SineForce:
         InputError
             The numbers are neither one for all scenes nor one for each.
         """
+        whole("scenes", scenes, 1, 2**31 - 1)
         values = (self.amplitude, self.frequency, self.phase)
         try:
             return np.stack([np.broadcast_to(one, scenes) for one in map(np.asarray, values)])
@@ -138,7 +139,8 @@ class Excitation:
         InputError
             The number of signals differs from that of the scenes.
         """
-        value = getattr(self, role)
+        value = getattr(self, choice("role", role, ("base", "force")))
+        whole("scenes", scenes, 1, 2**31 - 1)
         if value is None or isinstance(value, SineForce):
             return ()
         given = (value,) if isinstance(value, Signal) else value
@@ -201,7 +203,7 @@ class Excitation:
         ndarray
             Time [s], shape (scenes,); infinite for sines.
         """
-        ends = np.full(scenes, np.inf)
+        ends = np.full(whole("scenes", scenes, 1, 2**31 - 1), np.inf)
         for role in ("base", "force"):
             given = self.signals(role, scenes)
             if given:
@@ -263,7 +265,8 @@ def _numbers(name, value):
         numbers = np.asarray(value)
     except ValueError:
         numbers = np.empty(0, dtype=object)
-    if numbers.dtype.kind not in "iuf" or numbers.ndim > 1 or not np.isfinite(numbers).all():
+    right = numbers.dtype.kind in "iuf" and numbers.ndim <= 1 and numbers.size > 0
+    if not right or not (np.abs(numbers.astype(np.float64)) <= LARGEST).all():
         raise InputError(
             f"{name} must be a finite number or one for each scene, got {shown(value)}"
         )

@@ -13,7 +13,16 @@ from ca_damper.excitation.samples import OF
 from ca_damper.excitation.signal import MOST_NODES, Signal, spline
 from taichi_dem.kit.elementary import sines_and_cosines
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, finite, positive, several, shown, told_apart, whole
+from taichi_dem.kit.validation import (
+    LARGEST,
+    between,
+    choice,
+    positive,
+    several,
+    shown,
+    told_apart,
+    whole,
+)
 
 #: Nodes in a cycle of the highest frequency, unless the user gives a step.
 NODES_A_CYCLE = 40
@@ -240,6 +249,4 @@ def _grid(duration, highest, step):
 
 
 def _number(name, value):
-    if not finite(value):
-        raise InputError(f"{name} must be finite numbers, got {shown(value)}")
-    return float(value)
+    return between(name, value, -LARGEST, LARGEST)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ca_damper.excitation.signal import LEAST_NODES, Signal, end_slope, integral, spline
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, flag, float_array, shown, told_apart
+from taichi_dem.kit.validation import choice, flag, real_numbers, shown, told_apart
 
 #: What samples are of: the signal itself or its second derivative.
 OF = ("value", "acceleration")
@@ -86,11 +86,8 @@ def checked_signal(
 
 
 def _column(name, values):
-    try:
-        column = float_array(values)
-    except (TypeError, ValueError):
-        column = np.empty(0)
-    if column.ndim != 1 or len(column) < LEAST_NODES or not np.isfinite(column).all():
+    column = real_numbers(name, values)
+    if column.ndim != 1 or len(column) < LEAST_NODES:
         raise InputError(
             f"{name} must be at least {LEAST_NODES} finite numbers, got {shown(values)}"
         )

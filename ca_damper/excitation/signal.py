@@ -17,7 +17,14 @@ import numpy as np
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import finite, float_array, positive, shown
+from taichi_dem.kit.validation import (
+    LARGEST,
+    between,
+    instance,
+    positive,
+    real_numbers,
+    shown,
+)
 
 #: Nodes of a signal: fewer determine no spline with "not a knot", more find no memory.
 LEAST_NODES, MOST_NODES = 4, 2**24
@@ -63,6 +70,7 @@ class Signal:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "step", positive("step", self.step))
+        instance("label", self.label, str)
         for name in ("value", "bend"):
             object.__setattr__(self, name, _nodes(name, getattr(self, name)))
         if len(self.value) != len(self.bend):
@@ -92,7 +100,7 @@ class Signal:
         tuple of (ndarray, ndarray, ndarray)
             Value, derivative [1/s] and second derivative [1/s^2], in the unit of the signal.
         """
-        place = np.asarray(time_s, dtype=np.float64) / self.step
+        place = real_numbers("time_s", time_s) / self.step
         k = np.clip(np.floor(place).astype(np.int64), 0, len(self.value) - 2)
         u, h = place - k, self.step
         w = 1.0 - u
@@ -119,8 +127,7 @@ class Signal:
         InputError
             The factor is not finite.
         """
-        if not finite(factor):
-            raise InputError(f"factor must be a finite number, got {shown(factor)}")
+        between("factor", factor, -LARGEST, LARGEST)
         label, times = f"{factor:g} times {self.label}", float(factor)
         return Signal(self.step, times * self.value, times * self.bend, label, self.treated)
 
@@ -200,15 +207,19 @@ def _inner(right):
 def _nodes(name, values):
     """A copy of finite numbers (nodes,) that refuses to be written."""
     try:
-        nodes = float_array(values)
-    except (TypeError, ValueError):
+        nodes = np.array(values)
+    except ValueError:
         nodes = np.empty(0)
-    if nodes.ndim != 1 or not LEAST_NODES <= len(nodes) <= MOST_NODES:
+    right = nodes.dtype.kind in "iuf" and nodes.ndim == 1
+    if not right or not LEAST_NODES <= len(nodes) <= MOST_NODES:
         raise InputError(
             f"{name} must be from {LEAST_NODES} to {MOST_NODES} numbers, got {shown(values)}"
         )
-    if not np.isfinite(nodes).all():
-        k = int(np.flatnonzero(~np.isfinite(nodes))[0])
-        raise InputError(f"{name} must be finite, got {nodes[k]} at node {k}")
+    nodes = nodes.astype(np.float64)
+    bad = np.flatnonzero(~(np.abs(nodes) <= LARGEST))
+    if len(bad):
+        raise InputError(
+            f"{name} must be finite numbers up to {LARGEST:g}, got {nodes[bad[0]]} at node {bad[0]}"
+        )
     nodes.flags.writeable = False
     return nodes

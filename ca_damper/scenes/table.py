@@ -6,8 +6,11 @@ import numpy as np
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, shown
+from taichi_dem.kit.validation import LARGEST, SMALLEST, choice, positive, shown, whole
 
+_WHOLE = ("particles", "seed")
+#: A container that is not driven stands still: only a Batch needs its cycles.
+_MAY_BE_ZERO = ("frequency", "base_amplitude", "damping")
 #: Scenes of a table, and the largest seed.
 _MOST_SCENES, _MOST_SEED = 2**24, 2**31 - 1
 
@@ -16,9 +19,8 @@ class SceneTable:
     """Parameters of each scene of a batch, one row a scene; plain NumPy.
 
     Plain NumPy. Parameters are given as scalars or sequences and are broadcast against each other.
-    They are checked to be numbers here, and whole ones where they count; a Batch checks their
-    ranges. What a scene does depends on its own row only, so that no bit depends on the rest of the
-    batch.
+    A Batch checks them against its filling. What a scene does depends on its own row only, so that
+    no bit depends on the rest of the batch.
 
     Parameters
     ----------
@@ -47,7 +49,7 @@ class SceneTable:
     Raises
     ------
     InputError
-        A value is no number, or the numbers of rows differ.
+        A value is out of its range, or the numbers of rows differ.
 
     Examples
     --------
@@ -127,8 +129,7 @@ class SceneTable:
         dt : float or array_like
             Step [s], a scalar or (scenes,).
         """
-        for name, values in (("frequency", frequency), ("dt", dt)):
-            self._host[name] = _kept(name, np.broadcast_to(values, self.count))
+        self.change(frequency=frequency, dt=dt)
 
     def column(self, name: str) -> np.ndarray:
         """Column of the table by name.
@@ -143,7 +144,7 @@ class SceneTable:
         ndarray
             Values, shape (scenes,); read-only, see ``change``.
         """
-        return self._host[name]
+        return self._host[choice("name", name, self.COLUMNS)]
 
     def row(self, s: int) -> dict[str, Any]:
         """Numbers of a scene by name.
@@ -158,14 +159,13 @@ class SceneTable:
         dict
             Numbers by the name of the column.
         """
+        whole("s", s, 0, self.count - 1)
         return {name: self._host[name][s].item() for name in self.COLUMNS}
 
 
 def _kept(name: str, column: np.ndarray) -> np.ndarray:
     """A copy of a column of 64 bits, which refuses to be written."""
-    # A number of more bits may become infinite here, which a Batch refuses.
-    with np.errstate(over="ignore"):
-        kept = column.astype(np.int64 if name in ("particles", "seed") else np.float64)
+    kept = column.astype(np.int64 if name in _WHOLE else np.float64)
     kept.flags.writeable = False
     return kept
 
@@ -173,8 +173,8 @@ def _kept(name: str, column: np.ndarray) -> np.ndarray:
 def _broadcast(values: dict[str, Any]) -> list[np.ndarray]:
     """Numbers by name as arrays of one shape (scenes,); InputError for anything else."""
     columns = {name: _numbers(name, value) for name, value in values.items()}
-    for name in ("particles", "seed"):
-        _check_whole(name, columns[name])
+    for name, column in columns.items():
+        _check_whole(name, column) if name in _WHOLE else _check_range(name, column)
     lengths = {len(column) for column in columns.values()} - {1}
     count = lengths.pop() if lengths else 1
     if lengths or not 1 <= count <= _MOST_SCENES:
@@ -195,6 +195,15 @@ def _numbers(name: str, value: Any) -> np.ndarray:
     if column.ndim != 1 or column.dtype.kind not in "iuf":
         raise InputError(f"{name} must be a number or a sequence of numbers, got {shown(value)}")
     return column
+
+
+def _check_range(name: str, column: np.ndarray) -> None:
+    zero_allowed = name in _MAY_BE_ZERO
+    with np.errstate(over="ignore"):  # a number of more bits may become infinite
+        column = column.astype(np.float64)
+    inside = (column >= SMALLEST) & (column <= LARGEST) | (zero_allowed & (column == 0.0))
+    for value in column[~inside][:1].tolist():
+        positive(name, value, zero_allowed)
 
 
 def _check_whole(name: str, column: np.ndarray) -> None:

@@ -22,6 +22,7 @@ from ca_damper.spheres.start_values import (
 )
 from taichi_dem.kit.engine_pool import power_of_two
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.likely_units import BOX, GRAIN, GRAIN_MASS, MODULUS, in_unit
 from taichi_dem.kit.validation import (
     choice,
     finite,
@@ -41,6 +42,11 @@ _STEPS_PER_CONTACT = 5.0
 
 # Spheres of a box: steps grow with their number, memory with its scenes too.
 _MOST_SPHERES = 1_000_000
+#: Options whose number tells by its size when another unit is meant.
+_QUANTITIES = {
+    **{"young": MODULUS, "wall_young": MODULUS},
+    **{"diameter": GRAIN, "width": BOX, "height": BOX},
+}
 
 # Room that rounding may take from a row of spheres that fits exactly.
 _ROUNDING = 1e-9
@@ -162,6 +168,10 @@ class Spheres:
         for name in ("width", "height"):
             self._check_size(name)
         self._check_capacity()
+        for name, quantity in _QUANTITIES.items():
+            in_unit(name, getattr(self, name), quantity)
+        ball = math.pi / 6.0 * self.diameter**3
+        in_unit("particle_mass", self.particle_mass, GRAIN_MASS, self.particle_mass / ball)
         if self.sizes is not None:
             whole("spheres in sizes", sum(count for count, _ in self.sizes), 1, self.capacity)
         if self.start is not None:
@@ -267,6 +277,7 @@ class Spheres:
         float
             Clearance [m].
         """
+        whole("particles", particles, 0, 2**31 - 1)
         return self.height - self.diameter * particles / self.lattice[0]
 
     def with_clearance(self, particles: int, clearance: float) -> "Spheres":
@@ -284,8 +295,9 @@ class Spheres:
         Spheres
             The same options with another height.
         """
-        layers = particles / self.lattice[0]
-        return replace(self, height=self.diameter * layers + clearance)
+        layers = whole("particles", particles, 0, 2**31 - 1) / self.lattice[0]
+        free = positive("clearance", clearance, zero_allowed=True)
+        return replace(self, height=self.diameter * layers + free)
 
     def check(self, particles: int, dt: float) -> None:
         """Refuse an invalid number of spheres or step [s].

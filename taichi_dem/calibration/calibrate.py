@@ -17,6 +17,7 @@ from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.elasticity.moduli import POISSON, bond_moduli, checked_poisson, elastic_constants
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.likely_units import MODULUS, STRENGTH, in_unit
 from taichi_dem.kit.validation import between, instance, positive, told_apart, whole
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import Mesh
@@ -70,7 +71,8 @@ class Targets:
     def __post_init__(self):
         for name in ("young", "tension", "brazilian", "compression"):
             if getattr(self, name) is not None:
-                positive(name, getattr(self, name))
+                value = positive(name, getattr(self, name))
+                in_unit(name, value, MODULUS if name == "young" else STRENGTH)
         if self.poisson is not None:
             checked_poisson(self.poisson)
         if all(getattr(self, field.name) is None for field in fields(self)):
@@ -117,7 +119,7 @@ class Match:
         bool
             True where the target is met.
         """
-        return abs(self.misfit) <= tolerance
+        return abs(self.misfit) <= positive("tolerance", tolerance, zero_allowed=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.effects.pressure import FacePressure
 from taichi_dem.kit.elementary import sine_and_cosine, sine_shortfall
-from taichi_dem.kit.validation import positive, word
+from taichi_dem.kit.likely_units import BLAST_RISE, PRESSURE, in_unit
+from taichi_dem.kit.validation import positive, real_numbers, word
 from taichi_dem.materials import Material
 
 
@@ -97,8 +98,8 @@ class GasPressure(FacePressure):
         start: float = 0.0,
     ):
         self.group = word("group", group)
-        self.peak = positive("peak", peak)
-        self.rise = positive("rise", rise)
+        self.peak = in_unit("peak", positive("peak", peak), PRESSURE)
+        self.rise = in_unit("rise", positive("rise", rise), BLAST_RISE)
         self.decay_ratio = positive("decay_ratio", decay_ratio)
         self.start = positive("start", start, zero_allowed=True)
 
@@ -144,7 +145,7 @@ class GasPressure(FacePressure):
         ndarray
             Pressure [Pa].
         """
-        times = np.ascontiguousarray(times, dtype=np.float64) - self.start
+        times = np.ascontiguousarray(real_numbers("times", times)) - self.start
         pressure = np.zeros_like(times)
         _sample(self.peak, self.rise, self.decay_ratio, times, pressure)
         return pressure

@@ -1,10 +1,12 @@
 """Weight."""
 
+import math
 from collections.abc import Sequence
 
 import taichi as ti
 
 from taichi_dem.effects.base import Effect, Travel, along
+from taichi_dem.kit.likely_units import ACCELERATION, in_unit
 from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import direction
 from taichi_dem.materials import Material
@@ -31,6 +33,7 @@ class Gravity(Effect):
 
     def __init__(self, acceleration: Sequence[float] = (0.0, -9.81, 0.0)):
         self._acceleration = direction("acceleration", acceleration)
+        in_unit("size of acceleration", math.hypot(*self._acceleration), ACCELERATION)
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Acceleration [m/s^2], three components."""

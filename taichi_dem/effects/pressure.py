@@ -10,6 +10,7 @@ from taichi_dem.effects.base import Effect
 from taichi_dem.effects.history import History, history_points, shortest_piece
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.likely_units import PRESSURE, in_unit
 from taichi_dem.kit.products import matvec
 from taichi_dem.kit.validation import finite, positive, shown, word
 from taichi_dem.materials import Material
@@ -115,6 +116,7 @@ class Pressure(FacePressure):
         self.group = word("group", group)
         points = (values,) if finite(values) else values
         self.times, self.values = history_points(times, points)
+        in_unit("largest of values", max(self.values, key=abs), PRESSURE)
 
     @classmethod
     def triangle(cls, group: str, peak: float, rise: float, fall: float) -> "Pressure":

@@ -10,7 +10,9 @@ import numpy as np
 from taichi_dem.elasticity.bond_rules import BondGeometry, evaluated, per_bond
 from taichi_dem.elasticity.statics import BondStatics
 from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
+from taichi_dem.kit.validation import instance, shown
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import (
@@ -152,7 +154,9 @@ def mesh_stiffness(mesh: Mesh, material: AnyMaterial) -> MeshStiffness:
     --------
     >>> mesh_stiffness(read_mesh(PAPER_BLOCK), CONCRETE).young  # doctest: +SKIP
     """
-    topology = topology_of(mesh)
+    topology = topology_of(instance("mesh", mesh, Mesh))
+    if not hasattr(material, "normal_stiffness"):
+        raise InputError(f"material must be a Material or BodyMaterials, got {shown(material)}")
     constants = material.normal_stiffness, material.shear_stiffness
     springs = per_bond(mesh, topology, material.density, constants)
     statics = BondStatics(mesh, topology, springs)

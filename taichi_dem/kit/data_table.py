@@ -13,7 +13,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.optional import optional
 from taichi_dem.kit.units import unit_of, without_unit
-from taichi_dem.kit.validation import FileName
+from taichi_dem.kit.validation import FileName, instance, shown, word
 
 #: Rows that are shown at the top and at the bottom of a long table.
 _SHOWN = 5
@@ -38,6 +38,11 @@ class Table(dict[str, np.ndarray]):
     units : dict of str to str
         Unit by name of the column, ``"1"`` of pure numbers, ``""`` where it is not known.
 
+    Raises
+    ------
+    InputError
+        Columns are not of one shape (rows,), or a name is no text.
+
     Examples
     --------
     >>> table = Table({"time_s": [0.0, 1.0], "kinetic_J": [0.0, 2.5]}, index="time_s")
@@ -54,9 +59,16 @@ class Table(dict[str, np.ndarray]):
         units: Optional[Mapping[str, str]] = None,
         index: str = "row",
     ):
-        super().__init__({name: _locked(values) for name, values in columns.items()})
+        instance("columns", columns, Mapping)
+        instance("units", units, (Mapping, type(None)))
+        super().__init__(
+            {word("name of a column", name): _locked(columns[name]) for name in columns}
+        )
+        shapes = {name: values.shape for name, values in self.items()}
+        if len({*shapes.values()}) > 1 or any(len(shape) != 1 for shape in shapes.values()):
+            raise InputError(f"columns must be of one shape, (rows,), got {shown(shapes)}")
         self.units = {name: (units or {}).get(name, unit_of(name)) for name in self}
-        self.index = index
+        self.index = word("index", index)
 
     @property
     def row_count(self) -> int:

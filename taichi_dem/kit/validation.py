@@ -267,3 +267,23 @@ def unit_vector(name: str, value: Any) -> np.ndarray:
     if not length(vector) > 0.0:
         raise InputError(f"{name} must be longer than zero, got {shown(value)}")
     return vector / length(vector)
+
+
+def real_numbers(name: str, value: Any, least: float = -LARGEST) -> np.ndarray:
+    """A number or an array of any shape as floats; InputError unless all are from least to 1e60."""
+    try:
+        given = np.asarray(value)
+    except ValueError:
+        given = np.array(None)  # rows of different lengths
+    if given.dtype.kind not in "iuf":
+        raise InputError(f"{name} must be a number or an array of numbers, got {shown(value)}")
+    with np.errstate(over="ignore"):
+        found = given.astype(np.float64)
+    bad = found[~((found >= least) & (found <= LARGEST))]
+    if bad.size:
+        kind = "finite" if least < 0.0 else "zero or positive" if least == 0.0 else "positive"
+        raise InputError(
+            f"{name} must be {kind} numbers from {least:g} to {LARGEST:g}, "
+            f"got {shown(bad[0].item())}"
+        )
+    return found

@@ -8,6 +8,7 @@ import numpy as np
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.mesh.content import is_solid, is_tetrahedron, tells_parts
+from taichi_dem.mesh.gmsh_names import made_name, physical_names
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.split import owners_in
 
@@ -75,29 +76,34 @@ def _cells_of_bodies(raw) -> Iterator[tuple[int, np.ndarray]]:
 def _marked_cells(raw) -> Iterator[tuple[str, int, np.ndarray]]:
     """Name of a group, number of a block, and which of its cells are in the group."""
     if "gmsh:physical" in raw.cell_data:
-        names = {tag: name for name, (tag, dimension) in raw.field_data.items() if dimension == 3}
+        names = physical_names(raw, 3)
         for k, value, chosen in _values(raw, "gmsh:physical"):
             if value > 0:  # 0: in no physical group
-                for name in names.get(value, f"physical_{value}").split(BOTH):
-                    yield name, k, chosen
+                name = names.get(value) or made_name("physical", value, names.values())
+                yield from _of_each(name, k, chosen)
         # A volume in two groups: Gmsh 4.1 keeps one number a cell, but the sets know of both.
-        for name in names.values():
-            yield from _of_set(raw, name)
+        for key in raw.field_data:
+            for k, chosen in _of_set(raw, key):
+                yield from _of_each(key.name, k, chosen)
         return
     for name in raw.cell_sets:
-        yield from _of_set(raw, name)
+        yield from ((name, k, chosen) for k, chosen in _of_set(raw, name))
     for name in raw.cell_data:
         if not name.startswith("gmsh:") and tells_parts(raw, name):
             for k, value, chosen in _values(raw, name):
-                yield f"{name}_{value}", k, chosen
+                yield made_name(name, value, raw.cell_sets), k, chosen
 
 
-def _of_set(raw, name) -> Iterator[tuple[str, int, np.ndarray]]:
-    for k, (block, members) in enumerate(zip(raw.cells, raw.cell_sets.get(name, ()))):
+def _of_each(names, k, chosen) -> Iterator[tuple[str, int, np.ndarray]]:
+    yield from ((name, k, chosen) for name in names.split(BOTH))
+
+
+def _of_set(raw, key) -> Iterator[tuple[int, np.ndarray]]:
+    for k, (block, members) in enumerate(zip(raw.cells, raw.cell_sets.get(key, ()))):
         if is_solid(block.type) and members is not None and len(members):
             chosen = np.zeros(len(block.data), dtype=bool)
             chosen[members] = True
-            yield name, k, chosen
+            yield k, chosen
 
 
 def _values(raw, name) -> Iterator[tuple[int, int, np.ndarray]]:

@@ -9,6 +9,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
+from taichi_dem.mesh.gmsh_names import physical_names
 from taichi_dem.mesh.split import shape_of
 
 #: Name of a group that is not read, and the kind of its members.
@@ -130,12 +131,13 @@ def is_quadrangle(kind: str) -> bool:
 
 def unread_groups(raw: Any) -> tuple[Unread, ...]:
     """Groups that are not of faces, as pairs of name and kind of member."""
-    names = {(int(tag), int(dimension)): name for name, (tag, dimension) in raw.field_data.items()}
+    names = {dimension: physical_names(raw, dimension) for dimension in _KINDS}
     found = []
     for block, tags in zip(raw.cells, raw.cell_data.get("gmsh:physical", ())):
         if block.dim in _KINDS:
             for tag in np.unique(tags[tags > 0]).tolist():
-                found.append((names.get((tag, block.dim), f"physical_{tag}"), _KINDS[block.dim]))
+                name = names[block.dim].get(tag, f"physical_{tag}")
+                found.append((name, _KINDS[block.dim]))
     known = {*raw.field_data, "gmsh:bounding_entities"}
     sets = (name for name in raw.cell_sets if name not in known)
     found += [(name, "elements") for name in sets if not _has_solid_members(raw, name)]

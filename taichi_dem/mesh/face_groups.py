@@ -8,7 +8,7 @@ import numpy as np
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot
-from taichi_dem.kit.validation import direction, shown, unit_vector, word
+from taichi_dem.kit.validation import direction, instance, shown, unit_vector, word
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 
@@ -22,7 +22,7 @@ def with_outer_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
     chosen: a function of the centres [m], (n, 3), that returns n truth values, as ``lambda x: x[:,
     1] > 0.5``. Raises InputError for a name that is taken, a choice of no face, or other values.
     """
-    faces = geometry.all_faces(mesh.tetrahedra)
+    faces = geometry.all_faces(instance("mesh", mesh, Mesh).tetrahedra)
     outer = faces[geometry.outer_rows(faces)]
     return _with_group(mesh, name, outer[_choose(mesh, outer, chosen)])
 
@@ -56,7 +56,7 @@ def with_body_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
     >>> mesh.group_bodies("upper").size > 0
     True
     """
-    if word("name", name) in mesh.body_groups:
+    if word("name", name) in instance("mesh", mesh, Mesh).body_groups:
         raise InputError(f"name must be that of a new group, got {shown(name)}, which is there")
     bodies = np.flatnonzero(_choose(mesh, mesh.tetrahedra, chosen, "bodies"))
     if not len(bodies):

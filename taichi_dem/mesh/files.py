@@ -15,6 +15,7 @@ import numpy as np
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done, write_text
+from taichi_dem.kit.likely_units import EDGE, in_unit
 from taichi_dem.kit.timeout import run_with_timeout
 from taichi_dem.kit.validation import FileName, path_name, positive
 from taichi_dem.mesh.cell_groups import body_groups_of, volumes_of
@@ -34,9 +35,11 @@ from taichi_dem.mesh.content import (
     unread_groups,
 )
 from taichi_dem.mesh.gmsh_check import refuse_bad_gmsh
+from taichi_dem.mesh.gmsh_names import keyed_by_dimension, made_name, physical_names, with_own_keys
 from taichi_dem.mesh.mesh import Mesh, checked_mesh, welded_numbers
 from taichi_dem.mesh.parts_in_files import unbonded_places
 from taichi_dem.mesh.split import folded_or_flat, shape_of, tetrahedra_in, triangles_in
+from taichi_dem.mesh.tetrahedra import edge_lengths
 
 #: Time that a reader may take [s], and what it reads at the slowest [byte/s]: some of meshio's wait
 #: for ever for the rest of a file that was cut off.
@@ -102,6 +105,8 @@ def read_mesh(
     except InputError as error:
         cells = _cell_at_fault(raw) if "tetrahedra " in str(error) else ""
         raise InputError(f"mesh file {path}: {error}{cells}") from None
+    edge = np.median(edge_lengths(mesh.points, mesh.tetrahedra))
+    in_unit(f"median edge of mesh file {path} at scale={scale:g}", float(edge), EDGE)
     told = [cells_dropped(printed), *parts_dropped(raw, unread)]
     told.append(unbonded_places(mesh.points, mesh.tetrahedra))
     told = [sentence for sentence in told if sentence]
@@ -199,7 +204,10 @@ def _refuse_if_gmsh(path):
 
 def _meshio_read(path):
     with np.errstate(over="ignore"):  # an STL's text, tried as if it were binary
-        return meshio.read(path)
+        if not path.lower().endswith(".msh"):
+            return keyed_by_dimension(meshio.read(path), {})
+        with with_own_keys(path) as (copy, names):
+            return keyed_by_dimension(meshio.read(copy), names)
 
 
 def _mesh(raw, scale, weld_tolerance, keep_coincident):
@@ -268,12 +276,13 @@ def _groups(raw):
     """Named groups of triangles, name -> (n, 3)."""
     found = defaultdict(list)
     if "gmsh:physical" in raw.cell_data:
-        names = {tag: name for name, (tag, dim) in raw.field_data.items() if dim == 2}
+        names = physical_names(raw, 2)
         for faces, value in _labelled(raw, raw.cell_data["gmsh:physical"]):
             if value > 0:  # 0: in no physical group
-                found[names.get(value, f"physical_{value}")].append(faces)
+                name = names.get(value) or made_name("physical", value, names.values())
+                found[name].append(faces)
         # A surface in two groups: Gmsh 4.1 keeps one number a face, but the sets know of both.
-        found.update(_sets(raw, names.values()))
+        found.update(_sets(raw))
     else:
         for key in raw.cell_data:
             if not key.startswith("gmsh:"):  # numbers of drawn entities, no choice of the user
@@ -290,13 +299,13 @@ def _labelled(raw, data):
                 yield _corners(block, values == value), value
 
 
-def _sets(raw, names):
-    """Triangles of meshio's cell sets of the given names, name -> list of (n, 3)."""
+def _sets(raw):
+    """Triangles of the sets of physical surfaces, name -> list of (n, 3)."""
     found = defaultdict(list)
-    for name in names:
-        for block, members in zip(raw.cells, raw.cell_sets.get(name, ())):
+    for key in raw.field_data:
+        for block, members in zip(raw.cells, raw.cell_sets.get(key, ())):
             if _is_face(block.type) and members is not None and len(members):
-                found[name].append(_corners(block, members))
+                found[key.name].append(_corners(block, members))
     return found
 
 

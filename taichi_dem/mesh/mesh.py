@@ -3,6 +3,7 @@
 x points to the right, y up, z towards the viewer.
 """
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -13,7 +14,16 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import FileName, flag, shown, told_apart, word
+from taichi_dem.kit.validation import (
+    FileName,
+    flag,
+    fraction,
+    instance,
+    path_name,
+    shown,
+    told_apart,
+    word,
+)
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.body_groups import checked_body_groups
 from taichi_dem.mesh.checked_groups import checked_groups
@@ -92,6 +102,9 @@ class Mesh(MeshMethods):
     def __post_init__(self) -> None:
         notes: list[str] = []
         flag("keep_coincident", self.keep_coincident)
+        for name in ("notes", "unread"):
+            instance(name, getattr(self, name), tuple)
+        instance("source", self.source, (str, os.PathLike))
         given = self.points, self.tetrahedra, self.groups, 0.0
         parts = _checked(*given, self.keep_coincident, notes)
         self._hold(parts, checked_body_groups(self.body_groups, len(parts[1])))
@@ -210,12 +223,13 @@ class Mesh(MeshMethods):
         Raises
         ------
         InputError
-            A group is not there, or is of outer faces.
+            A group is not there, or is of outer faces, or a share lies outside [0, 1].
         """
-        if not shares and not self.bonded_shares:
+        if not instance("shares", shares, Mapping) and not self.bonded_shares:
             return self
-        for name in shares:
+        for name, share in shares.items():
             self.group_faces(name)
+            fraction(f"share of group {name}", share)
             if name not in self.inner_groups:
                 raise InputError(
                     f"group {name} must be of inner faces, which two bodies share, to be unbonded "
@@ -296,12 +310,16 @@ def checked_mesh(
     """
     notes: list[str] = []
     flag("keep_coincident", keep_coincident)
+    if source != "":
+        path_name("source", source)
     parts = _checked(points, tetrahedra, groups, weld_tolerance, keep_coincident, notes)
     _note_parts(parts[1], notes)
     made = object.__new__(Mesh)
     made.__dict__.update(notes=tuple(notes), source=str(source), unread=())
     made.__dict__.update(keep_coincident=keep_coincident)
-    made._hold(parts, checked_body_groups(body_groups or {}, len(parts[1])))
+    made._hold(
+        parts, checked_body_groups({} if body_groups is None else body_groups, len(parts[1]))
+    )
     return made
 
 

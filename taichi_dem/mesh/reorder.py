@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from taichi_dem.kit.validation import instance
 from taichi_dem.mesh.body_groups import renumbered
 from taichi_dem.mesh.mesh import Mesh
 
@@ -43,6 +44,7 @@ def in_space_order(mesh: Mesh) -> Mesh:
     >>> in_space_order(read_mesh(PAPER_BLOCK)).body_count
     966
     """
+    instance("mesh", mesh, Mesh)
     order = np.argsort(_morton(mesh.points[mesh.tetrahedra].mean(axis=1)), kind="stable")
     groups = renumbered(mesh.body_groups, order)
     return replace(mesh, tetrahedra=mesh.tetrahedra[order], body_groups=groups)

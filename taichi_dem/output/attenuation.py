@@ -8,7 +8,7 @@ import numpy as np
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import by_fields
-from taichi_dem.kit.validation import positive
+from taichi_dem.kit.validation import flag, positive
 from taichi_dem.output.hole_monitor import HoleMonitor
 
 #: Bodies below which no power is fitted.
@@ -97,6 +97,8 @@ class Attenuation:
         speed : float
             Speed of the fit at one radius [m/s]; NaN likewise.
         """
+        positive("nearest", nearest, zero_allowed=True)
+        flag("inner_only", inner_only)
         taken = (self.inner | (not inner_only)) & (self.distance > nearest) & (self.speed > 0.0)
         if taken.sum() < _FEWEST:
             return np.nan, np.nan

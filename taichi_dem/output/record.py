@@ -12,7 +12,7 @@ from taichi_dem.engine.model import Model
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.files import output_folder, remove_files, write_csv
-from taichi_dem.kit.validation import FileName, file_stem
+from taichi_dem.kit.validation import FileName, file_stem, instance, several
 from taichi_dem.mesh.files import write_pvd, write_vtu
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.output.hole_monitor import HoleMonitor
@@ -319,7 +319,7 @@ def write_paraview(
     Raises
     ------
     InputError
-        The folder cannot be written to, or the name is none for files in it.
+        The folder cannot be written to, the name is none for files in it, or there is no frame.
 
     Notes
     -----
@@ -332,6 +332,9 @@ def write_paraview(
     --------
     >>> write_paraview("results/series", result.model, result.frames)  # doctest: +SKIP
     """
+    instance("model", model, Model)
+    frames = several("frames", frames, lambda what, one: instance(what, one, Frame))
+    instance("acting_since", acting_since, (Mapping, type(None)))
     folder = output_folder(folder)
     name = series_name(folder) if name is None else file_stem("name", name)
     remove_series(folder, name)

@@ -8,7 +8,7 @@ import numpy as np
 
 from taichi_dem.body_materials import AnyMaterial, BodyMaterials
 from taichi_dem.kit.display import counted, in_brief
-from taichi_dem.kit.validation import instance
+from taichi_dem.kit.validation import instance, whole
 from taichi_dem.materials import Material
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
@@ -84,6 +84,7 @@ class QualityReport:
         ndarray
             Numbers of the bodies, shape (count,).
         """
+        whole("count", count, 0, 2**31 - 1)
         return np.argsort(self.critical_step_s, kind="stable")[:count]
 
     def price(self, count: int = _WORST) -> np.ndarray:
@@ -101,7 +102,7 @@ class QualityReport:
             else limits the step, 1 where nothing limited it before.
         """
         steps = np.append(np.sort(self.critical_step_s), np.inf)
-        gained = steps[1 : count + 1]
+        gained = steps[1 : whole("count", count, 0, 2**31 - 1) + 1]
         return gained / steps[0] if np.isfinite(steps[0]) else np.ones_like(gained)
 
     def __repr__(self) -> str:

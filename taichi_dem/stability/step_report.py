@@ -10,6 +10,7 @@ from taichi_dem.body_materials import laid_out
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length
+from taichi_dem.kit.validation import shown, whole
 from taichi_dem.materials import Material
 from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
@@ -119,6 +120,7 @@ class StepReport:
         ndarray
             Numbers of the bodies, shape (count,).
         """
+        whole("count", count, 0, 2**31 - 1)
         return np.argsort(self.step_s, kind="stable")[:count]
 
     def price(self, count: int = _WORST) -> float:
@@ -134,6 +136,7 @@ class StepReport:
         float
             Factor of at least 1; infinite where nothing limits the step of the others.
         """
+        whole("count", count, 0, 2**31 - 1)
         steps = np.append(np.sort(self.step_s), np.inf)
         return float(steps[min(count, len(steps) - 1)] / steps[0]) if steps[0] < np.inf else 1.0
 
@@ -282,8 +285,8 @@ def step_report(scene: Union[Scene, Mesh], material: Optional[Material] = None) 
     if isinstance(scene, Mesh) and isinstance(material, Material):
         return _report(scene, material, True, True, 5)
     raise InputError(
-        f"step_report needs a Scene, or a Mesh and a Material, got {type(scene).__name__} and "
-        f"{type(material).__name__}"
+        f"scene must be a Scene, or a Mesh with a Material as material, got {shown(scene)} and "
+        f"{shown(material)}"
     )
 
 

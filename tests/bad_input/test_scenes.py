@@ -201,7 +201,7 @@ SCENES = {
     "Simulation driver": (lambda: Simulation(scene(), Uniform(), 3), "driver must be one of"),
     "quality": (lambda: quality_report(None, CONCRETE), "mesh must be a Mesh"),
     "quality material": (lambda: quality_report(PAIR, None), "material must be a Material"),
-    "steps": (lambda: step_report(3), "needs a Scene"),
+    "steps": (lambda: step_report(3), "must be a Scene"),
     "needs": (lambda: needed_effects(None), "result must be a Result"),
 }
 

@@ -11,7 +11,7 @@ from typing import Optional, Union
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Counted, Listener, Pace, Progress, listening
-from taichi_dem.kit.validation import instance, progress_option, shown
+from taichi_dem.kit.validation import fraction, instance, progress_option, shown, whole
 
 #: Least time between two updates of a cell in Jupyter [s].
 _NOTEBOOK_SECONDS = 0.2
@@ -78,6 +78,7 @@ class ProgressBar:
         share : float
             Share that is done, from 0 to 1.
         """
+        fraction("share", share)
         self(Progress(share, time.perf_counter() - self._started))
 
     def count(self, done: int, total: int) -> None:
@@ -90,6 +91,8 @@ class ProgressBar:
         total : int
             Number of all runs.
         """
+        whole("total", total, 0, 2**63)
+        whole("done", done, 0, total)
         self(Counted(done / max(1, total), time.perf_counter() - self._started, done, total))
 
     def __exit__(self, *error):
