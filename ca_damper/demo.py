@@ -27,7 +27,7 @@ from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
 from ca_damper.certificate import EFFECTS
 from ca_damper.demo_pictures import LEVEL, Decay, figures_of, sentences, write
-from ca_damper.film import film
+from ca_damper.film import Film, film
 from ca_damper.fixed_mass import RigidMass
 from ca_damper.oscillator import Oscillator
 from ca_damper.progress import Stages
@@ -53,7 +53,7 @@ SETTINGS = {
     "seed": (1, 1, study.whole(0, 2**31 - STARTS), "of the first start, 1"),
 }
 #: Cycles of a decay, samples in each; cycles of the animation, frames in each.
-CYCLES, SAMPLES, SHOWN, FRAMES = 45, 40, 6, 16
+CYCLES, SAMPLES, SHOWN, FRAMES = 45, 40, 5, 8
 _ENTRY = Entry(
     name=NAME,
     part="",
@@ -87,7 +87,7 @@ def let_go(options: Namespace, name: str) -> None:
     counts, starts = sorted({*COUNTS, options.particles}), options.seed + np.arange(STARTS)
     scenes = np.repeat(counts, STARTS), np.tile(starts, len(counts))
     jobs = [(rigid, counts, options.seed), *((one, *scenes) for one in fillings.values())]
-    recorded = {"measured_cycles": CYCLES, "recorded_samples": 2 * SAMPLES * CYCLES}
+    recorded: dict[str, Any] = {"measured_cycles": CYCLES, "recorded_samples": 2 * SAMPLES * CYCLES}
     batches = {job[0].label: _batch(*job, options, **recorded) for job in jobs}
     pair = [_batch(one, options.particles, options.seed, options) for one in (rigid, shown)]
     at = study.output_paths(options.out)
@@ -102,10 +102,11 @@ def let_go(options: Namespace, name: str) -> None:
         show_paragraph(sentence)
     print(f"\n{report}\n")
     study.finish(options, name, figures, [*batches.values(), *pair])
-    add_to_summary(options.out, certificate=report.certificate.as_dict())
+    if report.certificate is not None:
+        add_to_summary(options.out, certificate=report.certificate.as_dict())
 
 
-def _batch(filling: Any, particles: Any, seeds: Any, options: Namespace, **more: int) -> Batch:
+def _batch(filling: Any, particles: Any, seeds: Any, options: Namespace, **more: Any) -> Batch:
     """Containers on a base at rest, let go from the amplitude asked for."""
     chosen = isinstance(filling, FILLINGS[options.filling])
     dt = options.dt if chosen and options.dt else filling.default_dt
@@ -123,8 +124,8 @@ def _decay(counts: Sequence[int], batch: Batch) -> Decay:
     return Decay(counts, np.sqrt(2.0) * cycles.rms_by_cycle, batch.time_series()["x"].T)
 
 
-def _filmed(batch: Batch) -> Sequence[Any]:
-    """Frames of the first cycles of a container."""
+def _filmed(batch: Batch) -> Film:
+    """The first cycles of a container."""
     steps = int(batch.steps_per_cycle[0])
-    every = max(1, steps // FRAMES)
-    return film(batch, SHOWN * steps, sample_every=every, frame_every=every).frames[0]
+    samples, frames = (max(1, steps // number) for number in (SAMPLES, FRAMES))
+    return film(batch, SHOWN * steps, sample_every=samples, frame_every=frames)

@@ -8,10 +8,11 @@ from typing import Any, Optional
 import numpy as np
 
 from ca_damper.decay import logarithmic_decrement
+from ca_damper.film import Film
 from ca_damper.oscillator import Oscillator
 from ca_damper.plot import Box, Hanging, film_hanging
-from ca_damper.record import Frame
 from ca_damper.viewer import show_containers
+from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, GREY, picture, styles_of
 
@@ -35,6 +36,9 @@ class Decay:
     counts: Sequence[int]
     amplitude: np.ndarray
     x: np.ndarray
+
+    def __repr__(self):
+        return in_brief(self, f"{listed(self.counts)} particles", f"{len(self.x)} decays")
 
     def _of(self, array: np.ndarray, count: int) -> np.ndarray:
         """Rows of a number of particles, (starts, ...)."""
@@ -90,13 +94,13 @@ def _expected():
 def write(
     at: Callable[[str], str],
     decays: Mapping[str, Decay],
-    frames: tuple[Sequence[Frame], Sequence[Frame]],
+    films: tuple[Film, Film],
     filling: Any,
     options: Namespace,
 ) -> None:
     """Write the curves, their table and the animation.
 
-    frames: of the container with fixed particles, and with those of the filling, which are free.
+    films: of the container with fixed particles, and with those of the filling, which are free.
     """
     cycles = {"cycle": np.arange(1, 1 + decays["rigid"].amplitude.shape[1])}
     for label, decay in decays.items():
@@ -104,14 +108,15 @@ def write(
             cycles[f"amplitude_mm_{label}_N{count}"] = decay.amplitudes(count)
     write_csv(at("decay.csv"), cycles)
     plot_decay(at("decay.png"), decays, options.particles, options.amplitude)
-    fixed, free = frames
     box, style = Box.of(filling), styles_of([filling.label])[filling.label]
     # The rigid mass moves as smoothly as the structure: its box is not staggered.
     plain = Box(box.width, box.height, box.diameter)
+    (fixed,), (free,) = (film.frames for film in films)
     block = [_stacked(frame, plain) for frame in fixed]
+    curves = [(film.history["time_s"][:, 0], film.history["x"][:, 0]) for film in films]
     pair = [
-        Hanging(f"{options.particles} fixed", plain, block, GREY),
-        Hanging(f"{options.particles} free", box, free, style.colour),
+        Hanging(f"{options.particles} fixed", plain, block, GREY, curves[0]),
+        Hanging(f"{options.particles} free", box, free, style.colour, curves[1]),
     ]
     speed = 1e-3 * options.amplitude * 2.0 * np.pi * Oscillator().natural_frequency
     film_hanging(at("damper.gif"), pair, speed)
@@ -133,8 +138,8 @@ def plot_decay(path: str, decays: Mapping[str, Decay], count: int, top: float) -
     """Amplitude over cycles of a number of particles, free and fixed; top: of the start [mm]."""
     with picture(path, size=(7.0, 4.6)) as (_, axes):
         axes.axhline(LEVEL, color=BLACK, linewidth=0.8)
-        axes.axhline(threshold_mm(), color=BLACK, linewidth=0.8, linestyle=":")
-        axes.text(0.3, 0.97 * threshold_mm(), "peak acceleration 1 g", va="top")
+        dotted = {"linestyle": ":", "label": "peak acceleration 1 g"}
+        axes.axhline(threshold_mm(), color=BLACK, linewidth=1.2, **dotted)
         for label, style in styles_of(decays).items():
             sizes, ends = decays[label].amplitudes(count), decays[label].cycles(count)
             name, colour = f"{counted(count)}, {style.label}", style.colour
@@ -144,11 +149,16 @@ def plot_decay(path: str, decays: Mapping[str, Decay], count: int, top: float) -
             axes.plot(np.arange(len(sizes)) + 0.5, sizes, color=colour, **look)
             if ends is not None:
                 axes.text(ends + 1.0, 1.02 * LEVEL, f"{ends} cycles", color=colour, va="bottom")
-        axes.set(yscale="log", xlabel="cycles", ylabel="amplitude [mm]", xlim=(0, 25))
+        axes.set(
+            yscale="log",
+            xlabel="time [cycles of the empty container]",
+            ylabel="amplitude [mm]",
+            xlim=(0, 25),
+        )
         axes.set_ylim(2.0, 1.1 * top)
         axes.set_yticks([2, 5, 10, 20, 30], ["2", "5", "10", "20", "30"])
         axes.yaxis.set_minor_formatter("")
-        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
 
 
 def sentences(decays: Mapping[str, Decay], filling: Any, options: Namespace) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Optional
 
 from ca_damper.certificate import Certificate
+from ca_damper.checked_range import CheckedRange
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.files import write_text
@@ -58,6 +59,9 @@ class Report:
         as a share of it, with a confidence of 95 %; None where it is not known.
     certificate : Certificate, optional
         When effects first acted, what was left out, what was audited.
+    checked : CheckedRange, optional
+        Range in which the filling was checked, and what of the run lies outside; None where the
+        filling names none.
     """
 
     method: str
@@ -78,6 +82,7 @@ class Report:
     order: Optional[int] = None
     sampling: Optional[tuple[int, float]] = None
     certificate: Optional[Certificate] = None
+    checked: Optional[CheckedRange] = None
 
     def __repr__(self):
         particles = f"{_range(self.particles)} particles"
@@ -153,6 +158,7 @@ class Report:
             ("momentum error", f"{self.momentum_error:.2g} of what was exchanged"),
             ("known of the error", step),
             *(("", part) for part in others),
+            *(self.checked.rows() if self.checked is not None else ()),
             ("steps", f"{self.scene_steps:,} of scenes, {self.particle_steps:,} of particles"),
             ("evaluations", f"{self.container_evaluations:,} of the container's motion"),
             (
