@@ -14,6 +14,7 @@ import numpy as np
 from ca_damper import measures
 from ca_damper.activation import activated, certificate_of, periods_of
 from ca_damper.certificate import EFFECTS, Certificate, Periods
+from ca_damper.checked_range import checked_range, warn_outside
 from ca_damper.checks import (
     MOST_CYCLES,
     check_finite_start,
@@ -161,6 +162,10 @@ class Batch(LoadedScenes):
         ------
         InputError
             ``start`` is unknown or does not fit the excitation, or a number is not finite.
+
+        Notes
+        -----
+        A UserWarning says where the filling is known to fail on a scene.
         """
         coupling = self.engine.coupling
         choice("start", start, starts_of(self.excitation, self.mount))
@@ -168,6 +173,7 @@ class Batch(LoadedScenes):
         initial = self.numbers.initial(start)
         initial += np.column_stack([more, for_all("velocity", velocity, self.count)])
         check_finite_start(initial)
+        warn_outside(self)
         self._tell_compiling("placing", 0.2)
         coupling.start(np.ascontiguousarray(initial))
         self._started, self._told = True, 0
@@ -415,6 +421,7 @@ class Batch(LoadedScenes):
             certificate=self.certificate,
             diverged=tuple(map(str, self.divergences())),
             excitation=self.excitation.in_words(),
+            checked=checked_range(self),
         )
 
     @property

@@ -1,62 +1,125 @@
-"""Pictures and words of the demonstration: a container with particles beside an empty one."""
+"""Pictures and words of the demonstration: a container with free particles beside a rigid mass."""
 
 from argparse import Namespace
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Optional
 
 import numpy as np
 
-from ca_damper.measures import Cycles
+from ca_damper.decay import logarithmic_decrement
+from ca_damper.film import Film
 from ca_damper.oscillator import Oscillator
 from ca_damper.plot import Box, Hanging, film_hanging
 from ca_damper.viewer import show_containers
+from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
+from taichi_dem.kit.plot_style import BLACK, GREY, picture, styles_of
 
-#: Arrays by name.
-Columns = Mapping[str, np.ndarray]
+#: Cycles are counted down to this amplitude; decrements are means above and below two [mm].
+LEVEL, _ABOVE, _BELOW = 10.0, 12.0, 6.0
+#: Peak acceleration at which particles begin to leave the floor [m/s^2].
+_G = 9.81
+#: What an independent check of the programs found, let go at 30 mm, by spheres and place alike.
+_CYCLES_EXPECTED = {10: 8, 30: 5, 50: 4}
+_RIGID_EXPECTED, _DECREMENTS_EXPECTED = 16, (0.22, 0.075)
 
 
-def figures_of(cycles: Cycles, empty: Cycles, o: Oscillator) -> dict[str, tuple[float, str]]:
-    """Amplitude of the container with particles and without; their power and apparent mass."""
-    figures = {
-        "amplitude_mm": (1e3 * cycles.amplitude, "mm"),
-        "amplitude_empty_mm": (1e3 * empty.amplitude, "mm"),
-        "amplitude_left": (cycles.amplitude / empty.amplitude, "1"),
-        "rms_mm": (1e3 * cycles.rms, "mm"),
-        "power_mW": (1e3 * cycles.complex_power.real, "mW"),
-        "apparent_damping_N_s_m": (cycles.apparent_damping, "N s/m"),
-        "apparent_mass_g": (1e3 * cycles.apparent_mass, "g"),
-        "damping_ratio": (cycles.damping_ratio(o.mass, o.stiffness, o.damping), "1"),
-        "damping_ratio_empty": ([o.damping_ratio], "1"),
-        "loss_factor": (cycles.loss_factor(o.mass), "1"),
-    }
-    return {name: (float(value[0]), unit) for name, (value, unit) in figures.items()}
+@dataclass(frozen=True, eq=False)
+class Decay:
+    """Decays of a filling from several starts of each number of particles.
+
+    counts: numbers of particles. amplitude: of every cycle [m], x: samples over time [m], (counts x
+    starts, ...) each.
+    """
+
+    counts: Sequence[int]
+    amplitude: np.ndarray
+    x: np.ndarray
+
+    def __repr__(self):
+        return in_brief(self, f"{listed(self.counts)} particles", f"{len(self.x)} decays")
+
+    def _of(self, array: np.ndarray, count: int) -> np.ndarray:
+        """Rows of a number of particles, (starts, ...)."""
+        starts = len(array) // len(self.counts)
+        first = starts * list(self.counts).index(count)
+        return array[first : first + starts]
+
+    def amplitudes(self, count: int) -> np.ndarray:
+        """Median over the starts of the amplitude of every cycle [mm]."""
+        return 1e3 * np.median(self._of(self.amplitude, count), axis=0)
+
+    def cycles(self, count: int) -> Optional[int]:
+        """Cycles until the amplitude is below ``LEVEL``, a median; None where it stays above."""
+        below = 1e3 * self._of(self.amplitude, count) < LEVEL
+        ends = np.where(below.any(axis=1), below.argmax(axis=1), np.inf)
+        middle = float(np.median(ends))
+        return int(middle) if np.isfinite(middle) else None
+
+    def decrements(self, count: int) -> tuple[Optional[float], Optional[float]]:
+        """Mean decrement above 12 mm and below 6 mm; None where no cycle is there."""
+        found = [logarithmic_decrement(x) for x in self._of(self.x, count)]
+        size, lost = (np.concatenate(arrays) for arrays in zip(*found))
+        parts = (lost[1e3 * size > _ABOVE], lost[1e3 * size < _BELOW])
+        above, below = (float(part.mean()) if len(part) else None for part in parts)
+        return above, below
+
+
+def threshold_mm() -> float:
+    """Amplitude at which the peak acceleration of the empty container is 1 g [mm]."""
+    return 1e3 * _G / (2.0 * np.pi * Oscillator().natural_frequency) ** 2
+
+
+def figures_of(decays: Mapping[str, Decay], options: Namespace) -> dict[str, tuple]:
+    """Cycles and decrements of every filling, and where they are known the expected ones."""
+    figures: dict[str, tuple] = {"amplitude_at_1g_mm": (threshold_mm(), "mm")}
+    for label, decay in decays.items():
+        for count in decay.counts:
+            figures[f"cycles_{label}_N{count}"] = (decay.cycles(count), "1")
+        ends = decay.decrements(options.particles)
+        for side, value in zip(("above_12mm", "below_6mm"), ends):
+            figures[f"decrement_{side}_{label}_N{options.particles}"] = (value, "1")
+    return {**figures, **(_expected() if options.amplitude == 30.0 else {})}
+
+
+def _expected():
+    """Figures of an independent check, under the names of those measured."""
+    grains = {f"cycles_N{count}_expected": (n, "1") for count, n in _CYCLES_EXPECTED.items()}
+    names = "decrement_above_12mm_N30_expected", "decrement_below_6mm_N30_expected"
+    decrements = {name: (n, "1") for name, n in zip(names, _DECREMENTS_EXPECTED)}
+    return {"cycles_rigid_N30_expected": (_RIGID_EXPECTED, "1"), **grains, **decrements}
 
 
 def write(
     at: Callable[[str], str],
-    full: Any,
-    empty: Any,
+    decays: Mapping[str, Decay],
+    films: tuple[Film, Film],
     filling: Any,
     options: Namespace,
-    omega: float,
 ) -> None:
     """Write the curves, their table and the animation.
 
-    full, empty: a ``Swing`` each. omega: of the base [rad/s].
+    films: of the container with fixed particles, and with those of the filling, which are free.
     """
-    bare = {"x_empty_mm": empty.columns["x_mm"], "energy_empty_mJ": empty.columns["energy_mJ"]}
-    write_csv(at("motion.csv"), {**full.columns, **bare})
-    title, style = counted(options.particles), styles_of([filling.label])[filling.label]
-    plot_motion(at("motion.png"), title, full.columns, empty.columns, style)
-    fastest = 1.2 * omega * max(float(one.cycles.amplitude[0]) for one in (full, empty))
-    box = Box.of(filling)
-    # The empty container moves as smoothly as the structure: its box is not staggered.
+    cycles = {"cycle": np.arange(1, 1 + decays["rigid"].amplitude.shape[1])}
+    for label, decay in decays.items():
+        for count in decay.counts:
+            cycles[f"amplitude_mm_{label}_N{count}"] = decay.amplitudes(count)
+    write_csv(at("decay.csv"), cycles)
+    plot_decay(at("decay.png"), decays, options.particles, options.amplitude)
+    box, style = Box.of(filling), styles_of([filling.label])[filling.label]
+    # The rigid mass moves as smoothly as the structure: its box is not staggered.
     plain = Box(box.width, box.height, box.diameter)
-    smooth = Hanging("empty", plain, empty.frames, STYLES["empty"].colour)
-    pair = [smooth, Hanging(title, box, full.frames, style.colour)]
-    film_hanging(at("damper.gif"), pair, fastest)
+    (fixed,), (free,) = (film.frames for film in films)
+    block = [_stacked(frame, plain) for frame in fixed]
+    curves = [(film.history["time_s"][:, 0], film.history["x"][:, 0]) for film in films]
+    pair = [
+        Hanging(f"{options.particles} fixed", plain, block, GREY, curves[0]),
+        Hanging(f"{options.particles} free", box, free, style.colour, curves[1]),
+    ]
+    speed = 1e-3 * options.amplitude * 2.0 * np.pi * Oscillator().natural_frequency
+    film_hanging(at("damper.gif"), pair, speed)
     show_containers(pair, at("view.html"), open_browser=False)
 
 
@@ -65,52 +128,67 @@ def counted(particles: int) -> str:
     return f"{particles} particle{'' if particles == 1 else 's'}"
 
 
-def plot_motion(path: str, title: str, full: Columns, empty: Columns, style: Any) -> None:
-    """Displacement and energy over time, with particles and without; title: the particles."""
-    bare = {"color": STYLES["empty"].colour, "lw": 0.8, "label": STYLES["empty"].label}
-    own = {"color": style.colour}
-    time, own_title = full["time_s"], f"container with {title}"
-    with picture(path, 2, 1, size=(8.6, 5.6), sharex=True) as (_, (motion, energy)):
-        motion.plot(time, empty["x_mm"], **bare)
-        motion.plot(time, full["x_mm"], lw=0.9, label=f"{style.label}, {title}", **own)
-        motion.set(ylabel="displacement of\nthe container [mm]", xlim=(0.0, time[-1]))
-        energy.plot(time, empty["energy_mJ"], ls="--", **bare)
-        energy.plot(time, full["energy_mJ"], label=own_title, **own)
-        energy.plot(time, full["particles_mJ"], color=BLACK, label="the particles alone")
-        energy.set(xlabel="time [s]", ylabel="energy [mJ]", ylim=(0.0, None))
-        for axes in (motion, energy):
-            axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+def _stacked(frame, box):
+    """The frame of a rigid mass with its particles in rows on the floor of the box."""
+    row, column = np.divmod(np.arange(len(frame.position)), round(box.width / box.diameter))
+    return replace(frame, position=box.diameter * (np.column_stack([column, row]) + 0.5))
 
 
-def sentences(
-    figures: Mapping[str, tuple[float, str]],
-    filling: Any,
-    oscillator: Oscillator,
-    options: Namespace,
-) -> tuple[str, ...]:
+def plot_decay(path: str, decays: Mapping[str, Decay], count: int, top: float) -> None:
+    """Amplitude over cycles of a number of particles, free and fixed; top: of the start [mm]."""
+    with picture(path, size=(7.0, 4.6)) as (_, axes):
+        axes.axhline(LEVEL, color=BLACK, linewidth=0.8)
+        dotted = {"linestyle": ":", "label": "peak acceleration 1 g"}
+        axes.axhline(threshold_mm(), color=BLACK, linewidth=1.2, **dotted)
+        for label, style in styles_of(decays).items():
+            sizes, ends = decays[label].amplitudes(count), decays[label].cycles(count)
+            name, colour = f"{counted(count)}, {style.label}", style.colour
+            if label == "rigid":
+                name, colour = f"{counted(count)}, fixed", GREY
+            look = {"marker": style.marker, "markersize": 4, "linewidth": 1.0, "label": name}
+            axes.plot(np.arange(len(sizes)) + 0.5, sizes, color=colour, **look)
+            if ends is not None:
+                axes.text(ends + 1.0, 1.02 * LEVEL, f"{ends} cycles", color=colour, va="bottom")
+        axes.set(
+            yscale="log",
+            xlabel="time [cycles of the empty container]",
+            ylabel="amplitude [mm]",
+            xlim=(0, 25),
+        )
+        axes.set_ylim(2.0, 1.1 * top)
+        axes.set_yticks([2, 5, 10, 20, 30], ["2", "5", "10", "20", "30"])
+        axes.yaxis.set_minor_formatter("")
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+
+
+def sentences(decays: Mapping[str, Decay], filling: Any, options: Namespace) -> tuple[str, ...]:
     """The comparison in words."""
-    value = {name: one for name, (one, _) in figures.items()}
-    own, mass = oscillator.natural_frequency, 1e3 * oscillator.mass
-    load = 1e3 * options.particles * filling.particle_mass
+    count, oscillator = options.particles, Oscillator()
+    load, mass = 1e3 * count * filling.particle_mass, 1e3 * oscillator.mass
+    decay, rigid = decays[filling.label], decays["rigid"]
     return (
-        f"The container weighs {mass:g} g and swings by itself at {own:.2f} Hz.",
-        f"Its base shakes it at {options.frequency * own:.2f} Hz, by {options.amplitude:g} mm up "
-        "and down.",
-        f"Empty, it then swings by {value['amplitude_empty_mm']:.3g} mm.",
-        f"With {counted(options.particles)} ({load:g} g, {100.0 * load / mass:.0f} % of its mass) "
-        f"it swings by {value['amplitude_mm']:.3g} mm: {100.0 * value['amplitude_left']:.3g} % of "
-        "that.",
-        *(taken(value) if options.particles else ()),
+        f"The container weighs {mass:g} g, swings by itself at {oscillator.natural_frequency:.2f} "
+        f"Hz and is let go at {options.amplitude:g} mm.",
+        f"With {counted(count)} ({load:g} g, {100.0 * load / mass:.0f} % of its mass) fixed in it, "
+        f"{_until(rigid.cycles(count))}; with free ones, {_until(decay.cycles(count))}.",
+        *_lost(decay.decrements(count), rigid.decrements(count)),
     )
 
 
-def taken(value: Mapping[str, float]) -> tuple[str, ...]:
-    """Power and apparent mass of the particles in words; value: of the figures, by name."""
-    takes = value["power_mW"] > 0.0
-    power, damping = abs(value["power_mW"]), value["apparent_damping_N_s_m"]
+def _until(cycles):
+    """When the amplitude fell below the level."""
+    if cycles is None:
+        return f"it still swings by more than {LEVEL:g} mm at the end"
+    return f"it swings by less than {LEVEL:g} mm after {cycles} cycle{'' if cycles == 1 else 's'}"
+
+
+def _lost(ends, rigid):
+    """Decrements above and below the threshold, where there are some; rigid: of a fixed mass."""
+    above, below = ends
+    if above is None or below is None:
+        return ()
     return (
-        f"The particles {'take' if takes else 'give'} {power:.2g} mW {'from' if takes else 'to'} "
-        f"it, as a dashpot of {damping:.2g} N s/m would: the damping ratio is "
-        f"{value['damping_ratio']:.2g} instead of {value['damping_ratio_empty']:.2g}.",
-        f"In the swing they weigh as much as {value['apparent_mass_g']:.1f} g fixed to it.",
+        f"The logarithmic decrement is {above:.2g} above {_ABOVE:g} mm and {below:.2g} below "
+        f"{_BELOW:g} mm, that of the fixed mass {rigid[1]:.2g}: particles leave the floor where "
+        f"the peak acceleration is above about 1 g, which is at {threshold_mm():.1f} mm.",
     )

@@ -110,7 +110,8 @@ class Filling(Protocol):
     structure, and other options compile anew. It may have ``order``, that of the error in the step,
     for the report; choose its effects by itself, as ``activation.py`` describes; and have
     ``clearance(particles)`` [m] above settled particles, or ``with_clearance(particles,
-    clearance)``, for ``damper_map``.
+    clearance)``, for ``damper_map``; and ``checked_range(driven)``, of ``checked_range.py``, for
+    the report and the warning before a run.
     """
 
     @property

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Optional
 
 from ca_damper.certificate import Certificate
+from ca_damper.checked_range import CheckedRange
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.files import write_text
@@ -67,6 +68,9 @@ class Report:
         What acts beside the sine of the base, and what was done to samples of it, in words.
     transient : str, default ""
         Why the mean of the highest RMS is not known, in words.
+    checked : CheckedRange, optional
+        Range in which the filling was checked, and what of the run lies outside; None where the
+        filling names none.
     """
 
     method: str
@@ -90,6 +94,7 @@ class Report:
     diverged: tuple[str, ...] = ()
     excitation: tuple[str, ...] = ()
     transient: str = ""
+    checked: Optional[CheckedRange] = None
 
     def __repr__(self):
         particles = f"{_range(self.particles)} particles"
@@ -181,6 +186,7 @@ class Report:
             ("momentum error", f"{self.momentum_error:.2g} of what was exchanged"),
             ("known of the error", step),
             *(("", part) for part in others),
+            *(self.checked.rows() if self.checked is not None else ()),
             ("steps", f"{self.scene_steps:,} of scenes, {self.particle_steps:,} of particles"),
             ("evaluations", f"{self.container_evaluations:,} of the container's motion"),
             (

@@ -10,7 +10,7 @@ Small scenes with short transients, so that a reference at a quarter of the step
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,10 +18,11 @@ import numpy as np
 from _damper_reference import reference_values
 from ca_damper import Automaton, Empty, Oscillator, RigidMass, Spheres, frequency_response, goals
 
+PAPER = Automaton(rules="paper")
 #: Fillings by how often they are drawn, in tenths.
 FILLINGS = (
-    *((Empty(), 1), (RigidMass(), 1), (Spheres(), 2), (Automaton(), 3)),
-    *((Automaton(accounting="landing"), 1.5), (Automaton(accounting="landing+ejection"), 1.5)),
+    *((Empty(), 1), (RigidMass(), 1), (Spheres(), 2), (PAPER, 3)),
+    *((replace(PAPER, accounting=word), 1.5) for word in ("landing", "landing+ejection")),
 )
 #: CPU seconds that an answer may take, and a peak of spheres, which are dearer.
 BUDGET_S, PEAK_OF_SPHERES_S = 4.0, 12.0

@@ -30,8 +30,8 @@ RESPONSES, EVERY = ("dem", "ca_static", "ca_landing", "ca_ejection"), 8
 def measure(quick):
     """Yield the damper's cells and particles a second, and the time of the response figures."""
     repeats, least = (3, 0.03) if quick else (7, 0.06)
-    scan = shaken(Automaton(traversal="scan"), 1e-4)
-    listed, spheres = shaken(Automaton(), 1e-4), shaken(Spheres(), 2e-5)
+    scan = shaken(Automaton(rules="paper", traversal="scan"), 1e-4)
+    listed, spheres = shaken(Automaton(rules="paper"), 1e-4), shaken(Spheres(), 2e-5)
 
     def rate(batch, count, scene=SOME):
         return lambda: 1e-6 * count / step_seconds(batch, scene, least)

@@ -1,6 +1,7 @@
 """Runs that ``cost_of_effects.py`` makes in processes of their own, and what they cost."""
 
 import time
+from functools import partial
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.measured_overhead import elastic_step_seconds
 
-FILLINGS = {"spheres": Spheres, "automaton": Automaton}
+FILLINGS = {"spheres": Spheres, "automaton": partial(Automaton, rules="paper")}
 PEAK = 575e6
 
 

@@ -14,6 +14,7 @@ with the transfer function of the empty container.
 import os
 import sys
 import time
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -34,13 +35,13 @@ PARTICLES, SPHERES = 30, "dem_tsuji"
 CA_STEPS = (2e-3, 1.1e-3, 7e-4, 5e-4, 3e-4, 2e-4, 1e-4, 5e-5)
 DEM_STEPS = (1e-4, 6e-5, 4e-5, 3e-5, 2e-5, 1.4e-5)
 SOFT, SOFT_STEPS = Spheres(young=5e6, wall_young=5e6), (4e-4, 2.5e-4, 2e-4, 1e-4, 5e-5)
-PRINTED = Spheres(damping="printed")
+PRINTED, PAPER = Spheres(damping="printed"), Automaton(rules="paper")
 #: A filling, its steps [s] from coarse to fine, those of the quick job, step and seeds of the
 #: reference.
 METHODS = {
-    "ca_static": (Automaton(accounting="all"), CA_STEPS, (2e-3, 2e-4), 1e-5, 6),
-    "ca_ejection": (Automaton(accounting="landing+ejection"), CA_STEPS, (), 1e-5, 6),
-    "ca_landing": (Automaton(accounting="landing"), CA_STEPS, (2e-3, 2e-4), 1e-5, 6),
+    "ca_static": (PAPER, CA_STEPS, (2e-3, 2e-4), 1e-5, 6),
+    "ca_ejection": (replace(PAPER, accounting="landing+ejection"), CA_STEPS, (), 1e-5, 6),
+    "ca_landing": (replace(PAPER, accounting="landing"), CA_STEPS, (2e-3, 2e-4), 1e-5, 6),
     SPHERES: (Spheres(), DEM_STEPS, (1e-4, 3e-5), 5e-6, 3),
     "dem_printed": (PRINTED, (6e-5, 4e-5, 2e-5), (), 5e-6, 3),
     "dem_soft": (SOFT, SOFT_STEPS, (2e-4,), 2.5e-5, 3),

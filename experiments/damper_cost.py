@@ -11,6 +11,7 @@ and longer steps until it refuses or diverges.
 """
 
 import sys
+from dataclasses import replace
 from functools import partial
 from statistics import median
 
@@ -36,7 +37,8 @@ SETTINGS = {
     "cycles": (20, 3),
     "steps": (STEPS, (2e-5, 1e-4, 1e-3, 2e-3)),
 }
-PAIRS, SCAN = Spheres(search="all_pairs"), Automaton(traversal="scan")
+PAIRS, PAPER = Spheres(search="all_pairs"), Automaton(rules="paper")
+SCAN = replace(PAPER, traversal="scan")
 #: Label: filling, step [s], search or traversal with the step, marker, line. The paper's way is
 #: dashed, markers tell the automaton's steps apart.
 VARIANTS = {
@@ -44,9 +46,9 @@ VARIANTS = {
     "dem_cells": (Spheres(), 2e-5, "cells, 20 µs", "^", "-"),
     "combined": (Combined(), 1e-4, "20 and 100 µs", "v", "-"),
     "ca_scan_1e-4": (SCAN, 1e-4, "scan, 100 µs", "o", "--"),
-    "ca_list_1e-4": (Automaton(), 1e-4, "list, 100 µs", "o", "-"),
+    "ca_list_1e-4": (PAPER, 1e-4, "list, 100 µs", "o", "-"),
     "ca_scan_2e-5": (SCAN, 2e-5, "scan, 20 µs", "s", "--"),
-    "ca_list_2e-5": (Automaton(), 2e-5, "list, 20 µs", "s", "-"),
+    "ca_list_2e-5": (PAPER, 2e-5, "list, 20 µs", "s", "-"),
 }
 #: Marker of each outcome of a run.
 OUTCOMES = {"runs": "o", "diverges": "X", "refused": "|"}
@@ -65,7 +67,7 @@ def run(options):
             bar.count(k + 1, len(VARIANTS))
     borne = {
         one.label: [(dt, outcome(one, dt, options.cycles)) for dt in options.steps]
-        for one in (Spheres(), Automaton(), Automaton(accounting="landing"))
+        for one in (Spheres(), PAPER, replace(PAPER, accounting="landing"))
     }
     study.write_rows(folder / "cost.csv", [row for rows in costs.values() for row in rows])
     tried = [(label, *found) for label, rows in borne.items() for found in rows]

@@ -36,7 +36,7 @@ SETTINGS = {
     "cycles": (60, 25),
 }
 #: Spheres, and the automaton by the rules of the paper and of place.
-FILLINGS = (Spheres, Automaton, partial(Automaton, rules="place"))
+FILLINGS = (Spheres, partial(Automaton, rules="paper"), Automaton)
 #: Base motion without gravity [Hz], and ranges of the axes.
 WEIGHTLESS_HZ, RATIOS = 6.0, (0.6, 1.4)
 HERTZ, MILLIMETRES = (5.0, 40.0), (0.1, 10.0)

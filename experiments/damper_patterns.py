@@ -60,7 +60,8 @@ def options_parser():
 
 def run(options):
     """Shake both fillings, compare, picture."""
-    jobs = {"ca": (Automaton(accounting=options.accounting), CA_DT), "dem": (Spheres(), options.dt)}
+    automaton = Automaton(rules="paper", accounting=options.accounting)
+    jobs = {"ca": (automaton, CA_DT), "dem": (Spheres(), options.dt)}
     scenes = (
         np.repeat(PARTICLES, options.seeds),
         np.tile(np.arange(options.seeds) + 1, len(PARTICLES)),

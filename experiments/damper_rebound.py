@@ -15,6 +15,7 @@ Writes rebound.png, heights.csv, impacts.csv and summary.json to results/damper_
 
 import math
 import sys
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -41,7 +42,7 @@ COUNTED, ALLOWED_MS = 4, 2.0
 FREQUENCY = 10.0
 #: Column from which the particle falls; the second is one of those that stand lower.
 COLUMN = 1
-DEFAULT = Automaton().accumulator
+DEFAULT = Automaton(rules="paper").accumulator
 TITLES = {
     "signed": "automaton\nsigned (default)",
     "signed_through_walls": "automaton\nsigned through walls",
@@ -79,10 +80,10 @@ def run(options):
 def fillings(options):
     """Title, filling with one particle at the top, step [s], and how far it falls [m]."""
     both = {"restitution": options.restitution, "wall_restitution": options.restitution}
-    lattice, spheres = Automaton(), Spheres()
+    lattice, spheres = Automaton(rules="paper"), Spheres()
     top = lattice.rows - 1
     for reading in READINGS:
-        filling = Automaton(accumulator=reading, start=((COLUMN, top),), **both)
+        filling = replace(lattice, accumulator=reading, start=((COLUMN, top),), **both)
         yield reading, filling, options.ca_dt, top * lattice.width
     place = 0.5 * spheres.width, spheres.height - spheres.radius
     filling = Spheres(start=(place,), **both)

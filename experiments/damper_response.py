@@ -45,7 +45,9 @@ COARSE = ([0.80, 0.84, 0.87, 0.89], [1.04, 1.06, 1.09, 1.12])
 RATIOS = np.round(np.concatenate([COARSE[0], np.arange(0.90, 1.0201, 0.005), COARSE[1]]), 4)
 #: Of both fillings [kg].
 PARTICLE_MASS = Spheres().particle_mass
-AUTOMATA = [Automaton(accounting=word) for word in ("landing", "landing+ejection", "all")]
+#: Those of the paper.
+ACCOUNTINGS = ("landing", "landing+ejection", "all")
+AUTOMATA = [Automaton(rules="paper", accounting=word) for word in ACCOUNTINGS]
 #: The fillings compared, by label.
 FILLINGS = {filling.label: filling for filling in (Spheres(), *AUTOMATA)}
 NUMBERS = several(whole(0, 160))

@@ -56,7 +56,7 @@ SETTINGS = {
 #: Fillings by column: rules of the first edition, of place, and the spheres; their steps [s].
 FILLINGS = {
     "paper": (Automaton(rules="paper"), 1e-4),
-    "place": (Automaton(rules="place"), 1e-4),
+    "place": (Automaton(), 1e-4),
     "dem": (Spheres(), 2e-5),
 }
 #: Numbers of grains that swing, with the gap, swing and lag that are wanted [mm, mm, degrees]: of

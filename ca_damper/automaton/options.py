@@ -8,8 +8,10 @@ from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting
 from ca_damper.automaton.accumulator import READINGS
 from ca_damper.automaton.conflict_resolution import MOST_CELLS
 from ca_damper.automaton.device import DeviceAutomaton
+from ca_damper.automaton.known_range import range_of
 from ca_damper.automaton.lattice_device import LatticeDevice
 from ca_damper.automaton.place.device import PlaceAutomaton
+from ca_damper.checked_range import CheckedRange, Driven
 from ca_damper.contracts import check_members, members_of
 from ca_damper.filling import Structure
 from ca_damper.scenes.scene_fields import SceneFields
@@ -41,7 +43,7 @@ _FRICTION = 0.5
 
 @dataclass(frozen=True)
 class Automaton:
-    """Particles as a cellular automaton (Komatsuzaki et al., section 5).
+    """Particles as a cellular automaton, by rules of place or those of Komatsuzaki et al.
 
     One particle a cell of a triangular lattice; a particle changes its cell when it has travelled
     the width of one. Instances are immutable and checked when they are made.
@@ -87,10 +89,11 @@ class Automaton:
         ``"list"`` of particles or ``"scan"`` of all cells; both give the same bits.
     ledger : bool, default False
         Whether to record the momentum that the accounting leaves out.
-    rules : str, default "paper"
-        ``"paper"``: rules of the paper. ``"place"``: particles fly in any direction, collide where
-        their positions meet, and all impacts of a step are given to the container together.
-        ``"place"`` needs the defaults of accounting, pair_rule, priority, accumulator and ledger.
+    rules : str, default "place"
+        ``"place"``: particles fly in any direction, collide where their positions meet, and all
+        impacts of a step are given to the container together; accounting, pair_rule, priority,
+        accumulator and ledger have no other value than their default. ``"paper"``: rules of the
+        paper, for reproducing it; a UserWarning before a run says where they are known to fail.
     friction : float, optional
         Friction coefficient between particles, for rules ``"place"`` only. None: 0.5 there, no
         friction by the rules of the paper.
@@ -109,7 +112,7 @@ class Automaton:
 
     Examples
     --------
-    >>> Automaton(rules="place", columns=12).capacity
+    >>> Automaton(columns=12).capacity
     192
     """
 
@@ -130,7 +133,7 @@ class Automaton:
     start: Optional[tuple] = None
     traversal: str = "list"
     ledger: bool = False
-    rules: str = "paper"
+    rules: str = "place"
     friction: Optional[float] = None
     wall_friction: Optional[float] = None
 
@@ -167,14 +170,14 @@ class Automaton:
                     )
 
     def _check_rules(self) -> None:
+        flag("ledger", self.ledger)
         if self.rules == "place":
             for name, value in _OF_THE_PAPER.items():
                 if getattr(self, name) != value:
                     raise InputError(
-                        f"{name} must be {value!r} with rules 'place', which leave no choice, "
-                        f"got {getattr(self, name)!r}"
+                        f"{name} must be {value!r} with rules 'place', which leave no choice, got "
+                        f"{getattr(self, name)!r}: pass rules='paper' for the rules that do"
                     )
-        flag("ledger", self.ledger)
         if self.static_contact is not None:
             flag("static_contact", self.static_contact)
         if self.ledger and self._accounting.counts_all:
@@ -337,6 +340,21 @@ class Automaton:
                 f"dt must lie in (0, {most}) s, in which no particle crosses a cell "
                 f"of {self.width:g} m at v_max = {self.v_max:g} m/s, got {got}"
             )
+
+    def checked_range(self, driven: Driven) -> CheckedRange:
+        """Range in which the rules were checked, and what of the scenes lies outside it.
+
+        Parameters
+        ----------
+        driven : Driven
+            What is known of the scenes before they run.
+
+        Returns
+        -------
+        CheckedRange
+            The range, what is outside, and a sentence where the rules are known to fail.
+        """
+        return range_of(self, driven)
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
         """Meaning of the code of ``divergence_code``, and a step that avoids it [s]."""

@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Optional
 
 import numpy as np
 
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox
 from ca_damper.record import Frame
+from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.plot_style import BLACK
 from taichi_dem.kit.validation import FileName
 
@@ -18,12 +20,19 @@ _HANGS, _COILS, _HALF, _LEAD = 75.0, 9, 7.0, 6.0
 
 @dataclass(frozen=True)
 class Hanging:
-    """A container in a film: its name, its Box, its frames, and the colour of its curve."""
+    """A container in a film: its name, its Box, its frames, and the colour of its curve.
+
+    curve: times [s] and displacements [m], where it is drawn finer than its frames.
+    """
 
     title: str
     box: Box
     frames: Sequence[Frame]
     colour: str
+    curve: Optional[tuple[np.ndarray, np.ndarray]] = None
+
+    def __repr__(self):
+        return in_brief(self, self.title, f"{len(self.frames)} frames")
 
 
 def film_hanging(path: FileName, containers: Sequence[Hanging], fastest: float) -> None:
@@ -56,9 +65,9 @@ def film_hanging(path: FileName, containers: Sequence[Hanging], fastest: float) 
 
 def _curve(axes, one, begin):
     """Draw the displacement of a container; returns the dot for the present."""
-    time = [frame.time_s - begin for frame in one.frames]
-    moved = [1e3 * frame.x for frame in one.frames]
-    axes.plot(time, moved, color=one.colour, linewidth=0.9, label=one.title)
+    frames = zip(*((frame.time_s, frame.x) for frame in one.frames))
+    time, moved = map(np.array, frames if one.curve is None else one.curve)
+    axes.plot(time - begin, 1e3 * moved, color=one.colour, linewidth=0.9, label=one.title)
     return axes.plot([], [], "o", color=one.colour, markersize=4)[0]
 
 

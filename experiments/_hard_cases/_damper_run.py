@@ -9,9 +9,9 @@ from ca_damper.measures import COLUMNS
 from ca_damper.plot import Box
 
 FILLINGS = {
-    "automaton": Automaton(),
-    "automaton_ejection": Automaton(accounting="landing+ejection"),
-    "automaton_landing": Automaton(accounting="landing"),
+    "automaton": Automaton(rules="paper"),
+    "automaton_ejection": Automaton(rules="paper", accounting="landing+ejection"),
+    "automaton_landing": Automaton(rules="paper", accounting="landing"),
     "spheres": Spheres(),
     "spheres_printed": Spheres(damping="printed"),
     "empty": Empty(),

@@ -175,7 +175,7 @@ for name, shape in SHAPES.items():
 @case(["automaton"])
 def grains_by_place_full(trial):
     """Grains by the rules of place, every cell taken: their number and momentum are kept."""
-    what = Automaton(rules="place")
+    what = Automaton()
     batch = Batch(what, SceneTable(what.capacity, 1, 1e-4, 6.0, 0.024), mount="base")
     batch.start()
     batch.run(2, 1)

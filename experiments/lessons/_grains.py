@@ -1,6 +1,6 @@
 """Why a box of grains damps: one box on its spring, shaken at several frequencies at once.
 
-The grains are those of the automaton with static contact. All runs on the thread of the session.
+The grains are those of the automaton by rules of place. All runs on the thread of the session.
 """
 
 import numpy as np

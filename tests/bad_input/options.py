@@ -33,6 +33,7 @@ from taichi_dem import (
 from taichi_dem.mesh import shapes as mesh_shapes
 from taichi_dem.mesh.face_groups import with_inner_group
 from taichi_dem.mesh.gmsh import block_with_hole
+from tests.paper import paper
 
 
 class Option(NamedTuple):
@@ -79,11 +80,6 @@ def table(**columns):
 def checkpoint(**options):
     """A checkpoint of a name, unless it is given another."""
     return Checkpoint(**{"path": "run.npz", **options})
-
-
-def placed(**options):
-    """An automaton by the rules of place."""
-    return Automaton(rules="place", **options)
 
 
 def solved(**options):
@@ -233,14 +229,14 @@ BLAST = [
 _NUMBERS = ("width", "particle_mass", "v_max")
 _MODULI = ("reference_speed", "young", "wall_young", "diameter", "particle_mass")
 DAMPER = [
-    *taken(Automaton, "word", ("accounting", "pair_rule", "priority", "accumulator", "traversal")),
+    *taken(paper, "word", ("accounting", "pair_rule", "priority", "accumulator", "traversal")),
     *taken(Automaton, "word", ("rules",)),
-    *taken(placed, "zero or positive", ("friction", "wall_friction"), (None,)),
+    *taken(Automaton, "zero or positive", ("friction", "wall_friction"), (None,)),
     *taken(Automaton, "share", ("restitution", "wall_restitution")),
     *taken(Automaton, "positive", _NUMBERS),
     *taken(Automaton, "zero or positive", ("gravity", "static_threshold")),
     *taken(Automaton, "whole", ("columns", "rows")),
-    *taken(Automaton, "flag", ("ledger",)),
+    *taken(paper, "flag", ("ledger",)),
     *taken(Automaton, "flag", ("static_contact",), (None,)),
     *taken(Spheres, "word", ("damping", "search", "friction_law")),
     *taken(Spheres, "share", ("restitution", "wall_restitution")),

@@ -96,7 +96,7 @@ LINES = [
     ("damper_response", ("--accuracy", "1%", "--resume"), ("accuracy must be left out",)),
     ("damper_validity", ("--seeds", "0"), ("--seeds", "1 to 1000")),
     ("demo_damper", ("--particles", "161"), ("--particles", "0 to 160")),
-    ("demo_damper", ("--frequency", "0"), ("--frequency",)),
+    ("demo_damper", ("--amplitude", "0"), ("--amplitude",)),
     ("demo_damper", ("--seed", "-1"), ("--seed",)),
     ("demo_damper", ("--dt", "0.9"), ("dt must lie in", "0.9")),
     ("demo_damper", ("--filling", "water"), ("--filling", "automaton")),

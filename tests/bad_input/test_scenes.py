@@ -44,6 +44,7 @@ from taichi_dem import (
 from taichi_dem.mesh.face_groups import with_cut, with_inner_group, with_outer_group
 from taichi_dem.mesh.shapes import bar, pair, single
 from tests.bad_input.refusals import assert_refused, steady
+from tests.paper import paper
 
 PAIR = pair()
 CUT = with_inner_group(PAIR, "notch", lambda x: x[:, 0] < 1.0)
@@ -322,9 +323,9 @@ DAMPERS = {
     "solved oscillator": (lambda: solved(oscillator=3), "oscillator must be an Oscillator"),
     "solved progress": (lambda: solved(progress="bar"), "progress must be a function"),
     "lattice": (lambda: Automaton(columns=4000, rows=4000), "fewer than 4096 cells"),
-    "ledger": (lambda: Automaton(ledger=True), "ledger must be False"),
+    "ledger": (lambda: Automaton(rules="paper", ledger=True), "ledger must be False"),
     "priority": (
-        lambda: Automaton(pair_rule="one_sided", priority="pairs_first"),
+        lambda: paper(pair_rule="one_sided", priority="pairs_first"),
         "priority must be 'random'",
     ),
     "cell": (lambda: Automaton(start=[(10, 0)]), "(0, 0) to (9, 15), got (10, 0)"),

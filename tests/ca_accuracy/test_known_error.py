@@ -56,7 +56,7 @@ def test_a_filling_has_the_order_that_it_declares(filling, particles, step):
 
 @pytest.mark.parametrize("accounting", ["landing", "landing+ejection"])
 def test_an_automaton_that_leaves_impulses_out_declares_no_order(accounting):
-    filling = Automaton(accounting=accounting)
+    filling = Automaton(rules="paper", accounting=accounting)
     assert filling.order is None
     report = Batch(filling, SceneTable(1, 1, 1e-4, 6.0, 1e-3)).report()
     assert report.known_error.startswith("step 0.0001 s, order unknown; momentum closes to ")

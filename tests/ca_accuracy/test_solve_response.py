@@ -402,7 +402,7 @@ def test_plans_of_something_else_are_refused(plan, words):
 def test_a_method_without_a_limit_says_that_no_step_has_it():
     """Three grains whose pushes alone count change their mass by a third from step to step."""
     answer = solve_response(
-        Automaton(accounting="landing+ejection"),
+        Automaton(rules="paper", accounting="landing+ejection"),
         particles=3,
         goal=goals.apparent_mass_at(0.983),
         oscillator=Oscillator(base_amplitude=0.3e-3),

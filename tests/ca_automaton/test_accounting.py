@@ -3,10 +3,11 @@
 import pytest
 import taichi as ti
 
-from ca_damper import Automaton, Batch, SceneTable
+from ca_damper import Batch, SceneTable
 from ca_damper.automaton.accounting import ACCOUNTINGS, Uncounted
 from ca_damper.automaton.impulse_balance import ITEMS, quanta
 from tests.ca_automaton.test_momentum import ledger, shaken, test_momentum_is_accounted_for
+from tests.paper import outside, paper
 
 
 @ti.data_oriented
@@ -46,18 +47,19 @@ def test_what_it_leaves_out_is_written_down():
 
 
 def test_it_has_its_words():
-    automaton = Automaton(accounting="half")
+    automaton = paper(accounting="half")
     assert automaton.label == "ca_half"
     assert automaton.effects == ("pairs", "landing", "ejection")
-    assert Automaton(accounting="half", static_contact=True).label == "ca_half_static"
+    assert paper(accounting="half", static_contact=True).label == "ca_half_static"
 
 
 def test_a_container_at_rest_feels_half_of_the_weight():
     """Of one particle that lies on the floor: m g / 2, to the momentum of 4 g dt at the ends."""
-    automaton, cycles = Automaton(accounting="half", start=((4, 15),)), 12
+    automaton, cycles = paper(accounting="half", start=((4, 15),)), 12
     table = SceneTable(1, 1, 1e-4, 6.0)
     batch = Batch(automaton, table, mount="base", measured_cycles=cycles)
-    batch.start()
+    with outside():
+        batch.start()
     force = batch.run(12, cycles).mean_force[0]
     bound = 2 * 4 * 1e-4 / (cycles / 6.0)
     weight = automaton.particle_mass * automaton.gravity

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from ca_damper.automaton import ACCOUNTINGS, Automaton
+from ca_damper.automaton import ACCOUNTINGS
 from tests.ca_automaton.shaken import Shaken
+from tests.paper import paper
 
 SHAKEN = {"amplitude": 24e-3, "traced": 1200}
 
@@ -27,7 +28,7 @@ def test_list_and_scan_agree(accounting):
     """Impulses, carried mass, momentum, energy and state, at every step."""
     particles = [1, 20, 60, 159]
     runs = [
-        Shaken(Automaton(accounting=accounting, traversal=name), particles, **SHAKEN).run(1200)
+        Shaken(paper(accounting=accounting, traversal=name), particles, **SHAKEN).run(1200)
         for name in ("list", "scan")
     ]
     assert equal(*runs)
@@ -42,8 +43,8 @@ def shuffle(cells: ti.template(), number: ti.template(), order: ti.types.ndarray
 
 def test_order_of_the_particles_changes_nothing():
     """The list shuffled every 100 steps."""
-    straight = Shaken(Automaton(), 60, **SHAKEN).run(1200)
-    mixed = Shaken(Automaton(), 60, **SHAKEN)
+    straight = Shaken(paper(), 60, **SHAKEN).run(1200)
+    mixed = Shaken(paper(), 60, **SHAKEN)
     draw = np.random.default_rng(1)
     listed = mixed.device.cells.traversal
     for _ in range(12):
@@ -55,8 +56,8 @@ def test_order_of_the_particles_changes_nothing():
 
 def test_neighbours_in_the_batch_change_nothing():
     """A scene alone, and the same row as the third of five other scenes."""
-    alone = Shaken(Automaton(), 40, seed=7, **SHAKEN).run(1200)
-    among = Shaken(Automaton(), [10, 159, 40, 40, 80], seed=[7, 7, 7, 8, 9], dt=1e-4, **SHAKEN).run(
+    alone = Shaken(paper(), 40, seed=7, **SHAKEN).run(1200)
+    among = Shaken(paper(), [10, 159, 40, 40, 80], seed=[7, 7, 7, 8, 9], dt=1e-4, **SHAKEN).run(
         1200
     )
     assert equal(alone, among, scene=0, other_scene=2)
@@ -65,8 +66,8 @@ def test_neighbours_in_the_batch_change_nothing():
 
 def test_length_of_launches_changes_nothing():
     """1200 steps at once, and in pieces."""
-    whole = Shaken(Automaton(), [30, 90], **SHAKEN).run(1200)
-    pieces = Shaken(Automaton(), [30, 90], **SHAKEN)
+    whole = Shaken(paper(), [30, 90], **SHAKEN).run(1200)
+    pieces = Shaken(paper(), [30, 90], **SHAKEN)
     for steps in (1, 2, 397, 800):
         pieces.run(steps)
     assert equal(whole, pieces)
@@ -74,7 +75,7 @@ def test_length_of_launches_changes_nothing():
 
 def digest():
     """Of the state of eight shaken scenes."""
-    box = Shaken(Automaton(), [5, 20, 35, 50, 65, 80, 120, 160], amplitude=24e-3).run(1500)
+    box = Shaken(paper(), [5, 20, 35, 50, 65, 80, 120, 160], amplitude=24e-3).run(1500)
     return hashlib.sha256(b"".join(part.tobytes() for part in box.state())).hexdigest()
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ca_damper.automaton import Automaton
 from tests.ca_automaton.shaken import Shaken
+from tests.paper import paper
 
 GRAVITY, RESTITUTION, WIDTH, MASS = 10.0, 0.75, 6e-3, 0.2e-3
 TOP = 15
@@ -20,7 +20,7 @@ def impacts(count):
 def fall(dt=1e-4, column=4, seconds=0.9, **options):
     """Trace of one particle let go in the top row."""
     steps = round(seconds / dt)
-    automaton = Automaton(accounting="landing+ejection", start=((column, TOP),), **options)
+    automaton = paper(accounting="landing+ejection", start=((column, TOP),), **options)
     return Shaken(automaton, 1, dt=dt, traced=steps).run(steps).traces()[:, 0]
 
 
@@ -86,7 +86,7 @@ def test_zero_at_the_wall_keeps_the_place():
 @pytest.mark.parametrize("accounting", ["landing", "landing+ejection", "all"])
 def test_a_column_falls_to_the_floor_and_stays_a_column(accounting):
     """Ten in a column end in its ten lowest cells, whatever counts."""
-    automaton = Automaton(accounting=accounting, start=tuple((4, 6 + k) for k in range(10)))
+    automaton = paper(accounting=accounting, start=tuple((4, 6 + k) for k in range(10)))
     box = Shaken(automaton, 10).run(30000)
     height = box.device.snapshot(0)["position"][:, 1] / WIDTH
     assert height.min() == pytest.approx(1.0, abs=0.2)

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from ca_damper.automaton import ACCOUNTINGS, Automaton
+from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.automaton.impulse_balance import ITEMS, QUANTUM
 from tests.ca_automaton.shaken import Shaken
+from tests.paper import paper
 
 MASS, GRAVITY, DT, AMPLITUDE, FREQUENCY = 0.2e-3, 10.0, 1e-4, 18e-3, 6.0
 OMEGA = 2 * np.pi * FREQUENCY
@@ -21,7 +22,7 @@ def rise(step):
 
 def shaken(steps, **options):
     """Boxes of all numbers of particles, with a ledger where momentum goes astray."""
-    automaton = Automaton(ledger=options.get("accounting", "all") != "all", **options)
+    automaton = paper(ledger=options.get("accounting", "all") != "all", **options)
     box = Shaken(automaton, PARTICLES, 3, DT, AMPLITUDE, FREQUENCY, traced=steps)
     return box.run(steps)
 
@@ -81,7 +82,7 @@ def test_mean_force_is_the_weight(amplitude):
     """
     steps, late = round(24 / FREQUENCY / DT), round(4 / FREQUENCY / DT)
     particles = np.array([10, 30, 50, 100])
-    box = Shaken(Automaton(), particles, 2, DT, amplitude, FREQUENCY, traced=steps)
+    box = Shaken(paper(), particles, 2, DT, amplitude, FREQUENCY, traced=steps)
     trace = box.run(steps).traces()
     speed = OMEGA * amplitude * np.cos(OMEGA * DT * np.arange(steps + 1))
     force = trace[:, :, 0] - trace[:, :, 1] * (np.diff(speed)[:, None] + GRAVITY * DT)

@@ -4,11 +4,12 @@ import json
 
 import pytest
 
-from ca_damper import Automaton, Batch, InputError, SceneTable, Spheres, needed_effects
+from ca_damper import Batch, InputError, SceneTable, Spheres, needed_effects
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.effect_activity import EffectActivity
 from taichi_dem.kit.allocation import FieldTree
 from taichi_dem.kit.effect_usage import Advice
+from tests.paper import expected, paper
 
 #: Of a cell, and how high above the floor the one particle begins [cells].
 ROW = 10
@@ -17,13 +18,14 @@ ROW = 10
 def ran(filling, particles, dt, cycles=3, amplitude=0.0):
     """The report of a container that hardly moves, or shakes."""
     batch = Batch(filling, SceneTable(particles, 1, dt, 6.0, amplitude), mount="base")
-    batch.start()
+    with expected(batch):
+        batch.start()
     batch.run(cycles, 0)
     return batch.report()
 
 
 def test_one_particle_meets_the_floor_and_nobody_else(tmp_path):
-    report = ran(Automaton(start=((3, ROW),)), 1, 1e-4)
+    report = ran(paper(start=((3, ROW),)), 1, 1e-4)
     # Falling 60 mm takes 0.11 s, all bounces with e = 3/4 together (1 + e) / (1 - e) times that,
     # 0.77 s: after 0.5 s it has met the floor at 0.11, 0.27, 0.40 and 0.49 s and still flies.
     assert needed_effects(report).inactive == ("pairs", "ejection", "static contact")
@@ -36,7 +38,7 @@ def test_one_particle_meets_the_floor_and_nobody_else(tmp_path):
 
 
 def test_shaken_box_calls_for_everything():
-    report = ran(Automaton(), 40, 1e-4, amplitude=0.02)
+    report = ran(paper(), 40, 1e-4, amplitude=0.02)
     assert needed_effects(report).droppable == ()
 
 

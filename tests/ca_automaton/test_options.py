@@ -6,6 +6,7 @@ import pytest
 
 from ca_damper.automaton import ACCOUNTINGS, Automaton
 from ca_damper.errors import InputError
+from tests.paper import paper
 
 BAD = [
     ("accounting", "force", "landing, landing\\+ejection, all"),
@@ -44,13 +45,13 @@ def test_bad_options_are_refused_by_name(name, value, allowed):
 def test_priority_without_conflicts_is_refused():
     """With one-sided pairs no events compete: the option would do nothing."""
     with pytest.raises(InputError, match="priority must be 'random'"):
-        Automaton(pair_rule="one_sided", priority="pairs_first")
+        paper(pair_rule="one_sided", priority="pairs_first")
 
 
 def test_ledger_without_anything_to_write_down_is_refused():
     """With static contact everything acts on the container."""
     with pytest.raises(InputError, match="ledger must be False"):
-        Automaton(ledger=True)
+        paper(ledger=True)
 
 
 @pytest.mark.parametrize("particles", [-1, 161, 1.5, math.nan, True])
@@ -76,22 +77,22 @@ def test_step_must_stay_below_a_cell_at_the_largest_speed():
 
 
 def test_labels():
-    assert [Automaton(accounting=name).label for name in ACCOUNTINGS] == [
+    assert [paper(accounting=name).label for name in ACCOUNTINGS] == [
         "ca_landing",
         "ca_ejection",
         "ca_static",
     ]
-    labels = {Automaton(a, static_contact=c).label for a in ACCOUNTINGS for c in (False, True)}
+    labels = {paper(a, static_contact=c).label for a in ACCOUNTINGS for c in (False, True)}
     assert len(labels) == 2 * len(ACCOUNTINGS)
 
 
 def test_particles_rest_as_suits_the_accounting_unless_the_user_says_otherwise():
-    assert [Automaton(accounting=name).particles_rest for name in ACCOUNTINGS] == [
+    assert [paper(accounting=name).particles_rest for name in ACCOUNTINGS] == [
         False,
         False,
         True,
     ]
-    resting = Automaton(accounting="landing", static_contact=True)
+    resting = paper(accounting="landing", static_contact=True)
     assert resting.particles_rest
     assert resting.effects == ("pairs", "landing", "static contact")
-    assert Automaton(static_contact=False).effects == ("pairs", "landing", "ejection")
+    assert paper(static_contact=False).effects == ("pairs", "landing", "ejection")

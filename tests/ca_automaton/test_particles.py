@@ -5,10 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
-from ca_damper.automaton import ACCOUNTINGS, Automaton
+from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.automaton.accumulator import READINGS
 from ca_damper.lattice import DOWN_LEFT, DOWN_RIGHT, EMPTY, WALL
 from tests.ca_automaton.shaken import Shaken
+from tests.paper import paper
 
 PARTICLES = [0, 1, 2, 10, 50, 120, 159, 160]
 PAIRS = [("both", "random"), ("both", "pairs_first"), ("one_sided", "random")]
@@ -18,7 +19,7 @@ EVERY = list(itertools.product(ACCOUNTINGS, PAIRS, READINGS))
 def shaken(accounting, pairs, accumulator, traversal):
     """Every number of particles, shaken by four cells at 6 Hz for a cycle and a half."""
     options = {"pair_rule": pairs[0], "priority": pairs[1], "accumulator": accumulator}
-    automaton = Automaton(accounting=accounting, traversal=traversal, **options)
+    automaton = paper(accounting=accounting, traversal=traversal, **options)
     return Shaken(automaton, PARTICLES, dt=2e-4, amplitude=24e-3).run(1250)
 
 
@@ -51,7 +52,7 @@ def test_particles_stay_in_every_combination_of_options(accounting, pairs, accum
 
 def test_one_of_two_claimants_moves_and_each_as_often():
     """Fig. 5(b): two particles due for one cell in 2000 seeds; 5 sigma of a fair coin."""
-    automaton = Automaton(accounting="landing", start=((3, 9), (5, 9)))
+    automaton = paper(accounting="landing", start=((3, 9), (5, 9)))
     box = Shaken(automaton, [2] * 2000, seed=np.arange(2000))
     geometry = box.geometry
     left, right = geometry.cell_of(3, 9), geometry.cell_of(5, 9)
@@ -69,7 +70,7 @@ def test_one_of_two_claimants_moves_and_each_as_often():
 
 def test_start_draws_every_number_of_cells():
     """N from 0 to 160 cells, all at rest; another seed draws others."""
-    box = Shaken(Automaton(), list(range(161)) * 2, seed=[1] * 161 + [2] * 161)
+    box = Shaken(paper(), list(range(161)) * 2, seed=[1] * 161 + [2] * 161)
     kind, speed, _ = box.state()
     present = (kind != EMPTY) & (kind != WALL)
     assert list(present.sum(axis=1)) == list(range(161)) * 2
@@ -79,7 +80,7 @@ def test_start_draws_every_number_of_cells():
 
 def test_start_favours_no_cell():
     """40 of 160 cells: each taken in a quarter of 2000 seeds, within 5 sigma of a binomial."""
-    box = Shaken(Automaton(), [40] * 2000, seed=np.arange(2000))
+    box = Shaken(paper(), [40] * 2000, seed=np.arange(2000))
     kind, inner = box.state()[0], box.geometry.blank() == EMPTY
     taken = ((kind != EMPTY) & (kind != WALL)).sum(axis=0)[inner][:-1]
     assert abs(taken - 500).max() < 5 * np.sqrt(2000 * 0.25 * 0.75)

@@ -29,7 +29,7 @@ NUMBERS = ti.types.ndarray(dtype=ti.f64, ndim=1)
 
 
 def place(**options):
-    return Automaton(rules="place", **options)
+    return Automaton(**options)
 
 
 def kick(box, cell, across=0.0, up=0.0):
@@ -312,10 +312,11 @@ def test_no_state_is_absorbing():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"accounting": "landing"}, "accounting must be 'all' with rules 'place'"),
+        ({"accounting": "landing"}, "accounting must be 'all' with rules 'place'.*rules='paper'"),
         ({"pair_rule": "one_sided"}, "pair_rule must be 'both' with rules 'place'"),
         ({"priority": "pairs_first"}, "priority must be 'random' with rules 'place'"),
         ({"accumulator": "reset"}, "accumulator must be 'signed' with rules 'place'"),
+        ({"ledger": True}, "ledger must be False with rules 'place'.*pass rules='paper'"),
         ({"friction": -1.0}, "friction must"),
         ({"rules": "paper", "friction": 0.5}, "friction must be None with rules 'paper'"),
         ({"rules": "paper", "wall_friction": 0.1}, "wall_friction must be None with rules"),
@@ -324,7 +325,7 @@ def test_no_state_is_absorbing():
 )
 def test_options_that_do_not_belong_together_are_refused(options, words):
     with pytest.raises(InputError, match=words):
-        Automaton(**{"rules": "place", **options})
+        Automaton(**options)
 
 
 def test_grains_that_leave_the_box_are_named():

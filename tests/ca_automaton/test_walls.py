@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from ca_damper.automaton import ACCOUNTINGS, Automaton
+from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.lattice import DOWN, UP
 from tests.ca_automaton.shaken import Shaken
+from tests.paper import paper
 
 WIDTH, MASS, GRAVITY, DT = 6e-3, 0.2e-3, 10.0, 1e-4
 AMPLITUDE, OMEGA = 24e-3, 2 * np.pi * 6.0
@@ -19,7 +20,7 @@ def displacement(step):
 @pytest.mark.parametrize("accounting", ACCOUNTINGS)
 def test_a_particle_in_mid_air_stays_in_the_room(accounting):
     """Without gravity a particle at rest moves against the staircase round(x / 6 mm), +-4 cells."""
-    automaton = Automaton(accounting=accounting, gravity=0.0, start=((4, 8),))
+    automaton = paper(accounting=accounting, gravity=0.0, start=((4, 8),))
     box = Shaken(automaton, 1, amplitude=AMPLITUDE)
     start = box.device.snapshot(0)["position"][0]
     for _ in range(40):
@@ -37,7 +38,7 @@ def test_the_floor_pushes_what_lies_on_it():
     """
     step = int(np.ceil(np.arcsin(0.5 * WIDTH / AMPLITUDE) / OMEGA / DT))
     for accounting, felt in [("landing", 0.0), ("landing+ejection", 1.0)]:
-        automaton = Automaton(accounting=accounting, gravity=0.0, start=((4, 0), (4, 1), (8, 5)))
+        automaton = paper(accounting=accounting, gravity=0.0, start=((4, 0), (4, 1), (8, 5)))
         box = Shaken(automaton, 3, amplitude=AMPLITUDE, traced=step + 1)
         kind = box.state()[0]
         kind[kind == DOWN] = UP
@@ -53,7 +54,7 @@ def test_the_floor_pushes_what_lies_on_it():
 def test_the_heap_lifts_off_where_the_container_falls_faster():
     """All mass is carried until x w^2 exceeds g, none while it does; pressed heaps stay carried."""
     steps, amplitude = 6 * 1667, 10e-3
-    dead = Automaton(restitution=0.0, wall_restitution=0.0)
+    dead = paper(restitution=0.0, wall_restitution=0.0)
     box = Shaken(dead, 20, amplitude=amplitude, traced=steps).run(steps)
     carried = box.traces()[:, 0, 1]
     lifted = amplitude * np.sin(OMEGA * DT * np.arange(steps)) * OMEGA**2 > GRAVITY

@@ -68,7 +68,7 @@ def test_a_device_without_a_member_is_refused_by_its_name(name):
 def test_an_accounting_without_a_member_is_refused_by_its_name(name, monkeypatch):
     monkeypatch.setitem(ACCOUNTINGS, "partial", parts_of(Uncounted, name))
     with pytest.raises(InputError, match=f"accounting 'partial' must have '{name}'"):
-        Automaton(accounting="partial")
+        Automaton(rules="paper", accounting="partial")
 
 
 def members_asked(path, owner):
@@ -83,7 +83,11 @@ def members_asked(path, owner):
 @pytest.mark.parametrize(
     ("owner", "contract", "optional"),
     [
-        ("filling", Filling, {"structure", "activated", "clearance", "with_clearance"}),
+        (
+            "filling",
+            Filling,
+            {"structure", "activated", "checked_range", "clearance", "with_clearance"},
+        ),
         ("device", DeviceFilling, {"load", "first_steps", "audit", "find_blows", "carry_out"}),
     ],
 )

@@ -15,6 +15,7 @@ from ca_damper.fixed_mass import FixedMass
 from taichi_dem.kit import allocation
 from tests.ca_oscillator.kicks import Kicks
 from tests.own_engines import set_aside
+from tests.paper import paper
 from tests.slow import slow_but
 
 
@@ -177,7 +178,7 @@ def test_a_larger_batch_gets_a_larger_engine_and_a_smaller_one_the_smallest_that
     ],
 )
 def test_other_rules_are_another_structure(change):
-    assert Automaton(**change).structure.key != Automaton().structure.key
+    assert paper(**change).structure.key != paper().structure.key
 
 
 @pytest.mark.parametrize(

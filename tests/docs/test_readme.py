@@ -50,7 +50,7 @@ def test_the_damper_runs_and_both_fillings_agree(tmp_path):
     """
     said = run_pasted(blocks("README.md")[1], tmp_path).said
     peaks = dict(re.findall(r"^(\w+): peak at ([\d.]+) f0", said, re.MULTILINE))
-    assert list(peaks) == ["ca_static", "dem"]
+    assert list(peaks) == ["ca_place", "dem"]
     for label, ratio in peaks.items():
         assert float(ratio) == pytest.approx((86.0 / 92.0) ** 0.5, abs=0.01)
         with open(tmp_path / f"{label}.csv", newline="") as rows:

@@ -10,7 +10,7 @@ import pytest
 
 from _multirate import short_steps
 from _step_too_large import ended
-from ca_damper.demo_pictures import taken
+from ca_damper.demo_pictures import Decay
 from taichi_dem.kit import study
 
 
@@ -110,8 +110,10 @@ def test_the_bar_is_looked_at_once_the_blow_has_given_energy(script, last):
     assert len(marks) <= 201 and marks == sorted(set(marks))
 
 
-@pytest.mark.parametrize(("power", "words"), [(3.0, "take 3 mW from"), (-0.5, "give 0.5 mW to")])
-def test_grains_give_what_they_do_not_take(power, words):
-    names = ("apparent_damping_N_s_m", "damping_ratio", "damping_ratio_empty", "apparent_mass_g")
-    value = {"power_mW": power, **dict.fromkeys(names, 1.0)}
-    assert words in taken(value)[0]
+def test_cycles_of_a_decay_are_whole_and_none_where_it_stays_above():
+    """Medians over three starts of two numbers of particles; 10 mm is the level."""
+    ends = [[12e-3] * k + [9e-3] * (6 - k) for k in (2, 3, 5, 6, 6, 1)]
+    decay = Decay([10, 30], np.array(ends), np.zeros((6, 9)))
+    assert decay.cycles(10) == 3
+    assert decay.cycles(30) is None
+    assert decay.amplitudes(10).tolist() == [12.0, 12.0, 12.0, 9.0, 9.0, 9.0]

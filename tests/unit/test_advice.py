@@ -128,8 +128,8 @@ def test_advised_stiffness_ends_well(name):
 
 
 FILLINGS = {
-    "automaton": (Automaton(v_max=0.05), 4e-3, 0.03),
-    "place": (Automaton(rules="place", v_max=0.05), 4e-3, 0.03),
+    "automaton": (Automaton(rules="paper", v_max=0.05), 4e-3, 0.03),
+    "place": (Automaton(v_max=0.05), 4e-3, 0.03),
     "spheres": (Spheres(), 1e-4, 0.015),
     "combined": (Combined(), 5e-4, 0.015),
 }

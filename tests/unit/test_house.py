@@ -47,7 +47,7 @@ LAYERS = {
     "ca_damper": (
         (
             *("errors", "random_numbers", "progress", "measures", "report", "contracts"),
-            *("certificate", "steady_state"),
+            *("certificate", "checked_range", "steady_state"),
         ),
         ("rk45", "oscillator", "structure", "record", "excitation", "bouncing"),
         ("gravity", "collect_and_collide", "decay", "impact_damper"),

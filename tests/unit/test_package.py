@@ -137,7 +137,7 @@ def test_the_citation_has_the_version_the_authors_and_both_papers(wheel):
 @pytest.mark.parametrize(
     ("package", "files"),
     [
-        ("ca_damper", ("damper.gif", "motion.png", "motion.csv")),
+        ("ca_damper", ("damper.gif", "decay.png", "decay.csv")),
         pytest.param(
             "taichi_dem",
             ("cracks.png", "blast.gif", "history.csv", "mesh.msh", "paraview/out.pvd"),

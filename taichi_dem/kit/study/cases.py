@@ -7,6 +7,7 @@ trial figures with their bounds, and a curve to draw. ``assess`` tells how the m
 import difflib
 import math
 import time
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Callable, NamedTuple, Optional
@@ -155,10 +156,13 @@ def assess(case: Case, method: str, quick: bool) -> Trial:
     that returns numbers without them fails.
     """
     trial, started, error = Trial(case, method, quick), time.perf_counter(), ""
-    try:
-        case.run(trial)
-    except (InputError, SimulationDiverged) as raised:
-        error = " ".join(str(raised).split())
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always", UserWarning)
+        try:
+            case.run(trial)
+        except (InputError, SimulationDiverged) as raised:
+            error = " ".join(str(raised).split())
+    trial.warnings += [str(one.message) for one in heard]
     if error or method in case.refused:
         wanted = case.refused.get(method)
         said = [words for words in (error, *trial.warnings) if wanted and wanted in words]
