@@ -77,7 +77,7 @@ class Certificate:
     left_out : tuple of Estimate
         Estimate of each effect that no law of the scene serves.
     missing : tuple of MissingEffect, default ()
-        Effects that were left out and would have acted.
+        Effects that were left out, not by choice of the user, and would have acted.
     """
 
     acting: tuple[Acting, ...]
@@ -213,7 +213,8 @@ def certificate_of(run: Any, report: Any) -> Certificate:
         energy=left_energy,
         audits=_audits(run.step.audit, skipped),
         left_out=_not_served(run, scales, energy),
-        missing=report.missing_effects,
+        # What the user chose to leave out is no gap of what was left out for them.
+        missing=tuple(one for one in report.missing_effects if not one.is_chosen),
     )
 
 

@@ -57,7 +57,8 @@ class MissingEffect:
 
     effect: the effect to list. what: the finding in words. count: number of places. where: first
     such bond or body, as unit says; place_m: the middle of its face, or of the body, in the mesh
-    [m]. first_s: time at which it was first found [s].
+    [m]. first_s: time at which it was first found [s]. is_chosen: whether the scene lists the effect
+    in a form of the user's that leaves it out.
     """
 
     effect: str
@@ -67,6 +68,7 @@ class MissingEffect:
     place_m: tuple = ()
     first_s: float = 0.0
     unit: str = "bond"
+    is_chosen: bool = False
 
     def see(self, places: Union[Sequence[int], np.ndarray], time_s: float) -> None:
         """Take in the places of a recording at a time [s], numbers of bonds or bodies."""
@@ -120,7 +122,7 @@ def unserved(model: "Model") -> dict[str, MissingEffect]:
         if listed[name]
     }
     if "bare" in found:
-        found["bare"].effect = remedy(model.contact)
+        found["bare"].effect, found["bare"].is_chosen = remedy(model.contact), True
     if "friction" in found and not material.friction_has_dashpots:
         # Friction is a dashpot's force up to a limit: without a dashpot springs alone hold.
         found["friction"].effect = "StickingFriction"

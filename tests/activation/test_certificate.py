@@ -28,6 +28,7 @@ from taichi_dem.effects.base import Effect
 from taichi_dem.effects.chosen import ChosenEffects
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.audit import Audit
+from taichi_dem.mesh.joined import join
 from taichi_dem.mesh.parts import parts_of
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.timeline import NEVER
@@ -253,3 +254,16 @@ def test_weight_left_out_of_a_part_that_is_borne_is_judged_by_its_stress():
 def test_a_time_that_is_none_is_refused(until):
     with pytest.raises(InputError, match="until must be"):
         estimated_effects(pulled(), until)
+
+
+def test_a_form_of_contact_that_the_user_chose_is_named_but_no_gap_of_the_certificate():
+    """A bar flies through another: outer faces have no spheres, as the user said."""
+    two = join(bar(0.2, 0.1, (2, 1, 1)), bar(0.2, 0.1, (2, 1, 1)).moved(by=(0.21, 0.0, 0.0)))
+    away = np.zeros((two.body_count, 3))
+    away[two.body_count // 2 :, 0] = -100.0
+    chosen = effects.SphereContact(outer_faces=False)
+    scene = Scene(two, CONCRETE, "auto", loads=[chosen], velocity=away)
+    with pytest.warns(UserWarning, match="outer_faces=True"):
+        found = simulate(scene, until=1.2e-3, method=METHOD, samples=4)
+    assert any("outer_faces=True" in need for need in found.report.needs)
+    assert found.certificate.holds
