@@ -33,6 +33,7 @@ from ca_damper.progress import BatchProgress, OpenEnded
 from taichi_dem.kit.accuracy.answer import ErrorParts
 from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.progress.progress import Progress
+from tests.paper import outside, paper
 from tests.processes import users_environment
 
 PAPER = Oscillator()
@@ -77,9 +78,9 @@ def test_a_curve_of_a_rigid_mass():
 
 
 def grains(tolerance=0.03, **options):
-    """A few grains of the automaton at one frequency."""
+    """A few grains of the paper's automaton at one frequency."""
     given = {"particles": 20, "goal": goals.rms_at(0.97), **QUIET, **options}
-    return solve_response(Automaton(), tolerance=tolerance, **given)
+    return solve_response(paper(), tolerance=tolerance, **given)
 
 
 def test_the_same_question_has_the_same_bits_and_the_same_runs():
@@ -224,7 +225,7 @@ def test_a_budget_that_ends_after_a_round_without_a_number_gives_the_round_befor
 
     monkeypatch.setattr(Reduction, "_estimates", lost)
     asked = {"particles": 20, "goal": goals.peak_rms(), "tolerance": 1e-4, **QUIET}
-    answer = solve_response(Automaton(), seeds=3, budget_s=50.0, **asked)
+    answer = solve_response(paper(), seeds=3, budget_s=50.0, **asked)
     # The last looks once more at what there is.
     assert len(rounds) == 3 and math.isfinite(answer.error) and answer.error > 0.0
     assert "within budget_s of 50 s" in answer.shortfall
@@ -391,7 +392,7 @@ def test_a_question_may_begin_with_the_plan_of_another():
     ("plan", "words"),
     [
         (lambda: "fast", "plan must be that of an answer of solve_response, got 'fast'"),
-        (lambda: grains(0.1, particles=5).plan, "plan must be of the same filling and particles"),
+        (lambda: grains(0.1, particles=15).plan, "plan must be of the same filling and particles"),
     ],
 )
 def test_plans_of_something_else_are_refused(plan, words):
@@ -401,14 +402,15 @@ def test_plans_of_something_else_are_refused(plan, words):
 
 def test_a_method_without_a_limit_says_that_no_step_has_it():
     """Three grains whose pushes alone count change their mass by a third from step to step."""
-    answer = solve_response(
-        Automaton(rules="paper", accounting="landing+ejection"),
-        particles=3,
-        goal=goals.apparent_mass_at(0.983),
-        oscillator=Oscillator(base_amplitude=0.3e-3),
-        seeds=1,
-        **QUIET,
-    )
+    with outside():
+        answer = solve_response(
+            paper(accounting="landing+ejection"),
+            particles=3,
+            goal=goals.apparent_mass_at(0.983),
+            oscillator=Oscillator(base_amplitude=0.3e-3),
+            seeds=1,
+            **QUIET,
+        )
     assert not answer.reached and "changes in no order" in answer.shortfall
     # 8.4e-5 to 12.9e-5 kg at six steps from 4e-4 to 1.25e-5 s.
     for mass in (8.4e-5, 12.9e-5):
