@@ -83,7 +83,8 @@ class State:
         self.level = ti.field(ti.i32, shape=n)
         self.bound = ti.field(ti.i32, shape=n)
         self.last_tick = ti.field(ti.i64, shape=n)
-        self.lag = ti.Vector.field(max(1, len(tables.loads)), real, shape=n)
+        if tables.loads:
+            self.lag = ti.Vector.field(len(tables.loads), real, shape=n)
         self.slot = ti.Vector.field(6, real, shape=tables.capacity.faces)
         self.broken_tick = ti.field(ti.i64, shape=bonds)
         if tables.has_bond_heat:

@@ -50,9 +50,10 @@ class Option(NamedTuple):
 
 
 def taken(make, kind, names, allowed=()):
-    """Options that ``make`` takes by keyword."""
+    """Options that ``make`` takes by keyword; a partial of a class has its name."""
+    owner = getattr(make, "func", make).__name__
     return [
-        Option(make.__name__, name, kind, lambda value, name=name: make(**{name: value}), allowed)
+        Option(owner, name, kind, lambda value, name=name: make(**{name: value}), allowed)
         for name in names
     ]
 

@@ -55,7 +55,9 @@ EFFECTS = (
 def swept():
     """Table of a sweep of one row."""
     record = Record({"speed_m_s": 1.5}, "", True, 0.1, "1.0", "unknown", "machine")
-    return taichi_dem.SweepTable([Job({"mass": 2.0, "seed": 7}, "digest")], [record], seeded=False)
+    return taichi_dem.SweepTable(
+        [Job({"mass": 2.0, "seed": 7}, "digest", {})], [record], seeded=False
+    )
 
 
 def of_the_blast():

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from ca_damper import excitation
-from ca_damper.collect_and_collide import _positive
 from taichi_dem import InputError
 from taichi_dem.kit import validation
 from taichi_dem.kit.checkpoint import identity_of
@@ -19,7 +18,7 @@ CHECKS = {
     "direction": lambda x: validation.direction("x", [x, x, x]),
     "samples": lambda x: excitation.from_samples(np.arange(8) * x, np.arange(8.0)),
     "nodes": lambda x: excitation.Signal(1.0, np.arange(8) * x, np.zeros(8)),
-    "numbers": lambda x: _positive("x", np.array([x, x])),
+    "numbers": lambda x: validation.real_numbers("x", np.array([x, x])),
 }
 
 

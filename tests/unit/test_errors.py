@@ -16,6 +16,7 @@ from taichi_dem.kit.allocation import CapacityError
 from taichi_dem.kit.checkpoint import Interrupted
 from taichi_dem.kit.children import Terminated
 from taichi_dem.kit.errors import InputError, Portable, SimulationDiverged
+from taichi_dem.kit.likely_units import UnitWarning
 from taichi_dem.kit.sweeps.job import Leave
 
 
@@ -41,6 +42,7 @@ MADE = (
     Leave(),
     Terminated(15),
     Portable("words"),
+    UnitWarning("peak is read in Pa, got 575: likely MPa is meant"),
 )
 WAYS = {
     **{f"pickle {k}": lambda error, k=k: pickle.loads(pickle.dumps(error, k)) for k in range(6)},

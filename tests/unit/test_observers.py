@@ -156,7 +156,8 @@ def test_a_simulation_with_a_motion_of_its_own_is_run_as_a_scene_is():
 
 def test_a_diverged_run_has_been_observed_until_then():
     times = Notes(Every(samples=1), lambda view: view.time_s)
-    with pytest.raises(SimulationDiverged) as caught:
+    too_long = pytest.warns(UserWarning, match="less than the largest step")
+    with too_long, pytest.raises(SimulationDiverged) as caught:
         run(times, method=Uniform(2e-5), until=1e-2, samples=500)
     assert times.seen == caught.value.result.history["time_s"].tolist() != []
 
