@@ -57,8 +57,8 @@ class MissingEffect:
 
     effect: the effect to list. what: the finding in words. count: number of places. where: first
     such bond or body, as unit says; place_m: the middle of its face, or of the body, in the mesh
-    [m]. first_s: time at which it was first found [s]. is_chosen: whether the scene lists the effect
-    in a form of the user's that leaves it out.
+    [m]. first_s: time at which it was first found [s]. is_chosen: whether the user listed the
+    effect in a form that leaves it out.
     """
 
     effect: str
