@@ -24,7 +24,7 @@ def test_figures_are_those_kept(page):
 def test_no_measured_time_or_factor_is_typed(page):
     """Tables and blocks apart: their times are those of the gallery's texts."""
     text = (FOLDER / page).read_text(encoding="utf-8")
-    text = re.sub(r"```.*?```|^\|.*?$|<!-- figure.*?end -->", "", text, flags=re.DOTALL | re.M)
+    text = re.sub(r"```.*?```|^ *\|.*?$|<!-- figure.*?end -->", "", text, flags=re.DOTALL | re.M)
     assert not re.findall(r"[^\n]*\d (?:s|kJ|times|MB)\b[^\n]*", text)
 
 
