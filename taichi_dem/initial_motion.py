@@ -51,7 +51,7 @@ def _rows(name, given, mesh, centre) -> tuple[np.ndarray, list[_Shared]]:
     """A row for each body, and the vectors that were given for several of them."""
     if given is None:
         return np.zeros_like(centre), []
-    if isinstance(given, Mapping):
+    if isinstance(given, Mapping) and given:
         return _by_group(name, given, mesh)
     found = given(centre.copy()) if callable(given) else given
     array = _numbers(found)

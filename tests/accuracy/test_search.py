@@ -71,7 +71,7 @@ def certified(impulse=0.0, misses=0):
     ("certificate", "why"),
     [
         (certified(), ""),
-        (certified(impulse=2e-6), "sleep left out 2e-06 of the impulse, 1e-06 asked"),
+        (certified(impulse=2e-6), "sleep left out 2e-06 of a part's impulse, 1e-06 asked"),
         (certified(misses=1), "an audit of 10 skipped bonds asleep found 1 miss"),
     ],
 )

@@ -69,6 +69,7 @@ def ran(mesh, first, second=None, word="auto", **materials):
     return motion, broken, run.report(brief=True).certificate
 
 
+@pytest.mark.filterwarnings("ignore:.*is read in .* likely")
 @pytest.mark.parametrize("seed", [None, *range(4)])
 def test_each_part_has_the_bits_that_it_has_alone(seed):
     """And breaks where it does with all effects; what was left out is told of the worst part."""

@@ -135,6 +135,8 @@ def run_in(u, name, *drawn):
     return {**found, **joules}, result.report
 
 
+# Numbers in other units than those of the SI are meant here.
+@pytest.mark.filterwarnings("ignore:.*is read in .* likely")
 @pytest.mark.parametrize("name", slow_but(methods_in(Units()), "uniform"))
 def test_units_change_no_bit(seed, name):
     random = np.random.default_rng(seed)

@@ -144,6 +144,7 @@ def test_chord_of_a_disc():
     assert [chord_of(x) for x in (0.0, 0.6, 1.0, 3.0)] == pytest.approx([1.0, 0.8, 0.0, 0.0])
 
 
+@pytest.mark.filterwarnings("ignore:.*is read in .* likely")
 def test_energy_of_heavy_grains_never_grows():
     """Grains up to ten times the container's mass, without gravity, base at rest, a soft spring.
 

@@ -1,5 +1,7 @@
 """All blows of a step on one structure are resolved together: boxes at one place are one unit."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 import taichi as ti
@@ -18,6 +20,7 @@ from ca_damper import (
 from ca_damper.engine.modal_mount import ModalMount
 from ca_damper.filling import Blows
 from tests.ca_modes.frames import frame
+from tests.paper import outside
 
 MASS, STIFFNESS = Oscillator().mass, Oscillator().stiffness
 ONE_PLACE = ModalStructure.from_matrices([MASS], [[STIFFNESS]], [0.0065])
@@ -42,8 +45,10 @@ def column(share, **options):
 )
 def test_boxes_at_one_place_are_one_unit(rules, count, whole):
     """To the bit, as halves and quarters add up without rounding."""
-    unit = shaken(column(whole, rules=rules), Box(0, 1))
-    boxes = shaken(column(whole / count, rules=rules), [Box(0, 1)] * count)
+    # One grain is outside of what the paper's rules are known to serve.
+    with outside() if rules == "paper" else nullcontext():
+        unit = shaken(column(whole, rules=rules), Box(0, 1))
+        boxes = shaken(column(whole / count, rules=rules), [Box(0, 1)] * count)
     assert unit.force.any()
     assert np.array_equal(boxes.x, unit.x)
     assert np.array_equal(boxes.force.sum(axis=1), unit.force[:, 0])
@@ -104,6 +109,7 @@ def batch_on(structure, places, filling=None, particles=1, seeds=1):
     return batch
 
 
+@pytest.mark.filterwarnings("ignore:.*is read in .* likely")
 def test_energy_never_grows_for_any_mass():
     """Grains of 0.01 to 2 M in one to eight boxes, no gravity, soft springs, one or two places.
 

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from ca_damper import Automaton, RigidMass, Sweep, sweep_up_and_down
+from ca_damper import RigidMass, Sweep, sweep_up_and_down
 from tests.made_response import response
+from tests.paper import outside, paper
 
 RATIOS = np.array([0.9, 0.95, 1.0, 1.05])
 
@@ -44,7 +45,8 @@ def test_a_difference_beyond_chance_is_hysteresis_unless_a_mean_still_changes():
 def test_a_sweep_of_irregular_motion_has_a_bar_that_holds_none():
     """Ten grains near resonance: the ways differ by 0.1 and more, each seed otherwise."""
     asked = {"particles": 10, "ratios": [0.98, 0.99, 1.0], "seeds": 5, "progress": None}
-    found = sweep_up_and_down(Automaton(rules="paper"), **asked)
+    with outside():
+        found = sweep_up_and_down(paper(), **asked)
     assert np.abs(found.hysteresis).max() > 0.1
     assert found.hysteresis_error.shape == (1, 3) and not found.shows_hysteresis.any()
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from _measured_motion import HEADER, RECORD, record
-from ca_damper import Automaton, Spheres, plot
+from ca_damper import Spheres, plot
 from ca_damper.bouncing import Fall, RecordedFall
 from ca_damper.lattice import Geometry
 from ca_damper.measures import first_harmonic
@@ -20,6 +20,7 @@ from tests.experiments.contract import (
     rows_of,
     start,
 )
+from tests.paper import paper
 
 READINGS = ("signed", "signed_through_walls", "reset", "kept")
 FILLED = [f"{filling}_N{count}" for filling in ("ca", "dem") for count in (20, 40)]
@@ -306,9 +307,9 @@ def test_harmonic_gives_amplitude_and_lag():
 
 
 def test_box_of_the_automaton_is_staggered_and_moves_by_cells():
-    box = plot.Box.of_automaton(Automaton())
+    box = plot.Box.of_automaton(paper())
     plain = plot.Box.of_spheres(Spheres())
-    assert (plot.Box.of(Automaton()), plot.Box.of(Spheres())) == (box, plain)
+    assert (plot.Box.of(paper()), plot.Box.of(Spheres())) == (box, plain)
     assert (box.width, box.height) == pytest.approx((plain.width, plain.height), rel=1e-12)
     displaced = np.array([-0.0031, -0.0029, 0.0, 0.0029, 0.0031])
     assert box.lift(displaced) == pytest.approx([-6e-3, 0.0, 0.0, 0.0, 6e-3], abs=1e-15)
