@@ -1,7 +1,7 @@
 """Range in which a filling was checked, and what of the scenes of a batch lies outside it."""
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Optional
 
 import numpy as np
@@ -19,11 +19,14 @@ class CheckedRange:
         What of the scenes lies outside.
     warning : str, default ""
         Sentence before a run where the filling is known to fail.
+    knows_motion : bool, default True
+        Whether the motion of all containers is known before they run.
     """
 
     words: str
     outside: tuple[str, ...] = ()
     warning: str = ""
+    knows_motion: bool = True
 
     def rows(self) -> list[tuple[str, str]]:
         """Lines of the report.
@@ -33,14 +36,15 @@ class CheckedRange:
         list of (str, str)
             Name and text of each.
         """
-        found = "; ".join(self.outside)
-        return [("checked with", self.words), ("", f"outside: {found}" if found else "inside")]
+        found = f"outside: {'; '.join(self.outside)}" if self.outside else "inside"
+        open_part = "" if self.knows_motion else ", but for the motion, which was not looked at"
+        return [("checked with", self.words), ("", f"{found}{open_part}")]
 
 
 class Driven(NamedTuple):
     """What is known of scenes before they run, (scenes,) each.
 
-    particles: numbers. mass: of the container [kg], infinite where it is part of a structure.
+    particles: numbers. mass: of what a blow moves [kg], infinite for a container that is driven.
     amplitude [m] and acceleration [m/s^2] of a container that moves as a sine of its base, NaN of
     others.
     """
@@ -59,12 +63,17 @@ def checked_range(batch: Any) -> Optional[CheckedRange]:
         batch.table.column, ("particles", "mass", "base_amplitude", "frequency")
     )
     if batch.modal is not None:
+        places = np.resize(batch.modal.scene_places, batch.count)
+        recoils = np.array([batch.modal.structure.recoil(place) for place in places])
+        # Where nothing moves it is infinite.
+        mass = 1.0 / np.maximum(recoils, 1e-300)
+    elif batch.mount == "base":
         mass = np.full(batch.count, np.inf)
     if batch.mount != "base" or batch.excitation.kind.base != "sine":
         size = np.full(batch.count, np.nan)
     driven = Driven(particles, mass, size, size * (2.0 * np.pi * frequency) ** 2)
     found: CheckedRange = batch.filling.checked_range(driven)
-    return found
+    return replace(found, knows_motion=bool((size > 0.0).all()))
 
 
 def warn_outside(batch: Any) -> None:

@@ -185,7 +185,7 @@ def film(
     InputError
         The batch was not started, or a number is out of range.
     SimulationDiverged
-        A scene left the range in which its numbers mean anything.
+        All scenes have left the range in which their numbers mean anything.
 
     Examples
     --------

@@ -18,7 +18,7 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.progress import Stages
 from ca_damper.report import Report
 from ca_damper.response import Grid, Response
-from ca_damper.steady_state import half_width
+from ca_damper.steady_state import ROUNDING, half_width
 from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import in_brief
@@ -62,7 +62,7 @@ class Sweep:
 
     def __repr__(self):
         shows = self.shows_hysteresis
-        told = f"hysteresis beyond chance at {shows.sum()} of {shows.size} frequencies"
+        told = f"hysteresis beyond chance at {shows.sum()} of {shows.size} points"
         return in_brief(self, self.up.axes_in_words(), "up and down", told)
 
     @property
@@ -87,8 +87,8 @@ class Sweep:
 
     @property
     def shows_hysteresis(self) -> np.ndarray:
-        """Whether the mean over the seeds is beyond chance, (particles, ratios)."""
-        return np.abs(self.hysteresis.mean(axis=2)) > self.hysteresis_error
+        """Whether the mean over the seeds is beyond chance and rounding, (particles, ratios)."""
+        return np.abs(self.hysteresis.mean(axis=2)) > np.maximum(self.hysteresis_error, ROUNDING)
 
     @property
     def _share_by_cycles(self):

@@ -155,7 +155,8 @@ class Report:
         """Number of scenes that diverged, and the first of them."""
         if not self.diverged:
             return ()
-        return ("diverged", f"{len(self.diverged):,} of them, results nan"), ("", self.diverged[0])
+        words = f"{len(self.diverged):,} of them; nan for these and all on one structure with them"
+        return ("diverged", words), ("", self.diverged[0])
 
     def _further_excitations(self):
         """Number of the signals that a table has no room for."""

@@ -108,7 +108,7 @@ class StructureHistory(Tabulated):
 
         They are p - G y of ``structure``, and ``relative`` is the sum of shapes times these.
         """
-        return np.moveaxis(self.structure.modal(np.moveaxis(self.relative, 1, -1)), -1, 1)
+        return np.moveaxis(self.structure._modal(np.moveaxis(self.relative, 1, -1)), -1, 1)
 
     def table(self) -> Table:
         """A row a sample: time, base, x of each place and force of each box, for each seed.

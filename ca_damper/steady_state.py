@@ -35,7 +35,7 @@ _LATEST = 0.4
 # What is cut off beside the transient, as the inverse of a share of the rest: its last remains.
 _MARGIN = 5
 # Differences between cycles that are rounding, as a share of the mean.
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
 # Windows of a slow approach that are tried, as shares of the series.
 _WINDOWS = (2, 4, 8)
 # Largest correlation of neighbours that is believed; beyond, a series is too short for its own.
@@ -75,7 +75,7 @@ def steady_part(
     x = rows.mean(axis=0)
     if len(x) < LEAST_CYCLES:
         return _part(x, 0, math.inf, LEAST_CYCLES - len(x), False)
-    begin, allowed = _least_error(x), max(allowed, _ROUNDING)
+    begin, allowed = _least_error(x), max(allowed, ROUNDING)
     rest = rows[:, begin:]
     if _seeds_wander(rest, allowed) or (len(x) < LONG_CYCLES and _seeds_differ(rest, allowed)):
         part = _approach(x, allowed)
@@ -143,7 +143,7 @@ def batch_means(series: np.ndarray, batches: int = BATCHES) -> tuple[np.ndarray,
 def correlation(series: np.ndarray) -> float:
     """Correlation of neighbours in a series, in [0, 0.98], corrected for its length."""
     apart = series - series.mean()
-    total, rounding = float(apart @ apart), _ROUNDING * abs(float(series.mean()))
+    total, rounding = float(apart @ apart), ROUNDING * abs(float(series.mean()))
     if total <= rounding * rounding * len(series):
         return 0.0
     found = float(apart[1:] @ apart[:-1]) / total
@@ -166,7 +166,7 @@ def _halves_differ(rows, false_alarms):
     halves = _means_of_halves(rows)
     changes = halves @ [-1.0, 1.0]
     change = abs(float(changes.mean()))
-    if change <= _ROUNDING * abs(float(halves[:, 1].mean())):
+    if change <= ROUNDING * abs(float(halves[:, 1].mean())):
         return False
     error, freedom = _error_of_change(rows, changes)
     return error == 0.0 or t_outside(change / error, freedom) < false_alarms
@@ -278,7 +278,7 @@ def _limit(x):
     change from third to third does not fall.
     """
     (a, b, c), length = batch_means(x, 3)
-    if abs(c - b) <= _ROUNDING * abs(c):
+    if abs(c - b) <= ROUNDING * abs(c):
         return c, 0.0, 1.0
     ratio = (c - b) / (b - a) if b != a else math.inf
     if ratio >= 1.0:

@@ -207,7 +207,10 @@ class ModalStructure:
         InputError
             The motion has another shape, or a value is no finite number.
         """
-        moved = real_numbers("motion", motion)
+        return self._modal(real_numbers("motion", motion))
+
+    def _modal(self, moved):
+        """The same of an array, whose numbers need not be finite."""
         if moved.shape[-1:] != (self.place_count,):
             raise InputError(f"motion must have shape (..., {self.place_count}), got {moved.shape}")
         return moved @ self.masses @ self.shapes

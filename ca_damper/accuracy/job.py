@@ -8,6 +8,7 @@ from ca_damper.accuracy.plan import DamperPlan
 from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
+from ca_damper.spheres.options import Spheres
 from taichi_dem.kit.accuracy.branches import LEAST_SEEDS
 
 # First coarse step by the filling's own and by its bound, which is that of safe runs.
@@ -62,6 +63,9 @@ class Job:
     @property
     def is_drawn(self) -> bool:
         """Whether seeds make a difference."""
+        if isinstance(self.filling, Spheres):
+            # Only the places of spheres, and who has which size, are drawn.
+            return self.particles > 0 and (self.filling.start is None or bool(self.filling.sizes))
         return self.particles > 0 and not isinstance(self.filling, (Empty, RigidMass))
 
     def search_range(self) -> tuple[float, float]:

@@ -147,9 +147,9 @@ class Signal:
         values, slopes, _ = self.at(np.array([0.0, self.duration]))
         size = _ROUNDING * np.abs(self.value).max()
         values, slopes = _unless_tiny(values, size), _unless_tiny(slopes, size / self.step)
-        ends = (f"at {y:.3g} {unit} and {v:.3g} {unit}/s" for y, v in zip(values, slopes))
+        begin, end = (f"at {y:.3g} {unit} and {v:.3g} {unit}/s" for y, v in zip(values, slopes))
         done = f"{self.treated}; " if self.treated else ""
-        return f"{self.label}, {self.duration:.4g} s; {done}begins {{}}, ends {{}}".format(*ends)
+        return f"{self.label}, {self.duration:.4g} s; {done}begins {begin}, ends {end}"
 
 
 def _unless_tiny(values, size):

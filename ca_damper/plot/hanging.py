@@ -42,7 +42,8 @@ def film_hanging(path: FileName, containers: Sequence[Hanging], fastest: float) 
     vertical speed [m/s]. Raises InputError when the file cannot be written.
     """
     first = containers[0].frames
-    swing = 1.1 * max(abs(frame.x) for one in containers for frame in one.frames)
+    # A container that diverged has frames without numbers.
+    swing = 1.1 * np.nanmax([abs(frame.x) for one in containers for frame in one.frames])
     step = 1.35 * max(one.box.width for one in containers)
     with moving_picture(path, (4.0, 3.0)) as (figure, shoot):
         bench, curve = figure.subplots(1, 2, width_ratios=[1.25, 1.0])

@@ -27,6 +27,7 @@ from ca_damper import (
 )
 from ca_damper.accuracy import error_reduction, steady_runs
 from ca_damper.accuracy.error_reduction import Reduction
+from ca_damper.accuracy.job import Job
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.accuracy.steady_runs import BudgetSpent
 from ca_damper.progress import BatchProgress, OpenEnded
@@ -425,3 +426,14 @@ def test_grains_at_rest_lose_nothing_to_rounding():
         Automaton(), particles=5, goal=goals.loss_factor_at(0.8), oscillator=still, **QUIET
     )
     assert answer.reached and abs(answer.value) <= answer.error < 1e-11
+
+
+def test_spheres_that_start_at_given_places_are_not_drawn():
+    """Their seeds would be copies, whose spread of 0 tells nothing."""
+    places = [(0.006 + 0.011 * k, 0.02) for k in range(2)]
+    for filling, drawn in (
+        (Spheres(), True),
+        (Spheres(start=places), False),
+        (Spheres(start=places, sizes=[(1, 6e-3), (1, 5e-3)]), True),
+    ):
+        assert Job(filling, 2, Oscillator(), None, None).is_drawn == drawn

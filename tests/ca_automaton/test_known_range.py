@@ -2,7 +2,9 @@
 
 import pytest
 
-from ca_damper import Automaton, Batch, RigidMass, SceneTable
+from ca_damper import Automaton, Batch, ModalStructure, RigidMass, SceneTable
+from ca_damper.checked_range import checked_range
+from ca_damper.engine.modal_mount import ModalMount
 from tests.paper import paper
 
 #: A scene of the paper: 30 grains near resonance.
@@ -23,6 +25,7 @@ FAILS = {
     "dead": ({"restitution": 0.49}, DRIVEN, "base", "restitution 0.49, below 0.5"),
 }
 INSIDE = {
+    "heavy, driven": ({"particle_mass": 0.05}, DRIVEN, "base"),
     "resonance": ({}, FEW, "spring"),
     "eleven of a tenth": ({"particle_mass": 0.0085}, {**FEW, "particles": 11}, "spring"),
     "driven": ({"restitution": 0.5}, DRIVEN, "base"),
@@ -59,7 +62,10 @@ def test_the_paper_s_rules_are_silent_inside_their_range(name):
     made = batch(paper, *INSIDE[name])
     made.start()
     report = made.report()
-    assert report.checked.outside == () and "\n                   inside\n" in str(report)
+    assert report.checked.outside == () and "\n                   inside" in str(report)
+    # The motion of a spring's box, and of one at rest, says nothing before the run.
+    known = name in ("driven", "heavy, driven", "empty")
+    assert ("but for the motion" in str(report)) != known and report.checked.knows_motion == known
     assert report.as_dict()["checked"]["words"] == report.checked.words
 
 
@@ -90,3 +96,11 @@ def test_a_change_of_the_scenes_is_looked_at_again():
     made.change(particles=5)
     with pytest.warns(UserWarning, match="5 grains, ten or fewer"):
         made.start()
+
+
+def test_the_mass_of_a_structure_is_that_of_the_place_that_a_blow_moves():
+    """A structure of one place is an Oscillator of that mass."""
+    mount = ModalMount(ModalStructure.from_matrices([0.086], [[122.0]], [0.08]), [0])
+    grains = paper(particle_mass=0.2 * 0.086)
+    made = Batch(grains, SceneTable(**FEW), mount="spring", structure=mount)
+    assert "a grain of 0.2 of the container's mass" in checked_range(made).warning

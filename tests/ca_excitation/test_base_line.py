@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from ca_damper import Empty, Oscillator, excitation, shake
+from ca_damper.excitation.signal import spline
 
 PAPER = Oscillator()
 #: Half a sine of 10 g in 11 ms.
@@ -83,3 +84,9 @@ def test_times_that_are_evened_and_a_scaled_signal_say_so():
     made = excitation.from_samples(late, time, of="value").scaled(2.0)
     assert even.treated == "" and made.treated == "times evened by up to 0.0003 s"
     assert made.in_words("N").startswith("2 times samples, 0.99 s; times evened by up to 0.0003 s;")
+
+
+def test_a_label_may_hold_braces():
+    """As the name of a file may."""
+    made = spline(0.01, np.zeros(9), "run{a}{}")
+    assert made.in_words("m").startswith("run{a}{}, 0.08 s; ")

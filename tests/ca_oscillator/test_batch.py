@@ -276,7 +276,7 @@ def test_the_end_of_a_scene_does_not_end_the_others(tmp_path):
     for name, values in now.items():
         assert np.isfinite(values).tolist() == [True, name == "time_s", True]
     assert len(report.diverged) == 1
-    assert "1 of them, results nan" in str(report)
+    assert "1 of them; nan for these" in str(report)
     assert 340 < report.scene_steps - 2 * (4 * 167 + 3 * 143) <= 340 + 65
 
 

@@ -37,7 +37,7 @@ def test_a_difference_beyond_chance_is_hysteresis_unless_a_mean_still_changes():
     error = np.full(up.shape, 0.02)
     found = made(up, down, error)
     assert found.shows_hysteresis.tolist() == [[False, False, True, False]]
-    assert "hysteresis beyond chance at 1 of 4 frequencies" in repr(found)
+    assert "hysteresis beyond chance at 1 of 4 points" in repr(found)
     error[2, 3] = np.inf
     assert not made(up, down, error).shows_hysteresis.any()
 
@@ -55,3 +55,10 @@ def test_a_mean_that_still_grows_shows_no_hysteresis():
     asked = {"particles": 0, "ratios": [0.95, 1.0], "seeds": 1, "progress": None}
     grows = sweep_up_and_down(RigidMass(), transient_cycles=0, measured_cycles=20, **asked)
     assert np.abs(grows.hysteresis).max() > 0.1 and not grows.shows_hysteresis.any()
+
+
+def test_rounding_is_no_hysteresis():
+    """Of a linear system whose seeds agree, and whose mean rests to 1e-14."""
+    up = np.full((4, 2), 1e-3)
+    found = made(up, up * (1.0 + 1e-14), np.zeros(up.shape))
+    assert np.abs(found.hysteresis).max() > 0.0 and not found.shows_hysteresis.any()
