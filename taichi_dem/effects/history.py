@@ -32,8 +32,9 @@ def history_points(times: Any, values: Any) -> tuple[tuple[float, ...], tuple[fl
 
 
 def shortest_piece(times: tuple[float, ...], values: tuple[float, ...]) -> float:
-    """Shortest time between points of ``history_points`` [s]; infinite where nothing changes."""
-    return min((b - a for a, b in zip(times, times[1:])), default=inf) if _varies(values) else inf
+    """Shortest time in which ``history_points`` change [s]; infinite where nothing does."""
+    pieces = zip(times, times[1:], values, values[1:])
+    return min((end - begin for begin, end, one, other in pieces if one != other), default=inf)
 
 
 def _varies(values):
@@ -45,8 +46,8 @@ def unresolved_histories(effects: Any, step: float) -> tuple[str, ...]:
     times = ((effect, effect.change_time()) for effect in effects)
     return tuple(
         f"{effect.name}{_where(effect)} changes within {time:.3g} s, less than the largest step, "
-        f"{step:.3g} s: its whole impulse or way is kept, but not its shape over time; steps of at "
-        f"most {time:.3g} s resolve it"
+        f"{step:.3g} s: its shape over time may be lost, though loads keep their whole impulse and "
+        f"ramps their whole way; steps of at most {time:.3g} s resolve it"
         for effect, time in times
         if time < step
     )

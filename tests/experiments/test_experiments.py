@@ -114,10 +114,7 @@ FILES = {
         *("pressure.png", "cracks.png", "energy.png", "history.png", "acting.png"),
         *("blast.gif", "view.html", "paraview/{folder}.pvd", "paraview/{folder}_0000.vtu"),
     ),
-    "blast_methods": (
-        *("methods.csv", "methods.png", "history_reference.csv"),
-        *("levels_paper_multirate.png", "levels_multirate_controlled.png"),
-    ),
+    "blast_methods": (*("methods.csv", "methods.png", "history_reference.csv"),),
     "blast_multirate": (
         *("comparison.csv", "uniform.csv", "multirate_held.csv", "multirate_drifted.csv"),
         *("levels_multirate_held.png", "levels_multirate_drifted.png", "methods.png"),

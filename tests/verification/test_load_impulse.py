@@ -119,6 +119,8 @@ def test_a_prescribed_motion_goes_its_whole_way():
     [
         (effects.Pressure.triangle("face", 1e6, 2e-8, 3e-8), 2e-8),
         (effects.Pressure("face", [1e6, 1e6], times=[0.0, 1e-8]), math.inf),
+        # Pieces in which nothing changes do not count.
+        (effects.Pressure("face", [0.0, 0.0, 1e6], times=[0.0, 1e-9, 1e-3]), math.inf),
         (effects.GasPressure("face", rise=8e-8, decay_ratio=0.5), 4e-8),
         (effects.PrescribedMotion("face", (1.0, 0.0, 0.0), frequency=1e7), 5e-8),
         (effects.Gravity(), math.inf),
