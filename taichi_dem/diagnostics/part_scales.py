@@ -44,12 +44,6 @@ class PartScales:
         """Sum of a number of each body over every part."""
         return np.bincount(self.part, values, minlength=self.count)
 
-    def most(self, values: np.ndarray) -> np.ndarray:
-        """Largest of a number, not negative, of the bodies of every part."""
-        found = np.zeros(self.count)
-        np.maximum.at(found, self.part, values)
-        return found
-
     def sum_of_bonds(self, values: np.ndarray) -> np.ndarray:
         """Sum of a number of each bond over every part."""
         return np.bincount(self.of_bonds, values, minlength=self.count)

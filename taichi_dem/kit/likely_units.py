@@ -43,9 +43,9 @@ BLAST_RISE = Quantity("s", ((0.01, 1.0, "ms"), (5.0, 5e3, "us")))
 EDGE = Quantity("m", ((20.0, 1e4, "mm"),))
 #: Accelerations: up to some 200 times gravity in a centrifuge.
 ACCELERATION = Quantity("m/s^2", ((5e3, 2e4, "mm/s^2"),))
-#: Grains: 0.1 to 100 mm; boxes: 5 mm to 2 m.
 #: Masses of grains, told by their density: 100 to 20,000 kg/m^3.
 GRAIN_MASS = Quantity("kg", ((4e5, 4e7, "g"),))
+#: Grains: 0.1 to 100 mm; boxes: 5 mm to 2 m.
 GRAIN, BOX = Quantity("m", ((0.5, 100.0, "mm"),)), Quantity("m", ((5.0, 2e3, "mm"),))
 
 
