@@ -17,7 +17,7 @@ from taichi_dem.kit.allocation import field_bytes, tree_count
 from taichi_dem.step.auto_driver import CPU_ONLY
 from tests import arch
 
-pytest_plugins = ("tests.attacks", "tests.compilations", "tests.crash_safe", "tests.own_engines")
+pytest_plugins = ("tests.attacks", "tests.compiler", "tests.own_engines")
 
 
 def pytest_addoption(parser):
