@@ -4,8 +4,12 @@
 
 PYTHON ?=
 DEMO_OPTIONS ?=
-# One worker a core; tests of a file, and mostly of a folder, share what they build.
-TEST := -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
+# One worker a core; tests of a folder share what they compile (tests/conftest.py). A worker that dies is a failure.
+TEST := -m pytest -q -n 2 --dist loadscope --no-loadscope-reorder --max-worker-restart 0
+# Folders of tests of physics: verification, invariance, digests, both packages. The rest is all else.
+PHYSICS := $(addprefix tests/,verification boundaries equivalence material ca_automaton ca_spheres ca_combined ca_modes \
+  ca_excitation ca_maps)
+REST = $(filter-out $(PHYSICS),$(patsubst %/,%,$(wildcard tests/*/)))
 TEST_OPTIONS ?=
 BENCH_OPTIONS ?=
 ATTACK_OPTIONS ?=
@@ -33,7 +37,7 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-slow test-bounds test-quadrants attack fuzz lint bench gallery lessons docs mesh wheel \
+.PHONY: help venv demo test test-physics test-rest test-experiments test-slow test-bounds test-quadrants attack fuzz lint bench gallery lessons docs mesh wheel \
   release-check clean
 
 help: ## print this list
@@ -45,13 +49,22 @@ demo: $(STAMP) ## blast a block and show the fracture
 	$(BIN)/python experiments/blast_fracture.py $(DEMO_OPTIONS)
 
 test: $(STAMP) ## run the tests that a change must pass
-	$(BIN)/python $(TEST) -m "not slow" $(TEST_OPTIONS)
+	$(BIN)/python $(TEST) --durations 10 $(TEST_OPTIONS)
+
+test-physics: $(STAMP) ## of these: physics, invariance and bits, both packages
+	$(BIN)/python $(TEST) --durations 10 $(PHYSICS) $(TEST_OPTIONS)
+
+test-rest: $(STAMP) ## of these: all others
+	$(BIN)/python $(TEST) --durations 10 $(REST) $(TEST_OPTIONS)
+
+test-experiments: $(STAMP) ## run every experiment with --quick: it ends well, its figures are there and in range
+	$(BIN)/python -m pytest -q -n 2 -m experiment --durations 10 $(TEST_OPTIONS)
 
 test-slow: $(STAMP) ## run those that take longer
 	$(BIN)/python $(TEST) -m slow $(TEST_OPTIONS)
 
 test-bounds: $(STAMP) ## run small scenes with every access to a field checked (also in test-slow)
-	$(BIN)/python -m pytest -q tests/bad_input/test_bounds.py $(TEST_OPTIONS)
+	$(BIN)/python -m pytest -q -m "" tests/bad_input/test_bounds.py $(TEST_OPTIONS)
 
 attack: $(STAMP) ## attack it at random, minutes (ATTACK_OPTIONS="--attacks 100 --attack-seed 20": longer)
 	$(BIN)/python -m pytest -q -n 2 tests/attack --attacks 20 --attack-table docs/reliability.md $(ATTACK_OPTIONS)
@@ -61,7 +74,7 @@ fuzz: $(STAMP) ## run 10,000 random scenes, each briefly (FUZZ_OPTIONS="--number
 
 test-quadrants: $(QUADRANTS_STAMP) ## run the tests on Quadrants, Taichi's successor; list what differs
 	@rm -f results/quadrants.txt
-	$(QUADRANTS)/python $(TEST) -p tests.quadrants.report -m "not slow" $(TEST_OPTIONS) || test -s results/quadrants.txt
+	$(QUADRANTS)/python $(TEST) -p tests.quadrants.report $(TEST_OPTIONS) || test -s results/quadrants.txt
 
 wheel: $(STAMP) ## build the wheel into dist/ and run it in an empty environment (PYTHONS="python3.9 ...": in several)
 	@rm -rf build dist

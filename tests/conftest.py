@@ -1,4 +1,4 @@
-"""A Taichi session for every test file; tests of starting and stopping use subprocesses.
+"""A Taichi session for all tests of a worker; tests of starting and stopping use subprocesses.
 
 ``pytest --arch cuda`` runs all kernels of this process, and all experiments, on a CUDA device.
 Options of the attacks are those of ``tests/attacks.py``.
@@ -6,11 +6,13 @@ Options of the attacks are those of ``tests/attacks.py``.
 
 import contextlib
 import ctypes
+import faulthandler
 import gc
 import os
 from pathlib import Path
 
 import pytest
+from xdist.scheduler import LoadScopeScheduling
 
 from taichi_dem import InputError, runtime
 from taichi_dem.kit.allocation import field_bytes, tree_count
@@ -28,6 +30,33 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     """Hand the choice on."""
     arch.choose(config.getoption("--arch"))
+
+
+class ByFolder(LoadScopeScheduling):
+    """Tests of one folder run in one worker: they share engines, which are compiled once."""
+
+    def _split_scope(self, nodeid):
+        return nodeid.partition("::")[0].rpartition("/")[0]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Take the place of ``--dist loadscope``; None for all others."""
+    return ByFolder(config, log) if config.getoption("dist") == "loadscope" else None
+
+
+#: Longest time of one test [s]; the longest takes two minutes on a busy machine.
+MOST_SECONDS = 900
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item):
+    """End a process whose test hangs, by a thread that needs no Python."""
+    faulthandler.dump_traceback_later(MOST_SECONDS, exit=True)
+    try:
+        return (yield)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
 #: Bytes by which the process has grown in a session beyond which the next file begins with another:

@@ -1,11 +1,11 @@
-"""Whether the tests notice a wrong line: each mutant of ``mutants.txt`` is made in a copy and tested.
+"""Whether the tests notice a wrong line: each mutant of ``mutants.txt`` is made and tested.
 
     python -m tests.mutants                 the test files that a mutant names, until one test fails
     python -m tests.mutants --only contact  mutants whose area or name has this word
     python -m tests.mutants --all           survivors meet all the tests of ``make test``
     python -m tests.mutants --check         only ask whether each mutant can be made
 
-The table is printed and written to ``results/mutants.csv``.
+Each is made in a copy of the checkout; the verdicts go to ``results/mutants.csv``.
 """
 
 import argparse
@@ -32,7 +32,7 @@ Verdict = collections.namedtuple("Verdict", "area name verdict by seconds")
 
 
 def mutants(text):
-    """The mutants of a table: an area after ``#``, then blocks of a name, a file, two lines, tests."""
+    """The mutants of a table: an area after ``#``; blocks of a name, a file, two lines, tests."""
     found, area = [], ""
     for block in re.split(r"\n\s*\n", text.strip()):
         if block.startswith("#"):
@@ -100,7 +100,7 @@ def _run(folder, arguments):
     environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
         done = subprocess.run(
-            [*command, "-m", "not slow", *arguments],
+            [*command, *arguments],
             cwd=folder,
             env=environment,
             capture_output=True,

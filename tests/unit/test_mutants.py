@@ -1,0 +1,28 @@
+"""Every mutant of ``tests/mutants.txt`` can be made, so that the table says what the suite notices."""
+
+from collections import Counter
+
+import pytest
+
+from tests.mutants import Mutant, changed, faults, table
+
+LEAST = {
+    **{"bond laws": 15, "stepping and levels": 15, "solved dashpots": 12, "contact and search": 15},
+    **{"loads and supports": 8, "account and certificate": 10, "meshes and materials": 8},
+    **{"automaton": 12, "spheres": 8, "coupling and rk45": 7, "bars": 10},
+}
+
+
+def test_every_mutant_can_be_made_and_names_tests_that_are_there():
+    assert [fault for mutant in table() for fault in faults(mutant)] == []
+
+
+def test_no_area_of_the_physics_is_forgotten():
+    count = Counter(mutant.area for mutant in table())
+    assert {area: count[area] for area in LEAST if count[area] < LEAST[area]} == {}
+
+
+@pytest.mark.parametrize("text", ["y = 2", "x = 1; x = 1"])
+def test_a_line_that_is_not_there_once_makes_no_mutant(text):
+    with pytest.raises(ValueError, match="occurs"):
+        changed(text, Mutant("area", "name", "path", "x = 1", "x = 2", [], ""))
