@@ -1,4 +1,4 @@
-"""Every mutant of ``tests/mutants.txt`` can be made, so that the table says what the suite notices."""
+"""Every mutant of the table can be made, so that the table says what the suite notices."""
 
 from collections import Counter
 
