@@ -5,8 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from taichi_dem.kit.errors import SimulationDiverged
-
 
 class MadeUpRuns:
     """Stands for ``taichi_dem.accuracy.runs.Runs``.
@@ -72,6 +70,3 @@ def scattered(spread, centre=3.0):
         return centre + spread * float(np.random.default_rng([level, twin]).standard_normal())
 
     return formula
-
-
-__all__ = ["MadeUpRuns", "SimulationDiverged", "scattered", "searched"]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taichi_dem.kit.accuracy.branches import branches_of, clusters_of, sentence
+from taichi_dem.kit.accuracy.branches import branches_of, clusters_of
 
 SEEDS = tuple(range(1, 13))
 
@@ -20,30 +20,12 @@ def test_two_motions_are_told_apart_with_their_shares():
     assert first.share == pytest.approx(8 / 12) and first.share_error == pytest.approx(
         0.235, abs=5e-3
     )
-    words = sentence((first, second), "mm")
-    assert "12 seeds took 2 steady motions" in words and "67 +- 24 % of the seeds" in words
 
 
-def test_three_motions():
-    values = np.array([1.0, 2.0, 4.0] * 4) + 1e-3 * np.arange(12)
-    assert [len(one) for one in clusters_of(values, 1e-3, 0.0)] == [4, 4, 4]
-
-
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(5))
 def test_one_motion_with_chance_is_one_cluster(seed):
     values = np.random.default_rng(seed).normal(size=12)
     assert len(clusters_of(values, 0.3, 0.0)) == 1
     # A gap has to stand out from the errors of the seeds, and to matter.
     pair = np.where(np.arange(12) < 6, 0.0, 1.0)
     assert len(clusters_of(pair, 0.25, 0.0)) == len(clusters_of(pair, 0.0, 1.5)) == 1
-
-
-def test_few_seeds_or_no_numbers_are_one_cluster():
-    assert len(clusters_of([1.0, 9.0, 1.0], 0.0, 0.0)) == 1
-    assert len(clusters_of([np.nan] + [1.0, 9.0] * 4, 0.0, 0.0)) == 1
-
-
-def test_a_single_seed_has_a_bar_by_its_sampling():
-    values = np.array([1.0] * 7 + [5.0])
-    clusters = clusters_of(values, 0.1, 0.0)
-    assert branches_of(values, clusters, SEEDS[:8], 0.1, 2.0)[1].error == pytest.approx(0.2)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
-from taichi_dem.contact_search import verlet_list
+from taichi_dem import CONCRETE, Scene, Uniform, effects
 from taichi_dem.contact_search.contacts import FARTHEST, STEPS
 from taichi_dem.mesh.shapes import bar
 from tests.again import Again
@@ -12,15 +11,10 @@ from tests.again import Again
 DT = 1e-9
 
 
-def bodies():
-    """A bar, to be thrown about."""
-    return Again(Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [effects.SphereContact()]), Uniform(DT))
-
-
 @pytest.fixture(scope="module")
 def again():
-    """One for most tests, compiled once."""
-    return bodies()
+    """A bar, to be thrown about."""
+    return Again(Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [effects.SphereContact()]), Uniform(DT))
 
 
 def scattered(again, skin, spread):
@@ -93,21 +87,6 @@ def test_the_search_lists_all_near_spheres_and_no_others(again, skin, spread):
     assert set(found) == wanted
 
 
-def test_pairs_stand_in_order_and_are_indexed_from_both_bodies(again):
-    """Sums over a body's pairs have one order only if the lists do."""
-    contacts = scattered(again, 2e-4, 0.01).contacts
-    store, slots = contacts.store, near_slots(contacts.store)
-    bodies = store.body.to_numpy()[slots]
-    assert np.all(bodies[:, 0] < bodies[:, 1])
-    assert bodies.tolist() == sorted(bodies.tolist())
-    first, second_start = store.first_of.to_numpy(), store.second_start.to_numpy()
-    second_slot = store.second_slot.to_numpy()
-    for i in range(contacts.tables.body_count[None]):
-        assert list(range(first[i], first[i + 1])) == np.flatnonzero(bodies[:, 0] == i).tolist()
-        seconds = second_slot[second_start[i] : second_start[i + 1]].tolist()
-        assert seconds == slots[bodies[:, 1] == i].tolist()
-
-
 def slot_of_pair(store):
     """Slots of the near pairs by their two bodies."""
     slots = near_slots(store)
@@ -172,100 +151,9 @@ def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
         simulation.broad_phase.search()
 
 
-def neighbouring_faces(neighbours):
-    """Pairs of faces in the list of neighbours."""
-    first, last = neighbours.first.to_numpy()[:-1], neighbours.last.to_numpy()
-    listed = neighbours.listed
-    body, faces = listed.body.to_numpy(), listed.faces.to_numpy()
-    return {
-        (4 * i + fg // 4, 4 * int(body[k]) + fg % 4)
-        for i in range(len(last))
-        for k in range(first[i], last[i])
-        for fg in range(16)
-        if faces[k] >> fg & 1
-    }
-
-
-def near_faces(simulation, wide):
-    """Pairs of faces of two bodies of which some spheres are nearer than `wide` [m]."""
-    model, motion = simulation.model, simulation.state.motion()
-    size = model.spheres.per_face
-    sphere = simulation.tables.sphere.to_numpy().reshape(-1, size, 4)
-    body = np.arange(len(sphere)) // 4
-    place = np.einsum("nij,nsj->nsi", motion["rotation"][body], sphere[..., :3])
-    place += motion["position"][body][:, None]
-    pairs = np.array(sorted(near_balls(simulation, wide)))
-    first, second = pairs.T
-    gap = np.linalg.norm(place[second][:, None] - place[first][:, :, None], axis=-1)
-    gap -= sphere[first][:, :, None, 3] + sphere[second][:, None, :, 3]
-    return {(a, b) for a, b in pairs[(gap < wide).any(axis=(1, 2))].tolist()}
-
-
-def near_balls(simulation, wide):
-    """Pairs of faces of two bodies whose balls around the spheres are nearer than `wide` [m]."""
-    motion, ball = simulation.state.motion(), simulation.tables.cluster.to_numpy()
-    body = np.arange(len(ball)) // 4
-    place = np.einsum("nij,nj->ni", motion["rotation"][body], ball[:, :3])
-    place += motion["position"][body]
-    apart = np.linalg.norm(place[:, None] - place[None], axis=-1)
-    near = apart < ball[:, None, 3] + ball[None, :, 3] + wide
-    return {(a, b) for a, b in np.argwhere(near).tolist() if a // 4 < b // 4}
-
-
-@pytest.mark.parametrize(("drift", "turn"), [(0.8, 1e-4), (0.0, 4e-3)])
-def test_one_list_of_neighbours_serves_until_a_body_has_left_its_reach(again, drift, turn):
-    """Bodies drift and turn, each its own way, in small steps: whatever is near is in the list.
-
-    It is made anew when a sixteenth of them has escaped (BODY_SKINS - 1) / 2 + SKINS = 4 skins,
-    here by their fifth step at the earliest, not at every search.
-    """
-    skin, random = 2e-3, np.random.default_rng(7)
-    simulation = scattered(again, skin, 0.1)
-    neighbours, motion = simulation.broad_phase.neighbours, simulation.state.motion()
-    way = random.standard_normal(motion["position"].shape)
-    way *= drift * skin / np.linalg.norm(way, axis=1, keepdims=True)
-    spin = turn * random.standard_normal(motion["orientation"].shape)
-    listed_at, made = neighbours.reach.turned_to.to_numpy(), 0
-    for step in range(1, 41):
-        turned = motion["orientation"] + step * spin
-        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-        simulation.state.set_motion(motion["position"] + step * way, turned)
-        simulation.broad_phase.search()
-        assert near_faces(simulation, skin) <= neighbouring_faces(neighbours)
-        before, listed_at = listed_at, neighbours.reach.turned_to.to_numpy()
-        made += (listed_at != before).any(axis=(1, 2)).mean() > 0.5
-    assert 3 <= made <= 40 // 5
-
-
-@pytest.mark.slow
-def test_a_full_row_drops_what_its_body_has_left(monkeypatch, compiled_anew):
-    """Two bodies leap among the others, and rows have room for a few that come.
-
-    Whatever is near is in the list all the same, and rooms are seldom allotted anew.
-    """
-    monkeypatch.setattr(verlet_list, "SPARE", 8)
-    skin, random = 2e-3, np.random.default_rng(5)
-    simulation = scattered(bodies(), skin, 0.05)
-    neighbours, motion = simulation.broad_phase.neighbours, simulation.state.motion()
-    exposed = np.flatnonzero(simulation.contacts.exposed_faces.to_numpy())
-    leaping, rest = exposed[:: len(exposed) // 2], motion["position"].copy()
-    made, dropped = 0, 0
-    for _ in range(30):
-        motion["position"][leaping] = random.permutation(rest)[: len(leaping)]
-        simulation.state.set_motion(motion["position"], motion["orientation"])
-        rooms, ends = neighbours.first.to_numpy(), neighbours.last.to_numpy()
-        simulation.broad_phase.search()
-        assert near_faces(simulation, skin) <= neighbouring_faces(neighbours)
-        assert set(listed(simulation)) == expected(simulation, skin)
-        anew = (neighbours.first.to_numpy() != rooms).any()
-        made += anew
-        dropped += not anew and (neighbours.last.to_numpy() < ends).any()
-    assert dropped > 3 * made
-
-
-@pytest.mark.parametrize("far", [0.2, 0.45])
-def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(again, far):
-    """Bodies drift, each its own way, by up to a share of the skin between two searches.
+@pytest.mark.parametrize(("far", "turn"), [(0.45, 0.0), (0.2, 5e-4)])
+def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(again, far, turn):
+    """Bodies drift and turn, each its own way, by up to a share of the skin between two searches.
 
     A search leaves out the pairs that cannot meet yet, by how far their bodies have gone; half the
     skin is what a body may go before the next one.
@@ -276,10 +164,16 @@ def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(again,
     motion = simulation.state.motion()
     way = random.standard_normal(motion["position"].shape)
     way *= far * skin * random.random((len(way), 1)) / np.linalg.norm(way, axis=1, keepdims=True)
-    found = []
+    spin = turn * random.standard_normal(motion["orientation"].shape)
+    extent = simulation.tables.extent.to_numpy()
+    found, before = [], motion["orientation"]
     for step in range(1, 61):
-        simulation.state.set_motion(motion["position"] + step * way, motion["orientation"])
-        travel = contacts.travel.to_numpy() + np.linalg.norm(way, axis=1)
+        turned = motion["orientation"] + step * spin
+        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+        simulation.state.set_motion(motion["position"] + step * way, turned)
+        angle = 2.0 * np.linalg.norm(turned - before, axis=1)
+        before = turned
+        travel = contacts.travel.to_numpy() + np.linalg.norm(way, axis=1) + extent * angle
         contacts.travel.from_numpy(np.where(contacts.exposed_faces.to_numpy() != 0, travel, 0.0))
         touching = expected(simulation, 0.0)
         assert touching <= set(listed(simulation))
@@ -313,14 +207,3 @@ def test_a_fast_body_has_a_skin_for_some_steps(again):
         assert ((found >= low) & (found < high) & exposed).sum() > 10
     assert set(listed(simulation)) == expected(simulation, found)
     assert contacts.search_requested[None] == 0
-
-
-@pytest.mark.parametrize("option", ["neighbours_per_body", "pairs_per_body", "spheres_per_body"])
-def test_too_little_capacity_is_said_in_words(option):
-    """The lists have some room for small scenes whatever the options; the mesh has to exceed it."""
-    capacities = {"neighbours_per_body": 1000, option: 1}
-    contact = effects.SphereContact(outer_faces=True, skin=1.0, **capacities)
-    scene = Scene(bar(0.6, 0.2, (12, 4, 4)), CONCRETE, [contact])
-    simulation = Simulation(scene, Uniform(1e-9))
-    with pytest.raises(ValueError, match=f"larger {option}"):
-        simulation.start()

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from taichi_dem import PAPER_BLOCK, read_mesh
-from taichi_dem.mesh import colouring
 from taichi_dem.mesh.colouring import edge_colours
 from taichi_dem.mesh.topology import topology_of
 
@@ -49,23 +48,6 @@ def test_links_of_a_colour_share_no_body(graphs):
     assert most == 5
 
 
-def test_greedy_alone_takes_more_colours(graphs, monkeypatch):
-    """Up to 2 * 4 - 1 = 7 without the flip of a chain."""
-    monkeypatch.setattr(colouring, "_freed", lambda links, colours, at, i, j, used: used)
-    greedy = []
-    for body_count, links in graphs:
-        colours = edge_colours(links, body_count)
-        assert is_proper(links, colours)
-        greedy.append(colours.max() + 1)
-    assert 5 < max(greedy) <= 7
-
-
-def test_a_flip_colours_a_path_with_two():
-    """0-1 takes colour 0, 3-4 too, so 2-3 takes 1, and 1-2 finds neither: 2-3-4 is flipped."""
-    links = [(0, 1), (3, 4), (2, 3), (1, 2)]
-    assert edge_colours(links, 5).tolist() == [0, 1, 0, 1]
-
-
 def test_the_block_of_the_paper_takes_five_colours_at_most():
     mesh = read_mesh(PAPER_BLOCK)
     top = topology_of(mesh)
@@ -73,7 +55,3 @@ def test_the_block_of_the_paper_takes_five_colours_at_most():
     colours = edge_colours(links, mesh.body_count)
     assert is_proper(links, colours)
     assert DEGREE <= colours.max() + 1 <= 5
-
-
-def test_no_link_takes_no_colour():
-    assert edge_colours(np.zeros((0, 2), dtype=int), 3).tolist() == []

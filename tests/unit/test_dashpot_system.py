@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
-from taichi_dem.diagnostics.dashpot_system import DashpotSystem, cross_matrices
+from taichi_dem.diagnostics.dashpot_system import DashpotSystem
 from taichi_dem.mesh.shapes import bar
 
 STEP = 4e-7
@@ -38,11 +38,6 @@ def kicked(simulation):
 
 def after(sweeps, count):
     return next(itertools.islice(sweeps, count, None))
-
-
-def test_cross_matrices_multiply_as_the_cross_product():
-    r, w = np.random.default_rng(0).normal(size=(2, 5, 3))
-    assert np.allclose(np.einsum("nij,nj->ni", cross_matrices(r), w), np.cross(r, w), rtol=1e-15)
 
 
 def test_all_ways_of_sweeping_reach_one_motion(kicked):

