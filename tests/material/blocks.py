@@ -1,13 +1,28 @@
 """Meshes of which the elastic constants are known, and random ones, without a mesh generator."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 
-from taichi_dem import Material, checked_mesh
+from taichi_dem import CONCRETE, Material, checked_mesh
 from taichi_dem.mesh.shapes import bar, with_moved_nodes
 
 E, NU, DENSITY = 32e9, 0.2, 2450.0
+#: A firm, heavy ore with weak bonds.
+ORE = replace(
+    CONCRETE,
+    density=4000.0,
+    normal_stiffness=900e9,
+    shear_stiffness=150e9,
+    normal_damping=10e6,
+    tensile_strength=4e6,
+    cohesion=5e6,
+    friction=0.3,
+    fracture_energy=60.0,
+    contact_stiffness=4e9,
+    contact_damping=1e6,
+)
 
 
 def rock(**changed):

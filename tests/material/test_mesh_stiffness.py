@@ -1,31 +1,22 @@
-"""Elastic constants that meshes show: closed forms, bounds, random meshes, waves."""
+"""Meshes show the elastic constants that were asked for, in statics and in waves."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, InputError, checked_mesh, mesh_stiffness
+from taichi_dem import checked_mesh, mesh_stiffness
 from taichi_dem.closed_forms import LinearBonds
-from taichi_dem.elasticity.bond_rules import ModulusOverDistance, bond_geometry, per_bond
-from taichi_dem.elasticity.mesh_stiffness import VOIGT
+from taichi_dem.elasticity.bond_rules import ModulusOverDistance
 from taichi_dem.elasticity.moduli import POISSON, SPREAD, bond_moduli, elastic_constants
-from taichi_dem.elasticity.statics import BondStatics
-from taichi_dem.mesh.shapes import bar, pair
-from taichi_dem.mesh.tetrahedra import area_vectors
-from taichi_dem.mesh.topology import body_properties, face_vertices, topology_of
-from tests.material.blocks import DENSITY, NU, E, disphenoids, random_block, rock
+from taichi_dem.mesh.shapes import bar
+from tests.material.blocks import DENSITY, E, disphenoids, random_block, rock
 
 #: Of the static solve: forces agree to 1e-10, and a mesh of some cells has a condition of 1e2.
 SOLVED = 1e-8
 
 
-def with_moduli(normal, shear):
-    springs = {"normal_stiffness": normal, "shear_stiffness": shear}
-    return replace(rock(), **{name: ModulusOverDistance(m) for name, m in springs.items()})
-
-
-@pytest.mark.parametrize("ratio", [0.05, 0.35, 1.0, 3.0])
+@pytest.mark.parametrize("ratio", [0.05, 3.0])
 def test_a_grid_of_disphenoids_has_the_constants_of_uniform_tractions(ratio):
     """Closed form: normals along (1, 1, 0) and its like, and the centres behind the faces' middles.
 
@@ -35,91 +26,18 @@ def test_a_grid_of_disphenoids_has_the_constants_of_uniform_tractions(ratio):
     1/E_t) / 4, at any number of cells.
     """
     shear = ratio * E
-    for cells in (2, 3):
-        found = mesh_stiffness(disphenoids(cells), with_moduli(E, shear))
-        young = 2.0 / (1.0 / E + 1.0 / shear)
-        assert found.young_along == pytest.approx(young, rel=SOLVED)
-        assert found.shear_across == pytest.approx(0.5 * young, rel=SOLVED)
-        across = 0.25 * (1.0 / E - 1.0 / shear)
-        assert found.poisson_along == pytest.approx(-across * young, abs=SOLVED)
-        assert found.bulk == pytest.approx(E / 3.0, rel=SOLVED)
+    springs = {"normal_stiffness": E, "shear_stiffness": shear}
+    springs = {name: ModulusOverDistance(modulus) for name, modulus in springs.items()}
+    found = mesh_stiffness(disphenoids(2), replace(rock(), **springs))
+    young = 2.0 / (1.0 / E + 1.0 / shear)
+    assert found.young_along == pytest.approx(young, rel=SOLVED)
+    assert found.shear_across == pytest.approx(0.5 * young, rel=SOLVED)
+    across = 0.25 * (1.0 / E - 1.0 / shear)
+    assert found.poisson_along == pytest.approx(-across * young, abs=SOLVED)
+    assert found.bulk == pytest.approx(E / 3.0, rel=SOLVED)
 
 
-def test_a_uniform_stress_strains_disphenoids_uniformly():
-    """Patch test: with E_n = E_t every centre moves by the strain sigma / E times its place."""
-    mesh = disphenoids(3)
-    topology = topology_of(mesh)
-    material = with_moduli(E, E)
-    springs = per_bond(
-        mesh, topology, DENSITY, (material.normal_stiffness, material.shear_stiffness)
-    )
-    _, centre, _ = body_properties(mesh, DENSITY)
-    strain = np.random.default_rng(0).standard_normal((3, 3))
-    strain = 1e-5 * (strain + strain.T)
-    motion = np.zeros((mesh.body_count, 6, 1))
-    motion[:, :3, 0] = centre @ strain
-    force = BondStatics(mesh, topology, springs).forces(motion)
-    inside = (topology.body_bond >= 0).all(axis=1)
-    scale = E * np.abs(strain).max() * bond_geometry(mesh, topology, DENSITY).area.max()
-    assert inside.any()
-    assert np.abs(force[inside]).max() < 1e-12 * scale
-
-
-def test_the_springs_of_the_statics_are_those_of_the_linear_bonds():
-    mesh = random_block(2, seed=5)
-    topology, material = topology_of(mesh), rock()
-    springs = per_bond(
-        mesh, topology, DENSITY, (material.normal_stiffness, material.shear_stiffness)
-    )
-    motion = np.random.default_rng(1).standard_normal((mesh.body_count, 6, 2))
-    force = BondStatics(mesh, topology, springs).forces(motion)
-    dense = LinearBonds(mesh, material).stiffness @ motion.reshape(-1, 2)
-    assert np.abs(force.reshape(-1, 2) - dense).max() < 1e-12 * np.abs(dense).max()
-
-
-def uniform_tractions(mesh, material):
-    """Compliance of a block in which the traction of a uniform stress is on every face."""
-    topology = topology_of(mesh)
-    _, centre, _ = body_properties(mesh, material.density)
-    outer = face_vertices(mesh, topology.outer_body, topology.outer_face)
-    vector = area_vectors(mesh.points, np.vstack([topology.vertices, outer]))
-    area = np.linalg.norm(vector, axis=1)
-    normal = vector / area[:, None]
-    reach = np.vstack(
-        [
-            centre[topology.slave] - centre[topology.master],
-            mesh.points[outer].mean(axis=1) - centre[topology.outer_body],
-        ]
-    )
-    volume = area * np.sum(reach * normal, axis=1)
-    # Traction of every unit stress on every face.
-    traction = np.zeros((6, len(area), 3))
-    for k, (i, j) in enumerate(VOIGT):
-        traction[k, :, i] += normal[:, j]
-        traction[k, :, j] += normal[:, i] if i != j else 0.0
-    along = np.einsum("kni,ni->kn", traction, normal)
-    moduli = material.normal_stiffness.modulus, material.shear_stiffness.modulus
-    normally = np.einsum("n,kn,ln->kl", volume, along, along)
-    whole = np.einsum("n,kni,lni->kl", volume, traction, traction)
-    return (normally / moduli[0] + (whole - normally) / moduli[1]) / (volume.sum() / 3.0)
-
-
-def test_no_mesh_is_softer_than_under_uniform_tractions():
-    """Uniform tractions are in equilibrium with every body, so the complementary energy is least.
-
-    For any stress s: s S s <= s S_uniform s (principle of minimum complementary energy).
-    """
-    for seed, cells, poisson in ((0, 2, 0.2), (1, 3, 0.4), (2, 4, -0.1)):
-        mesh, material = random_block(cells, seed), rock(poisson=poisson)
-        bound = uniform_tractions(mesh, material)
-        gain = bound - mesh_stiffness(mesh, material).compliance
-        least, most = np.linalg.eigvalsh(gain)[[0, -1]]
-        assert least > -SOLVED * np.abs(bound).max()
-        # Not the bound itself: such meshes carry a twentieth and more beyond it.
-        assert most > 0.05 * np.abs(bound).min(where=np.eye(6, dtype=bool), initial=1.0)
-
-
-@pytest.mark.parametrize("poisson", [0.0, 0.2, 0.35])
+@pytest.mark.parametrize("poisson", [0.0, 0.35])
 def test_random_meshes_of_three_sizes_show_what_was_asked_for(poisson):
     """Within twice the spread that the random meshes of the table have among each other.
 
@@ -139,18 +57,6 @@ def test_random_meshes_of_three_sizes_show_what_was_asked_for(poisson):
     assert np.abs(ratio - poisson).max() < 2.0 * SPREAD[0] / 2.0
 
 
-def test_elements_of_another_size_change_nothing():
-    """Moduli have no length in them: a block of another size shows the same to round-off.
-
-    With constants per area it is the stiffer, the larger its elements: E = k h.
-    """
-    small, large = (random_block(3, seed=1, size=size) for size in (1.0, 8.0))
-    first, second = (mesh_stiffness(mesh, rock()) for mesh in (small, large))
-    assert second.compliance == pytest.approx(first.compliance, rel=SOLVED, abs=SOLVED / E)
-    first, second = (mesh_stiffness(mesh, CONCRETE) for mesh in (small, large))
-    assert second.young == pytest.approx(8.0 * first.young, rel=SOLVED)
-
-
 def test_units_and_numbers_of_bodies_change_nothing():
     """In millimetres and MPa all is the same number; bodies in another order are the same block."""
     mesh, random = random_block(3, seed=4), np.random.default_rng(4)
@@ -168,20 +74,6 @@ def test_moduli_of_bonds_and_constants_of_a_block_are_each_others_inverse():
     for poisson in np.linspace(*POISSON, 27).tolist():
         found = elastic_constants(*bond_moduli(E, poisson))
         assert found == pytest.approx((E, poisson), rel=1e-9, abs=1e-9)
-
-
-@pytest.mark.parametrize("value", [0.5, -1.0, 0.46, -0.25, np.nan, "0.2", None, True])
-def test_poissons_ratios_out_of_reach_are_refused(value):
-    with pytest.raises(
-        InputError, match=r"^poisson must be a number (above -1|from -0\.2 to 0\.45)"
-    ):
-        rock(poisson=value)
-
-
-def test_a_single_pair_and_bodies_without_bonds_have_a_stiffness_too():
-    """Bodies alone between half bonds: nothing divides by zero, and E is of the order asked for."""
-    for mesh in (pair(0.05), checked_mesh(pair(0.05).points[:4], [[0, 1, 2, 3]], {})):
-        assert 0.3 < mesh_stiffness(mesh, rock()).young / E < 3.0
 
 
 class PeriodicBar:
@@ -220,11 +112,3 @@ def test_a_wave_in_a_bar_runs_at_the_root_of_modulus_over_density():
     usual, coarse, fine = (endless.speed(count) / speed - 1.0 for count in (20, 80, 160))
     assert abs(usual) < (2.0 * np.pi / 20.0) ** 2 / 24.0
     assert coarse / fine == pytest.approx(4.0, rel=4.0 * (2.0 * np.pi / 80.0) ** 2)
-
-
-def test_a_table_prints_every_direction():
-    text = str(mesh_stiffness(random_block(2, seed=0), rock()))
-    assert [
-        line.split()[0] for line in text.splitlines()
-    ] == "block along along along all long".split()
-    assert NU == elastic_constants(*bond_moduli(E, NU))[1].__round__(6)

@@ -1,14 +1,12 @@
-"""Lanes compute what one member alone would, to the bit, and bonds are laid out one a lane."""
+"""Lanes compute what one member alone would, to the bit."""
 
 import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects, runtime
+from taichi_dem import runtime
 from taichi_dem.kit import lanes
-from taichi_dem.kit.allocation import values
 from taichi_dem.kit.lanes import LANES, by_lane
-from taichi_dem.mesh.shapes import bar
 
 BODIES = 11
 
@@ -88,68 +86,3 @@ def test_each_lane_has_the_bits_of_its_member(operations):
     dots = products[:, 0] + products[:, 1] + products[:, 2]
     assert np.array_equal(operations.dot.to_numpy(), dots)
     assert np.array_equal(operations.row.to_numpy(), both)
-
-
-def damped(*cells):
-    """A bar of damped bonds that can break."""
-    scene = Scene(bar(0.1, 0.05, cells), CONCRETE, [effects.BondDamping(), effects.Softening()])
-    return Simulation(scene, ImplicitDashpots(1e-7))
-
-
-def test_a_group_has_one_colour_and_shares_no_body():
-    """Whatever is left over of a colour, the next begins with a group of its own."""
-    left_over = set()
-    for cells in ((1, 1, 1), (2, 1, 1), (3, 1, 1), (2, 2, 1), (5, 2, 1), (5, 3, 1), (3, 3, 3)):
-        simulation = damped(*cells)
-        simulation.start()
-        model, bonds = simulation.model, simulation.advance.solver.bonds
-        place = values(bonds.index)[: model.bond_count]
-        assert len(set(place)) == model.bond_count
-        colours = np.searchsorted(values(bonds.colour_first), place // LANES, side="right") - 1
-        assert np.array_equal(colours, model.bond_colours)
-        for group in set(place // LANES):
-            bodies = model.bonds["slots"][place // LANES == group] >> 2
-            assert len(set(bodies.ravel())) == bodies.size
-        left_over |= set(np.bincount(model.bond_colours) % LANES)
-    assert left_over == set(range(LANES))
-
-
-@ti.kernel
-def release(bonds: ti.template(), b: ti.i32):
-    """Remove a bond from the sweeps."""
-    for _ in range(1):
-        bonds.end(b)
-
-
-def test_lanes_without_a_bond_belong_to_a_body_at_rest():
-    """After a run in which bonds break, and at once when one is released."""
-    simulation = damped(3, 2, 2)
-    centre, still = simulation.model.centre, [1.0, 0.0, 0.0, 0.0]
-    speeds = 20.0 * np.random.default_rng(1).normal(size=(2, *centre.shape))
-    simulation.state.set_motion(centre, np.tile(still, (len(centre), 1)), *speeds)
-    simulation.start()
-    simulation.advance_to(60)
-    solver = simulation.advance.solver
-    holds = simulation.state.broken_tick.to_numpy()[: simulation.model.bond_count] < 0
-    assert holds.any() and not holds.all()
-    for held in (holds, without_first(holds)):
-        for b in np.flatnonzero(holds & ~held):
-            release(solver.bonds, int(b))
-        check_lanes(solver, values(solver.bonds.index)[: len(held)][held])
-
-
-def without_first(holds):
-    """The same with one bond less."""
-    fewer = holds.copy()
-    fewer[np.flatnonzero(holds)[0]] = False
-    return fewer
-
-
-def check_lanes(solver, held):
-    """Places other than those held have the spare body, which rests, and a twist of zero."""
-    read, spare = solver.bonds.read(), solver.velocities.spare
-    holds = np.isin(np.arange(len(read["masters"])), held)
-    for name in ("masters", "slaves"):
-        assert np.array_equal(read[name] == spare, ~holds)
-    assert np.all(read["last"][~holds] == 0.0) and np.all(read["last"][holds] != 0.0)
-    assert np.all(solver.velocities.twist.to_numpy()[spare] == 0.0)

@@ -1,0 +1,124 @@
+"""No module imports a later layer, no sum depends on threads, and Taichi starts in one place."""
+
+import ast
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+# A module imports from its own layer and those before it; a folder counts as one module.
+LAYERS = {
+    "taichi_dem": """
+        kit | meshes mesh shapes | elasticity | materials body_materials
+        | physics timeline closed_forms wave_moduli | effects initial_motion | scene | stability
+        | methods | contact_search | step | diagnostics | engine | simulation
+        | output measured_speedup measured_overhead paired_cost observers run_plan | plot | viewer
+        | result scene_pictures | simulate needed_effects outcome | workload step_study goals
+        | accuracy calibration | solve | demo | __init__ | __main__""",
+    "ca_damper": """
+        errors random_numbers progress measures report contracts certificate checked_range
+        steady_state | rk45 oscillator structure record excitation bouncing
+        | gravity collect_and_collide decay impact_damper | checks scenes | window
+        | filling lattice | fixed_mass automaton spheres | combined | engine | activation
+        | batch needed_effects | plot | viewer | film
+        | amplitude_response response shake shake_structure damper_map
+        | frequency_sweep force_check goals | accuracy | solve_response | step_study
+        | demo_pictures | demo | __init__ | __main__""",
+}
+ROWS = {
+    package: {name: k for k, row in enumerate(text.split("|")) for name in row.split()}
+    for package, text in LAYERS.items()
+}
+PATHS = [
+    path.relative_to(ROOT).as_posix()
+    for package in LAYERS
+    for path in sorted((ROOT / package).rglob("*.py"))
+]
+
+
+def text_of(path):
+    return (ROOT / path).read_text(encoding="utf-8")
+
+
+def parsed(path):
+    return ast.parse(text_of(path))
+
+
+def imported(tree):
+    """Full names of all that is imported anywhere, but for types alone."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        yield from imported(node)
+
+
+def later(path):
+    """Names that a module imports from a later layer, or from where it may not."""
+    package, module = path.removesuffix(".py").split("/")[:2]
+    for name in imported(parsed(path)):
+        parts = [*name.split("."), "__init__"]
+        if parts[0] == package:
+            # What is no module comes from the package's front page, which sees them all.
+            row = ROWS[package].get(parts[1], ROWS[package]["__init__"])
+            allowed = row <= ROWS[package][module]
+        else:
+            # Of the other package ca_damper may take the kit.
+            allowed = parts[0] not in ("tests", "experiments", *LAYERS)
+            allowed = allowed or (package == "ca_damper" and parts[:2] == ["taichi_dem", "kit"])
+        if not allowed:
+            yield path, name
+
+
+def test_every_module_has_a_layer_and_imports_nothing_from_a_later_one():
+    assert [found for path in PATHS for found in later(path)] == []
+
+
+def atomic_sums(tree):
+    """Lines where threads may add to one entry of a field in any order, or hide it from a read."""
+    for function in ast.walk(tree):
+        marks = [ast.unparse(mark) for mark in getattr(function, "decorator_list", ())]
+        if {"ti.func", "ti.kernel"} & set(marks):
+            own = variables(function)
+            for node in ast.walk(function):
+                if isinstance(node, ast.AugAssign) and is_of_a_field(node.target, own):
+                    yield node.lineno
+                elif isinstance(node, ast.Call) and "atomic_add" in ast.unparse(node.func):
+                    # Counting has no rounding, in whatever order.
+                    if not isinstance(getattr(node.args[1], "value", None), int):
+                        yield node.lineno
+
+
+def variables(function):
+    """Names that a function assigns; what ti.static gives may be a field."""
+    made = [node for node in ast.walk(function) if isinstance(node, ast.Assign)]
+    plain = [node for node in made if "static" not in ast.unparse(node.value)]
+    parts = [part for node in plain for one in node.targets for part in ast.walk(one)]
+    return {p.id for p in parts if isinstance(p, ast.Name) and isinstance(p.ctx, ast.Store)}
+
+
+def is_of_a_field(target, own):
+    has_index = any(isinstance(node, ast.Subscript) for node in ast.walk(target))
+    return has_index and ast.unparse(target).split("[")[0].split(".")[0] not in own
+
+
+def test_no_kernel_adds_to_a_field_in_place():
+    kernels = [path for path in PATHS if "@ti." in text_of(path)]
+    assert [(path, line) for path in kernels for line in atomic_sums(parsed(path))] == []
+
+
+def test_sums_in_place_are_told_from_sums_in_variables():
+    """So that the rule above bites."""
+    text = "@ti.func\ndef f(self, i, y):\n    a = self.x[i]\n    x = ti.static(self.x)\n    {}"
+    for line in ("self.x[i] += y", "self.x[i][2] -= y", "x[i] += y", "ti.atomic_add(x[i], y)"):
+        assert list(atomic_sums(ast.parse(text.format(line)))) == [5], line
+    for line in ("a[2] += y", "y += 1", "self.x[i] = a + y", "ti.atomic_add(self.n[None], 1)"):
+        assert not list(atomic_sums(ast.parse(text.format(line)))), line
+
+
+def test_taichi_starts_in_one_place():
+    """With fast_math off, as other settings change the bits."""
+    paths = [path for path in PATHS if "ti.init(" in text_of(path)]
+    assert paths == ["taichi_dem/kit/runtime.py"]
+    assert "fast_math=False" in text_of(paths[0])
