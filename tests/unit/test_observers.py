@@ -41,9 +41,7 @@ def run(*observers, steps=200, **options):
         (Every(steps=6), [0, 6, 12, 18, 20]),
         # 2.5 steps: the nearest of two equally near ones is the even one, as Python rounds.
         (Every(time_s=2.5 * STEP), [0, 2, 5, 8, 10, 12, 15, 18, 20]),
-        (Every(time_s=0.3 * STEP), list(range(21))),
         (Every(samples=2), [0, 13, 20]),
-        (Every(wall_s=1e6), [20]),
         (At((0.0, 7.4 * STEP, 20 * STEP)), [0, 7, 20]),
     ],
 )
