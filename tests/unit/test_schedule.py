@@ -1,15 +1,47 @@
-"""Active lists and the step rule, on made-up keys and speeds."""
-
-from types import SimpleNamespace
+"""Every body and bond is visited when its own step ends: clock, lists and step rule alone."""
 
 import numpy as np
-import pytest
 import taichi as ti
 
+from taichi_dem import timeline
 from taichi_dem.stability.step_control import Displacement
 from taichi_dem.step.active_list import ActiveList, itself
-from taichi_dem.step.schedule import Schedule
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, coarsest_active
+
+
+def random_ticks(count=20000):
+    """Ticks on every grid: random multiples of random steps, and zero."""
+    random = np.random.default_rng(7)
+    level = random.integers(0, MAX_LEVEL + 1, count)
+    ticks = random.integers(0, 1 << 30, count) << (MAX_LEVEL - level)
+    return np.concatenate([[0, MACRO_TICKS, MACRO_TICKS - 1], ticks]).astype(np.int64)
+
+
+def test_a_tick_lies_on_the_grid_of_the_coarsest_due_level_and_on_no_coarser():
+    """Definition: level k is due where the tick is a multiple of its step."""
+    for tick in random_ticks().tolist():
+        low = timeline.coarsest_active(tick)
+        assert tick % timeline.ticks_of(low) == 0
+        assert low == 0 or tick % timeline.ticks_of(low - 1) != 0
+
+
+@ti.kernel
+def _mirror(
+    ticks: ti.types.ndarray(dtype=ti.i64, ndim=1), low: ti.types.ndarray(dtype=ti.i64, ndim=2)
+):
+    for k in range(ticks.shape[0]):
+        low[k, 0] = timeline.device_coarsest_active(ticks[k])
+        low[k, 1] = timeline.device_ticks_of(ti.cast(low[k, 0], ti.i32))
+
+
+def test_kernels_keep_the_same_time():
+    """The device functions mirror the Python ones, number for number."""
+    ticks = random_ticks()
+    got = np.zeros((len(ticks), 2), dtype=np.int64)
+    _mirror(ticks, got)
+    low = [timeline.coarsest_active(tick) for tick in ticks.tolist()]
+    assert got[:, 0].tolist() == low
+    assert got[:, 1].tolist() == [timeline.ticks_of(level) for level in low]
 
 
 @ti.data_oriented
@@ -39,50 +71,34 @@ class Sorter:
         for _ in range(1):
             self.list.move(member, key)
 
+    @ti.kernel
+    def due(self, low: ti.i32) -> ti.i32:
+        """Number of members that are due at a level."""
+        count = 0
+        for _ in range(1):
+            count = self.list.count(low)
+        return count
+
     def check(self, keys):
-        """end[k] counts the keys >= k, the first end[k] places hold just those members."""
-        order, end = self.list.order.to_numpy(), self.list.end.to_numpy()
-        place = self.list.index.to_numpy()
+        """The first due(k) places hold just the members whose keys are k or more."""
+        order, place = self.list.order.to_numpy(), self.list.index.to_numpy()
         for level in reversed(range(MAX_LEVEL + 1)):
             listed = np.flatnonzero(keys >= level)
-            assert end[level] == len(listed)
-            assert sorted(order[: end[level]]) == listed.tolist()
+            assert sorted(order[: self.due(level)]) == listed.tolist()
         assert np.array_equal(order[place[listed]], listed)
 
 
-def test_a_full_list_puts_every_member_behind_its_key():
-    """Also when it is filled a second time, with fewer members and other keys."""
-    random = np.random.default_rng(0)
-    keys = random.integers(-1, MAX_LEVEL + 1, 300).astype(np.int32)
-    sorter = Sorter(keys)
-    sorter.check(keys)
-    keys = random.integers(-1, MAX_LEVEL + 1, 300).astype(np.int32)
-    sorter.keys.from_numpy(keys)
-    sorter.fill(100)
-    sorter.check(keys[:100])
-
-
 def test_moves_keep_the_list_exact_at_every_level():
-    """500 moves of random members to random keys, up and down and not at all."""
+    """Random members to random keys, up and down, not at all, and off the list for good."""
     random = np.random.default_rng(1)
     keys = random.integers(0, MAX_LEVEL + 1, 60).astype(np.int32)
     sorter = Sorter(keys)
-    for _ in range(500):
-        member = int(random.integers(60))
-        keys[member] = random.integers(0, MAX_LEVEL + 1)
+    sorter.check(keys)
+    for _ in range(200):
+        member = int(random.choice(np.flatnonzero(keys >= 0)))
+        keys[member] = random.integers(-1, MAX_LEVEL + 1)
         sorter.move(member, int(keys[member]))
         sorter.check(keys)
-
-
-def test_a_negative_key_takes_a_member_off_the_list():
-    """Members leave one by one, from whatever key they had; the others stay."""
-    keys = np.array([5, MAX_LEVEL, 3, 0, 0, 5], dtype=np.int32)
-    sorter = Sorter(keys)
-    for member in (3, 1, 5, 0, 2, 4):
-        keys[member] = -1
-        sorter.move(member, -1)
-        sorter.check(keys)
-    assert sorter.list.end[0] == 0
 
 
 @ti.data_oriented
@@ -124,110 +140,3 @@ def test_the_paper_rule_takes_the_largest_step_that_is_short_enough_and_on_the_g
     coarser = level > low
     assert coarser.any()
     assert np.all(2.0 * step[coarser] * speed[coarser] > distance)
-
-
-class WantedLevels:
-    """Step rule of a test: every body wants a level that the test writes."""
-
-    def __init__(self, levels):
-        self.levels = ti.field(ti.i32, shape=len(levels))
-        self.levels.from_numpy(levels)
-        self.bodies = ti.field(ti.i32, shape=())
-
-    @ti.func
-    def wanted(self, level, speed2, low):
-        """The body's number comes as its squared speed; no coarser than its time allows."""
-        return ti.max(self.levels[ti.cast(speed2, ti.i32)], low)
-
-
-def ring(count, uniform, levels):
-    """Schedule of bodies in a ring, each bonded to the next; all it needs are fields."""
-    slots = [[4 * i, 4 * ((i + 1) % count) + 1] for i in range(count)]
-    faces, others = np.full((2, 4 * count), -1)
-    for b, (first, second) in enumerate(slots):
-        faces[[first, second]] = b
-        others[[first, second]] = second // 4, first // 4
-    tables = SimpleNamespace(
-        on_demand=False,
-        capacity=SimpleNamespace(bodies=count, bonds=count),
-        body_count=filled(ti.i32, np.array(count)),
-        bond_count=filled(ti.i32, np.array(count)),
-        bond_slots=ti.Vector.field(2, ti.i32, shape=count),
-        face_bond=filled(ti.i32, faces),
-        neighbour=filled(ti.i32, others),
-    )
-    tables.bond_slots.from_numpy(np.array(slots, dtype=np.int32))
-    state = SimpleNamespace(
-        tick=filled(ti.i64, np.array(0)),
-        broken_tick=filled(ti.i64, np.full(count, -1)),
-        **{name: filled(ti.i32, np.zeros(count)) for name in ("level", "bound")},
-        last_tick=filled(ti.i64, np.zeros(count)),
-    )
-    schedule = Schedule(tables, state, None, WantedLevels(levels), uniform, False)
-    schedule.load(None, SimpleNamespace(dt0=1.0, distance=None))
-    return schedule
-
-
-def filled(kind, array):
-    """Field with the values of an array."""
-    field = ti.field(kind, shape=array.shape)
-    field.from_numpy(array.astype(np.int64 if kind == ti.i64 else np.int32))
-    return field
-
-
-@ti.data_oriented
-class Clock:
-    """Runs a schedule alone; visits: how often each body and bond was due."""
-
-    def __init__(self, schedule, count):
-        self.schedule = schedule
-        self.bodies, self.bonds = (ti.field(ti.i32, shape=count) for _ in range(2))
-
-    @ti.kernel
-    def start(self):
-        """Fill the lists."""
-        for _ in range(1):
-            self.schedule.start_all()
-
-    @ti.kernel
-    def step(self):
-        """Go to the next tick; all who are due choose their step."""
-        low = ti.static(self.schedule.low)
-        for _ in range(1):
-            self.schedule.advance_clock(0)
-            for a in range(self.schedule.bonds.count(low[None])):
-                b = self.schedule.bonds.order[a]
-                self.bonds[b] = self.bonds[b] + 1
-            for a in range(self.schedule.bodies.count(low[None])):
-                i = self.schedule.bodies.order[a]
-                self.bodies[i] = self.bodies[i] + 1
-                self.schedule.state.last_tick[i] = self.schedule.state.tick[None]
-                self.schedule.choose_level(i, ti.cast(i, ti.f64))
-            self.schedule.reorder(0)
-
-
-@pytest.mark.parametrize("uniform", [False, True])
-def test_a_schedule_alone_visits_each_body_and_bond_as_its_level_asks(uniform):
-    """In a largest step 2^k times, a bond at the finer of its two levels; evaluations tell it."""
-    levels = np.array([0, 3, 1, 5, 0, 2, 2], dtype=np.int32)
-    count = len(levels)
-    clock = Clock(ring(count, uniform, levels), count)
-    clock.start()
-    # The first step is a largest one for all, after it each has its level.
-    clock.step()
-    told = clock.schedule.evaluations.to_numpy()
-    assert told[:3].tolist() == [1, count, count]
-    own = np.full(count, levels.max()) if uniform else levels
-    assert clock.schedule.state.level.to_numpy().tolist() == own.tolist()
-    for field in (clock.bodies, clock.bonds):
-        field.fill(0)
-    for _ in range(2 ** levels.max()):
-        clock.step()
-    assert clock.schedule.state.tick[None] == 2 * MACRO_TICKS
-    assert clock.schedule.state.last_tick.to_numpy().tolist() == [2 * MACRO_TICKS] * count
-    finer = np.maximum(own, np.roll(own, -1))
-    assert clock.bodies.to_numpy().tolist() == (2**own).tolist()
-    assert clock.bonds.to_numpy().tolist() == (2**finer).tolist()
-    told = clock.schedule.evaluations.to_numpy() - told
-    visited = (2**finer).sum()
-    assert told.tolist() == [2 ** own.max(), (2**own).sum(), visited, 0, count * 2**5, visited]
