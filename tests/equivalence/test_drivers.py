@@ -6,7 +6,7 @@ import pytest
 from taichi_dem import ImplicitDashpots, Simulation, runtime
 from taichi_dem.step.auto_driver import PARALLEL_FROM, RESIDENT_BELOW, AutoDriver, driver_name
 from taichi_dem.step.drivers import DRIVERS
-from tests.bar_blast import UNTIL, squeezed_scene
+from tests.bar_blast import UNTIL, bar_scene
 
 METHOD = ImplicitDashpots(4e-7, refresh=1e-5)
 STEPS = round(UNTIL / METHOD.dt0)
@@ -16,7 +16,7 @@ class Slow:
     """A clock on which one driver takes a hundred times as long as the other, whatever they do."""
 
     def __init__(self, slow):
-        self.slow, self.now, self.auto = slow, 0.0, None
+        self.slow, self.now = slow, 0.0
 
     def __call__(self):
         return self.now
@@ -35,71 +35,28 @@ class Slow:
         return timed
 
 
-def measuring(simulation, clock):
-    """Driver that measures both, drivers of its own, by a clock."""
-    drivers = {name: kind(simulation.step) for name, kind in DRIVERS.items()}
-    return AutoDriver(simulation.step, drivers, clock)
-
-
-@pytest.fixture(scope="module")
-def runs():
-    """The same scene by the resident driver, and by one that changes to the parallel one and back.
-
-    The clock calls the resident driver slow, and after the first choice the parallel one.
-    """
-    straight = Simulation(squeezed_scene(), METHOD, "resident")
+@pytest.mark.slow
+def test_the_faster_driver_is_chosen_again_and_again_and_changes_no_bit():
+    """The clock calls the resident driver slow, and after the first choice the parallel one."""
+    straight = Simulation(bar_scene(), METHOD, "resident")
     straight.advance_to(STEPS)
-    simulation = Simulation(squeezed_scene(), METHOD, "resident")
-    clock = Slow("resident")
-    simulation.driver = measuring(simulation, clock)
-    simulation.start()
-    clock.time_calls(simulation.driver)
-    names = [simulation.driver.name]
-    simulation.advance_to(STEPS // 3)
-    names.append(simulation.driver.name)
+    changing, clock = Simulation(bar_scene(), METHOD, "resident"), Slow("resident")
+    drivers = {name: kind(changing.step) for name, kind in DRIVERS.items()}
+    changing.driver = AutoDriver(changing.step, drivers, clock)
+    changing.start()
+    clock.time_calls(changing.driver)
+    names = [changing.driver.name]
+    changing.advance_to(STEPS // 3)
+    names.append(changing.driver.name)
     clock.slow = "parallel"
-    simulation.driver._begin()
-    simulation.advance_to(STEPS)
-    names.append(simulation.driver.name)
-    return straight, simulation, names
-
-
-@pytest.mark.slow
-def test_the_faster_driver_is_chosen_again_and_again(runs):
-    assert runs[2] == ["resident (measured)", "parallel (measured)", "resident (measured)"]
-    assert runs[1].report().driver == "resident (measured)"
-
-
-@pytest.mark.slow
-def test_changing_drivers_changes_no_bit(runs):
-    straight, changing, _ = runs
+    changing.driver._begin()
+    changing.advance_to(STEPS)
+    names.append(changing.driver.name)
+    assert names == ["resident (measured)", "parallel (measured)", "resident (measured)"]
     assert straight.report().broken_faces > 0 and straight.report().pair_evaluations > 0
     for name, array in straight.state.motion().items():
         assert np.array_equal(array, changing.state.motion()[name]), name
     assert straight.energy_balance.account() == changing.energy_balance.account()
-    assert straight.evaluations() == changing.evaluations()
-
-
-@pytest.mark.slow
-def test_tries_take_their_share(runs):
-    """Tries of 2 (1 + 0.01) s are repeated once the driver has gone on for twenty times as long."""
-    _, simulation, _ = runs
-    clock = Slow("parallel")
-    made = measuring(simulation, clock)
-    for name, driver in made.drivers.items():
-        seconds = 1.0 if name == "parallel" else 0.01
-        driver.few = lambda end, count, seconds=seconds: clock.__dict__.update(
-            now=clock.now + seconds
-        )
-        driver.run = lambda end: clock.__dict__.update(now=clock.now + 5.0)
-    calls = 0
-    for _ in range(4):
-        made.run(0)
-    assert not made.pending_tries and made.chosen == "resident"
-    while not made.pending_tries:
-        made.run(0)
-        calls += 1
-    assert calls == 9  # 20 * 2.02 s in pieces of 5 s
 
 
 def test_auto_goes_by_size_and_threads():

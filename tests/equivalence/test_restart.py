@@ -2,11 +2,7 @@
 
 import gc
 import os
-import random
-import signal
-import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -15,12 +11,12 @@ import taichi as ti
 from taichi_dem import CONCRETE, Checkpoint, InputError, Scene, Simulation, effects, simulate
 from taichi_dem.kit.checkpoint import read_checkpoint
 from taichi_dem.kit.field_memory import FieldMemory, fields_of
+from taichi_dem.mesh.face_groups import with_cut
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.record import Recorder
 from taichi_dem.simulate import saved_run
 from taichi_dem.timeline import MACRO_TICKS
 from tests.bar_blast import METHODS, UNTIL, squeezed_scene
-from tests.scenes import ROOT
 
 #: Share of the way at which a checkpoint is made: some of the bonds are broken, and bodies meet.
 SHARE = 0.905
@@ -91,7 +87,6 @@ def differing(first, second):
     scope="module",
     params=[
         "controlled",
-        pytest.param("uniform", marks=pytest.mark.slow),
         pytest.param("implicit", marks=pytest.mark.slow),
         pytest.param("faces", marks=pytest.mark.slow),
     ],
@@ -103,30 +98,6 @@ def run(request):
     return Run(METHODS[request.param])
 
 
-@pytest.fixture(scope="module")
-def foretold(run):
-    """Evaluations of a largest step at the start, as expected from the levels and as made."""
-    run.simulation.advance_to(2)
-    expected, before = run.simulation.evaluation_rate(), run.simulation.evaluations()
-    run.simulation.advance_to(3)
-    return expected * run.simulation.method.dt0, run.simulation.evaluations() - before
-
-
-def test_time_left_weighs_each_level_by_its_steps(run, foretold):
-    """A bond at level k is evaluated 2^k times a largest step; sweeps vary from step to step.
-
-    The expected number is within 3 eps of a whole one: a division and a product.
-    """
-    expected, made = foretold
-    bonds = run.simulation.model.bond_count
-    if run.simulation.solves:
-        fewest, most = run.simulation.method.sweeps
-        assert (1 + fewest) * bonds <= expected <= (1 + most) * bonds
-    else:
-        assert made >= (4 if run.simulation.schedule.controlled else 1) * bonds
-        assert expected == pytest.approx(made, rel=3 * np.finfo(float).eps)
-
-
 def test_every_field_is_found(run):
     """What is found is saved unless its class says why not: nobody has to remember it."""
     found = {id(one.field) for one in fields_of(run.simulation)}
@@ -135,7 +106,7 @@ def test_every_field_is_found(run):
 
 
 @pytest.fixture(scope="module")
-def straight(run, foretold, tmp_path_factory):
+def straight(run, tmp_path_factory):
     """Checkpoint on the way, what the run came to, and what its constant fields were before."""
     constant = FieldMemory(run.simulation, "constant")
     before, path = constant.read(), tmp_path_factory.mktemp("saved") / "run.npz"
@@ -174,50 +145,11 @@ def test_a_resumed_run_has_the_bits_of_a_straight_one(run, straight):
     assert differing(end, run.finish()) == []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("run", ["uniform"], indirect=True)
-def test_a_killed_run_resumes_to_the_same_bits(run, straight, tmp_path):
-    """kill -9 twice, at random moments after a checkpoint; then on in this process."""
-    path, moments = tmp_path / "run.npz", random.Random(6)
-    for resume in (None, path):
-        kill_after_checkpoint(path, resume, moments.uniform(0.0, 0.3))
-    run.resume(path)
-    assert 0.0 < run.simulation.time_s < UNTIL
-    run.simulation.advance_to(run.last)
-    reached = run.saved.memory.read()
-    assert differing({name: straight[2][name] for name in reached}, reached) == []
-
-
-_CHILD = """
-import sys
-from taichi_dem import Checkpoint, runtime, simulate
-from tests.bar_blast import METHODS, UNTIL, squeezed_scene
-runtime.start(threads=1)
-path, resume = sys.argv[1], sys.argv[2] or None
-keep = Checkpoint(path, every_wall_s=0.02)
-simulate(squeezed_scene(), method=METHODS["uniform"], until=UNTIL, samples=20, checkpoint=keep,
-    resume=resume)
-"""
-
-
-def kill_after_checkpoint(path, resume, seconds):
-    """Start a run, and kill it some seconds after it has saved itself for the first time."""
-    before = path.stat().st_mtime_ns if path.exists() else 0
-    environment = {**os.environ, "PYTHONPATH": ROOT}
-    line = [sys.executable, "-c", _CHILD, str(path), str(resume or "")]
-    child = subprocess.Popen(line, cwd=ROOT, env=environment)
-    while not path.exists() or path.stat().st_mtime_ns == before:
-        assert child.poll() is None
-        time.sleep(0.005)
-    time.sleep(seconds)
-    child.kill()
-    assert child.wait() == -signal.SIGKILL
-
-
-def light_scene(pulse=5e6, cells=(2, 1, 1)):
-    """A bar of 12 bodies without contact, quick to compile."""
+def light_scene(pulse=5e6, share=1.0):
+    """A bar of 12 bodies without contact, quick to compile; share: of bonds in its middle."""
     acting = [effects.BondDamping(), effects.GasPressure("left", peak=pulse, rise=1e-5)]
-    return Scene(bar(0.1, 0.05, cells), CONCRETE, acting)
+    mesh = with_cut(bar(0.1, 0.05, (2, 1, 1)), "joint", (0.05, 0, 0), (1, 0, 0))
+    return Scene(mesh, CONCRETE, acting, weaker={"joint": share})
 
 
 @pytest.fixture(scope="module")
@@ -265,9 +197,8 @@ def test_a_full_disk_at_the_end_names_the_checkpoint(light, tmp_path, monkeypatc
 @pytest.mark.parametrize(
     ("scene", "change", "words"),
     [
-        (light_scene(cells=(3, 1, 1)), {}, "of another mesh: 12 tetrahedra"),
+        (light_scene(share=0.5), {}, "bonded shares"),
         (light_scene(pulse=6e6), {}, "of another effects: .*5000000.0.*6000000.0"),
-        (light_scene(), {"method": METHODS["controlled"]}, "of another method: Uniform"),
         (
             light_scene(),
             {"until": 1e-6},
@@ -279,8 +210,3 @@ def test_what_does_not_belong_together_is_refused(light, scene, change, words):
     path, job = light
     with pytest.raises(InputError, match=words):
         simulate(scene, resume=path, **{"until": 1e-5, **job, **change})
-
-
-def test_a_checkpoint_must_be_one():
-    with pytest.raises(InputError, match=r"checkpoint must be a Checkpoint or None, got 'run.npz'"):
-        simulate(light_scene(), method=METHODS["uniform"], until=1e-6, checkpoint="run.npz")

@@ -1,15 +1,15 @@
 """Stability limits of the explicit step, found by bisection and compared with their formulas."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-import taichi as ti
 
 from taichi_dem import (
     CONCRETE,
     ImplicitDashpots,
     Scene,
     Simulation,
-    StepControl,
     Uniform,
     effects,
     step_report,
@@ -112,7 +112,7 @@ def test_bond_limits_are_where_motion_begins_to_grow(kind):
     listed, material = [], CONCRETE
     if kind == "dashpots":
         soft = {"normal_stiffness": 450e5, "shear_stiffness": 90e5, "fracture_energy": 1e9}
-        material = type(CONCRETE)(**{**vars(CONCRETE), **soft})
+        material = replace(CONCRETE, **soft)
         listed = [effects.BondDamping()]
     rig = Rig(pair(), listed, material=material)
     model = rig.simulation.model
@@ -153,21 +153,30 @@ def test_damped_pair_is_calm_below_what_the_report_tells_and_grows_above(way):
     assert largest(above * told) > 1e-4
 
 
-def facing(gap, sides=False):
+def facing(gap):
     """Two equal tetrahedra without a bond, base against base across a gap [m].
 
-    sides: put all other faces into a group hole.
+    All other faces are in a group hole.
     """
     mesh = single()
     points = mesh.points
     other = points * [-1.0, 1.0, 1.0] + [gap, 0.0, 0.0]
     around = [(0, 1, 2), (0, 2, 3), (0, 3, 1)]
     loaded = [*around, *(tuple(4 + k for k in face) for face in around)]
-    groups = {"hole": loaded} if sides else {}
-    return checked_mesh(np.vstack([points, other]), [[0, 1, 2, 3], [4, 6, 5, 7]], groups)
+    bodies = [[0, 1, 2, 3], [4, 6, 5, 7]]
+    return checked_mesh(np.vstack([points, other]), bodies, {"hole": loaded})
 
 
 GAP = 1e-6
+
+
+def meeting(divisions, material, **gas):
+    """Bodies that face each other, with contact and gas alone, by kernels of all effects."""
+    laws = effects.BondDamping(), effects.Softening(), effects.ShearSlip()
+    contact = effects.SphereContact(divisions, outer_faces=True)
+    listed = [*(law.silent() for law in laws), contact, effects.Friction().silent()]
+    listed.append(effects.GasPressure("hole", **gas))
+    return Rig(facing(GAP), listed, Uniform(1e-9, 1.0), material)
 
 
 def contact_eigenvalue(model, spheres):
@@ -197,10 +206,8 @@ def test_sphere_springs_hold_up_to_their_limit(divisions, contacts):
     rate for all that touch, never longer than the limit, here shorter by 2 at most.
     """
     pressure = 1e6
-    gas = effects.GasPressure("hole", peak=pressure, rise=1e-12, decay_ratio=1e12)
-    material = type(CONCRETE)(**{**vars(CONCRETE), "contact_damping": 1e-7 * 3.08e6})
-    listed = [effects.SphereContact(divisions, outer_faces=True), gas]
-    rig = Rig(facing(GAP, sides=True), listed, material=material)
+    gas = {"peak": pressure, "rise": 1e-12, "decay_ratio": 1e12}
+    rig = meeting(divisions, replace(CONCRETE, contact_damping=1e-7 * 3.08e6), **gas)
     model = rig.simulation.model
     spheres = model.spheres.centre.reshape(-1, 3)[:contacts]
     rate = CONCRETE.contact_stiffness * contact_eigenvalue(model, spheres)
@@ -231,7 +238,7 @@ def test_sphere_dashpots_kick_back_from_their_limit_on(divisions, contacts):
     for six it allows for tilting too, and may be shorter, but not by more than 3.
     The overlap is 1e-9 of a radius: springs add 1e-4 of the dashpots at this speed.
     """
-    rig = Rig(facing(GAP), [effects.SphereContact(divisions, outer_faces=True)])
+    rig = meeting(divisions, CONCRETE, start=1.0)
     model = rig.simulation.model
     position = rig.centre - np.outer([0.0, 1.0], [GAP + 1e-10, 0.0, 0.0])
     velocity = np.array([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
@@ -250,60 +257,6 @@ def test_sphere_dashpots_kick_back_from_their_limit_on(divisions, contacts):
     assert exact / 3.0 < formula <= exact * (1 + 1e-6)
 
 
-@ti.kernel
-def _refresh(limits: ti.template(), count: ti.i32):
-    for i in range(count):
-        limits.refresh(i)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("friction", [False, True])
-def test_near_contacts_are_counted_before_they_touch_and_limit_as_the_report_says(friction):
-    """Six spheres that will meet within twice the largest step, none of which touches yet.
-
-    The step's eigenvalue bound is above the exact one by at most 6^(1/32) = 1.06.
-    """
-    listed = [effects.SphereContact(outer_faces=True)] + [effects.Friction()] * friction
-    control = StepControl(safety=1.0)
-    rig = Rig(facing(GAP), listed, Uniform(1e-6, control=control))
-    velocity = np.array([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
-    rig.state.set_motion(rig.centre, STILL, velocity)
-    rig.simulation.broad_phase.search()
-    limits = rig.simulation.schedule.limits
-    _refresh(limits, 2)
-    # All faces of a regular body are alike, so that the worst is the base that meets.
-    _, whole = contact_eigenvalues(rig.simulation.model.mesh, CONCRETE.density, 5, friction)
-    exact = dashpot_step(CONCRETE.contact_damping * whole)
-    for body in range(2):
-        assert exact[body] / 1.06 < limits.limit[body] < exact[body] * (1 + 1e-6)
-    rig.state.set_motion(rig.centre, STILL, -velocity * 1e-6)
-    _refresh(limits, 2)
-    assert limits.limit[0] == 1e-6
-
-
-@pytest.mark.slow
-def test_limited_dashpots_never_throw_back_at_any_step():
-    """A contact keeps 1 / X of its coefficient, X = 2 dt lambda: bodies that meet stop together.
-
-    Head on with one contact X is the pair's rate times dt, so that after one step the approach is
-    over to what the eigenvalue bound leaves, 1 - 6^(-1/32); with full dashpots the same pair parts
-    faster than it came from X = 2 on. Found by bisection: no step up to 1e3 limits does that.
-    """
-    rig = Rig(
-        facing(GAP),
-        [effects.SphereContact(3, outer_faces=True)],
-        Uniform(1e-9, dashpot="limited"),
-    )
-    model, limits = rig.simulation.model, rig.simulation.schedule.limits
-    position = rig.centre - np.outer([0.0, 1.0], [GAP + 1e-10, 0.0, 0.0])
-    velocity = np.array([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
-    exact = model.body_mass[0] / CONCRETE.contact_damping
-    for share in (0.6, 1.0, 3.0, 10.0, 100.0):
-        after = rig.speeds(share * exact, 1, position, velocity, np.zeros((2, 3)))
-        assert after < 0.06 * np.linalg.norm(velocity)
-        assert limits.contact_damping[0] * exact == pytest.approx(1.0, rel=0.06)
-
-
 def test_limited_dashpots_of_a_bond_are_stable_at_any_step():
     """A bonded pair at ten times the step that full dashpots bear keeps 1.7 / X of them.
 
@@ -312,7 +265,7 @@ def test_limited_dashpots_of_a_bond_are_stable_at_any_step():
     bisection of a factor on the rates that the limiter knows.
     """
     soft = {"normal_stiffness": 450e5, "shear_stiffness": 90e5, "fracture_energy": 1e9}
-    material = type(CONCRETE)(**{**vars(CONCRETE), **soft})
+    material = replace(CONCRETE, **soft)
     rig = Rig(pair(), [effects.BondDamping()], Uniform(1e-9, dashpot="limited"), material)
     table = rig.simulation.schedule.limits.dashpot_table
     known, rate = table.to_numpy(), pair_eigenvalue(rig.simulation.model, dashpots_of(material))

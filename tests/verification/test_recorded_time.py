@@ -1,5 +1,7 @@
 """All that is recorded is of one time, and of second order in the step where the scheme is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from taichi_dem.mesh.shapes import bar, single
 
 UNTIL = 1.6e-5
 COLUMNS = ("kinetic_J", "bond_strain_J", "load_work_J", "bond_dashpot_J")
+UNDAMPED = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0)
 
 
 def solved(step):
@@ -23,37 +26,41 @@ SCHEMES = {
 }
 
 
-def recorded(method, damped, weight):
-    """Energies and a velocity at the end of a blow on a bar; weight: acceleration [m/s^2]."""
-    listed = [effects.GasPressure("left", peak=5e6, rise=1e-5), effects.Gravity((weight, 0.0, 0.0))]
-    listed += [effects.BondDamping()] * damped
-    scene = Scene(bar(0.2, 0.05, (4, 1, 1)), CONCRETE, listed)
-    run = {"until": UNTIL, "samples": 1, "frames": 1, "progress": None}
-    result = simulate(scene, method=method, **run)
+def blown(method, damped=True):
+    """A blow on a bar that falls along itself."""
+    listed = [effects.GasPressure("left", peak=5e6, rise=1e-5), effects.Gravity((1e5, 0.0, 0.0))]
+    material = CONCRETE if damped else UNDAMPED
+    scene = Scene(bar(0.2, 0.05, (4, 1, 1)), material, [*listed, effects.BondDamping()])
+    return simulate(scene, method=method, until=UNTIL, samples=1, frames=1, progress=None)
+
+
+def recorded(method, damped):
+    """Energies and a velocity at the end."""
+    result = blown(method, damped)
     energies = [result.history[name][-1] for name in COLUMNS[: 3 + damped]]
     return np.array([*energies, result.frames[-1].velocity[5, 0]])
 
 
-@pytest.mark.parametrize("weight", [0.0, 1e5])
 @pytest.mark.parametrize("name", SCHEMES)
-def test_what_is_recorded_is_of_second_order(name, weight):
+def test_what_is_recorded_is_of_second_order(name):
     """Errors of steps h, h/2 and h/4: the ratio of their differences is 4, and 2 at first order.
 
     A tenth of an order is allowed: dashpots answer a step of 2e-7 s by a tenth of their rate's
     next term, and a half of an order would already be another scheme.
     """
     make, largest, damped = SCHEMES[name]
-    found = [recorded(make(largest / 2**k), damped, weight) for k in range(3)]
+    found = [recorded(make(largest / 2**k), damped) for k in range(3)]
     ratio = (found[0] - found[1]) / (found[1] - found[2])
     assert np.log2(ratio) == pytest.approx(2.0, abs=0.1)
 
 
-@pytest.mark.parametrize("method", [Uniform(1e-7), ImplicitDashpots(1e-7), Multirate(1e-7, 1.0)])
-def test_a_body_that_falls_from_rest_is_where_the_parabola_says(method):
+@pytest.mark.parametrize("name", SCHEMES)
+def test_a_body_that_falls_from_rest_is_where_the_parabola_says(name):
     """The leapfrog is exact for a constant force if velocities start half a step back."""
     weight = np.array([3.0, -981.0, 20.0])
-    listed = [effects.Gravity(tuple(weight)), effects.BondDamping()]
-    scene = Scene(single(0.05), CONCRETE, listed[:1])
+    later = effects.GasPressure("base", start=1.0)
+    listed = [later, effects.Gravity(tuple(weight)), effects.BondDamping()]
+    scene, method = Scene(single(0.05), CONCRETE, listed), SCHEMES[name][0](1e-7)
     result = simulate(scene, method=method, until=1e-4, samples=2, frames=2, progress=None)
     for frame in result.frames:
         # A thousand steps round the position and the velocity a thousand times.
@@ -64,16 +71,11 @@ def test_a_body_that_falls_from_rest_is_where_the_parabola_says(method):
 
 def test_sweeps_that_end_early_are_counted_and_told():
     """One sweep a step is too few for a blow; enough of them leave nothing to tell."""
-    reports = {}
-    for sweeps in ((1, 1), (2, 400)):
-        blow = effects.GasPressure("left", peak=5e6, rise=1e-5)
-        scene = Scene(bar(0.2, 0.05, (4, 1, 1)), CONCRETE, [blow, effects.BondDamping()])
-        method = ImplicitDashpots(4e-7, sweeps=sweeps, tolerance=1e-6)
-        result = simulate(scene, method=method, until=UNTIL, samples=1, progress=None)
-        reports[sweeps] = result.report
-    early, enough = reports.values()
+    early, enough = (
+        blown(ImplicitDashpots(4e-7, sweeps=sweeps, tolerance=1e-6)).report
+        for sweeps in ((1, 1), (2, 400))
+    )
     assert 0 < early.unconverged_steps <= early.substeps and early.worst_residual > 1e-6
     assert any("sweeps ended with changes" in need for need in early.needs)
-    assert f"{early.unconverged_steps} substeps unconverged" in str(early)
     assert enough.unconverged_steps == 0 and enough.worst_residual == 0.0
     assert not any("sweeps" in need for need in enough.needs)

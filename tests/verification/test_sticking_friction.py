@@ -15,17 +15,13 @@ import taichi as ti
 from taichi_dem import (
     CONCRETE,
     ImplicitDashpots,
-    InputError,
-    Multirate,
     Scene,
     Simulation,
     Uniform,
     checked_mesh,
     effects,
 )
-from taichi_dem.effects.base import Effect
 from taichi_dem.mesh.shapes import single
-from tests.slow import slow_but
 
 EPS = np.finfo(float).eps
 GROUND, EDGE, G, MU = 2e4, 0.1, 9.81, 0.3
@@ -34,7 +30,6 @@ STEP = 1e-4
 SETTLED = 0.5
 METHODS = {
     "uniform": Uniform(STEP),
-    "multirate": Multirate(STEP, 1e-7),
     "implicit": ImplicitDashpots(STEP),
 }
 
@@ -71,46 +66,20 @@ class Slope:
         return self.simulation.energy_balance.account()
 
 
-def stays(method, until):
-    """The way between being settled and a time, and how well the account closes."""
-    run = Slope(0.2, effects.StickingFriction(), method)
-    first, _ = run.go(SETTLED)
-    account = run.account
-    last, speed = run.go(until)
-    return abs(last - first), abs(speed), account, run.account
-
-
-def check_rest(way, speed, settled, account):
+def test_a_body_below_the_friction_angle_stays():
     """It stays to what its place, 2 km from the origin, is known to; a thousandfold at most.
 
     The stretch of the springs before was 1e-5 m. Nothing is spent at rest. Velocities are half a
     step old: the account of the shaking before is as good as w dt / 2 = 0.06 of what it lost, here
     better by ten.
     """
-    assert way < 1000 * EPS * GROUND and speed < 1000 * EPS * GROUND / STEP
-    assert account["friction"] == pytest.approx(settled["friction"], rel=1e-6)
-    assert abs(account["residual"]) < 0.006 * account["load_work"]
-
-
-@pytest.mark.parametrize("name", slow_but(METHODS, "implicit"))
-def test_a_body_below_the_friction_angle_stays(name):
-    check_rest(*stays(METHODS[name], 2.0))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", METHODS)
-def test_a_body_below_the_friction_angle_stays_for_a_million_steps(name):
-    check_rest(*stays(METHODS[name], 1e6 * STEP))
-
-
-@pytest.mark.slow
-def test_friction_without_a_spring_creeps():
-    """So the tests above would fail: weight drives it against 39 dashpots."""
-    run = Slope(0.2, effects.Friction(), METHODS["uniform"])
+    run = Slope(0.2, effects.StickingFriction(), METHODS["implicit"])
     first, _ = run.go(SETTLED)
-    way, speed = run.go(2.0)
-    assert way - first == pytest.approx(speed * (2.0 - SETTLED), rel=0.01)
-    assert speed > 1e-3
+    settled = run.account
+    last, speed = run.go(2.0)
+    assert abs(last - first) < 1000 * EPS * GROUND and abs(speed) < 1000 * EPS * GROUND / STEP
+    assert run.account["friction"] == pytest.approx(settled["friction"], rel=1e-6)
+    assert abs(run.account["residual"]) < 0.006 * run.account["load_work"]
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -201,26 +170,3 @@ def test_the_spring_is_linear_and_turns_with_the_contact(spring):
     turned, still, spent = spring.move(normal, (0, 0, 0), 1e9)
     assert turned @ normal == pytest.approx(0.0, abs=8 * EPS * np.linalg.norm(force))
     assert still == pytest.approx(stored, rel=8 * EPS) and spent == 0.0
-
-
-@pytest.mark.parametrize("ratio", [0.0, -1.0, 1.5, math.nan, "stiff"])
-def test_a_ratio_out_of_range_is_refused(ratio):
-    with pytest.raises(InputError, match="stiffness_ratio must be a number from 1e-06 to 1, got"):
-        effects.StickingFriction(ratio)
-
-
-def test_two_kinds_of_friction_are_refused():
-    both = [effects.SphereContact(), effects.Friction(), effects.StickingFriction()]
-    with pytest.raises(InputError, match="friction and sticking_friction both take the role"):
-        Scene(single(), CONCRETE, both)
-
-
-class Unbounded(Effect):
-    """A friction law of one's own that names no limit."""
-
-    role, name = "friction", "unbounded"
-
-
-def test_friction_without_a_limit_is_refused():
-    with pytest.raises(InputError, match="effect Unbounded must have a member limit, as its role"):
-        slope(0.2, Unbounded())

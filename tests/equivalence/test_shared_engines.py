@@ -1,0 +1,218 @@
+"""Engines: a structure is compiled once; a scene in one has the bits of a scene alone.
+
+The last file of its folder, as ``runtime.clear`` gives all engines of the session back.
+"""
+
+import contextlib
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import taichi as ti
+from taichi.lang import impl
+
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    InputError,
+    Scene,
+    Simulation,
+    Uniform,
+    effects,
+    runtime,
+)
+from taichi_dem.effects.base import Effect
+from taichi_dem.engine.engine import ENGINES
+from taichi_dem.kit import allocation
+from taichi_dem.mesh.shapes import bar, single
+from taichi_dem.physics.rotation import zero3
+from taichi_dem.timeline import NEVER
+
+#: Largest steps of a run: bonds break at the left end, and what they held touches.
+STEPS = 60
+
+
+def drawn(seed):
+    """A bar of some size under a blow, and solved dashpots; every number in them is drawn."""
+    random = np.random.default_rng(seed)
+    cells = tuple(int(n) for n in random.integers(1, 5, 3))
+    material = replace(
+        CONCRETE,
+        density=float(random.uniform(1e3, 4e3)),
+        contact_damping=float(10.0 ** random.uniform(5, 6.5)),
+        friction=float(random.uniform(0.1, 0.9)),
+        tensile_strength=float(random.uniform(2e6, 6e6)),
+    )
+    contact = effects.SphereContact(
+        divisions=int(random.integers(3, 6)),
+        outer_faces=bool(random.integers(2)),
+        skin=float(10.0 ** random.uniform(-3, -1)),
+    )
+    gas = effects.GasPressure("left", peak=2e9, rise=float(random.uniform(5e-6, 2e-5)))
+    laws = effects.BondDamping(), effects.Softening(), effects.ShearSlip()
+    listed = [*laws, contact, effects.Friction(), gas]
+    speed = float(10.0 ** random.uniform(4, 6))
+    scene = Scene(bar(0.02 * cells[0], 0.05, cells), material, listed, max_speed=speed)
+    method = ImplicitDashpots(
+        float(random.uniform(1e-7, 4e-7)),
+        (int(random.integers(1, 4)), int(random.integers(5, 12))),
+        float(10.0 ** random.uniform(-4, -1)),
+        float(random.uniform(0.5, 1.0)),
+        float(random.uniform(4e-7, 1e-5)),
+    )
+    return scene, method
+
+
+def outcome(simulation):
+    """Bits of a run: motion, fracture and account."""
+    motion = simulation.state.motion()
+    broken = simulation.state.broken_tick.to_numpy()
+    return [*motion.values(), broken, np.array(list(simulation.energy_balance.account().values()))]
+
+
+def same(first, second):
+    return all(np.array_equal(a, b) for a, b in zip(first, second))
+
+
+def ran(scene, method):
+    """A run to its end."""
+    simulation = Simulation(scene, method, "resident")
+    simulation.advance_to(STEPS)
+    return simulation
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """Bits of two scenes of one structure, one after the other; that is compiled from here on."""
+    return [outcome(ran(*drawn(seed))) for seed in (1, 2)]
+
+
+def test_other_numbers_compile_nothing_and_leave_no_trace(alone, compilations):
+    """Scenes of one structure, each with all numbers drawn anew, one after the other."""
+    engines = ENGINES.count
+    assert same(outcome(ran(*drawn(1))), alone[0])
+    assert same(outcome(ran(*drawn(2))), alone[1])
+    assert compilations == [] and ENGINES.count == engines
+
+
+def test_two_live_simulations_have_the_bits_of_each_alone(alone):
+    together = [Simulation(*drawn(seed), "resident") for seed in (1, 2)]
+    for step in range(0, STEPS + 1, 12):
+        for simulation in together:
+            simulation.advance_to(step)
+    assert all(same(outcome(one), bits) for one, bits in zip(together, alone))
+
+
+def test_reset_begins_again_with_another_scene_and_compiles_nothing(alone, compilations):
+    scene, method = drawn(1)
+    simulation = ran(*drawn(2))
+    simulation.reset(scene, method)
+    assert simulation.time_s == 0.0 and simulation.searches == 0
+    simulation.advance_to(STEPS)
+    assert same(outcome(simulation), alone[0]) and compilations == []
+    with pytest.raises(InputError, match="reset must have a scene"):
+        simulation.reset(replace(scene, effects=scene.effects[1:]))
+    assert same(outcome(simulation), alone[0])
+
+
+def test_nothing_is_compiled_in_the_time_of_steps(compilations, compiled_anew, monkeypatch):
+    """Readings of contacts are compiled between steps, once a bar has broken."""
+    simulation = Simulation(*drawn(1))
+    counts, timed = [], simulation._timed
+
+    @contextlib.contextmanager
+    def counted():
+        before = len(compilations)
+        with timed():
+            yield
+        counts.append(len(compilations) - before)
+
+    monkeypatch.setattr(simulation, "_timed", counted)
+    simulation.start()
+    started = len(compilations)
+    simulation.advance_to(2 * STEPS)
+    assert (simulation.state.broken_tick.to_numpy() != NEVER).any()
+    assert len(compilations) > started and set(counts) == {0}
+    assert simulation.run_cpu_seconds > 0.0
+
+
+def test_a_view_keeps_to_its_simulation():
+    """Also one that was taken before another simulation came to the engine."""
+    first, second = (Simulation(Scene(single(), CONCRETE), Uniform()) for _ in range(2))
+    states, still = (first.state, second.state), [[1.0, 0.0, 0.0, 0.0]]
+    for k, state in enumerate(states):
+        state.set_motion([[k, 0.0, 0.0]], still)
+    assert [state.position.to_numpy()[0, 0] for state in states] == [0.0, 1.0]
+    field = states[0].position
+    assert states[1].position.to_numpy()[0, 0] == 1.0 and field.to_numpy()[0, 0] == 0.0
+
+
+@ti.data_oriented
+class Careless(Effect):
+    """A load whose kernel reads a number of the host, which the compiler takes as a constant."""
+
+    role = "load"
+    name = "careless"
+
+    def __init__(self, push):
+        self.push = push
+
+    @ti.func
+    def acts_on(self, i):
+        """Every body."""
+        return 1
+
+    @ti.func
+    def wrench(self, i, motion):
+        """A force along x."""
+        force = zero3()
+        force[0] = self.push * self.tables.mass[i]
+        return force, zero3()
+
+
+def test_a_number_that_a_kernel_read_as_a_constant_is_never_another_scenes():
+    """v = push t, whoever compiled first, and also where two began before any compiled."""
+    before, speeds = ENGINES.count, []
+    for pushes in ((1.0, 2.0), (2.0, 5.0)):
+        scenes = [Scene(single(), CONCRETE, [Careless(push)]) for push in pushes]
+        for simulation in [Simulation(scene, Uniform()) for scene in scenes]:
+            simulation.advance_to(100)
+            speeds.append(simulation.motion()["velocity"][0, 0] / 1e-6)
+    assert speeds == pytest.approx([1.0, 2.0, 2.0, 5.0], rel=1e-12)
+    assert ENGINES.count == before + 3
+
+
+def test_another_thread_is_refused_in_words():
+    simulation, said = Simulation(Scene(single(), CONCRETE), Uniform()), []
+
+    def work():
+        for call in (lambda: simulation.advance_to(1), runtime.clear):
+            try:
+                call()
+            except InputError as error:
+                said.append(str(error))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert len(said) == 2
+    assert all("on the thread that called runtime.start()" in sentence for sentence in said)
+    simulation.advance_to(1)
+
+
+def test_clear_gives_memory_back_and_refuses_what_was_made_before():
+    before = allocation.field_bytes()
+    simulation = Simulation(Scene(bar(1.0, 0.1, (400, 1, 1)), CONCRETE), Uniform())
+    simulation.start()
+    assert allocation.field_bytes() > before
+    runtime.clear()
+    assert ENGINES.count == 0
+    # Taichi frees no kernel while its program lives.
+    assert impl.get_runtime().get_num_compiled_functions() == 0
+    for call in (lambda: simulation.advance_to(1), simulation.report, simulation.reset):
+        with pytest.raises(InputError, match=r"simulation has been given back by runtime.clear"):
+            call()
+    again = Simulation(Scene(single(), CONCRETE), Uniform())
+    again.advance_to(1)
+    assert again.time_s == 1e-8
