@@ -163,16 +163,3 @@ def test_the_end_of_a_scene_does_not_end_the_others(tmp_path):
     assert batch.diverged.tolist() == [False, True, False]
     for name, values in batch.sample().items():
         assert np.isfinite(values).tolist() == [True, name == "time_s", True]
-
-
-def test_report_counts_the_steps_of_all_scenes_and_of_their_particles():
-    table = SceneTable([0, 3], 1, 1e-3, [5.0, 8.0], 1e-3)
-    batch = Batch(RigidMass(), table, measured_cycles=2)
-    batch.start()
-    batch.run(1, 2)
-    report = batch.report()
-    # Whole steps a cycle: 200 at 5 Hz and 125 at 8 Hz, three cycles each.
-    assert report.scene_steps == 3 * (200 + 125)
-    assert report.particle_steps == 3 * 3 * 125
-    # Six a try, and at least a try a step.
-    assert report.container_evaluations == 6 * batch.attempts().sum() >= 6 * report.scene_steps

@@ -39,13 +39,6 @@ def test_steady_state_repeats_after_a_cycle(frequency):
     assert end == pytest.approx(start, rel=1e-9, abs=1e-12)
 
 
-def test_a_scaled_one_swings_alike():
-    o, scaled = Oscillator(), Oscillator().scaled(0.5, 0.6e-3)
-    assert scaled.mass == 0.5
-    for frequency in (3.0, 6.0, 9.0):
-        assert scaled.transfer(frequency) == pytest.approx(o.transfer(frequency), rel=1e-12)
-
-
 def test_series_of_sine_and_cosine_reach_round_off():
     # Over a step's angle, at most 2 pi / 40: half a unit in the last place each operation.
     angle = np.linspace(-1.0, 1.0, 1001) * 2.0 * math.pi / LEAST_STEPS_PER_CYCLE

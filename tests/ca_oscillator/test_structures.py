@@ -1,7 +1,6 @@
 """A structure of the damper is compiled once, and no number of an earlier batch stays in it."""
 
 import hashlib
-import threading
 
 import numpy as np
 import pytest
@@ -95,23 +94,6 @@ def uses(batch):
         *(lambda: batch.run(1, 1), lambda: batch.advance(1), batch.sample),
         *(lambda: batch.snapshot(0), batch.attempts, batch.report),
     )
-
-
-def test_a_batch_on_another_thread_is_refused_in_a_sentence():
-    batch, said = small_batch(), []
-
-    def work():
-        for use in (*uses(batch), small_batch):
-            with pytest.raises(InputError) as refused:
-                use()
-            said.append(str(refused.value))
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-    assert len(said) == len(uses(batch)) + 1
-    assert all("on the thread that called runtime.start()" in sentence for sentence in said)
-    batch.advance(1)
 
 
 def test_a_batch_whose_memory_was_given_back_or_session_stopped_is_refused():
