@@ -1,13 +1,24 @@
 """Automata in a container whose motion is prescribed, and what their particles do."""
 
+import numpy as np
+
+from ca_damper.filling import structure_of
 from taichi_dem.kit.allocation import assign
 from tests.driven import Driven
+
+#: Room for all tests of this folder, so that each structure is compiled once.
+SCENES, TRACED = 64, 12500
+_with_room = set()
 
 
 class Shaken(Driven):
     """Scenes of one automaton in containers that move as x = A sin(w t), all at once."""
 
     def __init__(self, filling, particles, seed=1, dt=1e-4, amplitude=0.0, frequency=6.0, traced=0):
+        key = structure_of(filling).key
+        if key not in _with_room:
+            _with_room.add(key)
+            Driven(filling, np.resize(particles, SCENES), 1, dt, 0.0, frequency, TRACED)
         super().__init__(filling, particles, seed, dt, amplitude, frequency, traced)
 
     @property
@@ -16,11 +27,12 @@ class Shaken(Driven):
         return self.device.lattice.geometry
 
     def state(self):
-        """Kind, speed and way in all cells and the one beyond, to compare bits."""
+        """Kind, speed, way, and speed across, in all cells and the one beyond, to compare bits."""
         cells, count = self.device.cells, self.geometry.cells + 1
-        return [
-            self.in_use(field)[:, :count] for field in (cells.kind, cells.speed, cells.travelled)
-        ]
+        fields = [cells.kind, cells.speed, cells.travelled]
+        if hasattr(cells, "across"):
+            fields.append(cells.across.velocity)
+        return [self.in_use(field)[:, :count] for field in fields]
 
     def put(self, field, rows):
         """Write a field in the cells of all scenes."""

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.lattice import DOWN, UP
 from tests.ca_automaton.shaken import Shaken
 from tests.paper import paper
@@ -17,10 +16,9 @@ def displacement(step):
     return AMPLITUDE * np.sin(OMEGA * DT * step)
 
 
-@pytest.mark.parametrize("accounting", ACCOUNTINGS)
-def test_a_particle_in_mid_air_stays_in_the_room(accounting):
+def test_a_particle_in_mid_air_stays_in_the_room():
     """Without gravity a particle at rest moves against the staircase round(x / 6 mm), +-4 cells."""
-    automaton = paper(accounting=accounting, gravity=0.0, start=((4, 8),))
+    automaton = paper(accounting="landing+ejection", gravity=0.0, start=((4, 8),))
     box = Shaken(automaton, 1, amplitude=AMPLITUDE)
     start = box.device.snapshot(0)["position"][0]
     for _ in range(40):
@@ -37,18 +35,18 @@ def test_the_floor_pushes_what_lies_on_it():
     from the floor, so that no blow comes first.
     """
     step = int(np.ceil(np.arcsin(0.5 * WIDTH / AMPLITUDE) / OMEGA / DT))
-    for accounting, felt in [("landing", 0.0), ("landing+ejection", 1.0)]:
-        automaton = paper(accounting=accounting, gravity=0.0, start=((4, 0), (4, 1), (8, 5)))
-        box = Shaken(automaton, 3, amplitude=AMPLITUDE, traced=step + 1)
-        kind = box.state()[0]
-        kind[kind == DOWN] = UP
-        box.put(box.device.cells.kind, kind)
-        box.run(step + 1)
-        given = 2 * MASS * AMPLITUDE * OMEGA * np.cos(OMEGA * DT * step)
-        impulse, _, momentum, _ = box.traces()[step, 0]
-        assert not box.traces()[:step, 0, :3].any()
-        assert momentum == pytest.approx(given, rel=1e-9)
-        assert impulse == pytest.approx(-felt * given, rel=1e-9, abs=0.0)
+    start = ((4, 0), (4, 1), (8, 5))
+    automaton = paper(accounting="landing+ejection", gravity=0.0, start=start)
+    box = Shaken(automaton, 3, amplitude=AMPLITUDE, traced=step + 1)
+    kind = box.state()[0]
+    kind[kind == DOWN] = UP
+    box.put(box.device.cells.kind, kind)
+    box.run(step + 1)
+    given = 2 * MASS * AMPLITUDE * OMEGA * np.cos(OMEGA * DT * step)
+    impulse, _, momentum, _ = box.traces()[step, 0]
+    assert not box.traces()[:step, 0, :3].any()
+    assert momentum == pytest.approx(given, rel=1e-9)
+    assert impulse == pytest.approx(-given, rel=1e-9)
 
 
 def test_the_heap_lifts_off_where_the_container_falls_faster():

@@ -26,7 +26,7 @@ class Kicks:
     mass: float = 0.0
     diverges_at: int = -1
     lost_at: int = -1
-    traced: int = 1
+    traced: int = 450
 
     label: ClassVar[str] = "kicks"
     effects: ClassVar[tuple] = ("kicks",)

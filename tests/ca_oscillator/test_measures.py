@@ -1,14 +1,13 @@
-"""Measures of signals whose measures are known."""
+"""Measures of signals whose measures are known: RMS, apparent mass and damping, power, peaks."""
 
 import math
 
 import numpy as np
 import pytest
 
-from ca_damper import Oscillator
+from ca_damper import Automaton, Oscillator
+from ca_damper.force_check import checked_response, force_mismatch
 from ca_damper.measures import COLUMNS, Cycles, peak
-from ca_damper.plot import Box, FilmMeasures
-from ca_damper.record import Frame
 
 STEPS, COUNT, OMEGA = 500, 4, 2.0 * math.pi * 6.0
 
@@ -24,7 +23,6 @@ def cycles_of(x, v, f):
     forces = (fs, fs * np.cos(middle), fs * np.sin(middle))
     sums = [part.sum(axis=1) for part in (*products, *forces)]
     record = np.stack([*sums, xs.max(axis=1), xs.min(axis=1), 3.0 * np.arange(COUNT)], axis=1)
-    assert record.shape[1] == len(COLUMNS)
     return Cycles(np.array([OMEGA / (2.0 * math.pi)]), np.array([STEPS]), record[None])
 
 
@@ -39,9 +37,9 @@ def test_response_of_two_harmonics_and_a_mean():
 
     cycles = cycles_of(x, nothing, nothing)
     assert cycles.rms == pytest.approx(math.sqrt((4.0 + 0.25) / 2.0), rel=1e-13)
+    assert cycles.rms_about_all == pytest.approx(cycles.rms, rel=1e-13)
     assert cycles.mean == pytest.approx(0.4, rel=1e-13)
     assert cycles.harmonic("x") == pytest.approx(2.0 * np.exp(0.3j), rel=1e-13)
-    assert cycles.harmonic_by_cycle("x").mean(axis=1) == pytest.approx(cycles.harmonic("x"))
     assert cycles.energy == pytest.approx(4.5)
 
 
@@ -53,27 +51,20 @@ def test_a_motion_of_half_the_frequency_counts_about_the_mean_of_all_cycles():
     assert cycles.rms == pytest.approx(math.sqrt(0.5 - (2.0 / math.pi) ** 2), rel=1e-4)
 
 
-def test_both_rms_agree_for_whole_waves():
-    cycles = cycles_of(lambda t: 0.4 + 2.0 * np.cos(OMEGA * t + 0.3), nothing, nothing)
-    assert cycles.rms_about_all == pytest.approx(cycles.rms, rel=1e-13)
-
-
-def test_amplitude_is_half_the_range():
-    cycles = cycles_of(lambda t: 0.1 + 2.0 * np.sin(OMEGA * t), nothing, nothing)
-    # Quarter cycles are steps here, so the extremes are samples.
-    assert cycles.amplitude == pytest.approx(2.0, rel=1e-13)
-
-
 def test_a_mean_that_drifts_from_cycle_to_cycle_is_no_response():
     def x(t):
         return np.floor(OMEGA * t / (2.0 * math.pi) + 1e-9) + 2.0 * np.sin(OMEGA * t)
 
-    assert cycles_of(x, nothing, nothing).rms == pytest.approx(math.sqrt(2.0), rel=1e-13)
+    cycles = cycles_of(x, nothing, nothing)
+    assert cycles.rms == pytest.approx(math.sqrt(2.0), rel=1e-13)
+    # Quarter cycles are steps here, so the extremes are samples.
+    assert cycles.amplitude == pytest.approx(2.0, rel=1e-13)
 
 
-@pytest.mark.parametrize(("mass", "damping"), [(0.01, 0.0), (0.0, 0.3), (-0.002, 0.05)])
-def test_apparent_mass_and_damping_are_those_of_a_mass_and_a_dashpot(mass, damping):
+def test_apparent_mass_and_damping_are_those_of_a_mass_and_a_dashpot():
     # f = -(m a + c v); its mean over a step is that of the differences of v and x.
+    mass, damping = -0.002, 0.05
+
     def x(t):
         return 0.02 * np.sin(OMEGA * t + 0.5)
 
@@ -84,44 +75,59 @@ def test_apparent_mass_and_damping_are_those_of_a_mass_and_a_dashpot(mass, dampi
         return -(mass * (v(end) - v(begin)) + damping * (x(end) - x(begin))) / (end - begin)
 
     cycles = cycles_of(x, v, f)
-    assert cycles.apparent_mass == pytest.approx(mass, rel=1e-11, abs=1e-14)
-    assert cycles.apparent_damping == pytest.approx(damping, rel=1e-11, abs=1e-13)
+    assert cycles.apparent_mass == pytest.approx(mass, rel=1e-11)
+    assert cycles.apparent_damping == pytest.approx(damping, rel=1e-11)
     power = 0.5 * (0.02 * OMEGA) ** 2 * (damping + 1j * OMEGA * mass)
     assert cycles.complex_power == pytest.approx(power, rel=1e-11)
     loss = damping / (OMEGA * (0.086 + mass))
-    assert cycles.loss_factor(0.086) == pytest.approx(loss, rel=1e-11, abs=1e-12)
+    assert cycles.loss_factor(0.086) == pytest.approx(loss, rel=1e-11)
     ratio = (0.08 + damping) / (2.0 * math.sqrt(123.4 * (0.086 + mass)))
     assert cycles.damping_ratio(0.086, 123.4, 0.08) == pytest.approx(ratio, rel=1e-11)
+    assert np.isnan(cycles_of(nothing, nothing, nothing).apparent_mass).all()
+
+
+def cycles_of_harmonics(frequency, **harmonics):
+    """One measured cycle of 1000 steps of exact harmonics x, v and f."""
+    sums = dict.fromkeys(COLUMNS, 0.0)
+    for name, value in harmonics.items():
+        sums[f"{name}_cos"], sums[f"{name}_sin"] = 500.0 * value.real, -500.0 * value.imag
+    return Cycles(np.array([frequency]), np.array([1000]), np.array([[list(sums.values())]]))
 
 
 def test_what_the_base_gives_the_dashpot_and_the_filling_take():
     """In the steady state of the empty container, by its transfer function."""
     o, frequency = Oscillator(), 6.3
     x, w = o.base_amplitude * o.transfer(frequency), 2.0 * np.pi * frequency
-    record = np.zeros((1, 1, len(COLUMNS)))
-    for name, value in (("x", -1j * x), ("v", w * x)):
-        record[0, 0, COLUMNS.index(f"{name}_cos")] = 50.0 * value.real
-        record[0, 0, COLUMNS.index(f"{name}_sin")] = -50.0 * value.imag
-    cycles = Cycles(np.array([frequency]), np.array([100]), record)
+    cycles = cycles_of_harmonics(frequency, x=-1j * x, v=w * x)
     powers = cycles.powers(o.base_amplitude, o.stiffness, o.damping)
-    assert (
-        powers["base"][0] == pytest.approx(powers["dashpot"][0], rel=1e-12) and powers["base"] > 0
-    )
-    assert powers["filling"][0] == 0.0
+    assert powers["base"][0] == pytest.approx(powers["dashpot"][0], rel=1e-12)
+    assert powers["base"][0] > 0.0 == powers["filling"][0]
 
 
-def test_a_container_at_rest_has_no_impedance():
-    assert np.isnan(cycles_of(nothing, nothing, nothing).apparent_mass).all()
+@pytest.mark.parametrize("share", [0.0, 0.25])
+def test_a_force_that_is_not_the_one_that_acted_is_found_out(share):
+    """X = (K + i w C)(-i y0 + F / held) / ...: a share more of the force shifts X by as much."""
+    o = Oscillator()
+    omega = 2.0 * np.pi * o.natural_frequency
+    held = o.stiffness + 1j * omega * o.damping
+    force, dynamic = 0.02 + 0.01j, held - o.mass * omega**2
+    x = (-1j * o.base_amplitude * held + force) / dynamic
+    still = {"x": np.zeros(1), "v": np.zeros(1)}
+    measured = (1.0 + share) * force * np.sinc(1e-3)
+    cycles = cycles_of_harmonics(o.natural_frequency, x=x, f=measured)
+    wanted = share * abs(force / dynamic) / abs(x)
+    assert force_mismatch(cycles, o, still, still) == pytest.approx(wanted, abs=1e-12)
 
 
-def test_peak_is_exact_where_one_over_rms_squared_is_a_parabola_of_the_ratio_squared():
-    x = np.array([0.8, 0.9, 0.97, 1.0, 1.02, 1.1])
-    response = (0.1 + 50.0 * (x**2 - 0.983**2) ** 2) ** -0.5
-    assert peak(x, response) == pytest.approx((0.983, 0.1**-0.5), rel=1e-12)
+def test_the_container_moves_as_the_measured_force_demands():
+    """Sums take x at n points a cycle: an n-th part of its change over the cycles is missed."""
+    job = {"particles": 10, "ratios": (0.95, 1.0), "seeds": 2, "dt": 2e-4, "start": "rigid"}
+    _, mismatch = checked_response(Automaton(), **job, transient_cycles=3, measured_cycles=4)
+    assert 0.0 < mismatch < 1e-3
 
 
-@pytest.mark.parametrize("damping", [0.0006, 0.01228, 0.05])
-@pytest.mark.parametrize("offset", np.linspace(0.0, 1.0, 7))
+@pytest.mark.parametrize("damping", [0.0006, 0.05])
+@pytest.mark.parametrize("offset", np.linspace(0.0, 1.0, 4))
 def test_peak_of_an_oscillator_from_a_grid_of_one_percent(damping, offset):
     """To (2 z)^2, the share of the base's velocity in its pull, and to the cube of the spacing.
 
@@ -134,27 +140,9 @@ def test_peak_of_an_oscillator_from_a_grid_of_one_percent(damping, offset):
     assert found == pytest.approx(o.peak(), rel=4.0 * damping**2 + 0.02**3)
 
 
-@pytest.mark.parametrize(
-    "response",
-    [
-        *([3.0, 2.0, 1.0], [1.0, 2.0, 3.0], [2.0, 2.0, 2.0], [0.0, 0.0, 0.0]),
-        *([math.nan, 2.0, 1.0], [1.0, 2.0, math.nan], [2.0, math.nan, 1.0]),
-    ],
-)
+@pytest.mark.parametrize("response", [[3.0, 2.0, 1.0], [2.0, 2.0, 2.0], [1.0, 2.0, math.nan]])
 def test_a_peak_at_an_end_or_beside_nan_is_outside(response):
     assert np.isnan(peak([0.9, 1.0, 1.1], response)).all()
-
-
-def test_peak_of_a_plateau_and_beside_rest():
-    ratio, height = peak([0.9, 1.0, 1.1], [1.0, 2.0, 2.0])
-    assert 1.0 < ratio < 1.1 and 2.0 < height < 3.0
-    assert peak([0.9, 1.0, 1.1], [0.0, 2.0, 1.0]) == (1.0, 2.0)
-
-
-def test_peak_of_points_too_far_apart_for_one_resonance():
-    """1 / response^2 would fall below zero between them: the curve's own parabola is taken."""
-    ratio, height = peak([0.5, 1.0, 1.1], [0.01, 1.0, 0.999])
-    assert 0.5 < ratio < 1.1 and 1.0 <= height < 2.0
 
 
 def test_noise_is_no_resonance_between_the_points():
@@ -164,28 +152,3 @@ def test_noise_is_no_resonance_between_the_points():
     assert peak(ratios[1:4], curve[1:4])[1] > 2.0 * max(curve)
     ratio, height = peak(ratios, curve)
     assert 1.0 < ratio < 1.02 and max(curve) < height < 1.1 * max(curve)
-    # A point near rest farther away leaves the range of numbers, and changes nothing.
-    far = peak([0.9, *ratios], [1e-200, *curve])
-    assert far == (ratio, height)
-
-
-def test_no_peak_without_numbers():
-    assert np.isnan(peak([1.0, 2.0], [math.nan, math.nan])).all()
-
-
-def test_film_measures_of_particles_on_the_floor_and_below_the_ceiling():
-    box = Box(0.05, 0.02, 0.004)
-    low = np.column_stack([np.linspace(0.01, 0.04, 3), np.full(3, 0.002)])
-    high = low + np.array([0.0, 0.016])
-    frames = [Frame(0.0, x, 0.0, place, 0.0 * place) for x, place in ((0.003, low), (0.0, high))]
-    found = FilmMeasures.of(box, [frames, frames], np.array([0.0, 0.5]))
-    assert found.height_mm == pytest.approx(np.array([[3.0, 16.0]] * 2))
-    assert found.above_floor_mm == pytest.approx(np.array([[0.0, 16.0]] * 2))
-    assert found.floor.tolist() == [[1.0, 0.0]] * 2 and found.ceiling.tolist() == [[0.0, 1.0]] * 2
-
-
-def test_the_swing_of_filmed_particles_is_that_of_their_mean():
-    phase = np.arange(8) / 8.0
-    height = 5.0 + 3.0 * np.sin(2.0 * np.pi * (phase - 0.125))
-    cycles = np.array([height + 1.0, height - 1.0])
-    assert FilmMeasures(phase, cycles, cycles, cycles, cycles).swing() == pytest.approx((3.0, 45.0))

@@ -7,7 +7,7 @@ import pytest
 import taichi as ti
 from scipy.integrate import solve_ivp
 
-from ca_damper import InputError, rk45
+from ca_damper import rk45
 
 
 def bell(_, t, y):
@@ -34,37 +34,17 @@ def test_local_error_is_of_order_6_and_embedded_difference_of_order_5():
     # The exponent itself still drifts by O(h); 0.3 tells 6 from 5 and 5 from 4 with room.
     assert slope_of(sizes, errors) == pytest.approx(6.0, abs=0.3)
     assert slope_of(sizes, gaps) == pytest.approx(5.0, abs=0.3)
+    new, slope, _ = steps[0]
+    assert slope[0] == bell(None, t + sizes[0], new)[0]
 
 
-def march(count, t_end=1.0):
-    """count equal steps of the bell from 0."""
-    y, h = np.array([1.0]), t_end / count
-    slope = bell(None, 0.0, y)
-    for k in range(count):
-        y, slope, _ = rk45.step(bell, None, k * h, y, slope, h)
-    return abs(y[0] - bell_at(t_end))
-
-
-def test_global_error_is_of_order_5():
-    counts = np.array([8, 16, 32, 64])
-    errors = [march(count) for count in counts]
-    assert slope_of(1.0 / counts, errors) == pytest.approx(5.0, abs=0.2)
-
-
-def test_last_slope_is_the_derivative_at_the_new_state():
-    y, t, h = np.array([0.7]), 0.4, 0.1
-    y_new, slope, _ = rk45.step(bell, None, t, y, bell(None, t, y), h)
-    assert slope[0] == bell(None, t + h, y_new)[0]
-
-
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-9])
-def test_error_level_is_that_of_scipy(tolerance):
+def test_error_level_is_that_of_scipy():
     # Same pair of formulas, same tolerance: errors of one magnitude, not equal, as the two choose
     # their steps differently. scipy divides the squared norm by the number of components.
     def van_der_pol(_, y):
         return np.array([y[1], 5.0 * (1.0 - y[0] ** 2) * y[1] - y[0]])
 
-    span, y0 = (0.0, 20.0), [2.0, 0.0]
+    span, y0, tolerance = (0.0, 20.0), [2.0, 0.0], 1e-6
     exact = solve_ivp(van_der_pol, span, y0, method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
     scipys = solve_ivp(van_der_pol, span, y0, method="RK45", rtol=tolerance, atol=tolerance)
     ours = rk45.solve(van_der_pol, span, y0, rtol=tolerance, atol=tolerance)
@@ -73,70 +53,44 @@ def test_error_level_is_that_of_scipy(tolerance):
     assert ours.evaluations < 1.25 * scipys.nfev
 
 
-def test_tolerance_is_kept_on_an_exact_solution():
-    # Each step may err by the tolerance; the oscillator carries errors on without growth, so the
-    # sum over the steps bounds the error at the end.
-    solution = rk45.solve(lambda t, y: np.array([y[1], -y[0]]), (0.0, 10.0), [0.0, 1.0], rtol=1e-8)
-    wanted = np.column_stack([np.sin(solution.t), np.cos(solution.t)])
-    steps = len(solution.t) - 1
-    assert solution.t[-1] == 10.0
-    assert np.abs(solution.y - wanted).max() < steps * (1e-9 + 1e-8)
+def turning_in_python(rate, t, y):
+    return np.array([rate * y[1], -rate * y[0]])
+
+
+def turned(t, y):
+    return turning_in_python(1.0, t, y)
 
 
 def test_wanted_times_are_landed_on_and_cost_no_accuracy():
+    # Each step may err by the tolerance; the oscillator carries errors on without growth, so the
+    # sum over the steps bounds the error at the end.
     wanted = np.linspace(0.0, 10.0, 7)
-    solution = rk45.solve(
-        lambda t, y: np.array([y[1], -y[0]]), (0.0, 10.0), [0.0, 1.0], rtol=1e-8, at=wanted
-    )
+    solution = rk45.solve(turned, (0.0, 10.0), [0.0, 1.0], rtol=1e-8, at=wanted)
     assert np.array_equal(solution.t, wanted)
     steps = solution.evaluations / 6
     assert np.abs(solution.y[:, 0] - np.sin(wanted)).max() < steps * (1e-9 + 1e-8)
 
 
-def test_stops_shorten_no_later_step():
-    def decay(t, y):
-        return -y
-
-    free = rk45.solve(decay, (0.0, 10.0), [1.0])
-    stopped = rk45.solve(decay, (0.0, 10.0), [1.0], at=[4.0, 4.0 + 1e-9])
-    # Two stops cut at most two steps each in two.
-    assert stopped.evaluations <= free.evaluations + 4 * 6
-
-
 def test_halving_the_tolerance_halves_the_error():
     # The estimate grows like h^5, so h goes like the tolerance^(1/5), and the error at the end like
     # h^5: in proportion to the tolerance. Ten halvings average over how the steps happen to fit.
-    def error(tolerance):
-        solution = rk45.solve(
-            *(lambda t, y: np.array([y[1], -y[0]]), (0.0, 20.0), [0.0, 1.0]),
-            rtol=tolerance,
-            atol=tolerance,
-        )
-        return np.hypot(*(solution.y[-1] - [math.sin(20.0), math.cos(20.0)]))
-
-    tolerances = 1e-6 * 0.5 ** np.arange(11)
-    errors = [error(tolerance) for tolerance in tolerances]
+    tolerances, errors = 1e-6 * 0.5 ** np.arange(11), []
+    for tolerance in tolerances:
+        solution = rk45.solve(turned, (0.0, 20.0), [0.0, 1.0], rtol=tolerance, atol=tolerance)
+        errors.append(np.hypot(*(solution.y[-1] - [math.sin(20.0), math.cos(20.0)])))
     assert slope_of(tolerances, errors) == pytest.approx(1.0, abs=0.1)
     assert (np.diff(errors) < 0.0).all()
 
 
-@pytest.mark.parametrize("error", [1e-9, 1e-3, 0.5, 1.0, 40.0])
-def test_growth_aims_at_nine_tenths_of_the_tolerance_limit(error):
-    assert rk45.growth(error) == pytest.approx(np.clip(0.9 * error**-0.2, 0.2, 5.0), rel=1e-14)
-
-
-@pytest.mark.parametrize("error", [math.nan, math.inf])
-def test_growth_shrinks_the_step_after_a_nonsense_error(error):
-    assert rk45.growth(error) == 0.2
+def test_growth_aims_at_nine_tenths_of_the_tolerance_limit():
+    for error in (1e-9, 1e-3, 0.5, 1.0, 40.0):
+        assert rk45.growth(error) == pytest.approx(np.clip(0.9 * error**-0.2, 0.2, 5.0), rel=1e-14)
+    assert rk45.growth(math.nan) == rk45.growth(math.inf) == 0.2
 
 
 @ti.func
 def turning(rate, t, y):
     return ti.Vector([rate * y[1], -rate * y[0]])
-
-
-def turning_in_python(rate, t, y):
-    return np.array([rate * y[1], -rate * y[0]])
 
 
 @ti.kernel
@@ -161,46 +115,13 @@ def test_a_step_has_the_same_bits_in_a_kernel_and_in_python():
     assert np.array_equal(one_turning_step(3.0, 0.0625).to_numpy(), np.concatenate([new, gap]))
 
 
-def test_integration_in_a_kernel_keeps_the_tolerance():
-    y = turn(2.0, 10.0, 1e-9).to_numpy()
-    attempts = int(y[2])
-    assert attempts > 0
-    assert np.abs(y[:2] - [math.sin(20.0), math.cos(20.0)]).max() < attempts * 1e-9
-
-
-def test_integration_in_a_kernel_and_in_python_agree():
-    kernel = turn(2.0, 10.0, 1e-6).to_numpy()
-    y = np.array([0.0, 1.0])
+def test_integration_in_a_kernel_keeps_the_tolerance_and_agrees_with_python():
+    kernel, y = turn(2.0, 10.0, 1e-9).to_numpy(), np.array([0.0, 1.0])
+    assert np.abs(kernel[:2] - [math.sin(20.0), math.cos(20.0)]).max() < kernel[2] * 1e-9
     slope = turning_in_python(2.0, 0.0, y)
     y, _, attempts = rk45.integrate(
-        turning_in_python, 2.0, 0.0, 10.0, y, slope, 1e-3, 1e-6, 1e-12, 100000
+        turning_in_python, 2.0, 0.0, 10.0, y, slope, 1e-3, 1e-9, 1e-12, 100000
     )
     assert attempts == int(kernel[2])
     # Only the power in the step control may round differently.
     assert np.abs(y - kernel[:2]).max() < 1e-13
-
-
-def test_a_singular_solution_is_refused_in_words():
-    # y' = y^2 from 1 ends at t = 1.
-    with pytest.raises(InputError, match=r"stuck at t = 1 "):
-        rk45.solve(lambda t, y: y * y, (0.0, 2.0), [1.0])
-
-
-@pytest.mark.parametrize(
-    ("changes", "name"),
-    [
-        ({"span": (0.0, math.nan)}, "span"),
-        ({"span": (1.0, 0.0)}, "span"),
-        ({"y0": [math.nan]}, "y0"),
-        ({"rtol": -1.0}, "rtol"),
-        ({"atol": 0.0}, "atol"),
-        ({"first": 0.0}, "first"),
-        ({"at": [0.5, 0.2]}, "at"),
-        ({"at": [0.5, 1.2]}, "at"),
-        ({"at": [math.nan]}, "at"),
-    ],
-)
-def test_bad_arguments_are_named(changes, name):
-    arguments = {"span": (0.0, 1.0), "y0": [1.0], **changes}
-    with pytest.raises(InputError, match=name):
-        rk45.solve(lambda t, y: -y, **arguments)
