@@ -89,6 +89,12 @@ def test_a_slow_approach_goes_on_until_little_is_left(time, allowed):
     assert gone < time * (math.log(1.0 / allowed) + 3.0) * 8.0 / 7.0 + 96.0
 
 
+def test_how_much_is_left_is_told_before_the_end():
+    part = steady_part(1.0 - np.exp(-np.arange(400) / 265.0))
+    # Its half-width has two standard errors of the limit beside the way to it.
+    assert not part.is_steady and 1.0 <= part.mean + part.drift < 1.05
+
+
 @pytest.mark.parametrize(("time", "noise"), [(30, 0.01), (100, 0.01), (265, 0.03)])
 def test_a_slow_approach_in_noise_ends_within_its_bar(time, noise):
     """20 runs: at 95 % it happens once in 400 that fewer than 16 bars hold the limit."""

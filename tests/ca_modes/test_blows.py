@@ -10,13 +10,14 @@ from ca_damper.filling import Blows
 from tests.ca_modes.frames import frame, two_storeys
 
 MASS = 0.1
+ONE = Box(1, 1, seed=3)
 NUMBERS = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
 def shaken(share, boxes):
     """Columns of cells with a grain of a share of a mass each, driven at resonance for 3 s."""
     structure = two_storeys()
-    grain = Automaton(rules="place", columns=1, rows=7, start=((0, 0),), particle_mass=share * MASS)
+    grain = Automaton(rules="place", columns=1, rows=7, particle_mass=share * MASS)
     sine = excitation.sines([structure.frequencies[0]], [3e-3], 3.0)
     return shake_structure(grain, structure, boxes, sine, seeds=1, progress=None)
 
@@ -24,7 +25,7 @@ def shaken(share, boxes):
 @pytest.mark.parametrize(("count", "whole"), [(2, 0.1), (4, 0.8)])
 def test_boxes_at_one_place_are_one_unit(count, whole):
     """To the bit, as halves and quarters add up without rounding."""
-    unit, boxes = shaken(whole, Box(1, 1)), shaken(whole / count, [Box(1, 1)] * count)
+    unit, boxes = shaken(whole, ONE), shaken(whole / count, [ONE] * count)
     assert unit.force.any()
     assert np.array_equal(boxes.x, unit.x)
     assert np.array_equal(boxes.force.sum(axis=1), unit.force[:, 0])

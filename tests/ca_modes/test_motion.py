@@ -46,50 +46,6 @@ def amplification(structure, added=None):
     return np.abs(structure.transfer(np.linspace(0.0, 12.0, 24001), added)).max()
 
 
-def test_a_mode_that_moves_one_place_is_the_oscillator():
-    """The same equations in the same unit: only roundings differ, 1e-16 of the motion a step.
-
-    The other mode moves the other place alone.
-    """
-    o, motion = Oscillator(), base_motion(duration=0.5)
-    own, shapes = (o.natural_frequency, 14.0), np.diag([o.mass**-0.5, 1.0])
-    structure = ModalStructure([o.mass, 1.0], own, [o.damping_ratio, 0.01], shapes)
-    alone = shake(RigidMass(), motion, particles=20, seeds=[3])
-    made = shake_structure(RigidMass(), structure, Box(0, 20), motion, seeds=[3])
-    for name in ("x", "v", "force"):
-        wanted = getattr(alone, name)[:, 0]
-        error = np.abs(getattr(made, name)[:, 0] - wanted).max()
-        # 5000 steps.
-        assert error < 5000 * 1e-16 * np.abs(wanted).max(), (name, error)
-    assert made.rms[0] == pytest.approx(alone.rms[0], rel=1e-12)
-    assert made.peak[0] == pytest.approx(alone.peak[0], rel=1e-12)
-
-
-@pytest.mark.parametrize("moving", [False, True])
-def test_all_modes_under_base_and_force_move_as_the_exact_solution(moving):
-    """With masses in two boxes at one of two places, and their weight from t = 0 on."""
-    structure, pushed = two_storeys(), (3.1, 0.05, 0.4)
-    force = SineForce(pushed[1], pushed[0], pushed[2])
-    added = np.array([0.0, 500.0]) * MASS
-    motion = base_motion() if moving else still(2.0)
-    made = shaken(
-        *(structure, [Box(1, 300), Box(1, 200)], Excitation(motion, force)),
-        **{"filling": RigidMass(MASS, gravity=9.8), "force_place": 0},
-    )
-    sines = SINES if moving else ()
-    wanted = on_base(structure, sines, added, [(*pushed, 0)], -9.8 * added)
-    x, v = wanted.at(made.time_s)
-    # RK45 is exact to (w dt)^6 = 2e-12 here; 20000 roundings.
-    allowed = 3e-12 * np.abs(x).max()
-    if moving:
-        allowed += SPLINE * amplification(structure, added) * sum(a for _, a, _ in SINES)
-    assert np.abs(made.x[:, :, 0] - x).max() < allowed
-    assert np.abs(made.v[:, :, 0] - v).max() < 2.0 * np.pi * 14.0 * allowed
-    fine = wanted.at(np.arange(20001) * 1e-4)[0]
-    assert made.rms[:, 0] == pytest.approx(fine[:-1].std(axis=0), rel=1e-4)
-    assert made.peak[:, 0] == pytest.approx(np.abs(fine).max(axis=0), rel=1e-4)
-
-
 def test_modes_left_out_move_with_the_base():
     """Kept modes, from the base: (1 + S'A S) u'' + C u' + W u = -S'(M + A) 1 y''."""
     structure, added = frame(2), np.array([0.0, 0.04, 0.06])
@@ -113,6 +69,50 @@ def test_modes_left_out_move_with_the_base():
     allowed = SPLINE * amplification(structure, added) * sum(a for _, a, _ in SINES)
     assert np.abs(made.x[:, :, 0] - wanted).max() < 2.0 * allowed
     assert made.modal[:, :, 0] == pytest.approx(relative, abs=20.0 * allowed)
+
+
+def test_a_mode_that_moves_one_place_is_the_oscillator():
+    """The same equations in the same unit: only roundings differ, 1e-16 of the motion a step.
+
+    The other mode moves the other place alone.
+    """
+    o, motion = Oscillator(), base_motion(duration=0.5)
+    own, shapes = (o.natural_frequency, 14.0), np.diag([o.mass**-0.5, 1.0])
+    structure = ModalStructure([o.mass, 1.0], own, [o.damping_ratio, 0.01], shapes)
+    alone = shake(RigidMass(), motion, particles=20, seeds=[3])
+    made = shake_structure(RigidMass(), structure, Box(0, 20), motion, seeds=[3])
+    for name in ("x", "v", "force"):
+        wanted = getattr(alone, name)[:, 0]
+        error = np.abs(getattr(made, name)[:, 0] - wanted).max()
+        # 5000 steps.
+        assert error < 5000 * 1e-16 * np.abs(wanted).max(), (name, error)
+    assert made.rms[0] == pytest.approx(alone.rms[0], rel=1e-12)
+    assert made.peak[0] == pytest.approx(alone.peak[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("moving", [True, False])
+def test_all_modes_under_base_and_force_move_as_the_exact_solution(moving):
+    """With masses in two boxes at one of two places, and their weight from t = 0 on."""
+    structure, pushed = two_storeys(), (3.1, 0.05, 0.4)
+    force = SineForce(pushed[1], pushed[0], pushed[2])
+    added = np.array([0.0, 500.0]) * MASS
+    motion = base_motion() if moving else still(2.0)
+    made = shaken(
+        *(structure, [Box(1, 300), Box(1, 200)], Excitation(motion, force)),
+        **{"filling": RigidMass(MASS, gravity=9.8), "force_place": 0},
+    )
+    sines = SINES if moving else ()
+    wanted = on_base(structure, sines, added, [(*pushed, 0)], -9.8 * added)
+    x, v = wanted.at(made.time_s)
+    # RK45 is exact to (w dt)^6 = 2e-12 here; 20000 roundings.
+    allowed = 3e-12 * np.abs(x).max()
+    if moving:
+        allowed += SPLINE * amplification(structure, added) * sum(a for _, a, _ in SINES)
+    assert np.abs(made.x[:, :, 0] - x).max() < allowed
+    assert np.abs(made.v[:, :, 0] - v).max() < 2.0 * np.pi * 14.0 * allowed
+    fine = wanted.at(np.arange(20001) * 1e-4)[0]
+    assert made.rms[:, 0] == pytest.approx(fine[:-1].std(axis=0), rel=1e-4)
+    assert made.peak[:, 0] == pytest.approx(np.abs(fine).max(axis=0), rel=1e-4)
 
 
 def zero_order_hold(structure, history):
