@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ca_damper import Goal, InputError, goals
+from ca_damper import Goal
 from ca_damper.accuracy.goal_estimate import SeedValues, estimate
 
 GOAL = Goal("any", "m", "extreme", lambda found: found.rms[0, 0])
@@ -18,8 +18,9 @@ def values_of(rng, seeds, between, within, mean=1.0):
     return SeedValues(made, variance, freedom, NOTHING)
 
 
-@pytest.mark.parametrize(("between", "within"), [(0.0, 0.01), (0.02, 0.001), (0.0, 0.0)])
-@pytest.mark.parametrize("seeds", [3, 8])
+@pytest.mark.parametrize(
+    ("between", "within", "seeds"), [(0.0, 0.01, 3), (0.02, 0.001, 8), (0.0, 0.0, 3)]
+)
 def test_a_bar_of_seeds_and_sampling_holds_the_mean(between, within, seeds):
     """400 cases: 95 % is 380 with a standard deviation of 4.4."""
     rng, held = np.random.default_rng(5), 0
@@ -28,21 +29,6 @@ def test_a_bar_of_seeds_and_sampling_holds_the_mean(between, within, seeds):
         sampling, chance = found.bars(0.95)
         held += bool(abs(found.mean[0] - 1.0) <= np.hypot(sampling, chance)[0] + 1e-12)
     assert 366 <= held <= 400
-
-
-def test_seeds_that_differ_a_little_cannot_hide_behind_their_sampling():
-    """Chance as large as the sampling is seen by 8 seeds of 7 degrees of freedom now and then."""
-    rng, held = np.random.default_rng(6), 0
-    for _ in range(400):
-        found = values_of(rng, 8, 0.01, 0.01)
-        held += bool(abs(found.mean[0] - 1.0) <= np.hypot(*found.bars(0.95))[0])
-    assert held >= 340
-
-
-def test_one_seed_has_no_chance_to_tell():
-    found = SeedValues(np.ones((1, 1)), np.array([0.04]), 7, np.array([0.3]))
-    sampling, chance = found.bars(0.95)
-    assert chance[0] == 0.0 and sampling[0] == pytest.approx(np.hypot(2.3646 * 0.2, 0.3), rel=1e-4)
 
 
 def test_an_estimate_has_the_value_of_the_finest_step_and_the_parts_of_all():
@@ -58,32 +44,14 @@ def test_an_estimate_has_the_value_of_the_finest_step_and_the_parts_of_all():
 
 
 def test_a_bar_holds_the_limit_where_the_step_s_error_is_like_that_of_chance():
-    """2400 cases, standard deviation 0.4 %; squares of both parts alone would hold it in 89 %."""
+    """1200 cases, standard deviation 0.6 %; squares of both parts alone would hold it in 89 %."""
     rng, sigma, steps = np.random.default_rng(4), 0.01, (1.0, 2.0, 4.0)
     held = []
     for shift in (0.0, 0.5, 1.0, 2.0, 5.0, 10.0):
-        for _ in range(400):
+        for _ in range(200):
             means = 1.0 + sigma * (shift * np.array(steps) + rng.normal(size=3))
             one = np.array([sigma**2])
             levels = [SeedValues(np.array([[mean]]), one, 200, NOTHING) for mean in means]
             found = estimate(GOAL, steps, levels, NOTHING, 1.0, 0.95)
             held.append(bool(abs(found.value[0] - 1.0) <= found.parts.total[0]))
     assert 0.93 <= np.mean(held) <= 0.97
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: Goal("", "m", "value", len, (1.0,)), "name of a goal must be text"),
-        (lambda: Goal("a", "m", "mean", len, (1.0,)), "kind of a goal must be one of"),
-        (lambda: Goal("a", "m", "value", 3, (1.0,)), "must be a function of a Response"),
-        (lambda: Goal("a", "m", "value", len), "ratios of a goal must hold at least one"),
-        (lambda: Goal("a", "m", "curve", len, (1.0, 0.9)), "must ascend"),
-        (lambda: Goal("a", "m", "extreme", len, (1.0,)), "must be left out"),
-        (lambda: goals.rms_at(0.0), "ratio must be a positive"),
-        (lambda: goals.response_curve([]), "at least one"),
-    ],
-)
-def test_goals_that_mean_nothing_are_refused(make, words):
-    with pytest.raises(InputError, match=words):
-        make()

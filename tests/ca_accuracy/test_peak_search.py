@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ca_damper import InputError, Oscillator
-from ca_damper.accuracy.peak_search import Lattice, PeakSearch
+from ca_damper.accuracy.peak_search import PeakSearch
 
 
 class Curve:
@@ -22,8 +22,8 @@ class Curve:
         return self.oscillator.rms(np.array(ratios) * natural, self.added).tolist()
 
 
-@pytest.mark.parametrize("damping", [0.0006, 0.003, 0.0123, 0.05])
-@pytest.mark.parametrize("added", [0.0, 0.006, 0.032])
+@pytest.mark.parametrize("damping", [0.0006, 0.0123, 0.05])
+@pytest.mark.parametrize("added", [0.0, 0.032])
 def test_the_peak_is_found_and_resolved_with_few_frequencies(damping, added):
     curve = Curve(damping, added)
     ratio, lattice = PeakSearch(curve, 0.7, 1.04, True).run()
@@ -49,18 +49,3 @@ def test_a_search_leaves_a_range_that_may_be_extended():
 def test_a_peak_outside_a_given_range_is_said_to_be_outside(low, high, side):
     with pytest.raises(InputError, match=f"outside, {side}"):
         PeakSearch(Curve(0.02), low, high, False).run()
-
-
-def test_a_container_that_never_moves_has_no_peak():
-    with pytest.raises(InputError, match="ratios must hold the peak"):
-        PeakSearch(lambda ratios: [0.0] * len(ratios), 0.9, 1.1, True).run()
-
-
-def test_ratios_of_a_lattice_are_the_same_numbers_on_every_level():
-    lattice = Lattice(0.9, 0.1 / 3.0)
-    for level in range(5):
-        assert lattice.ratio(3 * 2**level, level) == lattice.ratio(3, 0)
-    assert lattice.position(lattice.ratio(5, 2), 2) == pytest.approx(5.0)
-    assert lattice.wide(0.9) == (tuple(lattice.ratio(k, 0) for k in (-2, 0, 2)),)
-    between = lattice.wide(0.9 + 0.5 * lattice.spacing)
-    assert between == tuple(tuple(lattice.ratio(k + j, 0) for j in (-2, 0, 2)) for k in (0, 1))

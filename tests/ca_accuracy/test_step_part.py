@@ -46,12 +46,6 @@ def test_chance_hides_an_order_and_is_not_taken_for_none():
     assert told(THREE, [1.0, 1.0 + 1e-12, 1.0]).is_regular
 
 
-def test_places_are_judged_each_by_itself():
-    values = np.array([[1.1, 1.0], [1.2, 1.3], [1.4, 1.0]])
-    found = step_part(THREE, values, np.zeros_like(values), 1.0, 0.95)
-    assert not found.is_regular and found.value[0] == 1.1 and found.value[1] > 1.0
-
-
 @pytest.mark.parametrize("steps", [THREE, FIVE])
 def test_a_bar_of_steps_without_an_order_holds_another_step(steps):
     """2000 cases. Three draws look like an order in 9 % of cases, which are then held by half."""

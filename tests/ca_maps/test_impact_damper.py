@@ -1,10 +1,9 @@
-"""The impact damper in closed form: balances that its motion obeys, and refusals."""
+"""The impact damper in closed form: balances that its motion obeys, and whether it is stable."""
 
 import numpy as np
 import pytest
 
 from ca_damper import ImpactDamper, Oscillator, rk45
-from taichi_dem.kit.errors import InputError
 
 STRUCTURE = Oscillator()
 CASES = [(0.1, 0.75, 12e-3, 6.0288), (0.02, 0.3, 30e-3, 5.9), (0.08, 0.5, 8e-3, 6.1)]
@@ -65,32 +64,10 @@ def drawn(count):
                 yield made, u
 
 
-def differences(made, u, size):
-    """Jacobian of the map from blow to blow by central differences."""
-    state = np.array([*made.motion(u, 0.0), -u, 0.0])
-    assert next_blow(made, u, state) == pytest.approx(state, abs=1e-9)
-    columns = [
-        (next_blow(made, u, state + step) - next_blow(made, u, state - step)) / (2.0 * step.sum())
-        for step in size * np.diag([1e-7, 1e-6, 1e-6, 1e-7])
-    ]
-    return np.array(columns).T
-
-
-def test_small_changes_grow_from_blow_to_blow_by_the_multipliers():
-    """The Jacobian of 76 dampers by differences, of second order: half the size, a third is left.
-
-    Rounding of 1e-16 by 1e-7 is 1e-9 of the largest entry, and some of it the next order.
-    """
-    for made, u in drawn(76):
-        wide, near = differences(made, u, 1.0), differences(made, u, 0.5)
-        left = np.abs(wide - near) + 1e-7 * np.abs(near).max()
-        assert (np.abs(made._jacobian(u) - near) <= left).all()
-
-
 def test_a_motion_that_small_changes_leave_is_not_possible():
     """Pushed by 1e-6 of its speed, it comes back or leaves in 200 blows as multipliers say."""
     counts = {True: 0, False: 0}
-    for made, u in drawn(300):
+    for made, u in drawn(150):
         largest = abs(made.multipliers(u)[0])
         assert made.is_stable(u) == made.is_possible(u) == (largest < 1.0)
         if 0.9 < largest < 1.1:
@@ -105,12 +82,3 @@ def test_a_motion_that_small_changes_leave_is_not_possible():
         assert left == (largest > 1.0), (made, u)
         counts[left] += 1
     assert min(counts.values()) > 10
-
-
-@pytest.mark.parametrize(
-    "name, value", [("particle_mass", 0.0), ("clearance", -1.0), ("frequency", np.nan)]
-)
-def test_numbers_out_of_range_are_refused(name, value):
-    numbers = {"particle_mass": 0.01, "restitution": 0.5, "clearance": 0.01, "frequency": 6.0}
-    with pytest.raises(InputError, match=name):
-        ImpactDamper(STRUCTURE, **{**numbers, name: value})

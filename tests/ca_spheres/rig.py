@@ -7,6 +7,15 @@ from taichi_dem.kit.allocation import values
 from tests.driven import Driven
 
 
+def put(device, places, velocities, s=0):
+    """Give the spheres of a scene that has not begun places [m] and velocities [m/s]."""
+    bodies = device.bodies
+    corner = np.array([0.5 * bodies.body[None].width, 0.0])
+    for k, (place, velocity) in enumerate(zip(np.atleast_2d(places), np.atleast_2d(velocities))):
+        bodies.position[s * bodies.stride + k] = place - corner
+        bodies.velocity[s * bodies.stride + k] = velocity
+
+
 class Rig(Driven):
     """Spheres in containers that are driven as x = amplitude sin(2 pi f t), or stand still."""
 
@@ -41,18 +50,14 @@ class Rig(Driven):
         shape = (-1, self.device.bodies.stride, 2)
         return values(field).reshape(shape)[: self.count, : self.filling.capacity]
 
-    def throw(self, velocity, s=0):
-        """Give the spheres of a scene velocities [m/s], (particles, 2)."""
-        bodies = self.device.bodies
-        for k, v in enumerate(np.atleast_2d(velocity)):
-            bodies.velocity[s * bodies.stride + k] = v
+    def put(self, places, velocities, s=0):
+        """Give the spheres of a scene that has not begun places and velocities."""
+        put(self.device, places, velocities, s)
+        return self
 
-    def shift(self, distance, s=0):
-        """Move all spheres of a scene by a distance (horizontal, vertical) [m]."""
-        bodies = self.device.bodies
-        for k in range(self.table.particles[s]):
-            i = s * bodies.stride + k
-            bodies.position[i] = bodies.position[i] + ti.Vector(distance)
+    def spin(self, s=0):
+        """Spins of the spheres of a scene [rad/s]."""
+        return self.device.snapshot(s)["spin"]
 
     def mirror(self, s, to):
         """Give scene ``to`` the places and velocities of scene s, left and right exchanged."""
