@@ -1,4 +1,4 @@
-"""Every public call of ca_damper, by its name in the docs, with arguments that it takes."""
+"""Every public call of ca_damper, by its name in the docs, with what it takes beside defaults."""
 
 import functools
 
@@ -9,6 +9,7 @@ from ca_damper import (
     Automaton,
     Batch,
     Box,
+    Combined,
     Goal,
     ImpactDamper,
     ModalStructure,
@@ -38,7 +39,7 @@ SIGNAL = excitation.sines(1.0, 1e-3, 0.1)
 SCENES = {"particles": 2, "seed": 1, "dt": 1e-3, "frequency": 6.0, "base_amplitude": 1e-3}
 HELD = {"mass": 0.1, "stiffness": 100.0, "damping": 0.1}
 TABLE = {**SCENES, **HELD}
-SAVED = {"progress": None, "checkpoint": None, "resume": None}
+SILENT = {"progress": None}
 CYCLES = {"transient_cycles": 1, "measured_cycles": 1}
 
 
@@ -72,39 +73,29 @@ def cycles():
 
 @functools.cache
 def made_film():
-    """A film of two spheres."""
-    batch = Batch(Spheres(), SceneTable(2, 1, 1e-5))
+    """A film of two grains."""
+    batch = Batch(Automaton(), SceneTable(2, 1, 1e-4), mount="base")
     batch.start("rest")
     return film(batch, 40, sample_every=10, frame_every=20, progress=None)
 
 
 def answer():
     """Response with effects on demand."""
-    options = {"seeds": 1, "dt": 1e-3, **CYCLES, "effects": "auto", "progress": None}
+    options = {"seeds": 1, "dt": 1e-3, **CYCLES, "effects": "auto", **SILENT}
     return frequency_response(FILLING, particles=[2], ratios=[1.0], **options)
 
 
 def damper_calls():
-    """Rows (name, function, valid arguments); names with "#" are variants of a call."""
+    """Rows (name, function, arguments); names with "#" are variants of a call."""
     return [*_fillings(), *_batches(), *_structures(), *_excitations(), *_answers()]
 
 
 def _fillings():
-    share = {"restitution": 0.5, "wall_restitution": 0.5}
-    words = {"accounting": "all", "pair_rule": "both", "priority": "random", "rules": "paper"}
-    more = {"accumulator": "signed", "traversal": "list", "ledger": False, "static_contact": None}
-    box = {"width": 0.06, "columns": 10, "rows": 16, "start": None}
-    numbers = {"static_threshold": 0.0, "particle_mass": 1e-4, "gravity": 9.8, "v_max": 10.0}
-    yield "Automaton", Automaton, {**share, **words, **more, **box, **numbers}
-    yield "Automaton#cells", Automaton, {"start": [(0, 0)]}
+    yield "Automaton", functools.partial(Automaton, rules="paper"), {}
     placed = functools.partial(Automaton, rules="place")
     yield "Automaton#place", placed, {"friction": 0.3, "wall_friction": 0.3}
-    stiff = {"young": 5e8, "wall_young": 5e8, "poisson": 0.3, "wall_poisson": 0.3}
-    rough = {"friction": 0.3, "wall_friction": 0.3, "friction_law": "viscous", "rotation": False}
-    body = {"damping": "tsuji", "reference_speed": 0.5, "diameter": 6e-3, "particle_mass": 2e-4}
-    room = {"width": 0.06, "height": 0.096, "gravity": 9.8, "search": "cells"}
-    none = dict.fromkeys(("start", "sizes", "start_velocity"))
-    yield "Spheres", Spheres, {**share, **stiff, **rough, **body, **room, **none}
+    yield "Combined", Combined, {}
+    yield "Spheres", Spheres, {}
     placed = {"start": [[0.01, 0.01], [0.03, 0.03]], "start_velocity": [[0.0, 0.0], [0.0, 0.0]]}
     yield "Spheres#start", Spheres, placed
     yield "Spheres#sizes", Spheres, {"sizes": [(3, 6e-3), (2, 4e-3)]}
@@ -112,7 +103,7 @@ def _fillings():
         yield f"{name}.clearance", filling.clearance, {"particles": 10}
         high = {"particles": 10, "clearance": 0.024}
         yield f"{name}.with_clearance", filling.with_clearance, high
-    yield "RigidMass", RigidMass, {"particle_mass": 2e-4, "gravity": 9.8}
+    yield "RigidMass", RigidMass, {}
 
 
 def _batches():
@@ -122,18 +113,14 @@ def _batches():
     yield "SceneTable.drive", on_new_table("drive"), {"frequency": 5.0, "dt": 1e-3}
     yield "SceneTable.column", SceneTable(**TABLE).column, {"name": "dt"}
     yield "SceneTable.row", SceneTable(**TABLE).row, {"s": 0}
-    given = {"filling": FILLING, "table": SceneTable(**TABLE), "mount": "spring"}
-    numbers = {"measured_cycles": 1, "rtol": 1e-9, "atol": 1e-12, "recorded_samples": 0}
-    yield "Batch", Batch, {**given, **numbers, "effects": "listed", "structure": None}
-    start = {"start": "rest", "displacement": 0.0, "velocity": 0.0}
-    yield "Batch.start", Batch(FILLING, SceneTable(2, 1, 1e-3)).start, start
+    yield "Batch", Batch, {"filling": FILLING, "table": SceneTable(**TABLE)}
+    yield "Batch.start", Batch(FILLING, SceneTable(2, 1, 1e-3)).start, {}
     yield "Batch.drive", on_new_batch("drive"), {"frequency": 6.0}
-    yield "Batch.run", on_new_batch("run"), {**CYCLES, "progress": None}
-    yield "Batch.measure_each", each_cycle, {"cycles": 1, "progress": None}
-    yield "Batch.advance", on_new_batch("advance"), {"steps": 2, "progress": None}
+    yield "Batch.run", on_new_batch("run"), {**CYCLES, **SILENT}
+    yield "Batch.measure_each", each_cycle, {"cycles": 1, **SILENT}
+    yield "Batch.advance", on_new_batch("advance"), {"steps": 2, **SILENT}
     yield "Batch.snapshot", on_new_batch("snapshot"), {"s": 0}
-    every = {"steps": 4, "sample_every": 2, "frame_every": 2, "progress": None}
-    yield "film", film, {"batch": started(), **every}
+    yield "film", film, {"batch": started(), "steps": 4, "frame_every": 2, **SILENT}
     page = {"path": path("f.html"), "scenes": [0], "open_browser": False}
     yield "film.Film.show", made_film().show, page
     yield "film.Film.write_xyz", made_film().write_xyz, {"path": path("f.xyz"), "scene": 0}
@@ -146,33 +133,30 @@ def _batches():
 
 
 def _structures():
-    yield "Oscillator", Oscillator, {**HELD, "base_amplitude": 1e-3}
-    yield "Oscillator.energy", OSCILLATOR.energy, {"x": 0.1, "v": 0.1, "y": 0.0}
-    driven = {"frequency": 6.0, "added_mass": 0.01}
-    yield "Oscillator.transfer", OSCILLATOR.transfer, driven
-    yield "Oscillator.rms", OSCILLATOR.rms, driven
-    yield "Oscillator.steady_state", OSCILLATOR.steady_state, {**driven, "gravity": 9.8}
-    yield "Oscillator.peak", OSCILLATOR.peak, {"added_mass": 0.01}
+    yield "Oscillator", Oscillator, {}
+    yield "Oscillator.energy", OSCILLATOR.energy, {"x": 0.1, "v": 0.1}
+    for name in ("transfer", "rms", "steady_state", "right_hand_side"):
+        yield f"Oscillator.{name}", getattr(OSCILLATOR, name), {"frequency": 6.0}
+    yield "Oscillator.peak", OSCILLATOR.peak, {}
     yield "Oscillator.scaled", OSCILLATOR.scaled, {"mass": 0.2, "base_amplitude": 1e-3}
-    yield "Oscillator.right_hand_side", OSCILLATOR.right_hand_side, {"frequency": 6.0}
     grain = {"particle_mass": 0.01, "restitution": 0.5, "clearance": 0.01, "frequency": 6.0}
     yield "ImpactDamper", ImpactDamper, {"oscillator": OSCILLATOR, **grain}
     damper = ImpactDamper(OSCILLATOR, **grain)
     yield "ImpactDamper.free", damper.free, {"t": 0.01}
-    yield "ImpactDamper.motion", damper.motion, {"u": 0.1, "t": 0.01}
-    yield "ImpactDamper.position", damper.position, {"u": 0.1, "t": 0.01}
+    for name in ("motion", "position"):
+        yield f"ImpactDamper.{name}", getattr(damper, name), {"u": 0.1, "t": 0.01}
     for name in ("start", "is_possible", "rms"):
         yield f"ImpactDamper.{name}", getattr(damper, name), {"u": 0.1}
     modes = {"masses": [1.0, 2.0], "frequencies": [3.0], "damping_ratios": 0.01}
     yield "ModalStructure", ModalStructure, {**modes, "shapes": [[1.0], [0.0]]}
-    matrices = {"mass": [1.0], "stiffness": [[1e3]], "damping_ratios": 0.01, "modes": 1}
+    matrices = {"mass": [1.0], "stiffness": [[1e3]], "damping_ratios": 0.01}
     yield "ModalStructure.from_matrices", ModalStructure.from_matrices, matrices
     yield "ModalStructure.recoil", STRUCTURE.recoil, {"place": 0}
     yield "ModalStructure.modal", STRUCTURE.modal, {"motion": [1.0, 0.0]}
     asked = {"frequency": 3.0, "added_masses": [0.1, 0.0]}
     yield "ModalStructure.transfer", STRUCTURE.transfer, asked
     yield "ModalStructure.force_transfer", STRUCTURE.force_transfer, {"place": 0, **asked}
-    yield "Box", Box, {"place": 0, "particles": 3, "seed": 1}
+    yield "Box", Box, {"place": 0, "particles": 3}
     yield "collect_and_collide", collect_and_collide, {"amplitude": 1e-2, "gap": 1e-3}
     time = np.linspace(0.0, 50.0, 500)
     fall = np.exp(-0.02 * time) * np.cos(time)
@@ -181,31 +165,28 @@ def _structures():
 
 def _excitations():
     where, base = "excitation", excitation.Excitation(base=SIGNAL)
-    yield f"{where}.Excitation", excitation.Excitation, {"base": SIGNAL, "force": None}
+    yield f"{where}.Excitation", excitation.Excitation, {"base": SIGNAL}
     yield f"{where}.Excitation.signals", base.signals, {"role": "base", "scenes": 1}
     yield f"{where}.Excitation.sizes", base.sizes, {"scenes": 1}
     yield f"{where}.Excitation.duration", base.duration, {"scenes": 1}
     nodes = {"value": [0.0, 1.0, 1.0, 0.0], "bend": [0.0] * 4}
-    yield f"{where}.Signal", excitation.Signal, {"step": 0.1, **nodes, "label": "x"}
+    yield f"{where}.Signal#", excitation.Signal, {"step": 0.1, "label": "x", **nodes}
     yield f"{where}.Signal.at", SIGNAL.at, {"time_s": 0.01}
     yield f"{where}.Signal.scaled", SIGNAL.scaled, {"factor": 2.0}
-    force = {"amplitude": 1.0, "frequency": 5.0, "phase": 0.0}
+    force = {"amplitude": 1.0, "frequency": 5.0}
     yield f"{where}.SineForce", excitation.SineForce, force
     yield f"{where}.SineForce.rows", excitation.SineForce(**force).rows, {"scenes": 1}
     time = np.arange(100) * 0.01
-    samples = {"time_s": time, "values": np.sin(10.0 * time)}
-    options = {"of": "acceleration", "correct_baseline": False}
-    yield f"{where}.from_samples", excitation.from_samples, {**samples, **options}
+    samples = {"time_s": time, "values": np.sin(10.0 * time), "of": "acceleration"}
+    yield f"{where}.from_samples", excitation.from_samples, samples
     with open(path("s.csv"), "w") as file:
         file.writelines(["time_s,force_N\n", *(f"{0.01 * k},{k * (49 - k)}\n" for k in range(50))])
-    read = {"path": path("s.csv"), "column": "force_N", "correct_baseline": False}
-    yield f"{where}.from_csv", excitation.from_csv, read
-    more = {"duration": 1.0, "of": "acceleration", "step": 1e-3}
-    noise = {"frequencies": [1.0, 10.0], "density": [1.0, 1.0], "seed": 1, **more}
+    yield f"{where}.from_csv", excitation.from_csv, {"path": path("s.csv"), "column": "force_N"}
+    noise = {"frequencies": [1.0, 10.0], "density": [1.0, 1.0], "duration": 1.0}
     yield f"{where}.random_vibration", excitation.random_vibration, noise
-    tones = {"frequencies": 1.0, "amplitudes": 1.0, "phases": 0.0, **more}
+    tones = {"frequencies": 1.0, "amplitudes": 1.0, "duration": 1.0}
     yield f"{where}.sines", excitation.sines, tones
-    chirp = {"low": 1.0, "high": 5.0, "amplitude": 1.0, "way": "linear", **more}
+    chirp = {"low": 1.0, "high": 5.0, "amplitude": 1.0, "duration": 1.0}
     yield f"{where}.sweep", excitation.sweep, chirp
 
 
@@ -220,21 +201,17 @@ def _answers():
     for name in ("apparent_mass_at", "loss_factor_at", "rms_at"):
         yield f"goals.{name}", getattr(goals, name), {"ratio": 1.0}
     yield "goals.response_curve", goals.response_curve, {"ratios": [0.9, 1.0]}
-    filled = {"filling": FILLING, "particles": 2, "seeds": 1}
-    held = {"oscillator": OSCILLATOR, "dt": 1e-3}
-    swept = {**filled, **held, **CYCLES, **SAVED, "ratios": [0.9, 1.0], "start": "rest"}
-    curve = {**swept, "base_amplitude": 1e-3, "effects": "listed"}
-    yield "frequency_response", frequency_response, curve
+    filled = {"filling": FILLING, "particles": 2, "seeds": 1, **SILENT}
+    swept = {**filled, **CYCLES, "dt": 1e-3, "ratios": [0.9, 1.0]}
+    yield "frequency_response", frequency_response, {**swept, "base_amplitude": 1e-3}
     yield "sweep_up_and_down", sweep_up_and_down, swept
-    window = {"duration": 0.01, "interval": 1e-3, "displacement": 0.0, "velocity": 0.0}
-    shaken = {"excitation": SIGNAL, "effects": "listed", **window, **SAVED}
-    yield "shake", shake, {**filled, **held, **shaken, "mount": "spring"}
-    boxes = {"filling": FILLING, "structure": STRUCTURE, "boxes": Box(0, 2), "seeds": 1}
-    yield "shake_structure", shake_structure, {**boxes, **shaken, "dt": 1e-3, "force_place": None}
+    window = {"excitation": SIGNAL, "duration": 0.01, "dt": 1e-3, "seeds": 1, **SILENT}
+    yield "shake", shake, {**filled, **window}
+    boxes = {"filling": FILLING, "structure": STRUCTURE, "boxes": Box(0, 2)}
+    yield "shake_structure", shake_structure, {**boxes, **window}
     ways = {"amplitudes": 1e-3, "frequencies": 6.0, "particles": 10, "clearances": 0.024}
-    run = {"seeds": 1, "dt": 1e-3, **CYCLES, "progress": None}
-    yield "damper_map", damper_map, {"filling": Automaton(), **ways, **run}
-    asked = {"goal": goals.rms_at(1.0), "tolerance": 0.5, "confidence": 0.9, "budget_s": 60.0}
-    more = {"oscillator": OSCILLATOR, "ratios": (0.9, 1.1), "plan": None, "progress": None}
-    yield "solve_response", solve_response, {**filled, **asked, **more}
-    yield "needed_effects", needed_effects, {"result": answer(), "tolerance": 0.01}
+    once = {"seeds": 1, "dt": 1e-3, **CYCLES, **SILENT}
+    yield "damper_map", damper_map, {"filling": Automaton(), **ways, **once}
+    asked = {"goal": goals.rms_at(1.0), "tolerance": 0.5, "budget_s": 60.0, "ratios": (0.9, 1.1)}
+    yield "solve_response", solve_response, {**filled, **asked}
+    yield "needed_effects", needed_effects, {"result": answer()}
