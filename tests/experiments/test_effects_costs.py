@@ -1,10 +1,8 @@
 """Costs of effects are those of the same states: a frozen batch goes on as its run would."""
 
 import numpy as np
-import pytest
 
 import _effects_costs
-import _effects_tables
 from _effects_damper import FrozenBatch
 from ca_damper.lattice import DIRECTIONS, HELD
 from taichi_dem import ImplicitDashpots, simulate
@@ -44,14 +42,6 @@ def kinds(frozen, state):
     """Contents of the cells of its scenes in a state; an engine may hold those of others too."""
     frozen._memory().write(frozen.states[state])
     return frozen.batch.engine.table.in_use(frozen.batch.device.cells.kind)
-
-
-def test_what_is_spared_follows_from_the_ratio():
-    complete = {"seconds": 2e-3, "ratio": 1.0, "low": 1.0, "high": 1.0, "rounds": 9}
-    cost = {"seconds": 5.0, "ratio": 0.8, "low": 0.7, "high": 0.85, "rounds": 9}
-    found = _effects_tables.costs(cost, complete, 1000)
-    spared = [found[f"spared_{name}"] for name in ("percent", "least_percent", "most_percent", "s")]
-    assert spared == pytest.approx([20.0, 15.0, 30.0, 0.4])
 
 
 def test_a_known_list_leaves_out_nothing():

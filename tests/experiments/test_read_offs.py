@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import _trust
-from _bench_figure import Figure
 from _blast_ensemble import HOLE, hole_moves, moved, over_time, stronger
 from _hard_cases._statics import least_friction
 from _hard_cases.blast_piles import CARD, SPAN, TALL, house
@@ -17,7 +16,6 @@ from ca_damper.measures import first_harmonic
 from taichi_dem import CONCRETE, PAPER_BLOCK, read_mesh
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.study import Timing
-from taichi_dem.kit.study.floors import CACHE, MULTIPLY_ADD, Work
 from taichi_dem.kit.study.work_precision import Point, answers, cheapest
 from taichi_dem.mesh.mesh import group_area, volumes
 from taichi_dem.mesh.shapes import bar, mirrored_copies
@@ -92,16 +90,6 @@ def test_luck_and_noise_are_no_answers():
     assert steps([*ROWS, point("slow", 2.0, 1e-6)], 0.001)["slow"] == 0.01
     assert steps([*ROWS, point("slow", 0.001, np.nan, "diverged")], 0.1)["slow"] is None
     assert steps(ROWS, 0.001, {"sharp": 0.005})["sharp"] is None
-
-
-@pytest.mark.parametrize(
-    ("unit", "value", "share"),
-    # Of a work that takes 4 s at least.
-    [("s", 16.0, 0.25), ("ms", 16000.0, 0.25), ("steps/s", 0.1, 0.4), ("million/s", 1e-7, 0.4)],
-)
-def test_a_share_of_the_floor_is_least_time_over_time(unit, value, share):
-    one = Figure("some", unit, [0.0, value, 2.0 * value], "", Work(bytes=32, flops=6))
-    assert one.share({CACHE: 8.0, MULTIPLY_ADD: 2.0}) == pytest.approx(share)
 
 
 def test_a_perturbed_block_keeps_its_flat_sides_and_moves_by_shares_of_an_edge():
