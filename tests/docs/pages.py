@@ -1,15 +1,10 @@
-"""What tests read out of the pages: code blocks, links, and what a block leaves behind."""
+"""What tests read out of the pages: code blocks, links, headings and names."""
 
-import pickle
 import re
-import subprocess
-import sys
 from pathlib import Path
-from typing import NamedTuple
 
 from markdown_it import MarkdownIt
 
-from tests.processes import users_environment
 from tests.scenes import ROOT
 
 FOLDER = Path(ROOT)
@@ -17,11 +12,14 @@ PAGES = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "REL
 PAGES += tuple(sorted(f"docs/{path.name}" for path in (FOLDER / "docs").glob("*.md")))
 
 
+def text_of(page):
+    """A page as it stands."""
+    return (FOLDER / page).read_text(encoding="utf-8")
+
+
 def tokens(page):
     """All tokens of a page, those inside of lines too."""
-    for token in MarkdownIt("gfm-like", {"linkify": False}).parse(
-        (FOLDER / page).read_text(encoding="utf-8")
-    ):
+    for token in MarkdownIt("gfm-like", {"linkify": False}).parse(text_of(page)):
         yield token
         yield from token.children or ()
 
@@ -59,33 +57,3 @@ def anchors(page):
     for _, text in headings(page):
         made.add(re.sub(r"[^\w\- ]", "", text).strip().lower().replace(" ", "-"))
     return made
-
-
-class Program(NamedTuple):
-    """A block that has run: the folder with its files, what it printed, and what was wanted."""
-
-    folder: Path
-    said: str
-    left: object
-
-
-#: Runs a file as Python does, and keeps the value that an expression has at its end.
-_RUNNER = """
-import pickle, runpy, sys
-left = runpy.run_path("pasted.py", run_name="__main__")
-with open("left.pickle", "wb") as file:
-    pickle.dump(eval(sys.argv[1], left), file)
-"""
-
-
-def run_pasted(text, folder, wanted="None"):
-    """Run a block as a user does: as it stands, in a file in a folder, by a process of its own.
-
-    wanted: expression of names that the program leaves, whose value tests look at.
-    """
-    (folder / "pasted.py").write_text(text, encoding="utf-8")
-    line = [sys.executable, "-c", _RUNNER, wanted]
-    options = {"capture_output": True, "text": True, "timeout": 600}
-    done = subprocess.run(line, cwd=folder, env=users_environment(), **options)
-    assert done.returncode == 0 and done.stderr == "", done.stderr
-    return Program(folder, done.stdout, pickle.loads((folder / "left.pickle").read_bytes()))

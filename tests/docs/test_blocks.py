@@ -1,0 +1,125 @@
+"""Every Python block of the pages runs as it stands, and what it computes follows its formula."""
+
+import runpy
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from ca_damper.automaton.accounting import ACCOUNTINGS
+from taichi_dem import runtime
+from taichi_dem.kit.study.cases import assess
+from tests.docs.pages import PAGES, blocks
+from tests.processes import users_environment
+
+#: Blocks that a process of their own runs: the first one that a user sees, and those that start
+#: processes themselves. All others share the session, and so the engines, of the tests.
+APART = ("README.md", 0), ("docs/sweeps.md", 0), ("docs/sweeps.md", 1)
+#: Pages whose blocks take longer: runs to an accuracy, several kinds of structures.
+LONG = "accuracy boundaries damper_engineering effects_auto look material sweeps".split()
+BLOCKS = [(page, number) for page in PAGES for number in range(len(blocks(page)))]
+CASES = [
+    pytest.param(block, marks=pytest.mark.experiment)
+    if block[0] in {f"docs/{name}.md" for name in LONG}
+    else block
+    for block in BLOCKS
+]
+
+
+@pytest.fixture(scope="module")
+def left_by(tmp_path_factory):
+    """``left_by(page, number)``: names that a block has left, run once for all tests."""
+    made = {}
+
+    def run(page, number=0):
+        if (page, number) not in made:
+            folder = tmp_path_factory.mktemp("page")
+            (folder / "pasted.py").write_text(blocks(page)[number], encoding="utf-8")
+            with pytest.MonkeyPatch.context() as patched:
+                patched.chdir(folder)
+                patched.setattr(runtime, "start", lambda *_, **__: None)
+                # One of the pages adds its own to this table.
+                patched.setitem(ACCOUNTINGS, "walls", None)
+                made[page, number] = runpy.run_path("pasted.py", run_name="__main__")
+        return made[page, number]
+
+    return run
+
+
+@pytest.mark.parametrize("block", CASES, ids=lambda block: "{}-{}".format(*block))
+def test_a_block_runs_as_it_stands(left_by, block, tmp_path):
+    if block not in APART:
+        left_by(*block)
+        return
+    (tmp_path / "pasted.py").write_text(blocks(block[0])[block[1]], encoding="utf-8")
+    options = {"capture_output": True, "text": True, "timeout": 600}
+    line = [sys.executable, "pasted.py"]
+    done = subprocess.run(line, cwd=tmp_path, env=users_environment(), **options)
+    assert done.returncode == 0 and done.stderr == "" and done.stdout, done.stderr
+
+
+def test_the_effect_moves_a_body_as_the_leapfrog_must(left_by):
+    """v_n = a dt sum of sin(w k dt), k < n, and x = dt sum of v_n: (a T dt / 2) cot(pi dt / T).
+
+    200 steps of round-off on 1e-4 m beside a centre 0.01 m from the origin: 200 x 2^-53 x 0.01 m.
+    """
+    left = left_by("docs/add_an_effect.md")
+    amplitude, period, step = 2.0, 0.02, 1e-4
+    expected = 0.5 * amplitude * period * step / np.tan(np.pi * step / period)
+    assert left["moved"] == pytest.approx(expected, abs=200 * 2.0**-53 * 0.02)
+    # Of the largest kinetic energy on the way, m (2 a / w)^2 / 2, as at the end there is none.
+    mass = left["result"].model.body_mass[0]
+    most = 0.5 * mass * (amplitude * period / np.pi) ** 2
+    assert abs(left["result"].report.energy_balance["residual"]) < 200 * 2.0**-52 * most
+
+
+def test_the_contact_law_stores_what_it_takes(left_by):
+    """m v^2 = 39 (2/5) k D^(5/2), and the speed comes back.
+
+    The leapfrog is of second order: relative errors of (w dt)^2 with the stiffness at the deepest
+    place, w^2 = 39 (3/2) k sqrt(D) / (m / 2). That place is looked for every five steps: at most
+    2.5 away from it, where the way is short by (w 2.5 dt)^2 / 2 of D. On the way velocities are
+    half a step old, and the account is off by F v dt / 2, at most w dt / 2 of the energy.
+    """
+    left = left_by("docs/add_a_contact_law.md")
+    mass, speed, stiffness = left["simulation"].model.body_mass[0], left["speed"], left["stiffness"]
+    depth = (mass * speed**2 / (39 * 0.4 * stiffness)) ** 0.4
+    second_order = 117.0 * stiffness * np.sqrt(depth) / mass * 1e-7**2
+    assert left["deepest"] == pytest.approx(depth, rel=(1 + 2.5**2 / 2) * second_order)
+    assert left["rebound"] == pytest.approx(speed, rel=second_order)
+    energy, unexplained = left["account"]["kinetic"], left["unexplained"]
+    assert max(unexplained) < 0.5 * np.sqrt(second_order) * energy
+    assert unexplained[-1] < second_order * energy
+
+
+def test_the_integrator_gains_energy_by_its_factor(left_by):
+    """E_n = E_0 (1 + (w dt)^2)^n; openings of 1e-8 m beside coordinates of 0.01 m keep 1e-10."""
+    left = left_by("docs/add_a_time_integrator.md")
+    model, step = left["model"], left["step"]
+    rate2 = 2.0 * 450e9 * 3.0 * model.bonds["area"][0] / model.body_mass[0]
+    expected = (1.0 + rate2 * step**2) ** np.arange(left["count"] + 1)
+    assert left["euler"] / left["euler"][0] == pytest.approx(expected, rel=1e-7)
+    # Of energies of one time the leapfrog's differ by (w dt)^2 / 4, cos^2(p / 2) at phase p.
+    swing = 0.25 * rate2 * step**2 * 1.01
+    assert left["leapfrog"] / left["leapfrog"][0] == pytest.approx(1.0, rel=swing)
+
+
+def test_the_accounting_gives_the_container_the_weight_and_landings_do_not(left_by):
+    """m g of a particle at rest, to the momentum of 4 g dt at both ends of two seconds."""
+    force, weight = left_by("docs/add_a_damper_accounting.md")["force"], 2e-3
+    assert force["walls"] == pytest.approx(-weight, rel=8 * 1e-4 / 2.0)
+    assert force["landing"] == 0.0
+
+
+def test_the_blocks_of_the_tutorial_keep_their_momentum(left_by):
+    """v1 + v2 = 2 m/s of equal masses."""
+    left = left_by("docs/tutorial.md", 1)
+    moved = left["result"].frames[-1].velocity[:, 0] * left["result"].model.body_mass
+    mass = left["result"].model.body_mass.sum()
+    assert moved.sum() / mass == pytest.approx(1.0, rel=1e-9)
+
+
+def test_the_hard_case_of_the_page_passes(left_by):
+    (case,) = left_by("docs/hard_cases.md")["CASES"]
+    assert assess(case, "implicit", quick=True).status == "passed"

@@ -1,0 +1,137 @@
+"""Experiments in a user's shell: JSON alone, readers that leave, Ctrl-C and going on again."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import time
+import warnings
+
+import pytest
+
+import blast_fracture
+from taichi_dem import InputError
+from taichi_dem.kit import study
+from taichi_dem.kit.files import write_text
+from taichi_dem.kit.study import cached, digest
+from tests import arch
+from tests.experiments.contract import command
+from tests.processes import users_environment
+from tests.terminal import run_in_terminal
+
+#: The quick run of this one takes a few seconds.
+SMALLEST = "demo_step_too_large"
+
+
+def test_json_is_the_summary_alone_and_the_bar_stays_on_the_terminal(tmp_path):
+    folder = tmp_path / "out"
+    with open(tmp_path / "said", "w") as file:
+        line = [*command(SMALLEST, "--quick", "--out", folder), "--json"]
+        seen = run_in_terminal(line, stdout=file)
+    assert seen.returncode == 0 and "compiling" in seen.text
+    # The bar was erased, and the cursor is shown again.
+    assert seen.raw.count("\x1b[?25l") == seen.raw.count("\x1b[?25h") > 0
+    said = (tmp_path / "said").read_text()
+    assert said == (folder / "summary.json").read_text() + "\n"
+    assert json.loads(said)["experiment"] == SMALLEST
+
+
+def test_a_reader_that_leaves_costs_nothing(tmp_path):
+    line = command(SMALLEST, "--quick", "--out", tmp_path / "out")
+    script = '"$@" | head -1; exit "${PIPESTATUS[0]}"'
+    options = {"capture_output": True, "text": True, "env": users_environment()}
+    done = subprocess.run(["bash", "-c", script, "bash", *line], **options)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "out" / "summary.json").is_file()
+    assert (tmp_path / "out" / "energy.png").stat().st_size > 1000
+
+
+@pytest.fixture
+def ended(tmp_path, capsys):
+    """``ended(run, *options)``: exit code, standard output and standard error of a study."""
+
+    def run_study(run, *options):
+        given = ["--threads", "2", "--arch", arch.chosen(), "--out", str(tmp_path), *options]
+        code = study.main(run, study.parser("none", "What for?"), given)
+        return code, *capsys.readouterr()
+
+    return run_study
+
+
+@pytest.mark.filterwarnings("always")
+def test_json_and_errors_are_kept_apart(ended):
+    def loud(options):
+        print("a line")
+        warnings.warn("a warning", stacklevel=1)
+        write_text(os.path.join(options.out, "summary.json"), "{}")
+
+    def refuse(_):
+        print("a line")
+        raise InputError("until must be 1, got 2")
+
+    assert ended(loud, "--json") == (0, "{}\n", "warning: a warning\n")
+    assert ended(refuse, "--json") == (2, "", "until must be 1, got 2\n")
+
+
+def test_a_summary_of_an_earlier_run_is_not_passed_on(ended, tmp_path):
+    (tmp_path / "summary.json").write_text("{}")
+    os.utime(tmp_path / "summary.json", (1.0, 1.0))
+    code, said, _ = ended(lambda _: None, "--json")
+    assert (code, said) == (2, "")
+
+
+def test_a_kept_result_is_computed_once_for_the_same_settings_and_sources(tmp_path):
+    calls = []
+
+    def compute():
+        calls.append(1)
+        return {"value": 0.1 + 0.2}
+
+    made = [cached(tmp_path, "x", settings, (), compute) for settings in (1, 1, 2)]
+    assert [kept for _, kept in made] == [False, True, False]
+    assert all(result == {"value": 0.1 + 0.2} for result, _ in made) and len(calls) == 2
+    assert digest(1, ("ca_damper",)) != digest(1, ("taichi_dem",))
+
+
+class CtrlC:
+    """Stands for the progress bar, and for a user who presses Ctrl-C while it runs."""
+
+    def __init__(self, title):
+        self.calls = 0
+
+    def __enter__(self):
+        return self
+
+    def __call__(self, progress):
+        self.calls += progress.phase == "running"
+        if self.calls == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.01)
+
+    def __exit__(self, *_):
+        pass
+
+
+@pytest.mark.experiment
+def test_interrupted_blast_goes_on_to_the_same_files(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(blast_fracture, "picture", lambda result, folder: None)
+    quick = ["--quick", "--threads", "2", "--method", "fixed", "--until", "4e-5"]
+    quick += ["--without", "sphere_contact,friction", "--checkpoint-every", "500steps"]
+
+    def run(folder, *more):
+        given = [*quick, "--out", str(tmp_path / folder), *more]
+        code = study.main(blast_fracture.run, blast_fracture.options_parser(), given)
+        return code, capsys.readouterr().err
+
+    assert run("straight") == (0, "")
+    with monkeypatch.context() as patched:
+        patched.setattr("taichi_dem.kit.progress.progress_bar.ProgressBar", CtrlC)
+        code, said = run("stopped")
+    path = tmp_path / "stopped" / "checkpoint.npz"
+    assert code == 130 and os.listdir(path.parent) == [path.name]
+    assert re.fullmatch(rf"interrupted at t = \S+ s, saved in {path}: go on with --resume\n", said)
+    assert run("stopped", "--resume") == (0, "")
+    for name in ("history.csv", "bonds.csv", "mesh.msh", "paraview/{folder}_0006.vtu"):
+        files = [tmp_path / k / name.format(folder=k) for k in ("stopped", "straight")]
+        assert files[0].read_bytes() == files[1].read_bytes()
