@@ -115,7 +115,9 @@ class ContactProbe:
     """
 
     def __init__(self, mesh, effects, material=CONCRETE):
-        simulation = Simulation(Scene(mesh, material, effects), Multirate(STEP, 1.0))
+        self.simulation = simulation = Simulation(
+            Scene(mesh, material, effects), Multirate(STEP, 1.0)
+        )
         self.model, self.state, self.advance = (
             simulation.model,
             simulation.state,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, ImplicitDashpots, effects
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.mesh.shapes import pair
 from taichi_dem.stability.mesh_limits import dashpots_of, springs_of
 from tests.verification.test_limits import Rig, bisected, pair_eigenvalue
@@ -150,3 +150,22 @@ def test_velocities_at_the_end_of_the_step_bear_longer_ones(rigs):
     assert exact > 5.0 * 2.0 / np.sqrt(stiff)
     found = [openings(rig, part * exact, [400])[0] for part in (0.99, 1.01)]
     assert abs(found[0]) < STRETCH < abs(found[1])
+
+
+def test_a_driven_body_gives_way_no_more_than_a_fixed_one():
+    """Seen from a support with a constant velocity, a pair moves as beside one at rest.
+
+    Places grow to 1e-4 m and round in each of the steps; the dashpots hand on what they get.
+    """
+    steps, found = 50, []
+    for speed in np.array([[0.0, 0.0, 0.0], [3.0, -2.0, 1.0]]):
+        listed = [effects.BondDamping(), effects.PrescribedMotion("left", speed)]
+        method = ImplicitDashpots(1e-6, **TIGHT)
+        simulation = Simulation(Scene(pair(), CONCRETE, listed), method)
+        centre = simulation.model.centre
+        parting = speed + np.array([[0.0], [0.1]])
+        simulation.state.set_motion(centre, [1.0, 0.0, 0.0, 0.0], parting)
+        simulation.advance_to(steps)
+        found.append(simulation.state.position.to_numpy() - centre - speed * steps * 1e-6)
+    assert np.abs(found[0][1]).max() > 1e-7
+    assert np.abs(found[1] - found[0]).max() < 100 * steps * 0.02 * EPS

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import taichi as ti
 
 from taichi_dem import (
     CONCRETE,
@@ -17,7 +18,7 @@ from taichi_dem import (
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.mesh.topology import topology_of
-from taichi_dem.stability.body_limits import LIMITED
+from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED
 from taichi_dem.stability.mesh_limits import (
     bond_rates,
     dashpots_of,
@@ -279,3 +280,21 @@ def test_limited_dashpots_of_a_bond_are_stable_at_any_step():
     assert exact < 0.5 * LIMITED * (1 + 1e-9) < 1.0
     assert bisected(wild, 0.5 * exact, 1.5 * exact) == pytest.approx(exact, rel=0.007)
     assert not wild(1.0)
+
+
+@ti.kernel
+def shares(limits: ti.template(), step: ti.f64) -> ti.types.vector(2, ti.f64):
+    return ti.Vector([limits.bond_share(0, step), limits.contact_share(0, step)])
+
+
+def test_limited_bonds_leave_contacts_what_they_need():
+    """With X = 2 dt rate: contacts take min(X, 0.5) at least, and both together 1.7 at most."""
+    listed = [effects.BondDamping(), effects.SphereContact(3, outer_faces=True)]
+    scene = Scene(pair(), CONCRETE, listed)
+    limits = Simulation(scene, Uniform(1e-9, dashpot="limited")).schedule.limits
+    rounding = 4.0 * LIMITED * np.finfo(float).eps
+    for x in 10.0 ** np.random.default_rng(1).uniform(-2.0, 2.0, (50, 2)):
+        limits.bond_damping[0], limits.contact_damping[0] = 0.5 * x
+        taken = shares(limits, 1.0) * x
+        assert taken[1] >= min(x[1], FOR_CONTACTS) - rounding
+        assert taken.sum() <= LIMITED + rounding

@@ -194,3 +194,17 @@ def test_force_of_i_on_j_is_that_of_j_on_i(probe):
     error = 12 * FORCE_ERROR + 200 * EPS * C * 50.0 * 0.1
     assert np.abs(first - second).max() < error
     assert np.abs(heat - taken).max() < error * 10.0
+
+
+def test_heat_that_waits_in_a_pair_is_in_the_account(probe):
+    """A pair keeps what its steps took until its first body books it [J]."""
+    simulation = probe.simulation
+    simulation.start()
+    probe.state.set_motion(placed(probe, OVERLAP), [1.0, 0.0, 0.0, 0.0])
+    simulation.broad_phase.search()
+    taken = {"sphere_dashpot": 1.0, "friction": 2.0, "injected": 4.0}
+    before = simulation.energy_balance.account()
+    probe.store.heat[probe.store.near_slot[0]] = list(taken.values())
+    after = simulation.energy_balance.account()
+    gained = {name: after[name] - before[name] for name in taken}
+    assert gained == pytest.approx(taken, rel=8 * EPS)
