@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_dem import runtime
 from taichi_dem.kit import lanes
 from taichi_dem.kit.lanes import LANES, by_lane
 
@@ -50,7 +49,6 @@ class Operations:
 
 @pytest.fixture(scope="module")
 def operations():
-    runtime.start()
     made, random = Operations(), np.random.default_rng(3)
     for field in (made.vector, made.number, made.matrix, *made.rows):
         field.from_numpy(random.normal(size=field.to_numpy().shape))
