@@ -300,7 +300,7 @@ def _initialise(wanted):
             default_ip=ti.i32,
             fast_math=False,
             # Three times the compile time for nothing: LLVM optimises these kernels as well alone.
-            # Kernels then must not add to fields in place: see tests/unit/test_kernel_source.py.
+            # Kernels then must not add to fields in place: see tests/unit/test_source_rules.py.
             advanced_optimization=False,
             cpu_max_num_threads=wanted.threads,
             debug=wanted.debug,
