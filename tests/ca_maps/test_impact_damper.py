@@ -67,7 +67,7 @@ def drawn(count):
 def test_a_motion_that_small_changes_leave_is_not_possible():
     """Pushed by 1e-6 of its speed, it comes back or leaves in 200 blows as multipliers say."""
     counts = {True: 0, False: 0}
-    for made, u in drawn(150):
+    for made, u in drawn(300):
         largest = abs(made.multipliers(u)[0])
         assert made.is_stable(u) == made.is_possible(u) == (largest < 1.0)
         if 0.9 < largest < 1.1:
