@@ -37,7 +37,7 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-physics test-rest test-experiments test-slow test-bounds test-quadrants attack fuzz lint bench gallery lessons docs mesh wheel \
+.PHONY: help venv demo test test-physics test-rest test-experiments test-slow test-quadrants attack fuzz lint bench gallery lessons docs mesh wheel \
   release-check clean
 
 help: ## print this list
@@ -63,14 +63,11 @@ test-experiments: $(STAMP) ## run every experiment with --quick: it ends well, i
 test-slow: $(STAMP) ## run those that take longer
 	$(BIN)/python $(TEST) -m slow $(TEST_OPTIONS)
 
-test-bounds: $(STAMP) ## run small scenes with every access to a field checked (also in test-slow)
-	$(BIN)/python -m pytest -q -m "" tests/bad_input/test_bounds.py $(TEST_OPTIONS)
+attack: $(STAMP) ## attack it with hostile values, files, sessions and environments (ATTACK_OPTIONS="--attacks 100")
+	$(BIN)/python -m pytest -q -n 2 -m attack tests/attack --attacks 20 $(ATTACK_OPTIONS)
 
-attack: $(STAMP) ## attack it at random, minutes (ATTACK_OPTIONS="--attacks 100 --attack-seed 20": longer)
-	$(BIN)/python -m pytest -q -n 2 tests/attack --attacks 20 --attack-table docs/reliability.md $(ATTACK_OPTIONS)
-
-fuzz: $(STAMP) ## run 10,000 random scenes, each briefly (FUZZ_OPTIONS="--number 500 --seed 7": some)
-	$(BIN)/python -m tests.fuzz --number 10000 $(FUZZ_OPTIONS)
+fuzz: $(STAMP) ## run random scenes, also with every access to a field checked (FUZZ_OPTIONS="--attack-seed 7")
+	$(BIN)/python -m pytest -q -n 2 -m attack tests/fuzz --attacks 20 $(FUZZ_OPTIONS)
 
 test-quadrants: $(QUADRANTS_STAMP) ## run the tests on Quadrants, Taichi's successor; list what differs
 	@rm -f results/quadrants.txt
