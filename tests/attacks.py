@@ -1,4 +1,4 @@
-"""Options of the attacks: a test marked ``attack`` that takes a seed is run once for each of them."""
+"""Options of the attacks: a test marked ``attack`` that takes a seed is run once a seed."""
 
 
 def pytest_addoption(parser):
