@@ -9,6 +9,7 @@ from gallery import TOOLS
 from tests import arch
 from tests.processes import users_environment
 
+READER = Path(__file__).resolve().parents[1] / "figures.py"
 FOLDER = Path(__file__).resolve().parents[2] / "experiments"
 NAMES = sorted(
     path.stem
@@ -17,16 +18,21 @@ NAMES = sorted(
 )
 
 
-def command(name, *arguments):
-    """Command line of an experiment with two threads."""
+def command(name, *arguments, report=None):
+    """Command line of an experiment with two threads.
+
+    report: file for what its figures lack, see ``tests.figures``.
+    """
+    read = [] if report is None else [str(READER), str(report)]
     everywhere = ["--threads", "2", "--arch", arch.chosen()]
-    return [sys.executable, str(FOLDER / f"{name}.py"), *everywhere, *map(str, arguments)]
+    return [sys.executable, *read, str(FOLDER / f"{name}.py"), *everywhere, *map(str, arguments)]
 
 
-def start(name, *arguments):
+def start(name, *arguments, report=None):
     """The finished process of an experiment, output in pipes."""
     options = {"capture_output": True, "text": True, "timeout": 1800}
-    return subprocess.run(command(name, *arguments), env=users_environment(), **options)
+    line = command(name, *arguments, report=report)
+    return subprocess.run(line, env=users_environment(), **options)
 
 
 def rows_of(path):

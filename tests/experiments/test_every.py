@@ -254,8 +254,8 @@ def test_every_experiment_has_a_row_and_an_entry_of_the_gallery():
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_quick_run_ends_well_and_its_key_figures_lie_within_their_bars(name, tmp_path):
-    row, folder = EVERY[name], tmp_path / "out"
-    done = start(name, "--quick", "--out", folder)
+    row, folder, report = EVERY[name], tmp_path / "out", tmp_path / "figures.json"
+    done = start(name, "--quick", "--out", folder, report=report)
     assert done.returncode == 0, done.stderr
     # No progress bar, no banner, no warning: a pipe gets lines, and a file stays readable.
     assert [line for line in done.stderr.splitlines() if KNOWN not in line] == []
@@ -271,6 +271,7 @@ def test_a_quick_run_ends_well_and_its_key_figures_lie_within_their_bars(name, t
     assert list(folder.glob("*.csv")) and not list(folder.rglob("*.part*"))
     for picture in folder.glob("*.png"):
         assert is_drawn(picture), picture.name
+    assert json.loads(report.read_text())["defects"] == []
 
 
 def figures_of(name, folder):
