@@ -151,6 +151,7 @@ class Loan(Uncopied):
         engine._holder = None
         if self._aside is not None:
             memory.write(self._aside)
+            engine._used = True
         engine.enter(self.scene)
         engine._holder = weakref.ref(self)
         self._aside = None
