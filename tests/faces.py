@@ -30,11 +30,6 @@ def triangle_distance(c, corners):
     return np.where(inside, np.abs(height), beside)
 
 
-def solid():
-    """A block of 72 bodies."""
-    return bar(1.5 * WIDE, WIDE, (3, 2, 2))
-
-
 def cracked():
     """The block in two parts that touch, and are bonded nowhere."""
     half = bar(0.75 * WIDE, WIDE, (2, 2, 2))

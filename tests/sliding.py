@@ -1,20 +1,18 @@
-"""A body that slides on a plate of tetrahedra under its own weight: how fast it is braked."""
+"""A body that slides on a plate of tetrahedra under its own weight, by contact of faces."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, checked_mesh, effects
+from taichi_dem import CONCRETE, Scene, Simulation, checked_mesh, effects
 from taichi_dem.mesh.shapes import bar, placed_together, single
 from taichi_dem.mesh.tetrahedra import all_faces
 
 GRAVITY = 9.81
 #: Plate: its side and that of its boxes, of six tetrahedra each [m]; the body starts at a corner.
 SIDE, BOX = 0.4, 0.4 / 6
-#: Way over which the braking is averaged [m], and the step [s], at which sphere springs are stable.
-WAY, STEP = 0.1, 2e-6
-#: Sphere pairs for each body that its divisions of an edge may bring.
-MOST = {5: 160, 10: 640, 20: 6000}
+#: Step [s] at which sphere springs are stable.
+STEP = 2e-6
 
 
 def tetrahedron():
@@ -22,11 +20,6 @@ def tetrahedron():
     mesh = single(0.05)
     standing = np.stack([mesh.points[:, 1], -mesh.points[:, 0], mesh.points[:, 2]], axis=1)
     return checked_mesh(standing, mesh.tetrahedra, {})
-
-
-def block():
-    """A cube of 0.1 m of 48 bonded tetrahedra."""
-    return bar(0.1, 0.1, (2, 2, 2))
 
 
 def plate():
@@ -41,11 +34,10 @@ def plate():
     return checked_mesh(made.points, made.tetrahedra, {"bottom": faces[below]})
 
 
-def sliding(body, speed, angle, friction, divisions=5, kind=effects.SphereContact, **other):
+def sliding(body, speed, angle, friction, method):
     """Simulation of a body that slides over a fixed plate at a speed [m/s], and its direction.
 
-    angle: of the direction against the edges of the plate's boxes. kind: of the contact.
-    other: the method, and the law of friction, in place of those of the measurement.
+    angle: of the direction against the edges of the plate's boxes.
     """
     low, high = body.points.min(axis=0), body.points.max(axis=0)
     place = np.array([0.13, 0.0, 0.13]) - 0.5 * (low + high)
@@ -53,35 +45,15 @@ def sliding(body, speed, angle, friction, divisions=5, kind=effects.SphereContac
     mesh = placed_together({"plate": (plate(), (0.0, 0.0, 0.0)), "body": (body, place)})
     listed = [
         effects.BondDamping(),
-        kind(divisions, spheres_per_body=MOST[divisions]),
-        other.get("law", effects.Friction)(),
+        effects.FaceContact(5, spheres_per_body=160),
+        effects.Friction(),
         effects.Gravity((0.0, -GRAVITY, 0.0)),
         effects.Fixed("plate_bottom"),
     ]
     material = replace(CONCRETE, friction=friction)
-    simulation = Simulation(
-        Scene(mesh, material, listed), other.get("method", ImplicitDashpots(STEP))
-    )
+    simulation = Simulation(Scene(mesh, material, listed), method)
     direction = np.array([np.cos(angle), 0.0, np.sin(angle)])
     velocity = np.zeros((mesh.body_count, 3))
     velocity[-body.body_count :] = speed * direction
     simulation.state.set_motion(simulation.model.centre, [1.0, 0.0, 0.0, 0.0], velocity)
     return simulation, direction
-
-
-def deceleration(body, speed, angle, friction, divisions=5, kind=effects.SphereContact):
-    """Mean deceleration [m/s^2] over ``WAY``, or over 0.7 of the time to stop by Coulomb's law.
-
-    Returns also the largest rise of the body [m], and the CPU time of a step [s].
-    """
-    simulation, direction = sliding(body, speed, angle, friction, divisions, kind)
-    time = min(WAY / speed, 0.7 * speed / (CONCRETE.friction * GRAVITY))
-    own = slice(-body.body_count, None)
-    mass = simulation.model.body_mass[own]
-    first, rise = simulation.model.centre[own, 1], 0.0
-    for part in range(1, 11):
-        simulation.advance_to(round(part * time / STEP / 10))
-        height = simulation.state.position.to_numpy()[own, 1] - first
-        rise = max(rise, float(mass @ height) / mass.sum())
-    present = mass @ simulation.state.velocity.to_numpy()[own] @ direction / mass.sum()
-    return (speed - present) / time, rise, simulation.run_cpu_seconds * STEP / time

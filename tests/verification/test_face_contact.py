@@ -164,9 +164,7 @@ def braking(friction):
     The impulse along the normal is that of the weight and of what the body bounces.
     """
     speed, time, method = 5.0, 0.01, ImplicitDashpots(0.5 * STEP)
-    simulation, way = sliding(
-        tetrahedron(), speed, 0.4, friction, 5, effects.FaceContact, method=method
-    )
+    simulation, way = sliding(tetrahedron(), speed, 0.4, friction, method)
     dt, ends = simulation.method.dt0, []
     for part in (0.1, 1.0):
         simulation.advance_to(round(part * time / dt))
