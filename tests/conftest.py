@@ -7,8 +7,10 @@ Options of the attacks are those of ``tests/attacks.py``.
 import contextlib
 import ctypes
 import faulthandler
+import functools
 import gc
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -39,6 +41,16 @@ class ByFolder(LoadScopeScheduling):
         return nodeid.partition("::")[0].rpartition("/")[0]
 
 
+#: Folders that take longest: begun first, so that workers end together.
+FIRST = ("verification", "equivalence", "unit", "activation")
+
+
+def pytest_collection_modifyitems(items):
+    """Long folders first; all else stays in its order."""
+    rank = {name: place for place, name in enumerate(FIRST)}
+    items.sort(key=lambda item: rank.get(item.path.parent.name, len(rank)))
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     """Take the place of ``--dist loadscope``; None for all others."""
@@ -59,10 +71,9 @@ def pytest_runtest_protocol(item):
         faulthandler.cancel_dump_traceback_later()
 
 
-#: Bytes by which the process has grown in a session beyond which the next file begins with another:
-#: two workers and the processes that tests start share a machine. Compilers keep up to gigabytes
-#: for ever, so that the size alone would end every session once it has been reached.
-_MOST_GROWTH = 2e9
+#: Bytes by which the process has grown in a session beyond which the next file begins with another.
+#: What has been compiled is then read from the cache of kernels, and traced again.
+_MOST_GROWTH = 0.8e9
 _MOST_TREES = 200
 _at_start = {}
 
@@ -71,11 +82,10 @@ _at_start = {}
 def taichi_session():
     """Two threads, whatever the machine has: results must not depend on their number.
 
-    Files share a session, and so the engines that have been compiled, while there is room.
+    Files of a folder share a session, and so the engines that have been compiled, if there is room.
     """
     if runtime.settings() is not None and _is_full():
-        runtime.stop()
-        _return_memory()
+        _stop()
     if arch.chosen() == "cuda" and not runtime.cuda_present():
         pytest.skip("no CUDA device answers here")
     if runtime.settings() is None:
@@ -99,8 +109,29 @@ def _resident_bytes():
     return pages * os.sysconf("SC_PAGE_SIZE")
 
 
-def _return_memory():
-    """Give what is free back to the system, where the C library can: compilers leave gigabytes."""
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_teardown(item, nextitem):
+    """Give the memory of a folder back after its last test: engines, and runs that it has kept."""
+    yield
+    folder = item.path.parent
+    if nextitem is None or nextitem.path.parent != folder:
+        for module in list(sys.modules.values()):
+            if Path(getattr(module, "__file__", None) or "").parent == folder:
+                _forget_runs(module)
+        _stop()
+
+
+def _forget_runs(module):
+    """Empty the caches of functions of a module."""
+    for kept in vars(module).values():
+        if isinstance(kept, functools._lru_cache_wrapper):
+            kept.cache_clear()
+
+
+def _stop():
+    """Stop Taichi, and give what is free back to the system, where the C library can."""
+    if runtime.settings() is not None:
+        runtime.stop()
     gc.collect()
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)

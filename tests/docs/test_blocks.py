@@ -13,18 +13,12 @@ from taichi_dem.kit.study.cases import assess
 from tests.docs.pages import PAGES, blocks
 from tests.processes import users_environment
 
+pytestmark = pytest.mark.experiment
+
 #: Blocks that a process of their own runs: the first one that a user sees, and those that start
 #: processes themselves. All others share the session, and so the engines, of the tests.
 APART = ("README.md", 0), ("docs/sweeps.md", 0), ("docs/sweeps.md", 1)
-#: Pages whose blocks take longer: runs to an accuracy, several kinds of structures.
-LONG = "accuracy boundaries damper_engineering effects_auto look material sweeps".split()
 BLOCKS = [(page, number) for page in PAGES for number in range(len(blocks(page)))]
-CASES = [
-    pytest.param(block, marks=pytest.mark.experiment)
-    if block[0] in {f"docs/{name}.md" for name in LONG}
-    else block
-    for block in BLOCKS
-]
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +41,7 @@ def left_by(tmp_path_factory):
     return run
 
 
-@pytest.mark.parametrize("block", CASES, ids=lambda block: "{}-{}".format(*block))
+@pytest.mark.parametrize("block", BLOCKS, ids=lambda block: "{}-{}".format(*block))
 def test_a_block_runs_as_it_stands(left_by, block, tmp_path):
     if block not in APART:
         left_by(*block)

@@ -1,11 +1,14 @@
 """Costs of effects are those of the same states: a frozen batch goes on as its run would."""
 
 import numpy as np
+import pytest
 
 import _effects_costs
 from _effects_damper import FrozenBatch
 from ca_damper.lattice import DIRECTIONS, HELD
 from taichi_dem import ImplicitDashpots, simulate
+
+pytestmark = pytest.mark.experiment
 
 TABLE = {"particles": 30, "ratios": (0.96, 1.0), "seeds": (1, 2), "measured_cycles": 2}
 

@@ -14,7 +14,7 @@ from tests.experiments.contract import FOLDER, NAMES, rows_of, start
 
 ENTRY = {entry.name: entry for entry in read_entries(FOLDER / ENTRIES)}
 #: Those that the fast suite runs: a blast, a damper, a study.
-FAST = ("blast_ensemble", "damper_measured_motion", "demo_step_too_large")
+FAST = ("demo_sleeping", "damper_patterns", "demo_step_too_large")
 #: Line on standard error of what is known to be outside the range of the paper's rules.
 KNOWN = "rules 'paper' of the automaton are known to fail"
 

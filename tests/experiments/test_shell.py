@@ -20,6 +20,8 @@ from tests.experiments.contract import command
 from tests.processes import users_environment
 from tests.terminal import run_in_terminal
 
+pytestmark = pytest.mark.experiment
+
 #: The quick run of this one takes a few seconds.
 SMALLEST = "demo_step_too_large"
 
@@ -113,7 +115,6 @@ class CtrlC:
         pass
 
 
-@pytest.mark.experiment
 def test_interrupted_blast_goes_on_to_the_same_files(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(blast_fracture, "picture", lambda result, folder: None)
     quick = ["--quick", "--threads", "2", "--method", "fixed", "--until", "4e-5"]

@@ -10,6 +10,8 @@ import pytest
 from _hard_cases import registry
 from taichi_dem.kit.study.cases import assess
 
+pytestmark = pytest.mark.experiment
+
 LEAST_ALIKE = ("multirate_drifted", "implicit")
 #: Cases with effects, methods or limits of their own compile an engine; the pyramid is large.
 OF_ITS_OWN = (

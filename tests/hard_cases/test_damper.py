@@ -5,6 +5,8 @@ import pytest
 from _hard_cases import registry
 from taichi_dem.kit.study.cases import assess
 
+pytestmark = pytest.mark.experiment
+
 #: They differ from others by one law or account, which other tests are about.
 VARIANTS = ("spheres_printed", "automaton_ejection")
 #: They compile an engine of their own; other cases ask the like of engines that are there.
