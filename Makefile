@@ -57,8 +57,8 @@ test-physics: $(STAMP) ## of these: physics, invariance and bits, both packages
 test-rest: $(STAMP) ## of these: all others
 	$(BIN)/python $(TEST) --durations 10 $(REST) $(TEST_OPTIONS)
 
-test-experiments: $(STAMP) ## run every experiment with --quick: it ends well, its figures are there and in range
-	$(BIN)/python -m pytest -q -n 2 -m experiment --durations 10 $(TEST_OPTIONS)
+test-experiments: $(STAMP) ## run every experiment, hard case and program of the pages, each once and quick
+	$(BIN)/python $(TEST) -m "experiment and not slow" --durations 10 $(TEST_OPTIONS)
 
 test-slow: $(STAMP) ## run those that take longer
 	$(BIN)/python $(TEST) -m slow $(TEST_OPTIONS)

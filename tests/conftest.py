@@ -35,10 +35,14 @@ def pytest_configure(config):
 
 
 class ByFolder(LoadScopeScheduling):
-    """Tests of one folder run in one worker: they share engines, which are compiled once."""
+    """Tests of one folder run in one worker: they share engines, which are compiled once.
+
+    Experiments, which run in processes of their own, share nothing.
+    """
 
     def _split_scope(self, nodeid):
-        return nodeid.partition("::")[0].rpartition("/")[0]
+        folder = nodeid.partition("::")[0].rpartition("/")[0]
+        return nodeid if folder.endswith("experiments") else folder
 
 
 #: Folders that take longest: begun first, so that workers end together.
