@@ -9,7 +9,7 @@ TEST := -m pytest -q -n 2 --dist loadscope --no-loadscope-reorder --max-worker-r
 # Folders of tests of physics: verification, invariance, digests, both packages. The rest is all else.
 PHYSICS := $(addprefix tests/,verification boundaries equivalence material ca_automaton ca_spheres ca_combined ca_modes \
   ca_excitation ca_maps)
-REST = $(filter-out $(PHYSICS),$(patsubst %/,%,$(wildcard tests/*/)))
+REST = $(filter-out $(PHYSICS) tests/__pycache__,$(patsubst %/,%,$(wildcard tests/*/)))
 TEST_OPTIONS ?=
 BENCH_OPTIONS ?=
 ATTACK_OPTIONS ?=
