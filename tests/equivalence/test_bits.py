@@ -30,9 +30,9 @@ def fields_of(simulation):
     return {name: field.to_numpy() for name, field in simulation.state.fields().items()}
 
 
-def state_after(driver="resident", brute_force=False, **contact):
+def state_after(driver="resident", **contact):
     """All changing fields of the brisk block as arrays after STEPS, and the simulation."""
-    simulation = Simulation(brisk_scene(**contact), HELD, driver, brute_force)
+    simulation = Simulation(brisk_scene(**contact), HELD, driver)
     simulation.advance_to(STEPS)
     return fields_of(simulation), simulation
 
@@ -65,11 +65,6 @@ def test_reference_run_breaks_bonds_touches_and_uses_levels(held):
 def test_parallel_driver_gives_the_bits_of_the_resident_one(held, parallel):
     assert differing(held[0], parallel[0]) == []
     assert held[1].energy_balance.account() == parallel[1].energy_balance.account()
-
-
-def test_search_without_cells_gives_the_same_bits(held):
-    brute, _ = state_after(brute_force=True)
-    assert differing(held[0], brute, MOTION) == []
 
 
 def test_skin_changes_no_bit(held):

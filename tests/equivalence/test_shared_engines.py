@@ -116,6 +116,7 @@ def test_reset_begins_again_with_another_scene_and_compiles_nothing(alone, compi
     assert same(outcome(simulation), alone[0])
 
 
+@pytest.mark.slow
 def test_nothing_is_compiled_in_the_time_of_steps(compilations, compiled_anew, monkeypatch):
     """Readings of contacts are compiled between steps, once a bar has broken."""
     simulation = Simulation(*drawn(1))
