@@ -14,7 +14,14 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case",
+    [
+        "own places",
+        pytest.param("two motions in turn", marks=pytest.mark.slow),
+        "all leave a motion",
+    ],
+)
 def test_nearly_all_bars_hold(case):
     """95 % of 30 are 28.5, and three standard deviations fewer 24.9; none falls out of its level.
 

@@ -67,7 +67,7 @@ RUNS = {
     "moved": (driven_bar, Multirate(1e-8, 1e-7), 4e-5, "resident"),
     "moved_implicit": (driven_bar, ImplicitDashpots(2e-7), 4e-5, "resident"),
 }
-QUICK = ("held", "controlled", "controlled_parallel", "implicit", "bar_controlled")
+QUICK = ("held", "controlled", "implicit", "bar_controlled")
 
 
 def digest(arrays):

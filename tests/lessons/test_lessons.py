@@ -18,6 +18,8 @@ from taichi_dem.materials import CONCRETE
 from taichi_dem.scene import Scene
 from tests.scenes import ROOT
 
+pytestmark = pytest.mark.experiment
+
 NOTEBOOKS = sorted(Path(ROOT, "experiments", "lessons").glob("wh*.py"))
 
 
@@ -76,7 +78,6 @@ def test_what_the_base_gives_is_what_dashpot_and_grains_take(engine):
     assert answer.energy["filling"] > 0.2 * given and answer.throw > 1.0
 
 
-@pytest.mark.experiment
 def test_a_hard_pull_misses_what_is_left_out(engine):
     """The end is pulled out by v / (2 pi f); what would break says so, and what it did counts."""
     answer = engine.ask(_needs.answer, ("bond_damping",), 2.0)

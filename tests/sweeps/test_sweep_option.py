@@ -5,8 +5,12 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 from tests.processes import users_environment
 from tests.scenes import ROOT
+
+pytestmark = pytest.mark.experiment
 
 STUDY = """
 import sys

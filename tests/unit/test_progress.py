@@ -2,6 +2,8 @@
 
 import sys
 
+import pytest
+
 from taichi_dem import CONCRETE, Scene, Uniform, simulate
 from taichi_dem.mesh.shapes import bar
 from tests.terminal import run_in_terminal
@@ -27,6 +29,7 @@ def test_a_callback_hears_of_the_run_to_its_end():
     assert (told[-1].share, told[-1].seconds_left) == (1.0, 0.0)
 
 
+@pytest.mark.experiment
 def test_a_terminal_shows_compiling_and_is_left_clean(tmp_path):
     seen = run_in_terminal([sys.executable, "-c", JOB], cwd=tmp_path)
     assert seen.returncode == 0, seen.text

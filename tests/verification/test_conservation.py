@@ -20,10 +20,9 @@ DT0, DISTANCE = 1e-8, 2e-7
 SOLVED = 4e-7
 METHODS = {
     "held": lambda part: Multirate(DT0 * part, DISTANCE * part),
-    "uniform": lambda part: Uniform(DT0 * part, DISTANCE * part),
     "implicit": lambda part: ImplicitDashpots(SOLVED * part, sweeps=(2, 100), tolerance=1e-5),
 }
-UNTIL = {"held": 3e-5, "uniform": 3e-5, "implicit": 4e-5}
+UNTIL = {"held": 3e-5, "implicit": 4e-5}
 
 
 @pytest.fixture(scope="module")
