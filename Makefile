@@ -4,7 +4,7 @@
 
 PYTHON ?=
 DEMO_OPTIONS ?=
-# One worker a core; tests of a folder share what they compile (tests/conftest.py). A worker that dies is a failure.
+# One worker a core; tests of a group share what they compile (tests/conftest.py). A worker that dies is a failure.
 TEST := -m pytest -q -n 2 --dist loadscope --no-loadscope-reorder --max-worker-restart 0
 # Folders of tests of physics: verification, invariance, digests, both packages. The rest is all else.
 PHYSICS := $(addprefix tests/,verification boundaries equivalence material ca_automaton ca_spheres ca_combined ca_modes \

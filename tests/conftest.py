@@ -34,31 +34,42 @@ def pytest_configure(config):
     arch.choose(config.getoption("--arch"))
 
 
-class ByFolder(LoadScopeScheduling):
-    """Tests of one folder run in one worker: they share engines, which are compiled once.
+class ByGroup(LoadScopeScheduling):
+    """Tests of a group run in one worker: they share engines, which are compiled once.
 
     Experiments, which run in processes of their own, share nothing.
     """
 
     def _split_scope(self, nodeid):
-        folder = nodeid.partition("::")[0].rpartition("/")[0]
-        return nodeid if folder.endswith("experiments") else folder
+        group = group_of(Path(nodeid.partition("::")[0]))
+        return nodeid if group == "experiments" else group
 
 
-#: Folders that take longest: begun first, so that workers end together.
-FIRST = ("verification", "equivalence", "unit", "activation")
+def group_of(path):
+    """Group of a test file: its folder, all of the damper as one, and all that share the block."""
+    folder = path.parent.name
+    return "verification" if folder == "equivalence" else folder.partition("_")[0]
+
+
+#: Groups that take longest: begun first, so that workers end together.
+FIRST = ("verification", "unit", "ca", "activation")
 
 
 def pytest_collection_modifyitems(items):
-    """Long folders first; all else stays in its order."""
+    """Long groups first; in one of them what runs the same block side by side, all else as it is."""
     rank = {name: place for place, name in enumerate(FIRST)}
-    items.sort(key=lambda item: rank.get(item.path.parent.name, len(rank)))
+
+    def place(item):
+        group = group_of(item.path)
+        return rank.get(group, len(rank)), item.path.name if group == FIRST[0] else ""
+
+    items.sort(key=place)
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     """Take the place of ``--dist loadscope``; None for all others."""
-    return ByFolder(config, log) if config.getoption("dist") == "loadscope" else None
+    return ByGroup(config, log) if config.getoption("dist") == "loadscope" else None
 
 
 #: Longest time of one test [s]; the longest takes two minutes on a busy machine.
@@ -76,8 +87,7 @@ def pytest_runtest_protocol(item):
 
 
 #: Bytes by which the process has grown in a session beyond which the next file begins with another.
-#: What has been compiled is then read from the cache of kernels, and traced again.
-_MOST_GROWTH = 0.8e9
+_MOST_GROWTH = 0.7e9
 _MOST_TREES = 200
 _at_start = {}
 
@@ -86,7 +96,7 @@ _at_start = {}
 def taichi_session():
     """Two threads, whatever the machine has: results must not depend on their number.
 
-    Files of a folder share a session, and so the engines that have been compiled, if there is room.
+    Files of a group share a session, and so the engines that have been compiled, if there is room.
     """
     if runtime.settings() is not None and _is_full():
         _stop()
@@ -115,12 +125,13 @@ def _resident_bytes():
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_teardown(item, nextitem):
-    """Give the memory of a folder back after its last test: engines, and runs that it has kept."""
+    """Give the memory of a group back after its last test: engines, and runs that it has kept."""
     yield
-    folder = item.path.parent
-    if nextitem is None or nextitem.path.parent != folder:
+    group = group_of(item.path)
+    if nextitem is None or group_of(nextitem.path) != group:
         for module in list(sys.modules.values()):
-            if Path(getattr(module, "__file__", None) or "").parent == folder:
+            path = Path(getattr(module, "__file__", None) or "")
+            if path.parent.parent == item.path.parent.parent and group_of(path) == group:
                 _forget_runs(module)
         _stop()
 
