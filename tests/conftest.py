@@ -56,7 +56,7 @@ FIRST = ("verification", "unit", "ca", "activation")
 
 
 def pytest_collection_modifyitems(items):
-    """Long groups first; in one of them what runs the same block side by side, all else as it is."""
+    """Long groups first; in the first, what runs the same block side by side."""
     rank = {name: place for place, name in enumerate(FIRST)}
 
     def place(item):
