@@ -152,20 +152,41 @@ def test_velocities_at_the_end_of_the_step_bear_longer_ones(rigs):
     assert abs(found[0]) < STRETCH < abs(found[1])
 
 
+def driven(velocity, step, steps, speed=0.0, frequency=0.0):
+    """Places [m] of a pair after some steps, less those at the start; its left side is driven.
+
+    speed: of both bodies at first [m/s].
+    """
+    drive = effects.PrescribedMotion("left", velocity, frequency)
+    scene = Scene(pair(), CONCRETE, [effects.BondDamping(), drive])
+    simulation = Simulation(scene, ImplicitDashpots(step, **TIGHT))
+    centre = simulation.model.centre
+    simulation.state.set_motion(centre, [1.0, 0.0, 0.0, 0.0], speed)
+    simulation.advance_to(steps)
+    return simulation.state.position.to_numpy() - centre
+
+
 def test_a_driven_body_gives_way_no_more_than_a_fixed_one():
     """Seen from a support with a constant velocity, a pair moves as beside one at rest.
 
     Places grow to 1e-4 m and round in each of the steps; the dashpots hand on what they get.
     """
-    steps, found = 50, []
+    steps, step, found = 50, 1e-6, []
     for speed in np.array([[0.0, 0.0, 0.0], [3.0, -2.0, 1.0]]):
-        listed = [effects.BondDamping(), effects.PrescribedMotion("left", speed)]
-        method = ImplicitDashpots(1e-6, **TIGHT)
-        simulation = Simulation(Scene(pair(), CONCRETE, listed), method)
-        centre = simulation.model.centre
-        parting = speed + np.array([[0.0], [0.1]])
-        simulation.state.set_motion(centre, [1.0, 0.0, 0.0, 0.0], parting)
-        simulation.advance_to(steps)
-        found.append(simulation.state.position.to_numpy() - centre - speed * steps * 1e-6)
+        moved = driven(speed, step, steps, speed + np.array([[0.0], [0.1]]))
+        found.append(moved - speed * steps * step)
     assert np.abs(found[0][1]).max() > 1e-7
     assert np.abs(found[1] - found[0]).max() < 100 * steps * 0.02 * EPS
+
+
+def test_a_body_beside_a_driven_one_follows_it_to_second_order():
+    """Steps h, h/2, h/4: the differences of the neighbour's way have the ratio 4.
+
+    A drive that the sweeps see half a step off would be of first order, ratio 2.
+    """
+    still = np.zeros((2, 3))
+    places = [
+        driven((0.3, 0.0, 0.1), 1e-6 / 2**k, 40 * 2**k, still, frequency=5e3)[1] for k in range(3)
+    ]
+    ratio = np.linalg.norm(places[0] - places[1]) / np.linalg.norm(places[1] - places[2])
+    assert np.log2(ratio) == pytest.approx(2.0, abs=0.05)
