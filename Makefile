@@ -37,11 +37,11 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-physics test-rest test-experiments test-slow test-quadrants attack fuzz lint bench gallery lessons docs mesh wheel \
-  release-check clean
+.PHONY: help venv demo test test-physics test-rest test-experiments test-slow test-quadrants attack fuzz lint bench \
+  gallery lessons docs mesh wheel release-check clean
 
 help: ## print this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-14s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-16s %s\n", $$1, $$2}' Makefile
 
 venv: $(STAMP) ## set up .venv (about a minute; done by itself where needed)
 
