@@ -12,11 +12,6 @@ METHODS = {
 UNTIL = 8.4e-5
 
 
-def squeezed_scene(kind=effects.SphereContact):
-    """The bar with gas at its other end too, which from 7e-5 s on drives together what breaks."""
-    return bar_scene(effects.GasPressure("right", peak=2e9, rise=5e-5), kind=kind)
-
-
 def bar_scene(*more, kind=effects.SphereContact):
     """Bar of 72 bodies and 112 bonds with all effects of the paper and more; kind: of contact."""
     listed = paper_effects(kind=kind)[:-1]

@@ -98,6 +98,7 @@ def taichi_session():
 
     Files of a group share a session, and so the engines that have been compiled, if there is room.
     """
+    _give_back()
     if runtime.settings() is not None and _is_full():
         _stop()
     if arch.chosen() == "cuda" and not runtime.cuda_present():
@@ -144,9 +145,14 @@ def _forget_runs(module):
 
 
 def _stop():
-    """Stop Taichi, and give what is free back to the system, where the C library can."""
+    """Stop Taichi, and give what is free back to the system."""
     if runtime.settings() is not None:
         runtime.stop()
+    _give_back()
+
+
+def _give_back():
+    """Give what is free back to the system, where the C library can: compiling leaves much."""
     gc.collect()
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)

@@ -60,7 +60,7 @@ class AtABlock:
     def __init__(self, block, material=CONCRETE):
         self.block = block
         parts = {"block": (self.block, (0.0,) * 3), "body": (single(0.05), (1.0, 0.0, 0.0))}
-        listed = [effects.FaceContact(spheres_per_body=2000, pairs_per_body=100)]
+        listed = [effects.FaceContact(spheres_per_body=4000, pairs_per_body=100)]
         mesh = placed_together(parts, keep_coincident=True)
         self.simulation = Simulation(Scene(mesh, material, listed), Uniform(1e-9))
         self.model, self.state = self.simulation.model, self.simulation.state

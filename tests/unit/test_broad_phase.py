@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import taichi as ti
 
 from taichi_dem import CONCRETE, Scene, Uniform, effects
 from taichi_dem.contact_search.contacts import FARTHEST, STEPS
@@ -11,10 +12,20 @@ from tests.again import Again
 DT = 1e-9
 
 
+@ti.data_oriented
+class Marked(effects.SphereContact):
+    """A contact law that declares a column of each kind (``test_pair_store``)."""
+
+    def declare_columns(self, store):
+        """Declare a vector of a pair, and a number of a sphere pair."""
+        self.vector = store.column("arrow", ti.f64, 3)
+        self.of_spheres = store.sphere_column("sphere_mark", ti.i32)
+
+
 @pytest.fixture(scope="module")
 def again():
     """A bar, to be thrown about."""
-    return Again(Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [effects.SphereContact()]), Uniform(DT))
+    return Again(Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [Marked()]), Uniform(DT))
 
 
 def scattered(again, skin, spread):

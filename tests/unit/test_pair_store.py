@@ -4,23 +4,13 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_dem import CONCRETE, Scene, Uniform, effects
+from taichi_dem import CONCRETE, Scene, Uniform
 from taichi_dem.mesh.shapes import bar
 from tests.again import Again
-from tests.unit.test_broad_phase import near_slots, slot_of_pair
+from tests.unit.test_broad_phase import Marked, near_slots, slot_of_pair
 
 #: Scale of the motion by which bodies come near and part [m]; the skin is a twentieth of it.
 SPREAD = 0.02
-
-
-@ti.data_oriented
-class Marked(effects.SphereContact):
-    """A contact law that declares a column of each kind."""
-
-    def declare_columns(self, store):
-        """Declare a vector of a pair, and a number of a sphere pair."""
-        self.vector = store.column("arrow", ti.f64, 3)
-        self.of_spheres = store.sphere_column("sphere_mark", ti.i32)
 
 
 @ti.data_oriented

@@ -27,7 +27,7 @@ def test_energy_never_grows_when_a_fast_fragment_hits_a_sleeping_block():
     laws = effects.Softening().silent(), effects.ShearSlip().silent()
     touch = effects.SphereContact(3, outer_faces=True), effects.Friction()
     listed = [effects.BondDamping(), *laws, *touch, effects.GasPressure(start=1.0)]
-    method = Multirate(1e-6, 1e-6, control=StepControl())
+    method = Multirate(1e-6, 1e-6, control=StepControl(), dashpot="limited")
     simulation = Simulation(Scene(target(), CONCRETE, listed), method)
     velocity = np.zeros((simulation.model.body_count, 3))
     velocity[-1, 0] = SPEED
@@ -46,7 +46,8 @@ def test_energy_never_grows_when_a_fast_fragment_hits_a_sleeping_block():
 @pytest.fixture(scope="module")
 def woken():
     """The paper's block under a brisk pulse with all of the control, until bonds have broken."""
-    simulation = Simulation(brisk_scene(), Multirate(1.6e-7, 2e-6, control=StepControl()))
+    method = Multirate(1.6e-7, 2e-6, control=StepControl(), dashpot="limited")
+    simulation = Simulation(brisk_scene(), method)
     simulation.advance_to(180)
     return simulation
 
