@@ -66,7 +66,7 @@ def paper_question(until: float, tolerance: float) -> Question:
     return Question(0, paper_scene(), until, goals.hole_displacement(), tolerance)
 
 
-def dropped_question() -> Question:
+def dropped_question(until: float) -> Question:
     """How far three stiff tetrahedra go that fall on a slab: each bounce magnifies what differs.
 
     Under 3,000 times the weight of the earth, without dashpots, friction and bonds of their own.
@@ -83,7 +83,7 @@ def dropped_question() -> Question:
     material = replace(CONCRETE, contact_damping=0.0)
     chosen = [effects.Gravity((-3e4, 0, 0)), effects.FaceContact(), effects.Fixed("floor_left")]
     scene = Scene(placed_together(parts), material, chosen)
-    return Question(0, scene, 0.0155, goals.displacement("base"), 0.01)
+    return Question(0, scene, until, goals.displacement("base"), 0.01)
 
 
 def _turn(random):

@@ -104,10 +104,10 @@ def judged_damper(question: Any) -> Optional[Judged]:
     return Judged(question, answer, answer.plan.seconds, float(true.mean()), doubt)
 
 
-def answered(question: Any) -> tuple[Answer, float]:
+def answered(question: Any, repeats: int = REPEATS) -> tuple[Answer, float]:
     """Answer to a question to the blast, and its CPU time [s]."""
     spent = []
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         begun = clock()
         given = {"until": question.until, "goal": question.goal, "progress": None}
         answer = solve(question.scene, tolerance=question.tolerance, **given)
@@ -119,18 +119,18 @@ def _job(question):
     return Job(question.scene, question.until, question.goal, question.tolerance, 0.95)
 
 
-def fixed_runs(question: Any) -> list[FixedRun]:
-    """All runs of the scan, those that diverge left out."""
-    found = (_fixed_run(question, words, method) for words, method in _scanned(question))
+def fixed_runs(question: Any, others: bool = True) -> list[FixedRun]:
+    """All runs of the scan, those that diverge left out; others: methods beside the answer's."""
+    found = (_fixed_run(question, words, method) for words, method in _scanned(question, others))
     return [run for run in found if run is not None]
 
 
-def _scanned(question):
+def _scanned(question, others):
     """Methods of the scan, with their words."""
     base = _job(question).methods()
     longest = base.until / base.steps
     found = [(base.in_words(k), base.make(longest / 2**k)) for k in SCANNED]
-    if base.make is ImplicitDashpots:
+    if others and base.make is ImplicitDashpots:
         report = step_report(question.scene)
         full, limited = (float(report.borne(kind).min()) for kind in ("full", "limited"))
         found += [(f"explicit, {dt:.2g} s", Uniform(dt)) for dt in (full, 0.5 * full)]

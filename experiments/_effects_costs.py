@@ -39,6 +39,18 @@ KNOWN_LISTS = {
 }
 
 
+def costs_of_blast(scenes, lists, certified, **shared):
+    """Costs of scenes and of lists, and the certificate of a run until a time [s]: by one process.
+
+    Contact of all effects is compiled once for all of them.
+    """
+    return {
+        "blast": blast_costs(scenes, **shared),
+        "lists": list_costs(lists, **shared),
+        "certificate": certificate(certified, shared["step"]),
+    }
+
+
 def blast_costs(scenes, until, step, states, **timing):
     """Costs of lists of effects by scene, the first with all; states: how many over the run."""
     method, times = ImplicitDashpots(step), middles(states, until)

@@ -87,8 +87,8 @@ def short_steps(impact, length):
     )
 
 
-def write(impacts, dt0, at):
-    """Write the tables of all that is plotted, the picture, and the film."""
+def write(impacts, dt0, at, pictures):
+    """Write the tables of all that is plotted, the picture, and the film of some pictures."""
     time = {"time_s": impacts[0].time}
     columns = dict(time)
     for impact in impacts:
@@ -99,7 +99,7 @@ def write(impacts, dt0, at):
         write_csv(at(f"levels_{impact.name}.csv"), {**time, **shares})
     write_csv(at("blow.csv"), columns)
     picture_blow(at("blow.png"), impacts, dt0)
-    film_blow(at("blow.gif"), impacts[:2], dt0)
+    film_blow(at("blow.gif"), impacts[:2], dt0, pictures)
 
 
 def picture_blow(path, impacts, dt0):
@@ -127,7 +127,7 @@ def picture_blow(path, impacts, dt0):
         share.set(xlabel="time [µs]", title=f"steps: {other.style.label}")
 
 
-def film_blow(path, impacts, dt0, count=40):
+def film_blow(path, impacts, dt0, count):
     """Both bars by their bodies' steps, and how far the struck end moves. count: of pictures."""
     top = int(max(impact.levels.max() for impact in impacts)) + 1
     runs, rows = [], np.linspace(0, len(impacts[0].time) - 1, count).round().astype(int)

@@ -37,21 +37,25 @@ from taichi_dem.kit import study
 NAME = "accuracy_on_request"
 QUESTIONS = Path(__file__).with_name("accuracy_questions.csv")
 SETTINGS = {
-    "prices": (30, 2, study.whole(1, 30), "questions whose price is compared"),
-    "blasts": (100, 3, study.whole(1, 120), "questions to the blast whose bars are checked"),
+    "prices": (30, 1, study.whole(1, 30), "questions whose price is compared"),
+    "blasts": (100, 2, study.whole(1, 120), "questions to the blast whose bars are checked"),
     "dampers": (24, 1, study.whole(1, 40), "questions to the damper whose bars are checked"),
+    # Of a quick run: short bars, all with the same effects.
+    "first": ({}, {"price": 3, "blast": 27}),
+    # Whether single runs of the paper's block are made by other methods than that of the answers.
+    "others": (True, False),
     "until": (1e-4, 5e-5),
     "later": (5e-4, 5e-5),
-    "tolerances": ((0.1, 0.03, 0.01, 0.003), (0.1, 0.03)),
+    "tolerances": ((0.1, 0.03, 0.01, 0.003), (0.1,)),
     "damper_tolerances": ((0.1, 0.03, 0.01), (0.3,)),
     "ratios": (33, 3),
     "cycles": ((150, 20), (5, 5)),
-    "twins": (8, 3),
+    "particles": (30, 10),
+    "dropped": (0.0155, 0.008),
+    "twins": (8, 2),
 }
 ROWS = "kind seed question tolerance_percent value error true holds reached cpu_s"
 PRICES = "seed question tolerance_percent solve_s cheapest_s cheapest_method half_step_s ratio"
-#: Of the paper's damper.
-PARTICLES = 30
 #: Times are of one thread.
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
@@ -59,11 +63,15 @@ options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads
 def run(options):
     """Ask all questions, judge the answers, write tables and pictures."""
     folder = study.begin(options)
-    prices = [price_row(blast_question(seed)) for seed in seeds_of("price", options.prices)]
+    asked = {
+        kind: seeds_of(kind, getattr(options, f"{kind}s"), options.first.get(kind, 0))
+        for kind in ("price", "blast", "damper")
+    }
+    prices = [price_row(blast_question(seed)) for seed in asked["price"]]
     study.write_rows(folder / "prices.csv", [row for row in prices if row], PRICES)
     judged = {
-        "blast": [judged_blast(blast_question(k)) for k in seeds_of("blast", options.blasts)],
-        "damper": [judged_damper(damper_question(k)) for k in seeds_of("damper", options.dampers)],
+        "blast": [judged_blast(blast_question(seed)) for seed in asked["blast"]],
+        "damper": [judged_damper(damper_question(seed)) for seed in asked["damper"]],
     }
     judged = {kind: [one for one in some if one is not None] for kind, some in judged.items()}
     rows = [one.row(kind) for kind, some in judged.items() for one in some]
@@ -75,10 +83,11 @@ def run(options):
     study.finish(options, NAME, found, compiling, see="cost.png")
 
 
-def seeds_of(kind, count):
-    """First seeds of a kind of question in the file."""
+def seeds_of(kind, count, first):
+    """So many seeds of a kind of question in the file, from the first on."""
     with open(QUESTIONS, newline="", encoding="utf-8") as lines:
-        return [int(row["seed"]) for row in csv.DictReader(lines) if row["kind"] == kind][:count]
+        found = [int(row["seed"]) for row in csv.DictReader(lines) if row["kind"] == kind]
+    return found[first : first + count]
 
 
 def price_row(question):
@@ -132,8 +141,8 @@ def draw_all(folder, options, judged):
     }
     everyone = [one for some in judged.values() for one in some]
     draw_calibration(folder / "calibration.png", deviations, share_held(everyone))
-    dropped = dropped_question()
-    answer, _ = answered(dropped)
+    dropped = dropped_question(options.dropped)
+    answer, _ = answered(dropped, repeats=1)
     print(f"dropped bodies: {answer}")
     draw_parting(folder / "twins.png", *twins_of(dropped, options.twins), answer)
     return figures
@@ -145,7 +154,7 @@ def cost_of_blast(options):
     for one in found:
         print(f"{100 * one.question.tolerance:g} %: {one.answer}")
     true, fixed = found[-1].true, {}
-    for one in fixed_runs(found[-1].question):
+    for one in fixed_runs(found[-1].question, options.others):
         name = one.method.split(",")[0]
         fixed.setdefault(name, []).append((abs(one.value / true - 1.0), one.seconds))
     seconds = at_one_percent(options.tolerances, [one.seconds for one in found])
@@ -161,7 +170,7 @@ def cost_of_damper(options):
     found = []
     with ProgressBar("damper") as bar:
         for share in options.damper_tolerances:
-            given = {"particles": PARTICLES, "tolerance": share, "progress": bar}
+            given = {"particles": options.particles, "tolerance": share, "progress": bar}
             found.append(solve_response(Spheres(), goal=asked, **given))
             print(f"{100 * share:g} %: {found[-1][0]}\n{found[-1][1]}")
     height, (fixed_s, peak) = [both[1] for both in found], fixed_damper(options)
@@ -175,7 +184,7 @@ def cost_of_damper(options):
 def fixed_damper(options):
     """CPU time [s] and peak RMS [m] of the usual job: 150 + 20 cycles at 33 frequencies."""
     ratios = np.linspace(0.88, 1.04, options.ratios)
-    given = {"particles": PARTICLES, "ratios": ratios, "seeds": 1, "progress": None}
+    given = {"particles": options.particles, "ratios": ratios, "seeds": 1, "progress": None}
     # Compiles.
     frequency_response(Spheres(), **given, transient_cycles=0, measured_cycles=1)
     begun, (transient, measured) = study.clock(), options.cycles

@@ -38,8 +38,8 @@ named = partial(choice, "method", allowed=METHODS)
 QUICK_METHODS = ["explicit_limited", "implicit"]
 SETTINGS = {
     "methods": ([*METHODS], QUICK_METHODS, study.several(named), "by comma; all"),
-    "until": (5e-4, 8e-5, study.number(0, 1), "simulated time [s], 5e-4"),
-    "stable_until": (1e-4, 8e-5, study.number(0, 1), "for the stable step [s], 1e-4"),
+    "until": (5e-4, 6e-5, study.number(0, 1), "simulated time [s], 5e-4"),
+    "stable_until": (1e-4, 6e-5, study.number(0, 1), "for the stable step [s], 1e-4"),
     "samples": (100, 10, study.whole(1, 100000), "rows of the time series, 100"),
     "doublings": (8, 0, study.whole(0, 20), "tried for the largest stable step, 8"),
 }

@@ -36,13 +36,13 @@ from taichi_dem.workload.picture import draw_acceleration, draw_cuts, draw_share
 
 NAME = "blast_scaling"
 SETTINGS = {
-    "until": (5e-4, 1e-4, study.number(0, 1), "simulated time [s], 5e-4"),
+    "until": (5e-4, 5e-5, study.number(0, 1), "simulated time [s], 5e-4"),
     "l": (1e-8, 1e-7, study.number(0, 1), "the paper's way of a body in a step [m]"),
     "every": (50, 50, study.whole(1, 100000), "steps an interval, 50"),
-    "repeats": (5, 2, study.whole(1, 100), "of the threads' times"),
+    "repeats": (5, 1, study.whole(1, 100), "of the threads' times"),
     "counts": ((*range(1, 25), 32, 48, 64, 96, 128, 192, 256), (1, 2, 4, 8, 16, 24, 64, 256)),
     # Boxes of the bar for the threads, six tetrahedra each, and turns of one and two threads.
-    "cells": ((40, 20, 20), (20, 10, 10)),
+    "cells": ((40, 20, 20), (10, 5, 5)),
     "rounds": (ROUNDS, 1),
 }
 DT0 = 1e-8

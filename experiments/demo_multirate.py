@@ -42,6 +42,7 @@ SETTINGS = {
     "speed": (20.0, 20.0, study.number(0, 50), "of the fragment [m/s], 20"),
     "methods": (tuple(METHODS), ("uniform", "held")),
     "until": (2e-4, 4e-5),
+    "pictures": (40, 10),
 }
 options_parser = partial(study.parser, NAME, __doc__, BLAST_DRIVERS, settings=SETTINGS)
 DT0, DISTANCE = 4e-8, 5e-8
@@ -90,7 +91,7 @@ def run(options):
         impact.compare(impacts[0])
     rows = TABLE.rows(impacts)
     TABLE.show(rows)
-    write(impacts, DT0, at)
+    write(impacts, DT0, at, options.pictures)
     reports = [impact.result.report for impact in impacts]
     words = caption(rows, impacts[1], LENGTH)
     study.finish(options, NAME, figures_of(rows), reports, caption=words)
