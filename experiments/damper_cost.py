@@ -7,7 +7,8 @@ Spheres by comparing all pairs, as in the paper, and by cells, at 2e-5 s, and co
 in steps of 1e-4 s; the automaton by a scan of all cells, as in the paper, and by a list of
 particles, at the paper's 1e-4 s and at the spheres' 2e-5 s. CPU seconds of one core for one cycle
 of 6 Hz on the spring, median of repeats, compile time apart. Then every filling is run at longer
-and longer steps until it refuses or diverges.
+and longer steps until it refuses or diverges. A quick run leaves out variants that need further
+programs, such as all pairs and the combination.
 """
 
 import sys
@@ -30,13 +31,6 @@ SOME = 50
 NUMBERS = [1, 2, 5, 10, 20, 30, 40, 50, 60, 80, 100, 120, 140, 160]
 #: Steps tried for stability [s].
 STEPS = (1e-5, 2e-5, 3e-5, 5e-5, 7e-5, 1e-4, 2e-4, 3e-4, 5e-4, 7e-4, 1e-3, 1.5e-3, 2e-3, 3e-3)
-SETTINGS = {
-    "particles": (NUMBERS, [1, 10, 50, 160], several(whole(1, 160)), "numbers, 1 to 160"),
-    "repeats": (5, 3, whole(1, 1000), "of every timing, 5"),
-    "seconds": (0.05, 0.01),
-    "cycles": (20, 3),
-    "steps": (STEPS, (2e-5, 1e-4, 1e-3, 2e-3)),
-}
 PAIRS, PAPER = Spheres(search="all_pairs"), Automaton(rules="paper")
 SCAN = replace(PAPER, traversal="scan")
 #: Label: filling, step [s], search or traversal with the step, marker, line. The paper's way is
@@ -50,6 +44,17 @@ VARIANTS = {
     "ca_scan_2e-5": (SCAN, 2e-5, "scan, 20 µs", "s", "--"),
     "ca_list_2e-5": (PAPER, 2e-5, "list, 20 µs", "s", "-"),
 }
+SETTINGS = {
+    "particles": (NUMBERS, [1, 10, 50, 160], several(whole(1, 160)), "numbers, 1 to 160"),
+    "repeats": (5, 3, whole(1, 1000), "of every timing, 5"),
+    "seconds": (0.05, 0.01),
+    "cycles": (20, 3),
+    # Those of a quick run need the fewest programs.
+    "variants": (tuple(VARIANTS), ("dem_cells", "ca_scan_1e-4", "ca_list_1e-4", "ca_list_2e-5")),
+    # Of the automaton in the search for the longest step.
+    "accountings": (("all", "landing"), ("all",)),
+    "steps": (STEPS, (2e-5, 1e-4, 1e-3, 2e-3)),
+}
 #: Marker of each outcome of a run.
 OUTCOMES = {"runs": "o", "diverges": "X", "refused": "|"}
 #: Times are of one thread.
@@ -61,13 +66,14 @@ def run(options):
     folder = study.begin(options)
     with ca_damper.ProgressBar("timing") as bar:
         costs, compiling = {}, 0.0
-        for k, label in enumerate(VARIANTS):
+        for k, label in enumerate(options.variants):
             costs[label], seconds = cost_of(label, options)
             compiling += seconds
-            bar.count(k + 1, len(VARIANTS))
+            bar.count(k + 1, len(options.variants))
+    automata = [replace(PAPER, accounting=word) for word in options.accountings]
     borne = {
         one.label: [(dt, outcome(one, dt, options.cycles)) for dt in options.steps]
-        for one in (Spheres(), PAPER, replace(PAPER, accounting="landing"))
+        for one in (Spheres(), *automata)
     }
     study.write_rows(folder / "cost.csv", [row for rows in costs.values() for row in rows])
     tried = [(label, *found) for label, rows in borne.items() for found in rows]

@@ -5,7 +5,7 @@ amplitude, beside the theory of collect and collide: grains fly as one block bet
 and lose all of their relative motion at each wall. Expect the loss to jump at A = gap / pi to 4 in
 units of N m A^2 w^2 and to fall slowly after it. Then with gravity over amplitude and frequency:
 below A w^2 = g grains lie still and are mere mass; the loss is largest where they are thrown
-once a cycle, from about twice that on.
+once a cycle, from about twice that on. A quick run leaves the rules of the paper out.
 
     python experiments/damper_maps.py            # two minutes
     python experiments/damper_maps.py --particles 20
@@ -34,9 +34,9 @@ SETTINGS = {
     "levels": (12, 5),
     "frequencies": (10, 4),
     "cycles": (60, 25),
+    # Spheres, and the automaton by the rules of the paper and of place.
+    "fillings": ((Spheres, partial(Automaton, rules="paper"), Automaton), (Spheres, Automaton)),
 }
-#: Spheres, and the automaton by the rules of the paper and of place.
-FILLINGS = (Spheres, partial(Automaton, rules="paper"), Automaton)
 #: Base motion without gravity [Hz], and ranges of the axes.
 WEIGHTLESS_HZ, RATIOS = 6.0, (0.6, 1.4)
 HERTZ, MILLIMETRES = (5.0, 40.0), (0.1, 10.0)
@@ -52,7 +52,7 @@ def run(options):
         "measured_cycles": options.cycles - half,
     }
     jumps, maps = {}, {}
-    for make in FILLINGS:
+    for make in options.fillings:
         weightless, heavy = make(gravity=0.0), make(gravity=9.8)
         label = heavy.label
         gap = 96e-3 - 6e-3 * options.block / 10

@@ -10,8 +10,8 @@ damping is left. Try other numbers of particles and places to let go from.
     python experiments/demo_damper.py --particles 50 --amplitude 40
     python experiments/demo_damper.py --filling spheres
 
-The film shows one filling; all figures are those of both, as medians over nine starts. An amplitude
-is sqrt(2) times the RMS displacement of a cycle of the empty container.
+The film shows one filling; all figures are those of both, as medians over nine starts, five in a
+quick run. An amplitude is sqrt(2) times the RMS displacement of a cycle of the empty container.
 
 With --effects auto the program computes the effects that the scene calls for (the spheres turn
 where friction makes them); "listed", the default, takes the fillings as they are.

@@ -134,11 +134,16 @@ def _band(axis, x, values, colour, label):
     axis.fill_between(x, values.min(axis=1), values.max(axis=1), color=colour, alpha=0.25, lw=0)
 
 
+def _columns(figure, handles):
+    """Columns of a legend over the figure: as many as it has room for."""
+    return max(1, min(5, len(handles), int(figure.get_figwidth() / 1.8)))
+
+
 def _legend_of_bands(figure, axis):
     """Legend above all panels, made from one of them: what bands are is its last entry."""
     handles, _ = axis.get_legend_handles_labels()
     handles.append(_band_key())
-    figure.legend(handles=handles, loc="outside upper center", ncols=min(5, len(handles)))
+    figure.legend(handles=handles, loc="outside upper center", ncols=_columns(figure, handles))
 
 
 def _band_key():
@@ -233,7 +238,7 @@ def picture_hysteresis(path: Optional[FileName], sweeps: Mapping[str, Any]) -> F
         for k, axis in enumerate(axes[:, 0]):
             axis.set_ylabel(f"{particles[k]} particles:\nRMS displacement [mm]")
         handles, _ = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles=handles, loc="outside upper center", ncols=min(5, len(handles)))
+        figure.legend(handles=handles, loc="outside upper center", ncols=_columns(figure, handles))
     return figure
 
 
