@@ -45,23 +45,35 @@ class ByGroup(LoadScopeScheduling):
         return nodeid if group == "experiments" else group
 
 
-def group_of(path):
-    """Group of a test file: its folder, all of the damper as one, and all that share the block."""
-    folder = path.parent.name
-    return "verification" if folder == "equivalence" else folder.partition("_")[0]
-
-
 #: Groups that take longest: begun first, so that workers end together.
 FIRST = ("verification", "unit", "ca", "activation")
+#: Files of the first group that run the paper's effects: side by side, as they share engines. The
+#: last of them gives all engines back.
+OF_THE_BLOCK = """equivalence/test_bits.py verification/test_conservation.py
+    equivalence/test_digests.py equivalence/test_restart.py verification/test_wake_up.py
+    verification/test_convergence.py verification/test_implicit_scenes.py
+    material/test_two_materials.py equivalence/test_shared_engines.py""".split()
+
+
+def group_of(path):
+    """Group of a test file: its folder, all of the damper as one, and all that share the block."""
+    if path.parent.name == "equivalence" or _name(path) in OF_THE_BLOCK:
+        return FIRST[0]
+    return path.parent.name.partition("_")[0]
+
+
+def _name(path):
+    return f"{path.parent.name}/{path.name}"
 
 
 def pytest_collection_modifyitems(items):
-    """Long groups first; in the first, what runs the same block side by side."""
+    """Long groups first; in the first, what shares engines side by side."""
     rank = {name: place for place, name in enumerate(FIRST)}
+    of_the_block = {name: place for place, name in enumerate(OF_THE_BLOCK)}
 
     def place(item):
-        group = group_of(item.path)
-        return rank.get(group, len(rank)), item.path.name if group == FIRST[0] else ""
+        later = len(of_the_block)
+        return rank.get(group_of(item.path), len(rank)), of_the_block.get(_name(item.path), later)
 
     items.sort(key=place)
 
@@ -86,8 +98,9 @@ def pytest_runtest_protocol(item):
         faulthandler.cancel_dump_traceback_later()
 
 
-#: Bytes by which the process has grown in a session beyond which the next file begins with another.
-_MOST_GROWTH = 0.7e9
+#: Bytes of the process beyond which the next file begins with another session, if that of before
+#: has taken a good part of them.
+_MOST_BYTES, _LEAST_GROWTH = 1.05e9, 0.25e9
 _MOST_TREES = 200
 _at_start = {}
 
@@ -111,8 +124,10 @@ def taichi_session():
 def _is_full():
     started = runtime.settings()
     other = (started.arch, started.threads, started.debug) != (arch.chosen(), 2, False)
-    grown = _resident_bytes() - _at_start.get("bytes", 0)
-    return other or grown > _MOST_GROWTH or tree_count() > _MOST_TREES
+    size = _resident_bytes()
+    grown = size - _at_start.get("bytes", 0)
+    is_full = size > _MOST_BYTES and grown > _LEAST_GROWTH
+    return other or is_full or tree_count() > _MOST_TREES
 
 
 def _resident_bytes():

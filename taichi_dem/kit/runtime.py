@@ -135,6 +135,8 @@ def stop() -> None:
         others = {thread.ident for thread in threading.enumerate()} - {threading.get_ident()}
         if _session is not None and _session.thread in others:
             check_thread("session")
+        for forget in _on_clear:
+            forget()
         ti.reset()
         _current = _session = None
 
