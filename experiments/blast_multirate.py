@@ -33,6 +33,7 @@ METHODS = {
     "multirate_drifted": partial(Multirate, neighbour="drifted"),
 }
 SETTINGS = {
+    "methods": (tuple(METHODS), ("uniform", "multirate_held")),
     "l": (1e-7, 1e-7, study.number(0, 1), "largest way of a body in a step [m], 1e-7"),
     "dt0": (1e-8, 1e-8, study.number(0, 1), "largest step [s], 1e-8"),
     "early": (None, None, study.number(0, 1), "first instant compared [s], 5e-5"),
@@ -107,7 +108,8 @@ def run(options):
         raise InputError(f"early must be at most until, {most} s, got {got}")
     scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     runs = {
-        name: [follow(name, options, scene) for _ in range(options.repeats)] for name in METHODS
+        name: [follow(name, options, scene) for _ in range(options.repeats)]
+        for name in options.methods
     }
     rows = TABLE.rows(compared(runs, "early") + compared(runs, "late"))
     study.write_rows(at("comparison.csv"), rows)

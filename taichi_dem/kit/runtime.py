@@ -77,6 +77,11 @@ class Session(Uncopied):
         self.process = os.getpid()
         self.cleared = False
 
+    def _runs_here(self) -> bool:
+        """Whether Taichi still runs it, and on this thread."""
+        here = self.thread == threading.get_ident()
+        return here and impl.get_runtime().prog is self.program
+
 
 def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False) -> Settings:
     """Start Taichi, or do nothing when it already runs with these settings.
@@ -122,7 +127,7 @@ def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False)
 
 
 def stop() -> None:
-    """End the Taichi session; every simulation and batch made in it becomes invalid.
+    """End the Taichi session and free its engines; simulations and batches become invalid.
 
     Raises
     ------
@@ -135,8 +140,8 @@ def stop() -> None:
         others = {thread.ident for thread in threading.enumerate()} - {threading.get_ident()}
         if _session is not None and _session.thread in others:
             check_thread("session")
-        for forget in _on_clear:
-            forget()
+        if _session is not None and _session._runs_here():
+            _free_engines()
         ti.reset()
         _current = _session = None
 
@@ -151,8 +156,7 @@ def clear() -> None:
     if _session is None or _current is None:
         return
     check_session(_session, "session")
-    for forget in _on_clear:
-        forget()
+    _free_engines()
     _session.cleared = True
     with _turn:
         ti.reset()
@@ -160,8 +164,13 @@ def clear() -> None:
         _session = Session()
 
 
+def _free_engines():
+    for forget in _on_clear:
+        forget()
+
+
 def when_cleared(forget: Callable[[], object]) -> None:
-    """Have a function called by ``clear``.
+    """Have a function called by ``clear`` and ``stop``.
 
     Parameters
     ----------

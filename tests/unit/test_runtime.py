@@ -11,8 +11,8 @@ import pytest
 from tests.scenes import ROOT
 
 _SCRIPT = """
-import json
-from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, runtime
+import gc, json, weakref
+from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, effects, runtime
 from taichi_dem.mesh.shapes import pair
 
 said = {}
@@ -29,7 +29,13 @@ first = runtime.start(threads=1)
 said["same"] = runtime.start(threads=1) is first
 refused("other", lambda: runtime.start(threads=2))
 simulation = Simulation(Scene(pair(), CONCRETE), Uniform())
+damped = Scene(pair(), CONCRETE, [effects.BondDamping()])
+engine = weakref.ref(Simulation(damped, Uniform()).loan.engine)
+gc.collect()
+said["kept"] = [engine() is not None]
 runtime.stop()
+gc.collect()
+said["kept"].append(engine() is not None)
 second = runtime.start(threads=2)
 said["threads"] = [first.threads, second.threads]
 refused("older session", lambda: simulation.advance_to(1))
@@ -60,6 +66,7 @@ def test_sessions_start_once_and_say_why_they_refuse(tmp_path):
     assert said["same"]
     assert "already runs" in said["other"] and "call stop()" in said["other"]
     assert "has been stopped" in said["older session"]
+    assert said["kept"] == [True, False]
     assert said["threads"] == [1, 2]
     assert said["time"] == 1e-8
 
