@@ -4,7 +4,6 @@ from functools import cache
 
 import numpy as np
 
-from taichi_dem.kit import runtime
 from tests.activation.late_scenes import METHOD, late_scene, scene_of, simulation
 
 #: Role of an effect by its name.
@@ -23,25 +22,34 @@ BITS = (
 
 
 class Run:
-    """A run of a scene or its twin, or a part of it."""
+    """What is left of a run of a scene or its twin, whose engine goes on to others.
+
+    before: what acted before the effect may. since, evaluated: of each bond and law, of those that
+    are evaluated on demand. misses: what the audit found, by kind.
+    """
 
     def __init__(self, name, word, needed=True, method=METHOD, driver="resident", **options):
         self.late = late_scene(name) if needed else late_scene(name).without()
         self.scene = scene_of(late_scene(name), word, needed, **options)
-        self.simulation = simulation(self.late, self.scene, method, driver)
+        made = simulation(self.late, self.scene, method, driver)
         self.before = None
         if self.late.late > 0.0:
-            self.simulation.advance_to(int(self.late.late / method.dt0))
-            self.before = acting(self.simulation)
-        self.simulation.advance_to(round(self.late.until / method.dt0))
-        self.fields = {key: f.to_numpy() for key, f in self.simulation.state.fields().items()}
-        self.acting = acting(self.simulation)
-        self.report = self.simulation.report(brief=True)
+            made.advance_to(int(self.late.late / method.dt0))
+            self.before = acting(made)
+        made.advance_to(round(self.late.until / method.dt0))
+        self.fields = {key: field.to_numpy() for key, field in made.state.fields().items()}
+        self.acting, self.report = acting(made), made.report(brief=True)
+        self.moved = self.fields["position"] - made.model.centre
+        self.start_energy, self.evaluations = made.energy_balance.start_energy, made.evaluations()
+        if word == "auto":
+            activity = made.state.activity
+            self.since, self.evaluated = activity.since.to_numpy(), activity.evaluated.to_numpy()
+            self.misses = made.step.audit.misses.to_numpy().tolist()
 
     @property
     def way(self):
         """Largest displacement [m]."""
-        return np.abs(self.fields["position"] - self.simulation.model.centre).max()
+        return np.abs(self.moved).max()
 
 
 def acting(simulation):
@@ -59,11 +67,7 @@ def acting(simulation):
     return found
 
 
-def run(name, word="auto", needed=True, **options):
-    """A run, made once in each Taichi session: its fields end with the session."""
-    return _made_in(runtime.session(), name, word, needed, **options)
-
-
 @cache
-def _made_in(_, name, word, needed, **options):
+def run(name, word="auto", needed=True, **options):
+    """A run, made once."""
     return Run(name, word, needed, **options)

@@ -59,5 +59,5 @@ def too_deep(self, i, is_fast, advance):
 def test_sleep_that_is_too_deep_is_found(monkeypatch, every_bond):
     monkeypatch.setattr(Sleeping, "_opens", too_deep)
     made = Run("far_end 0", "auto")
-    assert missed(made.simulation)[ASLEEP] > 0
+    assert made.misses[ASLEEP] > 0
     assert not made.report.certificate.holds

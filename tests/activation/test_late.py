@@ -65,12 +65,11 @@ def test_the_effect_acts_late_and_is_found(name):
 def test_one_bond_alone_reaches_the_limit(name):
     """It is evaluated from then on, and no other."""
     auto, law = run(name, sleep=0.0), int(late_scene(name).role == "shear")
-    since = auto.simulation.state.activity.since.to_numpy()
-    evaluated = auto.simulation.state.activity.evaluated.to_numpy()
+    since, evaluated = auto.since, auto.evaluated
     assert auto.acting[NAMES[late_scene(name).role]] == 1
     assert (since != NEVER).sum(axis=0).tolist() == [1 - law, law]
     assert (evaluated[since == NEVER] == 0).all()
-    assert 0 < evaluated[:, law].sum() < auto.simulation.evaluations()
+    assert 0 < evaluated[:, law].sum() < auto.evaluations
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -88,11 +87,10 @@ def test_sleep_leaves_the_motion_and_what_acts_as_they_are(name):
 def test_where_it_is_not_needed_it_never_acts(name):
     twin, role = run(name, needed=False), late_scene(name).role
     assert NAMES[role] not in twin.acting
-    activity = twin.simulation.state.activity
     if late_scene(name).is_limit:
         law = int(role == "shear")
-        assert (activity.since.to_numpy()[:, law] == NEVER).all()
-        assert not activity.evaluated.to_numpy()[:, law].any()
+        assert (twin.since[:, law] == NEVER).all()
+        assert not twin.evaluated[:, law].any()
     if role == "contact":
         assert "friction" not in twin.acting
 
@@ -108,10 +106,9 @@ def test_sleep_changes_momentum_and_residual_by_no_more_than_it_says(name):
     assert auto.report.linear_momentum_error <= auto.report.substeps * EPSILON
     account = auto.report.energy_balance
     given = abs(account["load_work"]) + abs(account["support_work"])
-    given += auto.simulation.energy_balance.start_energy
-    moved = awake.fields["position"] - awake.simulation.model.centre
+    given += auto.start_energy
     apart = np.abs(auto.fields["position"] - awake.fields["position"]).max()
-    apart /= np.abs(moved - moved.mean(axis=0)).max()
+    apart /= np.abs(awake.moved - awake.moved.mean(axis=0)).max()
     share = auto.report.certificate.energy + 2.0 * apart + auto.report.substeps * EPSILON
     found = account["residual"] - awake.report.energy_balance["residual"]
     assert abs(found) <= share * given
@@ -123,7 +120,7 @@ def test_less_is_left_out_than_was_allowed_and_the_audit_finds_nothing(name):
     assert certificate.impulse <= certificate.sleep == 1e-6
     assert certificate.energy <= certificate.sleep
     assert certificate.holds
-    assert run(name).simulation.step.audit.misses.to_numpy().tolist() == [0, 0, 0]
+    assert run(name).misses == [0, 0, 0]
 
 
 def test_far_from_the_origin_bodies_at_rest_sleep():
