@@ -42,7 +42,7 @@ SETTINGS = {
     "dampers": (24, 1, study.whole(1, 40), "questions to the damper whose bars are checked"),
     # Of a quick run: short bars, all with the same effects.
     "first": ({}, {"price": 3, "blast": 27}),
-    # Whether single runs of the paper's block are made by other methods than that of the answers.
+    # Whether single runs are made by other methods than that of the answers, too.
     "others": (True, False),
     "until": (1e-4, 5e-5),
     "later": (5e-4, 5e-5),
@@ -67,7 +67,7 @@ def run(options):
         kind: seeds_of(kind, getattr(options, f"{kind}s"), options.first.get(kind, 0))
         for kind in ("price", "blast", "damper")
     }
-    prices = [price_row(blast_question(seed)) for seed in asked["price"]]
+    prices = [price_row(blast_question(seed), options.others) for seed in asked["price"]]
     study.write_rows(folder / "prices.csv", [row for row in prices if row], PRICES)
     judged = {
         "blast": [judged_blast(blast_question(seed)) for seed in asked["blast"]],
@@ -90,9 +90,9 @@ def seeds_of(kind, count, first):
     return found[first : first + count]
 
 
-def price_row(question):
+def price_row(question, others):
     """Cells of the table of prices; None where no single run, or no answer, is good enough."""
-    found, runs = judged_blast(question), fixed_runs(question)
+    found, runs = judged_blast(question), fixed_runs(question, others)
     best = found and cheapest(runs, found.true, question.tolerance)
     if best is None or not found.answer.reached:
         return None

@@ -63,7 +63,7 @@ STEPS = {
     "implicit": (4e-6, 2e-6, 1e-6, 5e-7, 2.5e-7, 1e-7, 5e-8),
     "fixed": (1e-8, 4e-9, 2e-9, 1e-9),
 }
-QUICK_STEPS = {"multirate_held": (1e-7,), "limited": (2e-8,), "implicit": (5e-7,)}
+QUICK_STEPS = {"multirate_held": (1e-7,), "implicit": (5e-7,)}
 CHECK = "multirate_held"
 SETTINGS = {
     "until": (1e-4, 6e-5),

@@ -86,10 +86,7 @@ FILLINGS = {
     },
 }
 #: Of these in the quick job, where every scene compiles in a process of its own.
-QUICK_FILLINGS = {
-    "spheres": ("spheres as they are", "friction of spheres"),
-    "automaton": ("automaton as they are", "static contact"),
-}
+QUICK_FILLINGS = {"spheres": ("spheres as they are", "friction of spheres")}
 SEEDS, PARTICLES = (1, 2), 30
 #: Threads are processes side by side.
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)

@@ -78,6 +78,7 @@ def test_what_the_base_gives_is_what_dashpot_and_grains_take(engine):
     assert answer.energy["filling"] > 0.2 * given and answer.throw > 1.0
 
 
+@pytest.mark.slow
 def test_a_hard_pull_misses_what_is_left_out(engine):
     """The end is pulled out by v / (2 pi f); what would break says so, and what it did counts."""
     answer = engine.ask(_needs.answer, ("bond_damping",), 2.0)
