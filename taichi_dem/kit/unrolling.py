@@ -1,6 +1,6 @@
 """LLVM's run-time unrolling switched off: kernels compile in three quarters of the time.
 
-LLVM repeats the body of each small loop eight times, and most of ours turn once or twice. Taichi
+LLVM repeats the body of each small loop eight times, and most of ours turn but a few times. Taichi
 has no switch for it; that of LLVM is called by its address, where Taichi's library tells it.
 """
 
