@@ -82,7 +82,7 @@ def test_a_body_below_the_friction_angle_stays():
     assert abs(run.account["residual"]) < 0.006 * run.account["load_work"]
 
 
-@pytest.mark.parametrize("name", ["implicit", pytest.param("uniform", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", METHODS)
 def test_a_body_above_the_friction_angle_slides_as_coulomb_says(name):
     """g (sin - mu cos), and friction takes mu m g cos times the way.
 
