@@ -78,10 +78,9 @@ class Session(Uncopied):
         self.process = os.getpid()
         self.cleared = False
 
-    def _runs_here(self) -> bool:
-        """Whether Taichi still runs it, and on this thread."""
-        here = self.thread == threading.get_ident()
-        return here and impl.get_runtime().prog is self.program
+    def _is_running(self) -> bool:
+        """Whether neither ti.init nor ti.reset has ended it."""
+        return impl.get_runtime().prog is self.program
 
 
 def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False) -> Settings:
@@ -116,7 +115,7 @@ def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False)
     wanted = _checked(arch, threads, debug)
     _check_process()
     with _turn:
-        if _current and _session and impl.get_runtime().prog is _session.program:
+        if _current and _session and _session._is_running():
             if wanted != _current:
                 raise InputError(
                     f"Taichi already runs with {_current}, asked for {wanted}: call stop()"
@@ -138,10 +137,11 @@ def stop() -> None:
     global _current, _session
     _check_process()
     with _turn:
-        others = {thread.ident for thread in threading.enumerate()} - {threading.get_ident()}
+        here = threading.get_ident()
+        others = {thread.ident for thread in threading.enumerate()} - {here}
         if _session is not None and _session.thread in others:
             check_thread("session")
-        if _session is not None and _session._runs_here():
+        if _session is not None and _session.thread == here and _session._is_running():
             _free_engines()
         ti.reset()
         _current = _session = None
@@ -229,7 +229,7 @@ def check_session(made_in: Session, what: str) -> None:
     _check_process()
     if made_in is not _session:
         raise InputError(f"this {what} belongs to a Taichi session that has been stopped")
-    if impl.get_runtime().prog is not made_in.program:
+    if not made_in._is_running():
         raise InputError(
             f"this {what} belongs to a Taichi session that ti.init or ti.reset has ended: start "
             "and stop Taichi by runtime.start() and runtime.stop() only"
