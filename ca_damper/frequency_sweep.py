@@ -7,7 +7,7 @@ takes up its new speed at once.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Optional, Union
+from typing import Any, Optional, Union
 
 import numpy as np
 
@@ -26,10 +26,6 @@ from taichi_dem.kit.optional import optional
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, FileName
-
-if TYPE_CHECKING:
-    from ca_damper.plot.response_plots import SweepPlots
-
 
 # Half-width of the RMS by its cycles, beside the measures.
 _ERROR = "rms_error"
@@ -117,7 +113,7 @@ class Sweep:
         return xarray.concat([self.up.to_xarray(), self.down.to_xarray()], axis)
 
     @property
-    def plot(self) -> "SweepPlots":
+    def plot(self) -> Any:
         """Pictures of the sweep: ``sweep.plot.hysteresis(path="hysteresis.png")``."""
         # Imported here, so that matplotlib loads only where a picture is drawn.
         from ca_damper.plot.response_plots import SweepPlots

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Optional, Union
+from typing import Any, Optional, Union
 
 import numpy as np
 
@@ -25,9 +25,6 @@ from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.units import unit_of
 from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, whole
-
-if TYPE_CHECKING:
-    from ca_damper.plot.response_plots import ResponsePlots
 
 #: Particle numbers that a notebook shows, evenly over those there are.
 _MOST_SHOWN = 8
@@ -207,7 +204,7 @@ class Response(Tabulated):
         return made.assign_coords(ratio=("frequency", self.ratios, {"units": "1"}))
 
     @property
-    def plot(self) -> "ResponsePlots":
+    def plot(self) -> Any:
         """Pictures of the response, one function each: ``response.plot.curves("loss_factor")``."""
         # Imported here, so that matplotlib loads only where a picture is drawn.
         from ca_damper.plot.response_plots import ResponsePlots

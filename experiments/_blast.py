@@ -5,7 +5,7 @@ from functools import partial
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, quality_report, read_mesh
 from taichi_dem.kit.study import add_checkpoints, checkpoint_of, parser
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
-from taichi_dem.stability.step_control import StepControl
+from taichi_dem.step_control import StepControl
 
 #: Drivers of a blast, the first the default.
 BLAST_DRIVERS = ("auto", "resident", "parallel")

@@ -25,9 +25,9 @@ import numpy as np
 from _blast import blast_parser
 from _blast_ensemble import blast, draw_displacement, hole_moves, over_time
 from taichi_dem import CONCRETE, InputError, plot, read_mesh, sweep
-from taichi_dem.engine.model import Model
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
+from taichi_dem.state.model import Model
 
 NAME = "blast_ensemble"
 SETTINGS = {

@@ -51,8 +51,8 @@ from taichi_dem.simulation import Simulation
 from taichi_dem.solve import solve
 from taichi_dem.stability.elastic_report import elastic_report
 from taichi_dem.stability.quality import quality_report
-from taichi_dem.stability.step_control import StepControl
 from taichi_dem.stability.step_report import step_report
+from taichi_dem.step_control import StepControl
 
 __all__ = [
     "CONCRETE",

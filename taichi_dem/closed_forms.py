@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_dem.elasticity.bond_rules import per_bond
 from taichi_dem.materials import Material
+from taichi_dem.materials.bond_rules import per_bond
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import body_properties, topology_of
 

@@ -18,7 +18,6 @@ from typing import Any, Optional
 import numpy as np
 
 from taichi_dem import plot
-from taichi_dem.diagnostics.certificate import Certificate
 from taichi_dem.effects import GasPressure, ShearSlip, SphereContact
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
@@ -29,6 +28,7 @@ from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.output.record import write_bodies
 from taichi_dem.output.run_costs import level_columns, level_shares
+from taichi_dem.report.certificate import Certificate
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate

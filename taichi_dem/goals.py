@@ -12,8 +12,6 @@ from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem.diagnostics.energy_balance import TERMS
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.kit.validation import (
@@ -30,8 +28,10 @@ from taichi_dem.kit.validation import (
 from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.output.fragments import fragment_of_body
 from taichi_dem.output.hole_monitor import HoleMonitor
+from taichi_dem.report.energy_balance import TERMS
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
+from taichi_dem.state.model import Model
 
 #: "value": at the end. "extreme": over the run, of which its Results then have a time series.
 #: "count": one that changes in leaps, as a whole number does.

@@ -14,7 +14,7 @@ from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.kit.progress.progress import listening
 from taichi_dem.kit.validation import LARGEST
 from taichi_dem.simulation import Simulation
-from taichi_dem.timeline import NEVER
+from taichi_dem.state.timeline import NEVER
 
 #: Substeps to begin with.
 _FIRST = 64

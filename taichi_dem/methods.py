@@ -4,10 +4,10 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any, Optional, Protocol, Union
 
-from taichi_dem.effects.roles import members_of
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import between, choice, plain_fields, positive, shown
-from taichi_dem.stability.step_control import Displacement, FixedStep, StepControl
+from taichi_dem.laws.roles import members_of
+from taichi_dem.step_control import Displacement, FixedStep, StepControl
 
 NEIGHBOURS = ("held", "drifted")
 DASHPOTS = ("full", "limited")

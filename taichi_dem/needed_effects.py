@@ -9,18 +9,18 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
-from taichi_dem.diagnostics.estimates import Estimate, estimates_before
-from taichi_dem.diagnostics.report import Report
-from taichi_dem.effects.chosen import ChosenEffects
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.validation import fraction, instance, positive
+from taichi_dem.laws.chosen import ChosenEffects
 from taichi_dem.mesh.parts import may_meet, parts_of
+from taichi_dem.report.estimates import Estimate, estimates_before
+from taichi_dem.report.report import Report
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import run_simulation
 from taichi_dem.simulation import Simulation
+from taichi_dem.state.model import Model
 
 #: Largest difference of two runs that rounding explains, as a share of what is recorded.
 ROUNDING = 1e-9

@@ -8,8 +8,6 @@ from typing import Any, Callable, Optional, Protocol, Union
 
 import numpy as np
 
-from taichi_dem.diagnostics.report import Report
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Pace
@@ -17,8 +15,10 @@ from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import instance, plain_fields, positive, shown, told_apart, whole
 from taichi_dem.methods import Method
 from taichi_dem.output.record import Frame, Recorder
+from taichi_dem.report.report import Report
 from taichi_dem.simulation import Simulation
-from taichi_dem.timeline import MACRO_TICKS, NEVER
+from taichi_dem.state.model import Model
+from taichi_dem.state.timeline import MACRO_TICKS, NEVER
 
 #: Largest steps that can be counted to, and calls of an observer in a run.
 _MOST_STEPS, _MOST_CALLS = 2**42, 1_000_000

@@ -4,14 +4,10 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Optional
+from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem.diagnostics.certificate import Certificate
-from taichi_dem.diagnostics.energy_balance import injected_words
-from taichi_dem.diagnostics.report import Report
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import counted, embedded, in_brief, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
@@ -29,10 +25,11 @@ from taichi_dem.output.record import (
     write_bonds,
     write_paraview,
 )
+from taichi_dem.report.certificate import Certificate
+from taichi_dem.report.energy_balance import injected_words
+from taichi_dem.report.report import Report
 from taichi_dem.scene import Scene
-
-if TYPE_CHECKING:
-    from taichi_dem.plot.result.plots import ResultPlots
+from taichi_dem.state.model import Model
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +143,7 @@ class Result(RunExports):
         return np.array([[along.mean() for along in way] for way in ways]).reshape(-1, 3)
 
     @property
-    def plot(self) -> "ResultPlots":
+    def plot(self) -> Any:
         """Pictures of the run, one function each: ``result.plot.energy(path="energy.png")``."""
         # Imported here, so that matplotlib loads only where a picture is drawn.
         from taichi_dem.plot.result.plots import ResultPlots

@@ -6,10 +6,6 @@ from typing import Any, ClassVar, Optional
 
 import numpy as np
 
-from taichi_dem.body_materials import BodyMaterials, body_materials
-from taichi_dem.effects.base import MANY, Effect, check_one_material
-from taichi_dem.effects.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
-from taichi_dem.effects.roles import check_effect
 from taichi_dem.initial_motion import initial_motion
 from taichi_dem.kit.display import counted, embedded, in_brief, titled
 from taichi_dem.kit.errors import InputError
@@ -25,10 +21,15 @@ from taichi_dem.kit.validation import (
     told_apart,
     word,
 )
+from taichi_dem.laws.base import Effect, check_one_material
+from taichi_dem.laws.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
+from taichi_dem.laws.roles import check_effect
 from taichi_dem.materials import Material
+from taichi_dem.materials.body_materials import BodyMaterials, body_materials
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
 from taichi_dem.mesh.topology import check_free
+from taichi_dem.state.model import MANY
 
 #: Share of an opening at which a law begins, and of a mean speed, at which no body wakes others.
 SLEEP = 1e-6

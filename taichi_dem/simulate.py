@@ -7,7 +7,6 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
-from taichi_dem.effects.history import unresolved_histories
 from taichi_dem.kit.checkpoint import Checkpoint, digest, identity_of, version_text
 from taichi_dem.kit.engine_pool import LoanMemory
 from taichi_dem.kit.errors import InputError, SimulationDiverged
@@ -16,6 +15,7 @@ from taichi_dem.kit.progress.progress import Listener, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, Owner, RunSnapshot, opened
 from taichi_dem.kit.validation import AUTO, FileName, instance, told_apart, word
+from taichi_dem.loads.history import unresolved_histories
 from taichi_dem.measured_speedup import speedup_of_run
 from taichi_dem.methods import Method, check_method
 from taichi_dem.observers import Observer, RunView
@@ -26,7 +26,7 @@ from taichi_dem.result import Result
 from taichi_dem.run_plan import RunPlan
 from taichi_dem.scene import Scene, scene_warnings
 from taichi_dem.simulation import Simulation, macro_steps
-from taichi_dem.timeline import MACRO_TICKS
+from taichi_dem.state.timeline import MACRO_TICKS
 
 
 @claiming()

@@ -10,38 +10,38 @@ from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem.diagnostics.bond_slip import BondSlips
-from taichi_dem.diagnostics.certificate import acting_since, certificate_of
-from taichi_dem.diagnostics.divergence import DivergenceCheck
-from taichi_dem.diagnostics.effect_activity import effect_activity
-from taichi_dem.diagnostics.energy_balance import EnergyBalance, open_account
-from taichi_dem.diagnostics.known_error import known_error
-from taichi_dem.diagnostics.missing_effects import MissingEffects
-from taichi_dem.diagnostics.readings import Readings
-from taichi_dem.diagnostics.report import Report
-from taichi_dem.diagnostics.shared_volume import SharedVolume
-from taichi_dem.diagnostics.step_resolution import StepResolution
-from taichi_dem.effects.gas_pressure import GasPressure
-from taichi_dem.engine.capacity import capacity_of
-from taichi_dem.engine.engine import ENGINES, Structure
-from taichi_dem.engine.model import Model
-from taichi_dem.engine.state import State
-from taichi_dem.engine.tables import Tables
-from taichi_dem.engine.view import PartView
+from taichi_dem.engine import ENGINES, Structure
+from taichi_dem.engine_view import PartView
 from taichi_dem.kit import runtime
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, instance, positive, shown, told_apart, whole
+from taichi_dem.loads.gas_pressure import GasPressure
 from taichi_dem.methods import Method, check_method
+from taichi_dem.report.bond_slip import BondSlips
+from taichi_dem.report.certificate import acting_since, certificate_of
+from taichi_dem.report.divergence import DivergenceCheck
+from taichi_dem.report.effect_activity import effect_activity
+from taichi_dem.report.energy_balance import EnergyBalance, open_account
+from taichi_dem.report.known_error import known_error
+from taichi_dem.report.missing_effects import MissingEffects
+from taichi_dem.report.readings import Readings
+from taichi_dem.report.report import Report
+from taichi_dem.report.shared_volume import SharedVolume
+from taichi_dem.report.step_resolution import StepResolution
 from taichi_dem.scene import Scene
-from taichi_dem.stability.step_control import counted_criteria
+from taichi_dem.state.capacity import capacity_of
+from taichi_dem.state.model import Model
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
+from taichi_dem.state.timeline import MACRO_TICKS, NEVER
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.auto_driver import MEASURED, AutoDriver, driver_name
 from taichi_dem.step.drivers import DRIVERS, Step
 from taichi_dem.step.schedule import Schedule
-from taichi_dem.timeline import MACRO_TICKS, NEVER
+from taichi_dem.step_control import counted_criteria
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42

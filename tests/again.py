@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from taichi_dem import Simulation
-from taichi_dem.timeline import MACRO_TICKS
+from taichi_dem.state.timeline import MACRO_TICKS
 
 
 class Again:

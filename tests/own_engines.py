@@ -5,7 +5,7 @@ import functools
 import pytest
 
 from ca_damper.engine import damper_engine
-from taichi_dem.engine.engine import ENGINES
+from taichi_dem.engine import ENGINES
 
 
 @pytest.fixture

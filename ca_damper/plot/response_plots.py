@@ -1,6 +1,6 @@
 """Pictures of a response or a sweep, one function each: ``response.plot``, ``sweep.plot``."""
 
-from typing import TYPE_CHECKING, Optional
+from typing import Any, Optional
 
 from matplotlib.figure import Figure
 
@@ -11,10 +11,6 @@ from ca_damper.plot.response import (
     picture_rms,
 )
 from taichi_dem.kit.validation import FileName, choice
-
-if TYPE_CHECKING:
-    from ca_damper.frequency_sweep import Sweep
-    from ca_damper.response import Response
 
 
 class ResponsePlots:
@@ -31,7 +27,7 @@ class ResponsePlots:
         response.plot.curves("loss_factor")
     """
 
-    def __init__(self, response: "Response"):
+    def __init__(self, response: Any):
         self._response = response
 
     def curves(self, measure: str = "rms", *, path: Optional[FileName] = None) -> Figure:
@@ -55,7 +51,7 @@ class ResponsePlots:
 class SweepPlots:
     """Pictures of a sweep; functions as those of ``ResponsePlots``."""
 
-    def __init__(self, sweep: "Sweep"):
+    def __init__(self, sweep: Any):
         self._sweep = sweep
 
     def hysteresis(self, *, path: Optional[FileName] = None) -> Figure:

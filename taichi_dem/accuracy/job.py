@@ -4,11 +4,11 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+from taichi_dem.elasticity.rates import bond_rates, springs_of
 from taichi_dem.goals import Goal
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.methods import ImplicitDashpots, Uniform
 from taichi_dem.scene import Scene
-from taichi_dem.stability.mesh_limits import bond_rates, springs_of
 from taichi_dem.stability.stable_step import spring_step
 from taichi_dem.stability.step_report import step_report
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from taichi_dem.accuracy.job import Job
 from taichi_dem.accuracy.runs import Runs
-from taichi_dem.diagnostics.energy_balance import open_account
 from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan, doubted
 from taichi_dem.kit.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
 from taichi_dem.kit.accuracy.step_error import StepError, step_error
 from taichi_dem.kit.accuracy.student import mean_and_deviation, t_quantile
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.validation import told_apart
+from taichi_dem.report.energy_balance import open_account
 
 #: Halvings of the step until one is stable, and from there on; of one refinement.
 _MOST_COARSE, _MOST_FINE, _MOST_AT_ONCE = 6, 7, 2

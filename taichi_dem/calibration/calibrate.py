@@ -7,19 +7,19 @@ from typing import Any, Optional
 import numpy as np
 
 from taichi_dem.calibration.strength_tests import TESTS
-from taichi_dem.elasticity.bond_rules import (
-    ContactShareOfCritical,
-    FaceStiffness,
-    ModulusOverDistance,
-    ShareOfCritical,
-)
 from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
-from taichi_dem.elasticity.moduli import POISSON, bond_moduli, checked_poisson, elastic_constants
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import MODULUS, STRENGTH, in_unit
 from taichi_dem.kit.validation import between, instance, positive, told_apart, whole
 from taichi_dem.materials import Material
+from taichi_dem.materials.bond_rules import (
+    ContactShareOfCritical,
+    FaceStiffness,
+    ModulusOverDistance,
+    ShareOfCritical,
+)
+from taichi_dem.materials.moduli import POISSON, bond_moduli, checked_poisson, elastic_constants
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.stability.elastic_report import element_sizes
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_dem.elasticity.bond_rules import BondGeometry, evaluated, per_bond
 from taichi_dem.elasticity.statics import BondStatics
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.kit.validation import instance, shown
+from taichi_dem.materials.bond_rules import BondGeometry, evaluated, per_bond
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import (
@@ -23,7 +23,7 @@ from taichi_dem.mesh.topology import (
 )
 
 if TYPE_CHECKING:
-    from taichi_dem.body_materials import AnyMaterial
+    from taichi_dem.materials.body_materials import AnyMaterial
 
 #: Components of stress and strain, in Voigt's order; strains yz, zx and xy are twice the tensor's.
 VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))

@@ -1,19 +1,15 @@
 """Groups chosen by where they are: faces for loads, supports, notches; bodies (NumPy only)."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, Callable, Optional
+from typing import Optional
 
 import numpy as np
 
-from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot
-from taichi_dem.kit.validation import direction, instance, shown, unit_vector, word
+from taichi_dem.kit.validation import direction, instance, unit_vector
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
-
-#: Given the centres of faces or bodies [m], (n, 3), whether each is chosen, (n,).
-Choice = Callable[[np.ndarray], Any]
+from taichi_dem.mesh.mesh_methods import Choice, choose, with_faces
 
 
 def with_outer_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
@@ -22,9 +18,7 @@ def with_outer_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
     chosen: a function of the centres [m], (n, 3), that returns n truth values, as ``lambda x: x[:,
     1] > 0.5``. Raises InputError for a name that is taken, a choice of no face, or other values.
     """
-    faces = geometry.all_faces(instance("mesh", mesh, Mesh).tetrahedra)
-    outer = faces[geometry.outer_rows(faces)]
-    return _with_group(mesh, name, outer[_choose(mesh, outer, chosen)])
+    return instance("mesh", mesh, Mesh).group(name, chosen)
 
 
 def with_body_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
@@ -56,12 +50,7 @@ def with_body_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
     >>> mesh.group_bodies("upper").size > 0
     True
     """
-    if word("name", name) in instance("mesh", mesh, Mesh).body_groups:
-        raise InputError(f"name must be that of a new group, got {shown(name)}, which is there")
-    bodies = np.flatnonzero(_choose(mesh, mesh.tetrahedra, chosen, "bodies"))
-    if not len(bodies):
-        raise InputError(f"group {name} must have at least one body, but none was chosen")
-    return replace(mesh, body_groups={**mesh.body_groups, name: bodies})
+    return instance("mesh", mesh, Mesh).body_group(name, chosen)
 
 
 def with_inner_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
@@ -71,7 +60,7 @@ def with_inner_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
     ``with_outer_group``.
     """
     inner = _inner_faces(mesh)[0]
-    return _with_group(mesh, name, inner[_choose(mesh, inner, chosen)])
+    return with_faces(mesh, name, inner[choose(mesh, inner, chosen)])
 
 
 def with_cut(
@@ -94,33 +83,11 @@ def with_cut(
     before = dot(centre - origin, along) > 0.0
     faces = inner[before[bodies[:, 0]] != before[bodies[:, 1]]]
     if chosen is not None:
-        faces = faces[_choose(mesh, faces, chosen)]
-    return _with_group(mesh, name, faces)
+        faces = faces[choose(mesh, faces, chosen)]
+    return with_faces(mesh, name, faces)
 
 
 def _inner_faces(mesh):
     """Faces between two bodies, (n, 3), and these bodies, (n, 2)."""
     rows = geometry.shared_faces(mesh.tetrahedra)
     return geometry.all_faces(mesh.tetrahedra)[rows[:, 0]], rows // 4
-
-
-def _choose(mesh, corners, chosen, what="faces"):
-    """Which faces or bodies, given by their corners, a choice takes, (n,)."""
-    centres = mesh.points[corners].mean(axis=1)
-    if not callable(chosen):
-        raise InputError(f"chosen must be a function of centres of {what}, got {shown(chosen)}")
-    found = np.asarray(chosen(centres))
-    if found.shape != (len(corners),) or found.dtype != bool:
-        raise InputError(
-            f"chosen must return one truth value for each of {len(corners)} {what}, got an "
-            f"array of {found.dtype} of shape {found.shape}"
-        )
-    return found
-
-
-def _with_group(mesh, name, faces):
-    if word("name", name) in mesh.groups:
-        raise InputError(f"name must be that of a new group, got {shown(name)}, which is there")
-    if not len(faces):
-        raise InputError(f"group {name} must have at least one face, but none was chosen")
-    return replace(mesh, groups={**mesh.groups, name: faces})

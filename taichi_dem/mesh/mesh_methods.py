@@ -1,17 +1,21 @@
 """Methods of a mesh that give another mesh, or a picture of it."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Optional
+from dataclasses import replace
+from typing import Any, Optional, TypeVar
 
 import numpy as np
 
 from taichi_dem.kit import pictures
 from taichi_dem.kit.display import embedded, titled
-from taichi_dem.kit.validation import FileName, direction
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import FileName, direction, shown, word
+from taichi_dem.mesh import tetrahedra as geometry
 
-if TYPE_CHECKING:
-    from taichi_dem.mesh.mesh import Mesh
-
+#: Given the centres of faces or bodies [m], (n, 3), whether each is chosen, (n,).
+Choice = Callable[[np.ndarray], Any]
+#: A mesh.
+Made = TypeVar("Made", bound="MeshMethods")
 #: Digits of the entries of a rotation: those that every machine's sine agrees on.
 _DIGITS = 15
 
@@ -19,7 +23,7 @@ _DIGITS = 15
 class MeshMethods:
     """What ``Mesh`` inherits."""
 
-    def group(self, name: str, chosen: Callable[[np.ndarray], Any]) -> "Mesh":
+    def group(self: Made, name: str, chosen: Choice) -> Made:
         """Return the mesh with one more group: outer faces chosen by their centres.
 
         Parameters
@@ -45,12 +49,12 @@ class MeshMethods:
         >>> "high" in mesh.groups
         True
         """
-        from taichi_dem.mesh.face_groups import with_outer_group
-
         mesh: Any = self
-        return with_outer_group(mesh, name, chosen)
+        faces = geometry.all_faces(mesh.tetrahedra)
+        outer = faces[geometry.outer_rows(faces)]
+        return with_faces(mesh, name, outer[choose(mesh, outer, chosen)])
 
-    def body_group(self, name: str, chosen: Callable[[np.ndarray], Any]) -> "Mesh":
+    def body_group(self: Made, name: str, chosen: Choice) -> Made:
         """Return the mesh with one more group of bodies, chosen by their centres.
 
         Parameters
@@ -70,18 +74,21 @@ class MeshMethods:
         InputError
             The name is taken, no body is chosen, or other values are returned.
         """
-        from taichi_dem.mesh.face_groups import with_body_group
-
         mesh: Any = self
-        return with_body_group(mesh, name, chosen)
+        if word("name", name) in mesh.body_groups:
+            raise InputError(f"name must be that of a new group, got {shown(name)}, which is there")
+        bodies = np.flatnonzero(choose(mesh, mesh.tetrahedra, chosen, "bodies"))
+        if not len(bodies):
+            raise InputError(f"group {name} must have at least one body, but none was chosen")
+        return replace(mesh, body_groups={**mesh.body_groups, name: bodies})
 
     def moved(
-        self,
+        self: Made,
         *,
         by: Sequence[float] = (0.0, 0.0, 0.0),
         turned: Sequence[float] = (0.0, 0.0, 0.0),
         about: Optional[Sequence[float]] = None,
-    ) -> "Mesh":
+    ) -> Made:
         """Return the mesh at another place: turned, then shifted.
 
         Parameters
@@ -104,8 +111,6 @@ class MeshMethods:
         InputError
             A value is not three finite numbers.
         """
-        from dataclasses import replace
-
         mesh: Any = self
         shift, turn = np.array(direction("by", by)), _rotation(direction("turned", turned))
         low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
@@ -144,3 +149,26 @@ def _rotation(turned):
     cos, sin = np.cos(radians), np.sin(radians)
     made = cos * np.eye(3) + sin * cross + (1.0 - cos) * axis[:, None] * axis[None, :]
     return np.round(made, _DIGITS)
+
+
+def choose(mesh: Any, corners: np.ndarray, chosen: Choice, what: str = "faces") -> np.ndarray:
+    """Which faces or bodies, given by their corners, a choice takes, (n,)."""
+    centres = mesh.points[corners].mean(axis=1)
+    if not callable(chosen):
+        raise InputError(f"chosen must be a function of centres of {what}, got {shown(chosen)}")
+    found = np.asarray(chosen(centres))
+    if found.shape != (len(corners),) or found.dtype != bool:
+        raise InputError(
+            f"chosen must return one truth value for each of {len(corners)} {what}, got an "
+            f"array of {found.dtype} of shape {found.shape}"
+        )
+    return found
+
+
+def with_faces(mesh: Any, name: str, faces: np.ndarray) -> Any:
+    """The mesh with one more group of faces, given by their corners."""
+    if word("name", name) in mesh.groups:
+        raise InputError(f"name must be that of a new group, got {shown(name)}, which is there")
+    if not len(faces):
+        raise InputError(f"group {name} must have at least one face, but none was chosen")
+    return replace(mesh, groups={**mesh.groups, name: faces})

@@ -5,11 +5,11 @@ from typing import Optional
 
 import numpy as np
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.validation import flag, positive
 from taichi_dem.output.hole_monitor import HoleMonitor
+from taichi_dem.state.model import Model
 
 #: Bodies below which no power is fitted.
 _FEWEST = 10

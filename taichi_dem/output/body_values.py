@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.validation import choice
 from taichi_dem.output.fragments import broken_by, fragment_of_body
 from taichi_dem.output.record import Frame
+from taichi_dem.state.model import Model
 
 #: Multiples of the golden ratio, less whole numbers, lie far apart.
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.validation import unit_vector, whole
 from taichi_dem.mesh.tetrahedra import area_vectors
+from taichi_dem.state.model import Model
 
 #: Sine of the angle between a face and a plane below which they count as parallel.
 _PARALLEL = 1e-6

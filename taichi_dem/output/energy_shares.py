@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from taichi_dem.diagnostics.energy_balance import TERMS
 from taichi_dem.kit.data_table import Table
+from taichi_dem.report.energy_balance import TERMS
 
 _GIVEN = ("load_work", "support_work", "injected")
 #: Of these some may be there at the start.

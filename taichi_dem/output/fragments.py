@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.data_table import Table
 from taichi_dem.mesh.tetrahedra import components, signed_volumes
 from taichi_dem.output.motion_record import body_spins
 from taichi_dem.output.record import Frame
+from taichi_dem.state.model import Model
 
 _AXES = "xyz"
 

@@ -4,12 +4,12 @@ from typing import Optional
 
 import numpy as np
 
-from taichi_dem.effects.gas_pressure import GasPressure
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.fixed_order import dot, length, weakest_direction
+from taichi_dem.loads.gas_pressure import GasPressure
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
 from taichi_dem.scene import Scene
+from taichi_dem.state.model import Model
 
 
 def watched_groups(scene: Scene) -> tuple[str, ...]:

@@ -8,7 +8,6 @@ from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.files import output_folder, remove_files, write_csv
@@ -17,7 +16,8 @@ from taichi_dem.mesh.files import write_pvd, write_vtu
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.output.hole_monitor import HoleMonitor
 from taichi_dem.simulation import Simulation
-from taichi_dem.timeline import MAX_LEVEL, NEVER
+from taichi_dem.state.model import Model
+from taichi_dem.state.timeline import MAX_LEVEL, NEVER
 
 #: Energy terms that have a column of their own in the time series, in its order.
 ENERGY_COLUMNS = (

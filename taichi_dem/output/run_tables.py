@@ -4,7 +4,6 @@ from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import whole
@@ -16,6 +15,7 @@ from taichi_dem.output.fragments import Fragments, fragments_of
 from taichi_dem.output.hole_monitor import watched_group
 from taichi_dem.output.record import Frame
 from taichi_dem.scene import Scene
+from taichi_dem.state.model import Model
 
 
 class RunTables:

@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import area_key, picture
 from taichi_dem.kit.validation import FileName
 from taichi_dem.plot.block import frame_block, name_outer_axes
 from taichi_dem.plot.view import View, surface
+from taichi_dem.state.model import Model
 
 _NEVER = "#E4E0D6"
 #: Titles by name, as ``Simulation.acting_since`` names them.

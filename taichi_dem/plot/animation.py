@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import STYLE, filming, write_gif
 from taichi_dem.kit.validation import FileName
 from taichi_dem.output.record import Frame
 from taichi_dem.plot.block import break_times, displaced, frame_block
 from taichi_dem.plot.view import View, surface, traces
+from taichi_dem.state.model import Model
 
 #: Half decades of speed that are told apart; what is slower has one colour.
 _STEPS = 7

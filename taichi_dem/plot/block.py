@@ -9,12 +9,12 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import area_key, picture
 from taichi_dem.kit.validation import FileName
 from taichi_dem.output.record import Frame, body_corners
 from taichi_dem.plot.levels import level_look, level_names
 from taichi_dem.plot.view import View, surface, traces
+from taichi_dem.state.model import Model
 
 STONE, JOINT, _INSIDE = "#E4E0D6", "#C9C3B5", "#B5AD9C"
 

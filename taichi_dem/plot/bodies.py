@@ -6,10 +6,10 @@ from typing import Any, Optional
 import numpy as np
 from matplotlib.collections import PolyCollection
 
-from taichi_dem.engine.model import Model
 from taichi_dem.output.record import Frame
 from taichi_dem.plot.block import displaced
 from taichi_dem.plot.view import View, surface
+from taichi_dem.state.model import Model
 
 
 def draw_bodies(

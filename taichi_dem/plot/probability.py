@@ -7,12 +7,12 @@ import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap, Normalize
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import picture
 from taichi_dem.kit.validation import FileName
 from taichi_dem.plot.block import JOINT, STONE, frame_block
 from taichi_dem.plot.deep import crossings
 from taichi_dem.plot.view import View, surface, traces
+from taichi_dem.state.model import Model
 
 
 def plot_crack_probability(path: FileName, model: Model, probability: np.ndarray) -> None:

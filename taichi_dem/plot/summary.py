@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import BLACK, BLUE, png_of, styled
 from taichi_dem.output.record import Frame, outward_columns
 from taichi_dem.plot.block import draw_breaks, frame_block
 from taichi_dem.plot.bodies import draw_bodies
 from taichi_dem.plot.view import View
+from taichi_dem.state.model import Model
 
 #: From this ratio of its sides on, a block lies above the curves and not beside them.
 _LONG = 2.2

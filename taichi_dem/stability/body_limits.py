@@ -4,16 +4,21 @@ A body's rates change only where a bond breaks or a contact comes near or leaves
 listed, and their rates found anew at the start of the next substep.
 """
 
-from typing import TYPE_CHECKING, Any, Optional
+from typing import Any, Optional
 
 import numpy as np
 import taichi as ti
 
+from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real
+from taichi_dem.methods import Method
 from taichi_dem.stability.contact_limits import ContactLimits
 from taichi_dem.stability.stable_step import dashpot_limit, spring_limit
-from taichi_dem.stability.step_control import (
+from taichi_dem.state.model import Model
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
+from taichi_dem.step_control import (
     BOND_C,
     BOND_K,
     CONTACT_C,
@@ -30,13 +35,6 @@ from taichi_dem.stability.step_control import (
     level_of,
     shorter,
 )
-
-if TYPE_CHECKING:
-    from taichi_dem.contact_search.contacts import Contacts
-    from taichi_dem.engine.model import Model
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
-    from taichi_dem.methods import Method
 
 HIT, RELEASE, CLOSE = (1 << k for k in range(len(EVENTS)))
 #: With c min(1, LIMITED / X) no dashpot takes more than this in a step (X = 2 is unstable).
@@ -84,9 +82,7 @@ class StabilityLimits:
 
     constant_fields = ("dashpot_table", "spring_table")
 
-    def __init__(
-        self, tables: "Tables", state: "State", contacts: Optional["Contacts"], method: "Method"
-    ):
+    def __init__(self, tables: Tables, state: State, contacts: Optional[Contacts], method: Method):
         self.tables, self.state, self.contacts = tables, state, contacts
         self.control = method.control
         self.controlled = method.control is not None
@@ -124,7 +120,7 @@ class StabilityLimits:
         self.listed_count = ti.field(ti.i32, shape=())
         self.woken = ti.field(ti.i32, shape=())
 
-    def load(self, model: "Model", method: "Method") -> None:
+    def load(self, model: Model, method: Method) -> None:
         """Load the bonds of a model and the numbers of a method."""
         rule = method.control or StepControl()
         assign(self.rule, np.array([method.dt0, rule.safety, rule.dashpot_floor]))
@@ -289,7 +285,7 @@ class StabilityLimits:
 
 
 def limits_for(
-    tables: "Tables", state: "State", contacts: Optional["Contacts"], method: "Method"
+    tables: Tables, state: State, contacts: Optional[Contacts], method: Method
 ) -> Optional[StabilityLimits]:
     """Limits for a method; None where it neither controls steps nor limits dashpots."""
     wanted = getattr(method, "control", None) or getattr(method, "dashpot", "full") == "limited"

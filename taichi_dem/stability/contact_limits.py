@@ -1,25 +1,21 @@
 """Contacts counted before they touch, and the limits they set to a body's step."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import taichi as ti
 from numpy.typing import ArrayLike
 
+from taichi_dem.contact.contacts import Contacts
+from taichi_dem.elasticity.rates import inverse_root
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.products import matmul, matmul_transposed, transposed_matmul
 from taichi_dem.kit.types import mat3, real
 from taichi_dem.physics.rotation import place_in, unit3
 from taichi_dem.physics.sphere_pair import is_within
 from taichi_dem.physics.wrench import cross_matrix
-from taichi_dem.stability.mesh_limits import inverse_root
-from taichi_dem.timeline import MAX_LEVEL
-
-if TYPE_CHECKING:
-    from taichi_dem.contact_search.contacts import Contacts
-    from taichi_dem.engine.model import Model
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
+from taichi_dem.state.model import Model
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
+from taichi_dem.state.timeline import MAX_LEVEL
 
 #: Squarings of the block of near contacts: tr(A^32)^(1/32) exceeds its largest eigenvalue by at
 #: most 6^(1/32), 6 %, and is never below it.
@@ -70,7 +66,7 @@ class ContactLimits:
 
     constant_fields = ("ahead", "root_mass", "root_inertia", "slides")
 
-    def __init__(self, tables: "Tables", state: "State", contacts: "Contacts"):
+    def __init__(self, tables: Tables, state: State, contacts: Contacts):
         self.tables, self.state, self.contacts = tables, state, contacts
         self.store = contacts.store
         self.ahead = ti.field(real, shape=MAX_LEVEL + 1)
@@ -80,7 +76,7 @@ class ContactLimits:
         self.root_mass = ti.field(real, shape=tables.capacity.bodies)
         self.root_inertia = ti.Matrix.field(3, 3, real, shape=tables.capacity.bodies)
 
-    def load(self, model: "Model", ahead: float) -> None:
+    def load(self, model: Model, ahead: float) -> None:
         """Load a model, and the time [s] that a step of level 0 looks ahead."""
         assign(self.ahead, ahead / 2.0 ** np.arange(MAX_LEVEL + 1))
         root = inverse_root(model.body_mass, model.body_inertia)

@@ -6,13 +6,13 @@ from typing import Optional, Union
 
 import numpy as np
 
-from taichi_dem.elasticity.bond_rules import ModulusOverDistance
 from taichi_dem.elasticity.mesh_stiffness import MeshStiffness, mesh_stiffness
-from taichi_dem.elasticity.moduli import elastic_constants
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import instance
 from taichi_dem.materials import Material
+from taichi_dem.materials.bond_rules import ModulusOverDistance
+from taichi_dem.materials.moduli import elastic_constants
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.scene import Scene
 from taichi_dem.stability.step_report import METHODS, StepReport, step_report

@@ -6,18 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.body_materials import AnyMaterial, BodyMaterials
-from taichi_dem.kit.display import counted, in_brief
-from taichi_dem.kit.validation import instance, whole
-from taichi_dem.materials import Material
-from taichi_dem.mesh import tetrahedra as geometry
-from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.topology import body_properties, topology_of
-from taichi_dem.stability.mesh_limits import (
+from taichi_dem.elasticity.rates import (
     bond_rates,
     dashpots_of,
     springs_of,
 )
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.validation import instance, whole
+from taichi_dem.materials import Material
+from taichi_dem.materials.body_materials import AnyMaterial, BodyMaterials
+from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.topology import body_properties, topology_of
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
 
 #: Elements listed in the printed table.

@@ -6,19 +6,7 @@ from typing import Optional, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_dem.body_materials import laid_out
-from taichi_dem.kit.display import counted, in_brief
-from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.fixed_order import length
-from taichi_dem.kit.validation import shown, whole
-from taichi_dem.materials import Material
-from taichi_dem.mesh.contact_spheres import spheres_of_faces
-from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
-from taichi_dem.mesh.topology import Density, body_properties, topology_of
-from taichi_dem.scene import Scene, scene_warnings
-from taichi_dem.stability.body_limits import LIMITED
-from taichi_dem.stability.mesh_limits import (
+from taichi_dem.elasticity.rates import (
     bond_rates,
     dashpots_of,
     inverse_root,
@@ -26,8 +14,20 @@ from taichi_dem.stability.mesh_limits import (
     scaled_eigenvalues,
     springs_of,
 )
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.fixed_order import length
+from taichi_dem.kit.validation import shown, whole
+from taichi_dem.materials import Material
+from taichi_dem.materials.body_materials import laid_out
+from taichi_dem.mesh.contact_spheres import spheres_of_faces
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
+from taichi_dem.mesh.topology import Density, body_properties, topology_of
+from taichi_dem.scene import Scene, scene_warnings
+from taichi_dem.stability.body_limits import LIMITED
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
-from taichi_dem.stability.step_control import StepControl
+from taichi_dem.step_control import StepControl
 
 #: Elements listed in the printed table.
 _WORST = 10

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.timeline import MAX_LEVEL
+from taichi_dem.state.timeline import MAX_LEVEL
 
 
 @ti.func

@@ -6,27 +6,25 @@ bodies, with opposite signs; a body takes the sum at its own time (Konno et al.,
 / m, L += T, then x += dt v and q = exp(dt w) q, with the spin w in the middle of the turn.
 """
 
-from typing import TYPE_CHECKING, Optional
+from typing import Optional
 
 import taichi as ti
 
-from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.products import stacked, transposed_matvec
 from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
 from taichi_dem.stability.body_limits import RELEASE
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
 from taichi_dem.step.bond_laws import BondLaws
 from taichi_dem.step.contact_force import ContactForce
 from taichi_dem.step.ground import GroundDashpots
+from taichi_dem.step.implicit.solver import Solver
 from taichi_dem.step.load_times import LoadTimes
+from taichi_dem.step.schedule import Schedule
 from taichi_dem.step.tangential_springs import TangentialSprings
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
-    from taichi_dem.step.implicit.solver import Solver
-    from taichi_dem.step.schedule import Schedule
 
 
 @ti.data_oriented
@@ -41,11 +39,11 @@ class Advance(BondLaws, ContactForce):
 
     def __init__(
         self,
-        tables: "Tables",
-        state: "State",
-        schedule: "Schedule",
+        tables: Tables,
+        state: State,
+        schedule: Schedule,
         contacts: Optional[Contacts],
-        solver: Optional["Solver"] = None,
+        solver: Optional[Solver] = None,
     ):
         self.tables, self.state, self.schedule = tables, state, schedule
         self.activity = state.activity
@@ -257,7 +255,7 @@ class Advance(BondLaws, ContactForce):
         self.state.position[i] = self.state.position[i] + elapsed * velocity
         self.state.last_tick[i] = self.state.tick[None]
         if ti.static(self.tables.on_demand):
-            self.state.sleeping.stir(i, self, elapsed, velocity, momentum)
+            self.schedule.sleeping.stir(i, self, elapsed, velocity, momentum)
         if ti.static(self.has_contact):
             self.contacts.moved(i, velocity, spin, elapsed)
         speed2 = velocity.norm_sqr()

@@ -4,19 +4,15 @@ One in 1024 of the bonds is looked at in every substep, by a hash of the number 
 result decides what is looked at, and nothing that the audit does remains.
 """
 
-from typing import TYPE_CHECKING
-
 import taichi as ti
 
 from taichi_dem.kit.types import vec2
 from taichi_dem.physics.bond import unit_arm, unit_opening
-from taichi_dem.step.activity import SLIP, SOFTENING
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
-    from taichi_dem.step.advance import Advance
-    from taichi_dem.step.schedule import Schedule
+from taichi_dem.state.activity import SLIP, SOFTENING
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
+from taichi_dem.step.advance import Advance
+from taichi_dem.step.schedule import Schedule
 
 #: One bond in so many is looked at; a power of two.
 RATE = 1024
@@ -48,9 +44,9 @@ class Audit:
 
     scratch_fields = ("first",)
 
-    def __init__(self, tables: "Tables", state: "State", schedule: "Schedule", advance: "Advance"):
+    def __init__(self, tables: Tables, state: State, schedule: Schedule, advance: Advance):
         self.tables, self.state, self.schedule, self.advance = tables, state, schedule, advance
-        self.activity, self.sleeping = state.activity, state.sleeping
+        self.activity, self.sleeping = state.activity, schedule.sleeping
         self.first = ti.field(ti.i32, shape=())
         self.audited, self.misses = (ti.field(ti.i64, shape=len(KINDS)) for _ in range(2))
         self.memory = [_memory(law, tables) for law in (tables.tension, tables.shear)]

@@ -30,7 +30,7 @@ class Begin:
         if schedule.has_limits:
             limited = ((self.bodies, schedule.limits.refresh),)
         if schedule.sleeps:
-            asleep = (self.bodies, self.stir), (self.bodies, self.state.sleeping.begin_beside)
+            asleep = (self.bodies, self.stir), (self.bodies, self.schedule.sleeping.begin_beside)
         return (
             (Once(), self.reset),
             *limited,
@@ -50,7 +50,7 @@ class Begin:
     @ti.func
     def stir(self, i):
         """Wake body i where something acts on it."""
-        self.state.sleeping.begin(i, self.advance)
+        self.schedule.sleeping.begin(i, self.advance)
 
     @ti.func
     def choose_level(self, i):

@@ -5,7 +5,7 @@ import taichi as ti
 from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.physics.bond import unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import zero3
-from taichi_dem.step.activity import SLIP, SOFTENING
+from taichi_dem.state.activity import SLIP, SOFTENING
 
 
 @ti.func

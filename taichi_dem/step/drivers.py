@@ -10,7 +10,7 @@ from typing import Optional, Protocol
 
 import taichi as ti
 
-from taichi_dem.contact_search.search import BroadPhase
+from taichi_dem.contact.search import BroadPhase
 from taichi_dem.kit.allocation import values
 from taichi_dem.step.active_list import Once
 from taichi_dem.step.advance import Advance
@@ -19,8 +19,7 @@ from taichi_dem.step.begin import Begin, Phases, SolvedBegin, joined
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
 from taichi_dem.step.schedule import Schedule
-from taichi_dem.step.sleeping import Chunks
-from taichi_dem.step.wake_up import WakeUp
+from taichi_dem.step.wake_up import Chunks, WakeUp
 
 #: The parallel driver is called for about this long [s] between two checks of divergence, progress
 #: and Ctrl-C.
@@ -79,9 +78,9 @@ class Step:
 
     def _rested(self):
         """Phases that find the momentum at which bodies wake others, where some may sleep."""
-        if self.state.sleeping is None:
+        if not self.schedule.sleeps:
             return ()
-        chunks = Chunks(self.state.sleeping, self.schedule)
+        chunks = Chunks(self.schedule)
         return (chunks, chunks.add), (Once(), chunks.end)
 
     def _audited(self):

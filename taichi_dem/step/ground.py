@@ -1,17 +1,13 @@
 """Dashpots between bodies and the ground, solved in the body's own update."""
 
-from typing import TYPE_CHECKING
-
 import taichi as ti
 
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.ground import braked_twist, twist_of
 from taichi_dem.physics.rotation import world_tensor
 from taichi_dem.physics.wrench import plus, zero_block
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
 
 
 @ti.data_oriented
@@ -21,7 +17,7 @@ class GroundDashpots:
     present: whether the scene lists one. above: rows of ``Advance._loaded`` above theirs.
     """
 
-    def __init__(self, tables: "Tables", state: "State"):
+    def __init__(self, tables: Tables, state: State):
         self.tables, self.state = tables, state
         self.present, self.above = bool(tables.ground), len(tables.loads)
 

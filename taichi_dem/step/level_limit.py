@@ -1,15 +1,13 @@
 """How much coarser a body may step than those it touches."""
 
-from typing import TYPE_CHECKING, Optional
+from typing import Optional
 
 import taichi as ti
 
-from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.contact.contacts import Contacts
 from taichi_dem.stability.body_limits import CLOSE, StabilityLimits
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
 
 
 @ti.data_oriented
@@ -22,8 +20,8 @@ class LevelLimit:
 
     def __init__(
         self,
-        tables: "Tables",
-        state: "State",
+        tables: Tables,
+        state: State,
         contacts: Optional[Contacts],
         limits: StabilityLimits,
     ):

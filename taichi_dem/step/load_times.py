@@ -1,12 +1,9 @@
 """Times from and up to which each load acts on a body: without a gap, so that no pulse is lost."""
 
-from typing import TYPE_CHECKING
-
 import taichi as ti
 
-if TYPE_CHECKING:
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
 
 
 @ti.data_oriented
@@ -18,7 +15,7 @@ class LoadTimes:
     balances them also where steps change, and may be behind or ahead until it changes.
     """
 
-    def __init__(self, tables: "Tables", state: "State"):
+    def __init__(self, tables: Tables, state: State):
         self.tables, self.state = tables, state
 
     @ti.func

@@ -4,27 +4,30 @@ Levels change seldom compared with their use, so a change of a body's level move
 entries.
 """
 
-from typing import TYPE_CHECKING, Any, Optional
+from typing import Any, Optional
 
 import numpy as np
 import taichi as ti
 
-from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import assign, raise_to, values
 from taichi_dem.kit.types import real
 from taichi_dem.methods import Method
 from taichi_dem.stability.body_limits import StabilityLimits
-from taichi_dem.stability.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
+from taichi_dem.state.model import Model
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
+from taichi_dem.state.timeline import (
+    MACRO_TICKS,
+    MAX_LEVEL,
+    device_coarsest_active,
+    device_ticks_of,
+)
 from taichi_dem.step.active_list import ActiveList, itself
 from taichi_dem.step.applied_until import AppliedUntil
 from taichi_dem.step.level_limit import LevelLimit
-from taichi_dem.step.sleeping import ASLEEP
-from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_active, device_ticks_of
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.model import Model
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
+from taichi_dem.step.sleeping import ASLEEP, Sleeping
+from taichi_dem.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 
 
 @ti.data_oriented
@@ -46,8 +49,8 @@ class Schedule:
 
     def __init__(
         self,
-        tables: "Tables",
-        state: "State",
+        tables: Tables,
+        state: State,
         contacts: Optional[Contacts],
         criterion: Any,
         uniform: bool,
@@ -57,9 +60,13 @@ class Schedule:
         self.tables, self.state, self.contacts, self.limits = tables, state, contacts, limits
         self.has_limits = limits is not None
         self.sleeps, self.woken = tables.on_demand, None
+        self.sleeping = Sleeping(tables) if self.sleeps else None
         self.controlled = self.has_limits and limits.control is not None
         self.retimes = self.controlled and limits.wakes != 0
-        self.applied_until = AppliedUntil(tables, state, self, contacts) if self.retimes else None
+        self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
+        self.applied_until = (
+            AppliedUntil(tables, state, self.step_seconds, contacts) if self.retimes else None
+        )
         self.spreads = self.controlled and not uniform and limits.spreads
         if limits is not None and self.spreads:
             self.level_limit = LevelLimit(tables, state, contacts, limits)
@@ -67,7 +74,6 @@ class Schedule:
         self.has_contact = contacts is not None
         self.store = contacts.store if self.has_contact else None
         capacity = tables.capacity
-        self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
         self.bodies = ActiveList(capacity.bodies)
         self.bonds = ActiveList(capacity.bonds)
         self.pairs = ActiveList(self.store.slots if self.has_contact else 1)
@@ -79,13 +85,15 @@ class Schedule:
         self.changed_count = ti.field(ti.i32, shape=())
         self.evaluations = ti.field(ti.i64, shape=6)
 
-    def load(self, model: "Model", method: Method) -> None:
-        """Load the steps of a method."""
+    def load(self, model: Model, method: Method, sleep: float) -> None:
+        """Load the steps of a method; sleep: see ``Scene``."""
         assign(self.step_seconds, method.dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
         # A user-defined rule may have no numbers to load.
         getattr(self.criterion, "load", lambda *_: None)(method.distance, method.dt0)
         if self.has_limits:
             self.limits.load(model, method)
+        if self.sleeping is not None:
+            self.sleeping.load(model, sleep)
 
     @property
     def dt0(self) -> float:
@@ -251,7 +259,7 @@ class Schedule:
             for a in range(self.store.near_count[None]):
                 for side in ti.static(range(2)):
                     pair = self.store.body[self.store.near_slot[a]]
-                    self.state.sleeping.awaken(pair[side], self.state)
+                    self.sleeping.awaken(pair[side], self.state)
             self.woken.admit(False)
         self._list_pairs()
         if ti.static(not self.uniform):
@@ -315,7 +323,7 @@ class Schedule:
             i, j = slots[0] >> 2, slots[1] >> 2
             key = self._key(i, j)
             if ti.static(self.sleeps):
-                if not self.state.sleeping.both_awake(i, j):
+                if not self.sleeping.both_awake(i, j):
                     key = -1
         return key
 
@@ -340,7 +348,7 @@ class Schedule:
             if ti.static(self.has_contact):
                 key = ti.max(key, self.contacts.finest_partner(i))
         if ti.static(self.sleeps):
-            if self.state.sleeping.awake[i] == ASLEEP:
+            if self.sleeping.awake[i] == ASLEEP:
                 key = -1
         return key
 

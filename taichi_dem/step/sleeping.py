@@ -7,21 +7,15 @@ at which both of its bodies are awake, with its whole opening: momentum is exact
 that it left out before are equal and opposite. They are bounded and booked when the bond wakes.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.types import real, vec2
+from taichi_dem.kit.types import real
 from taichi_dem.mesh.parts import parts_of
-from taichi_dem.timeline import MACRO_TICKS, NEVER
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.model import Model
-    from taichi_dem.engine.tables import Tables
-    from taichi_dem.step.advance import Advance
-    from taichi_dem.step.schedule import Schedule
+from taichi_dem.state.model import Model
+from taichi_dem.state.tables import Tables
+from taichi_dem.state.timeline import MACRO_TICKS, NEVER
 
 ASLEEP, AWAKE, STIRRED = range(3)
 #: Bodies whose momenta are summed one after the other.
@@ -46,7 +40,7 @@ class Sleeping:
     bound of the impulse [N s] and the energy [J] that each bond left out before it woke.
     """
 
-    def __init__(self, tables: "Tables"):
+    def __init__(self, tables: Tables):
         n = tables.capacity.bodies
         self.tables, self.acting = tables, (*tables.loads, *tables.supports)
         self.awake = ti.field(ti.i32, shape=n)
@@ -63,7 +57,7 @@ class Sleeping:
         self.sums = ti.field(real, shape=n)
         self.left_out = ti.Vector.field(2, real, shape=tables.capacity.bonds)
 
-    def load(self, model: "Model", share: float) -> None:
+    def load(self, model: Model, share: float) -> None:
         """Begin with all bodies asleep; all fields are zero before."""
         assign(self.since, np.full(model.body_count, NEVER))
         assign(self.share, share)
@@ -220,93 +214,3 @@ class Sleeping:
                 bound = self.share[None] * self.mean[p]
                 self.bound2[p] = bound * bound
                 total = 0.0
-
-
-@ti.data_oriented
-class Chunks:
-    """List of the chunks of bodies, at the ticks at which their momenta are summed."""
-
-    def __init__(self, sleeping: Sleeping, schedule: "Schedule"):
-        self.sleeping, self.state, self.schedule = sleeping, schedule.state, schedule
-
-    @ti.func
-    def count(self, low):
-        """Number of chunks now."""
-        count = 0
-        if self.sleeping.is_due(self.state.tick[None]):
-            count = self.sleeping.chunk_count[None]
-        return count
-
-    @ti.func
-    def pick(self, a):
-        """One of them."""
-        return a
-
-    @ti.func
-    def add(self, c):
-        """Sum the momenta of one."""
-        self.sleeping.chunk(c, self.state)
-
-    @ti.func
-    def end(self, one):
-        """Set the bound, and bring bodies woken of late into the order of the others.
-
-        Visits in the order of waking take up to 40 % longer.
-        """
-        if self.sleeping.is_due(self.state.tick[None]):
-            self.sleeping.renew_bound()
-            if self.sleeping.unsorted[None] > 0:
-                self.sleeping.unsorted[None] = 0
-                self.schedule.list_members()
-
-
-@ti.data_oriented
-class WokenLists:
-    """Puts woken bodies and their bonds on the lists of a schedule; books what they left out."""
-
-    def __init__(self, sleeping: Sleeping, schedule: "Schedule", advance: "Advance"):
-        self.sleeping, self.schedule, self.advance = sleeping, schedule, advance
-        self.tables, self.state = schedule.tables, schedule.state
-
-    @ti.func
-    def admit(self, moved: ti.template()):
-        """List the bodies woken since the last call, and the bonds that now act.
-
-        moved: whether bodies have moved since bonds were evaluated.
-        """
-        for a in range(self.sleeping.woken_count[None]):
-            i = self.sleeping.woken[a]
-            self.schedule.bodies.insert(i, self.schedule.body_key(i))
-            for f in range(4):
-                b = self.tables.face_bond[4 * i + f]
-                if b >= 0:
-                    key = self.schedule.bond_key(b)
-                    if key >= 0 and self.schedule.bonds.key[b] < 0:
-                        self.schedule.bonds.insert(b, key)
-                        self.sleeping.left_out[b] = self.left_out(b, moved)
-        self.sleeping.unsorted[None] = (
-            self.sleeping.unsorted[None] + self.sleeping.woken_count[None]
-        )
-        self.sleeping.woken_count[None] = 0
-
-    @ti.func
-    def left_out(self, b, moved: ti.template()):
-        """Bound of the impulse [N s] and the energy [J] that a bond has left out so far.
-
-        One body moved while the other slept, since it woke. moved: whether it has gone on since the
-        bond would last have been evaluated, as it does in the step in which it wakes others.
-        """
-        slots = self.tables.bond_slots[b]
-        i, j = slots[0] >> 2, slots[1] >> 2
-        if self.sleeping.since[i] < 0 or (
-            self.sleeping.since[j] >= 0 and self.sleeping.since[j] < self.sleeping.since[i]
-        ):
-            i = j
-        first, last, found = self.sleeping.since[i], 0.0, vec2(0.0, 0.0)
-        if ti.static(moved):
-            last = self.sleeping.stride[i]
-        if 0 <= first and first < self.state.tick[None]:
-            elapsed = self.schedule.seconds(self.state.tick[None] - first)
-            rounding = self.sleeping.rounding(i, self.state)
-            found = self.advance.withheld(b, elapsed, last, rounding)
-        return found

@@ -1,16 +1,14 @@
 """Tangential springs between contact spheres, for friction laws with memory."""
 
-from typing import TYPE_CHECKING, Optional
+from typing import Optional
 
 import taichi as ti
 
-from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.products import matvec, transposed_matvec
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
-    from taichi_dem.step.schedule import Schedule
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
+from taichi_dem.step.schedule import Schedule
 
 
 @ti.data_oriented
@@ -21,7 +19,7 @@ class TangentialSprings:
     """
 
     def __init__(
-        self, tables: "Tables", state: "State", schedule: "Schedule", contacts: Optional[Contacts]
+        self, tables: Tables, state: State, schedule: Schedule, contacts: Optional[Contacts]
     ):
         self.friction, self.state, self.schedule = tables.friction, state, schedule
         self.present = contacts is not None and contacts.remembers

@@ -6,13 +6,13 @@ from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.validation import FileName
 from taichi_dem.kit.viewer import WebPage, pack, quantise, select_frames, show_page, time_unit
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
 from taichi_dem.output.record import Frame
 from taichi_dem.plot.view import edge_keys, first_breaks, skin
+from taichi_dem.state.model import Model
 from taichi_dem.viewer.modes import colour_modes
 
 _HERE = Path(__file__).resolve().parent

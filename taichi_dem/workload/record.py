@@ -17,9 +17,9 @@ from taichi_dem.observers import Every
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import run_simulation
 from taichi_dem.simulation import Simulation
+from taichi_dem.state.timeline import MAX_LEVEL
 from taichi_dem.step.active_list import Once
 from taichi_dem.step.drivers import Resident, Step
-from taichi_dem.timeline import MAX_LEVEL
 
 #: What is counted: bonds, contact pairs, and the pairs of spheres that are compared in these.
 KINDS = ("bonds", "pairs", "spheres")

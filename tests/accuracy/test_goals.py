@@ -17,8 +17,8 @@ from taichi_dem import (
     read_mesh,
     simulate,
 )
-from taichi_dem.engine.model import Model
 from taichi_dem.result import Result
+from taichi_dem.state.model import Model
 from tests.accuracy.small_bar import BROKEN_UNTIL, broken_bar, struck_bar
 
 BODY = 5

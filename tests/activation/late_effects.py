@@ -5,10 +5,10 @@ import math
 import numpy as np
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, ElasticShear, ElasticTension
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.types import vec3
+from taichi_dem.laws.base import Effect, ElasticShear, ElasticTension
 from taichi_dem.physics.rotation import zero3
 
 NOWHERE = ((1.0, 1.0, 1.0), (0.0, 0.0, 0.0))

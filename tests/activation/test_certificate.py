@@ -18,7 +18,7 @@ from taichi_dem import (
 )
 from taichi_dem.kit.audit import Audit
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.timeline import NEVER
+from taichi_dem.state.timeline import NEVER
 from tests.scenes import beside
 
 METHOD, UNTIL = ImplicitDashpots(1e-6), 3e-4

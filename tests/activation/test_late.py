@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import ImplicitDashpots, Multirate, Scene, StepControl, checked_mesh
-from taichi_dem.timeline import NEVER
+from taichi_dem.state.timeline import NEVER
 from tests.activation.late_runs import BITS, NAMES, run
 from tests.activation.late_scenes import (
     SCENES,
@@ -130,4 +130,4 @@ def test_far_from_the_origin_bodies_at_rest_sleep():
     late = Late("tension", far, loads(), 0.0)
     made = simulation(late, Scene(far, strengths(), "auto", loads=late.loads))
     made.advance_to(2)
-    assert (made.state.sleeping.awake.to_numpy() == 0).sum() == 120
+    assert (made.schedule.sleeping.awake.to_numpy() == 0).sum() == 120

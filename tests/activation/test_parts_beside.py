@@ -7,7 +7,7 @@ import pytest
 
 from taichi_dem import Scene
 from taichi_dem.mesh.shapes import bar, placed_together
-from taichi_dem.timeline import NEVER
+from taichi_dem.state.timeline import NEVER
 from tests.activation.late_scenes import (
     MATERIAL,
     METHOD,

@@ -5,7 +5,7 @@ import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, ImplicitDashpots, InputError, Scene, Simulation, Uniform, effects
-from taichi_dem.effects.history import History
+from taichi_dem.loads.history import History
 from taichi_dem.mesh.shapes import bar, pair
 
 STEP = 1e-6

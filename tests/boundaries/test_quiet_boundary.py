@@ -14,8 +14,8 @@ from taichi_dem import (
     effects,
 )
 from taichi_dem.closed_forms import _carried
+from taichi_dem.elasticity.wave_moduli import wave_moduli
 from taichi_dem.mesh.shapes import bar, single, with_moved_nodes
-from taichi_dem.wave_moduli import wave_moduli
 
 #: Concrete whose bonds have no dashpots, so that no wave fades.
 UNDAMPED = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0)

@@ -23,10 +23,10 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem import effects as listed
-from taichi_dem.engine.model import Model
+from taichi_dem.elasticity.rates import dashpots_of, springs_of, subset_rates
 from taichi_dem.kit.fixed_order import inverse
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.stability.mesh_limits import dashpots_of, springs_of, subset_rates
+from taichi_dem.state.model import Model
 from tests.scenes import brisk_scene, paper_effects
 
 STORED = Path(__file__).with_name("digests.json")

@@ -15,7 +15,7 @@ from taichi_dem.mesh.face_groups import with_cut
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.record import Recorder
 from taichi_dem.simulate import saved_run
-from taichi_dem.timeline import MACRO_TICKS
+from taichi_dem.state.timeline import MACRO_TICKS
 from tests.bar_blast import METHODS, UNTIL, bar_scene
 
 #: Share of the way at which a checkpoint is made: some of the bonds are broken, and bodies meet.

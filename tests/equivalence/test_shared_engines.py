@@ -22,12 +22,12 @@ from taichi_dem import (
     effects,
     runtime,
 )
-from taichi_dem.effects.base import Effect
-from taichi_dem.engine.engine import ENGINES
+from taichi_dem.engine import ENGINES
 from taichi_dem.kit import allocation
+from taichi_dem.laws.base import Effect
 from taichi_dem.mesh.shapes import bar, single
 from taichi_dem.physics.rotation import zero3
-from taichi_dem.timeline import NEVER
+from taichi_dem.state.timeline import NEVER
 
 #: Largest steps of a run: bonds break at the left end, and what they held touches.
 STEPS = 60

@@ -14,7 +14,6 @@ from ca_damper.bouncing import Fall, RecordedFall
 from ca_damper.demo_pictures import Decay
 from ca_damper.measures import first_harmonic
 from taichi_dem import CONCRETE, PAPER_BLOCK, read_mesh
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.study import Timing
 from taichi_dem.kit.study.work_precision import Point, answers, cheapest
 from taichi_dem.mesh.mesh import group_area, volumes
@@ -22,6 +21,7 @@ from taichi_dem.mesh.shapes import bar, mirrored_copies
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.outcome import SPLIT, Outcome, displacement_error, energy_error, faces_error
 from taichi_dem.output.attenuation import Attenuation
+from taichi_dem.state.model import Model
 from taichi_dem.step_study import StepStudy
 
 # The package has functions of these names.

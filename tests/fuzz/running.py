@@ -7,8 +7,8 @@ import numpy as np
 from ca_damper import Batch, RigidMass, SceneTable
 from ca_damper.plot import Box
 from taichi_dem import Simulation
-from taichi_dem.diagnostics.energy_balance import unexplained_share
 from taichi_dem.observers import Every
+from taichi_dem.report.energy_balance import unexplained_share
 from taichi_dem.simulate import run_simulation
 from tests.paper import expected
 from tests.rounding import momentum_rounding

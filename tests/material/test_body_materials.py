@@ -13,14 +13,14 @@ from taichi_dem import (
     step_report,
     with_body_group,
 )
-from taichi_dem.body_materials import joined
-from taichi_dem.elasticity.bond_rules import bond_geometry
-from taichi_dem.elasticity.moduli import bond_moduli
-from taichi_dem.engine.model import Model
+from taichi_dem.materials.body_materials import joined
+from taichi_dem.materials.bond_rules import bond_geometry
+from taichi_dem.materials.moduli import bond_moduli
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import body_properties, topology_of
 from taichi_dem.methods import Uniform
 from taichi_dem.simulate import run_identity
+from taichi_dem.state.model import Model
 from tests.material.blocks import NU, ORE, E, random_block, rock
 
 HALF = ("half", lambda x: x[:, 0] > 0.5)

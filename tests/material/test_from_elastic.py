@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from taichi_dem import InputError, Scene, Simulation, Uniform, effects, elastic_report
-from taichi_dem.elasticity.bond_rules import bond_geometry
-from taichi_dem.elasticity.moduli import bond_moduli
-from taichi_dem.engine.model import Model
+from taichi_dem.materials.bond_rules import bond_geometry
+from taichi_dem.materials.moduli import bond_moduli
 from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.mesh.topology import topology_of
+from taichi_dem.state.model import Model
 from tests.material.blocks import DENSITY, NU, E, random_block, rock
 
 RATIO = 0.05

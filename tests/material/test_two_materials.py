@@ -15,7 +15,7 @@ from taichi_dem import (
     in_space_order,
     with_body_group,
 )
-from taichi_dem.body_materials import BodyMaterials, joined
+from taichi_dem.materials.body_materials import BodyMaterials, joined
 from taichi_dem.mesh.shapes import bar, pair
 from tests.material.blocks import NU, ORE, E, rock
 from tests.scenes import paper_effects

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, needed_effects
-from taichi_dem.diagnostics.bond_slip import MOST_SLIP
 from taichi_dem.mesh.shapes import pair
+from taichi_dem.report.bond_slip import MOST_SLIP
 
 EPS = np.finfo(float).eps
 

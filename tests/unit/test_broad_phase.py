@@ -5,7 +5,7 @@ import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, Scene, Uniform, effects
-from taichi_dem.contact_search.contacts import FARTHEST, STEPS
+from taichi_dem.contact.contacts import FARTHEST, STEPS
 from taichi_dem.mesh.shapes import bar
 from tests.again import Again
 

@@ -11,7 +11,7 @@ from taichi_dem import (
     effects,
     step_report,
 )
-from taichi_dem.effects.base import Effect
+from taichi_dem.laws.base import Effect
 from taichi_dem.mesh.shapes import bar, single
 
 

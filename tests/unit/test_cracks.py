@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.output.cracks import rose_of, strike_and_dip
+from taichi_dem.state.model import Model
 from tests.made_result import made_result, turned
 
 

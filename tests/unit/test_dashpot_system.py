@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
-from taichi_dem.diagnostics.dashpot_system import DashpotSystem
 from taichi_dem.mesh.shapes import bar
+from taichi_dem.report.dashpot_system import DashpotSystem
 
 STEP = 4e-7
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, needed_effects, simulate
-from taichi_dem.engine.engine import ENGINES
+from taichi_dem.engine import ENGINES
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.paired_cost import WARM, FrozenScene, states_of_run
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from taichi_dem.diagnostics.energy_balance import (
+from taichi_dem.report.energy_balance import (
     TERMS,
     injected_words,
     open_account,

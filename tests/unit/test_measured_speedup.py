@@ -6,7 +6,7 @@ import pytest
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation, effects
 from taichi_dem.measured_speedup import _twin, measured_speedup
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.timeline import NEVER
+from taichi_dem.state.timeline import NEVER
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
-from taichi_dem.diagnostics.missing_effects import unserved
-from taichi_dem.engine.model import Model
 from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.report.missing_effects import unserved
+from taichi_dem.state.model import Model
 from tests.probe import BondProbe
 from tests.scenes import beside
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Uniform, checked_mesh, effects, needed_effects, simulate
-from taichi_dem.diagnostics.effect_activity import effect_activity
-from taichi_dem.diagnostics.energy_balance import TERMS
-from taichi_dem.engine.model import Model
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
+from taichi_dem.report.effect_activity import effect_activity
+from taichi_dem.report.energy_balance import TERMS
+from taichi_dem.state.model import Model
 
 #: Far below the strength of concrete: a block of some 1 kg that falls from rest for 1e-5 s.
 STEP, UNTIL = 1e-7, 1e-5

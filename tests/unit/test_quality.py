@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE
+from taichi_dem.elasticity.rates import bond_rates, dashpots_of, springs_of
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.mesh.topology import body_properties, topology_of
-from taichi_dem.stability.mesh_limits import bond_rates, dashpots_of, springs_of
 
 EDGE = 0.05
 

@@ -3,10 +3,10 @@
 import numpy as np
 import taichi as ti
 
-from taichi_dem import timeline
-from taichi_dem.stability.step_control import Displacement
+from taichi_dem.state import timeline
+from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL, coarsest_active
 from taichi_dem.step.active_list import ActiveList, itself
-from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, coarsest_active
+from taichi_dem.step_control import Displacement
 
 
 def random_ticks(count=20000):

@@ -5,9 +5,9 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform
-from taichi_dem.diagnostics.shared_volume import DEEP, NOTABLE, SharedVolume
 from taichi_dem.mesh.shapes import pair
 from taichi_dem.mesh.tetrahedra import eighths
+from taichi_dem.report.shared_volume import DEEP, NOTABLE, SharedVolume
 from tests.scenes import apart, quaternions
 
 EDGE = 1.0

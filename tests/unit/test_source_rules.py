@@ -7,9 +7,9 @@ ROOT = Path(__file__).resolve().parents[2]
 # A module imports from its own layer and those before it; a folder counts as one module.
 LAYERS = {
     "taichi_dem": """
-        kit | meshes mesh shapes | elasticity | materials body_materials
-        | physics timeline closed_forms wave_moduli | effects initial_motion | scene | stability
-        | methods | contact_search | step | diagnostics | engine | simulation
+        kit | meshes mesh shapes | materials | elasticity closed_forms | physics | state
+        | laws | loads | effects initial_motion | scene | step_control | methods | contact
+        | stability | step | report | engine engine_view | simulation
         | output measured_speedup measured_overhead paired_cost observers run_plan | plot | viewer
         | result scene_pictures | simulate needed_effects outcome | workload step_study goals
         | accuracy calibration | solve | demo | __init__ | __main__""",
@@ -19,8 +19,8 @@ LAYERS = {
         | gravity collect_and_collide decay impact_damper | checks scenes | window
         | filling lattice | fixed_mass automaton spheres | combined | engine | activation
         | batch needed_effects | plot | viewer | film
-        | amplitude_response response shake shake_structure damper_map
-        | frequency_sweep force_check goals | accuracy | solve_response | step_study
+        | amplitude_response response frequency_sweep shake shake_structure damper_map
+        | force_check goals | accuracy | solve_response | step_study
         | demo_pictures | demo | __init__ | __main__""",
 }
 ROWS = {
@@ -43,15 +43,12 @@ def parsed(path):
 
 
 def imported(tree):
-    """Full names of all that is imported anywhere, but for types alone."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            continue
+    """Full names of all that is imported anywhere, also for types alone."""
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
-        yield from imported(node)
 
 
 def later(path):
@@ -73,6 +70,29 @@ def later(path):
 
 def test_every_module_has_a_layer_and_imports_nothing_from_a_later_one():
     assert [found for path in PATHS for found in later(path)] == []
+
+
+def arrows():
+    """Modules of the package that each module of ``taichi_dem`` imports, by path."""
+    paths = {name_of(path): path for path in PATHS if path.startswith("taichi_dem/")}
+    found = {}
+    for path in paths.values():
+        names = set(imported(parsed(path)))
+        modules = {name if name in paths else name.rpartition(".")[0] for name in names}
+        found[path] = {paths[name] for name in modules & set(paths)} - {path}
+    return found
+
+
+def name_of(path):
+    return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    """Taking out what imports nothing that is left must leave nothing."""
+    left = arrows()
+    while leaves := {path for path, ahead in left.items() if not ahead & set(left)}:
+        left = {path: ahead for path, ahead in left.items() if path not in leaves}
+    assert left == {}
 
 
 def atomic_sums(tree):

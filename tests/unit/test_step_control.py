@@ -18,20 +18,20 @@ from taichi_dem import (
     read_mesh,
     step_report,
 )
-from taichi_dem.mesh.shapes import bar, pair
-from taichi_dem.mesh.topology import faces_of_group, topology_of
-from taichi_dem.stability.mesh_limits import (
+from taichi_dem.elasticity.rates import (
     bond_rates,
     dashpots_of,
 )
+from taichi_dem.mesh.shapes import bar, pair
+from taichi_dem.mesh.topology import faces_of_group, topology_of
 from taichi_dem.stability.stable_step import (
     dashpot_limit,
     dashpot_step,
     spring_limit,
     spring_step,
 )
-from taichi_dem.stability.step_control import CRITERIA
 from taichi_dem.stability.step_report import stable_together
+from taichi_dem.step_control import CRITERIA
 
 
 def test_the_limit_of_a_step_is_that_of_contacts_or_else_of_bonds():

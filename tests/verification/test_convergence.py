@@ -15,7 +15,7 @@ from taichi_dem import (
     quality_report,
 )
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.timeline import MAX_LEVEL
+from taichi_dem.state.timeline import MAX_LEVEL
 from tests.scenes import brisk_scene
 
 UNTIL = 1e-5

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
+from taichi_dem.elasticity.rates import dashpots_of, springs_of
 from taichi_dem.mesh.shapes import pair
-from taichi_dem.stability.mesh_limits import dashpots_of, springs_of
 from tests.verification.test_limits import Rig, bisected, pair_eigenvalue
 
 EPS = np.finfo(float).eps

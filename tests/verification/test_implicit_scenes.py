@@ -6,7 +6,7 @@ import pytest
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, single
-from taichi_dem.timeline import MACRO_TICKS
+from taichi_dem.state.timeline import MACRO_TICKS
 
 #: Distance of the scenes from each other [m]: they never meet.
 APART = 2.0

@@ -15,18 +15,18 @@ from taichi_dem import (
     effects,
     step_report,
 )
-from taichi_dem.mesh.mesh import checked_mesh
-from taichi_dem.mesh.shapes import pair, single
-from taichi_dem.mesh.topology import topology_of
-from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED
-from taichi_dem.stability.mesh_limits import (
+from taichi_dem.elasticity.rates import (
     bond_rates,
     dashpots_of,
     springs_of,
 )
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import pair, single
+from taichi_dem.mesh.topology import topology_of
+from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
 from taichi_dem.stability.step_report import contact_eigenvalues
-from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL
+from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL
 
 STILL = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
 #: Steps of a run that must grow: at 1.004 of a limit a mode grows by 1.008 a step, 1e10 in all.

@@ -7,7 +7,7 @@ import taichi as ti
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation, StepControl, effects
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, single
-from taichi_dem.timeline import MACRO_TICKS
+from taichi_dem.state.timeline import MACRO_TICKS
 from tests.scenes import brisk_scene
 
 SPEED, EDGE, GAP = 20.0, 0.03, 3e-5

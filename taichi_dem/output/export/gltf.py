@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.files import write_bytes
 from taichi_dem.kit.validation import FileName, positive
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
@@ -14,6 +13,7 @@ from taichi_dem.output.export.glb import GlbFile
 from taichi_dem.output.export.rigid_motion import quaternions_of, rigid_motion
 from taichi_dem.output.fragments import broken_by, centres, fragment_of_body
 from taichi_dem.output.record import Frame
+from taichi_dem.state.model import Model
 
 #: Colours from low to high, viridis in nine steps, and that of crack faces; sRGB.
 _SCALE = np.array(

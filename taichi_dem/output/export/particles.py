@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.extended_xyz import XyzFrame, write_extended_xyz
 from taichi_dem.kit.validation import FileName, choice
 from taichi_dem.mesh.tetrahedra import signed_volumes
 from taichi_dem.output.export.rigid_motion import quaternions_of, rigid_motion
 from taichi_dem.output.fragments import broken_by, fragment_of_body, fragments_of
 from taichi_dem.output.record import Frame
+from taichi_dem.state.model import Model
 
 
 def write_particles(

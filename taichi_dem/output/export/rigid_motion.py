@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from taichi_dem.engine.model import Model
 from taichi_dem.output.fragments import centres, sums
 from taichi_dem.output.record import Frame
+from taichi_dem.state.model import Model
 
 
 def rigid_motion(model: Model, frame: Frame, of_body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

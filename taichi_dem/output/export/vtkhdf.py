@@ -6,11 +6,11 @@ from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem.engine.model import Model
 from taichi_dem.kit.files import write_bytes
 from taichi_dem.kit.optional import optional
 from taichi_dem.kit.validation import FileName
 from taichi_dem.output.record import Frame, body_corners, cell_data, corners_of_bodies
+from taichi_dem.state.model import Model
 
 _TETRAHEDRON = 10
 #: The format's version that brought series, the lowest that has all that is used here.

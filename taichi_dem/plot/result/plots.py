@@ -1,11 +1,12 @@
 """Pictures of a result, one function each: ``result.plot``."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Optional
+from typing import Optional
 
 from matplotlib.figure import Figure
 
 from taichi_dem.kit.validation import FileName, positive, unit_vector
+from taichi_dem.output.run_tables import RunTables
 from taichi_dem.plot.attenuation import plot_attenuation
 from taichi_dem.plot.block import plot_cracks
 from taichi_dem.plot.result.block import plot_block
@@ -14,9 +15,6 @@ from taichi_dem.plot.result.energy_shares import plot_energy_shares
 from taichi_dem.plot.result.fragments import plot_fragments
 from taichi_dem.plot.result.rose import plot_rose
 from taichi_dem.plot.series import plot_energy, plot_history
-
-if TYPE_CHECKING:
-    from taichi_dem.result import Result
 
 #: Columns that are drawn where there is no hole to look at.
 _PLAIN = ("largest_speed_m_s", "broken_faces", "smallest_step_s")
@@ -39,7 +37,7 @@ class ResultPlots:
         result.plot.block(colour="damage", magnify=5.0)
     """
 
-    def __init__(self, result: "Result"):
+    def __init__(self, result: RunTables):
         self._result = result
 
     def history(

@@ -1,7 +1,5 @@
 """Dashpots of bonds: one 6x6 block each, visited in the order of a fixed edge colouring."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import taichi as ti
 
@@ -11,14 +9,12 @@ from taichi_dem.kit.products import matmul_transposed, matvec, stacked, transpos
 from taichi_dem.kit.types import real, vec3, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
+from taichi_dem.state.model import Model
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
+from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.implicit.velocities import Velocities
-from taichi_dem.timeline import MACRO_TICKS
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.model import Model
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
-    from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.schedule import Schedule
 
 #: Colours that links of at most four a body can need: a link meets six others at most.
 BOND_COLOURS = 7
@@ -46,9 +42,7 @@ class BondDashpots:
 
     constant_fields = ("theta", "refresh_every", "index", "colour_first")
 
-    def __init__(
-        self, tables: "Tables", state: "State", schedule: "Schedule", velocities: Velocities
-    ):
+    def __init__(self, tables: Tables, state: State, schedule: Schedule, velocities: Velocities):
         self.tables, self.state = tables, state
         self.schedule, self.velocities = schedule, velocities
         bonds = tables.capacity.bonds
@@ -67,7 +61,7 @@ class BondDashpots:
         groups.place(*visited)
         groups.place(self.start)
 
-    def load(self, model: "Model", method: ImplicitDashpots) -> None:
+    def load(self, model: Model, method: ImplicitDashpots) -> None:
         """Colour the bonds of a model and take the numbers of a method."""
         assign(self.theta, np.array([method.theta, (1.0 - method.theta) / method.theta]))
         assign(self.refresh_every, max(1, round(method.refresh / method.dt)))

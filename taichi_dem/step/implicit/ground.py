@@ -1,19 +1,15 @@
 """Dashpots between bodies and the ground in the sweeps of a solved step."""
 
-from typing import TYPE_CHECKING
-
 import taichi as ti
 
 from taichi_dem.kit.products import matvec
 from taichi_dem.kit.types import real
 from taichi_dem.physics.ground import braked_twist, twist_of
 from taichi_dem.physics.rotation import world_tensor
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
 from taichi_dem.step.implicit.velocities import Velocities
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
-    from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.schedule import Schedule
 
 
 @ti.data_oriented
@@ -24,9 +20,7 @@ class GroundSweeps:
     of the velocities at both ends of the step, as of every ``GroundDashpots``.
     """
 
-    def __init__(
-        self, tables: "Tables", state: "State", schedule: "Schedule", velocities: Velocities
-    ):
+    def __init__(self, tables: Tables, state: State, schedule: Schedule, velocities: Velocities):
         self.tables, self.state = tables, state
         self.schedule, self.velocities = schedule, velocities
         rows, n = len(tables.ground), tables.capacity.bodies

@@ -1,23 +1,19 @@
 """Dashpots and friction of contacts, sphere by sphere: they push, within the bound of friction."""
 
-from typing import TYPE_CHECKING
-
 import taichi as ti
 
-from taichi_dem.contact_search.cell_grid import group
-from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.contact.cell_grid import group
+from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.products import matvec
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import place_in, unit3, zero3
 from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to, is_within, meeting
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
 from taichi_dem.step.contact_force import PairForces
 from taichi_dem.step.implicit.velocities import Velocities
+from taichi_dem.step.schedule import Schedule
 from taichi_dem.step.tangential_springs import TangentialSprings
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
-    from taichi_dem.step.schedule import Schedule
 
 #: Colours of pairs that share no body; pairs without a free one are visited last, in turn.
 COLOURS = 16
@@ -49,9 +45,9 @@ class PairDashpots:
 
     def __init__(
         self,
-        tables: "Tables",
-        state: "State",
-        schedule: "Schedule",
+        tables: Tables,
+        state: State,
+        schedule: Schedule,
         contacts: Contacts,
         velocities: Velocities,
     ):

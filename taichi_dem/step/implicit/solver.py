@@ -1,24 +1,22 @@
 """Sweeps over the dashpots of all bonds and contacts until their impulses agree."""
 
-from typing import TYPE_CHECKING, Optional
+from typing import Optional
 
 import numpy as np
 import taichi as ti
 
-from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import assign, raise_to
 from taichi_dem.kit.types import real
 from taichi_dem.methods import ImplicitDashpots
+from taichi_dem.state.model import Model
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
 from taichi_dem.step.implicit.bonds import BOND_COLOURS, BondDashpots
 from taichi_dem.step.implicit.ground import GroundSweeps
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
 from taichi_dem.step.implicit.velocities import Velocities
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.model import Model
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
-    from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.schedule import Schedule
 
 
 @ti.data_oriented
@@ -37,7 +35,7 @@ class Solver:
     """
 
     def __init__(
-        self, tables: "Tables", state: "State", schedule: "Schedule", contacts: Optional[Contacts]
+        self, tables: Tables, state: State, schedule: Schedule, contacts: Optional[Contacts]
     ):
         self.tables, self.state, self.schedule, self.contacts = tables, state, schedule, contacts
         self.bounds = ti.field(ti.i32, shape=2)
@@ -64,7 +62,7 @@ class Solver:
         self.unconverged = ti.field(ti.i64, shape=())
         self.worst = ti.field(real, shape=())
 
-    def load(self, model: "Model", method: ImplicitDashpots) -> None:
+    def load(self, model: Model, method: ImplicitDashpots) -> None:
         """Load the numbers of a method, and the bonds of a model."""
         assign(self.bounds, np.array(method.sweeps))
         assign(self.tolerance, method.tolerance)

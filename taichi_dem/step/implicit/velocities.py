@@ -1,7 +1,5 @@
 """Velocities while a step is being solved, and their change per impulse."""
 
-from typing import TYPE_CHECKING
-
 import taichi as ti
 
 from taichi_dem.kit.lanes import (
@@ -15,10 +13,8 @@ from taichi_dem.kit.lanes import (
 from taichi_dem.kit.products import matvec, stacked, transposed_matvec
 from taichi_dem.kit.types import real, vec6
 from taichi_dem.physics.rotation import unit3, world_tensor
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.state import State
-    from taichi_dem.engine.tables import Tables
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
 
 
 @ti.data_oriented
@@ -35,7 +31,7 @@ class Velocities:
 
     scratch_fields = ("twist", "given")
 
-    def __init__(self, tables: "Tables", state: "State"):
+    def __init__(self, tables: Tables, state: State):
         self.tables, self.state, self.spare = tables, state, tables.capacity.bodies
         n = self.spare + 1
         self.twist, self.turn = ti.Vector.field(6, real), ti.Matrix.field(3, 3, real)

@@ -1,0 +1,116 @@
+"""Cell grid over the centres of bodies, and the counting sort that fills it."""
+
+import taichi as ti
+
+from taichi_dem.kit.types import real
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
+
+#: Coordinates beyond this [m], and those that are no number, count as this: a run that diverges is
+#: named after the step in which it does, and until then every body must have a cell.
+_FAR = 1e30
+
+
+@ti.data_oriented
+class CellGrid:
+    """Sorts all bodies by cell, so that neighbours are sought in the cells nearby only.
+
+    ball: radius of the ball around a body within which others are near whose balls it meets [m].
+    member: bodies, cell by cell. brute_force: a single cell.
+    """
+
+    scratch_fields = ("first", "member", "cell", "counts", "corner", "edge", "largest")
+
+    def __init__(self, tables: Tables, state: State, ball: ti.Field, brute_force: bool = False):
+        n = tables.capacity.bodies
+        self.tables, self.state, self.ball, self.brute_force = tables, state, ball, brute_force
+        self.first = ti.field(ti.i32, shape=4 * n + 66)
+        self.member = ti.field(ti.i32, shape=n)
+        self.cell = ti.field(ti.i32, shape=n)
+        self.counts = ti.Vector.field(3, ti.i32, shape=())
+        self.corner = ti.Vector.field(3, real, shape=())
+        self.edge = ti.field(real, shape=())
+        self.largest = ti.field(real, shape=())
+
+    @ti.func
+    def fill(self):
+        """Sort the bodies into cells about as wide as one of their balls."""
+        self._size()
+        counts = self.counts[None]
+        for i in range(self.tables.body_count[None]):
+            cell = self._cell_of(self._bounded(i))
+            self.cell[i] = (cell[2] * counts[1] + cell[1]) * counts[0] + cell[0]
+        total = counts[0] * counts[1] * counts[2]
+        group(self.first, self.member, total, self.tables.body_count[None], self._cell_of_member)
+
+    @ti.func
+    def around(self, i):
+        """Cells with the centres of all whose balls meet that of body i: lowest, past highest."""
+        position = self._bounded(i)
+        reach = self.ball[i] + self.largest[None]
+        low = ti.max(self._cell_of(position - reach), 0)
+        high = ti.min(self._cell_of(position + reach) + 1, self.counts[None])
+        return low, high
+
+    @ti.func
+    def row(self, z, y, low, high):
+        """First place, and one past the last, of the members of the cells low .. high - 1 of a row.
+
+        The cells of a row follow one another, and so do their members.
+        """
+        cell = (z * self.counts[None][1] + y) * self.counts[None][0]
+        return self.first[cell + low], self.first[cell + high]
+
+    @ti.func
+    def _size(self):
+        low, high, mean = self._bounded(0), self._bounded(0), 0.0
+        self.largest[None] = 0.0
+        for i in range(self.tables.body_count[None]):
+            place = self._bounded(i)
+            low, high = ti.min(low, place), ti.max(high, place)
+            mean += self.ball[i] / self.tables.body_count[None]
+            self.largest[None] = ti.max(self.largest[None], self.ball[i])
+        edge = 2.0 * mean
+        if ti.static(self.brute_force):
+            edge += (high - low).max()
+        while _product(ti.floor((high - low) / edge) + 1.0) > 4 * self.tables.body_count[None] + 64:
+            edge *= 1.25
+        self.edge[None], self.corner[None] = edge, low
+        self.counts[None] = ti.cast((high - low) / edge, ti.i32) + 1
+
+    @ti.func
+    def _bounded(self, i):
+        """Position of a body, as far as it is one."""
+        return ti.max(ti.min(self.state.position[i], _FAR), -_FAR)
+
+    @ti.func
+    def _cell_of(self, position):
+        return ti.cast(ti.floor((position - self.corner[None]) / self.edge[None]), ti.i32)
+
+    @ti.func
+    def _cell_of_member(self, i):
+        return self.cell[i]
+
+
+@ti.func
+def _product(counts):
+    return counts[0] * counts[1] * counts[2]
+
+
+@ti.func
+def group(first: ti.template(), order: ti.template(), keys, count, key_of: ti.template()):
+    """List 0 .. count - 1 by key: those of key c, in order, at order[first[c]] .. first[c + 1].
+
+    first has room for keys + 2 entries.
+    """
+    for c in range(keys + 2):
+        first[c] = 0
+    for a in range(count):
+        key = key_of(a)
+        first[key + 2] = first[key + 2] + 1
+    for c in range(keys):
+        first[c + 2] = first[c + 2] + first[c + 1]
+    for a in range(count):
+        place = first[key_of(a) + 1]
+        order[place] = a
+        first[key_of(a) + 1] = place + 1

@@ -1,0 +1,216 @@
+"""Pairs of bodies in contact: the impulses they exchange, and how far bodies may go unsearched.
+
+A pair holds the sphere pairs whose gap was below the body skin of its bodies at the last search.
+"""
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.products import matvec, stacked
+from taichi_dem.kit.types import real, vec3
+from taichi_dem.laws.sphere_contact import ONCE_BROKEN
+from taichi_dem.methods import Method
+from taichi_dem.physics.rotation import place_in
+from taichi_dem.state.capacity import SPARE_PAIRS, SPARE_SPHERES
+from taichi_dem.state.model import Model
+from taichi_dem.state.pair_store import PairStore
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
+
+#: Largest steps that a fast body makes before it is searched again.
+STEPS = 16.0
+#: Share of its extent beyond which it is searched again whatever its speed, and further than which
+#: no step may carry it: spheres would pass each other unseen.
+FARTHEST = 0.25
+#: Gap where another face has the contact [m].
+AWAY = 1e30
+
+
+@ti.data_oriented
+class Contacts:
+    """Candidate pairs of bodies with broken faces; p: a slot of the ``PairStore``, called store.
+
+    exposed_faces: bit f for a broken face f. travel: bound of the displacement of any point of a
+    body since it was last searched [m]. skin: least gap up to which its spheres are listed [m].
+    body_skin: travel at which it is searched again [m]; a pair holds the spheres whose gap is below
+    the body skin of both. pace: largest step [s], and steps of
+    a body by which its contacts are counted before they touch. search_requested: 1 when the list
+    may miss one of them. outer_waits: 1 while outer faces wait for the first break to get spheres.
+    """
+
+    def __init__(self, tables: Tables, state: State):
+        n, capacity = tables.capacity.bodies, tables.capacity
+        self.tables, self.state = tables, state
+        self.law, self.friction = tables.contact, tables.friction
+        self.remembers = getattr(self.friction, "remembers", False)
+        self.pace = ti.field(real, shape=2)
+        self.store = PairStore(n, capacity.pair_entries, capacity.sphere_entries)
+        for effect in tables.effects:
+            effect.declare_columns(self.store)
+        self.exposed_faces = ti.field(ti.i32, shape=n)
+        self.law.watch_faces(self.exposed_faces)
+        self.travel = ti.field(real, shape=n)
+        self.body_skin = ti.field(real, shape=n)
+        self.skin = ti.field(real, shape=n)
+        self.search_requested = ti.field(ti.i32, shape=())
+        self.outer_waits = ti.field(ti.i32, shape=())
+
+    def load(self, model: Model, method: Method) -> None:
+        """Load the numbers of a scene and a method; no pairs exist yet."""
+        effect, n = model.contact, model.body_count
+        assign(self.outer_waits, int(effect.outer_faces == ONCE_BROKEN))
+        assign(self.skin, effect.skin * model.spheres.extent)
+        assign(self.pace, np.array([method.dt0, method.steps_ahead]))
+        assign(self.store.slot_limit, n * effect.pairs_per_body + SPARE_PAIRS)
+        assign(self.store.sphere_limit, n * effect.spheres_per_body + SPARE_SPHERES)
+
+    @ti.func
+    def cluster_centre(self, i, face):
+        """Centre of the ball around the spheres of a face of body i now [m]."""
+        return self.state.position[i] + matvec(
+            self.state.rotation[i], self.tables.cluster[face].xyz
+        )
+
+    @ti.func
+    def gap(self, i, j, a, b):
+        """Gap between bodies i and j by an entry (a, b) of the pair store [m]."""
+        gap = 0.0
+        if ti.static(self.law.meets_faces):
+            branch = self.state.position[j] - self.state.position[i]
+            turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
+            near = self.law.nearest(a, b, turn, offset)
+            gap = near.apart.norm() - near.reach
+            if near.can_meet == 0:
+                gap = AWAY
+        else:
+            gap = self._gap_of_spheres(i, j, a, b)
+        return gap
+
+    @ti.func
+    def _gap_of_spheres(self, i, j, a, b):
+        on_first = matvec(self.state.rotation[i], self.tables.sphere[a].xyz)
+        on_second = matvec(self.state.rotation[j], self.tables.sphere[b].xyz)
+        apart = self.state.position[j] + on_second - self.state.position[i] - on_first
+        return apart.norm() - self.tables.sphere[a][3] - self.tables.sphere[b][3]
+
+    @ti.func
+    def pair_energy(self, p):
+        """Elastic energy of a pair's overlaps now, and of springs between its spheres [J]."""
+        energy = 0.0
+        pair = self.store.body[p]
+        m = self.tables.pair(pair[0], pair[1])
+        for k in range(self.store.first[p], self.store.last[p]):
+            spheres = self.store.sphere[k]
+            overlap = -self.gap(pair[0], pair[1], spheres[0], spheres[1])
+            energy += self.law.stored(m, ti.max(0.0, overlap))
+            if ti.static(self.remembers):
+                energy += self.friction.stored(m, k)
+        return energy
+
+    @ti.func
+    def closer(self, p, margin):
+        """Number of sphere pairs of a pair of bodies with a gap below a margin [m] now."""
+        count = 0
+        pair = self.store.body[p]
+        for k in range(self.store.first[p], self.store.last[p]):
+            spheres = self.store.sphere[k]
+            count += ti.cast(self.gap(pair[0], pair[1], spheres[0], spheres[1]) < margin, ti.i32)
+        return count
+
+    @ti.func
+    def touching(self, p):
+        """Number of sphere pairs of a pair of bodies that overlap now."""
+        return self.closer(p, 0.0)
+
+    @ti.func
+    def add_impulse(self, p, side: ti.template(), linear, angular):
+        """Add an impulse [N s] and its moment [N m s] to the pending ones of a body of a pair."""
+        slot = 2 * p + side
+        self.store.waiting[p][side] = 1
+        self.store.impulse[slot] = self.store.impulse[slot] + stacked(linear, angular)
+
+    @ti.func
+    def book_friction(self, p, energy):
+        """Book energy [J] that friction took beside an impulse, for the first body to take."""
+        if energy != 0.0:
+            self.store.heat[p][1] = self.store.heat[p][1] + energy
+            self.store.waiting[p][0] = 1
+
+    @ti.func
+    def gather(self, i):
+        """Collect the pending impulse and moment of the contacts of body i.
+
+        The heat of the pairs in which it is first is booked to it.
+        """
+        linear, angular = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+        for a in range(self.store.first_of[i], self.store.first_of[i + 1]):
+            p = self.store.near_slot[a]
+            if self.store.waiting[p][0] == 1:
+                linear, angular = self._gather_side(p, 0, linear, angular)
+                self.state.contact_heat[i] = self.state.contact_heat[i] + self.store.heat[p]
+                self.store.heat[p] = vec3(0.0)
+        for a in range(self.store.second_start[i], self.store.second_start[i + 1]):
+            p = self.store.second_slot[a]
+            if self.store.waiting[p][1] == 1:
+                linear, angular = self._gather_side(p, 1, linear, angular)
+        return linear, angular
+
+    @ti.func
+    def _gather_side(self, p, side: ti.template(), linear, angular):
+        taken = self.store.impulse[2 * p + side]
+        self.store.impulse[2 * p + side] = 0.0 * taken
+        self.store.waiting[p][side] = 0
+        return linear + taken[0:3], angular + taken[3:6]
+
+    @ti.func
+    def finest_partner(self, i):
+        """Finest level among the bodies in body i's pairs; -1 without any."""
+        level = -1
+        for a in range(self.store.first_of[i], self.store.first_of[i + 1]):
+            level = ti.max(level, self.state.level[self.store.body[self.store.near_slot[a]][1]])
+        for a in range(self.store.second_start[i], self.store.second_start[i + 1]):
+            level = ti.max(level, self.state.level[self.store.body[self.store.second_slot[a]][0]])
+        return level
+
+    @ti.func
+    def moved(self, i, velocity, spin, elapsed):
+        """Add to the displacement of body i; request a search once it may exceed the body skin.
+
+        A body that leaps too far in one step for its contacts to be followed is out of bounds.
+        """
+        if self.exposed_faces[i] != 0:
+            speed = self._speed(i, velocity, spin)
+            if elapsed * speed > FARTHEST * self.tables.extent[i]:
+                ti.atomic_min(self.state.bad_body[None], i)
+            way = self.travel[i] + speed * elapsed
+            self.travel[i] = way
+            if way + self.pace[1] * elapsed * speed > self.body_skin[i]:
+                self.search_requested[None] = 1
+
+    @ti.func
+    def set_body_skin(self, i):
+        """Set the body skin of body i: half the skin, or more where it is fast.
+
+        A few fragments are faster than all others, and would cause most of the searches.
+        """
+        speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
+        way = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])
+        self.body_skin[i] = ti.max(0.5 * self.skin[i], way)
+
+    @ti.func
+    def _speed(self, i, velocity, spin):
+        """Bound of the speed of any point on the spheres of body i [m/s]."""
+        return velocity.norm() + spin.norm() * self.tables.extent[i]
+
+    @ti.func
+    def approach(self, i, j):
+        """Bound of the speed at which spheres of two bodies approach each other [m/s]."""
+        between = self.state.velocity[j] - self.state.velocity[i]
+        first = self._speed(i, between, self.state.spin[i])
+        return first + self.state.spin[j].norm() * self.tables.extent[j]
+
+    @ti.func
+    def margin(self, i, j):
+        """Gap below which spheres of two bodies are candidates [m]."""
+        return self.body_skin[i] + self.body_skin[j]

@@ -1,0 +1,130 @@
+"""Narrow phase of the contact search: sphere pairs within a margin, and the gap of all others."""
+
+import taichi as ti
+
+from taichi_dem.contact.contacts import Contacts
+from taichi_dem.kit.products import matvec
+from taichi_dem.kit.types import real, vec4
+from taichi_dem.physics.triangle import closest_point
+
+#: Skins beyond their margin within which the gap of two spheres is found; others count as farther.
+OUTLOOK = 7.0
+
+
+@ti.data_oriented
+class NarrowPhase:
+    """Compares the spheres on the faces of two bodies, at the positions of their last search.
+
+    sphere: centre and radius of every sphere there [m]. cluster: centre of the ball around those of
+    a face [m]. corner: of every face there [m], where spheres meet faces.
+    """
+
+    def __init__(self, contacts: Contacts):
+        self.contacts, self.tables, self.state = contacts, contacts.tables, contacts.state
+        self.store = contacts.store
+        capacity = self.tables.capacity
+        self.sphere = ti.Vector.field(4, real, shape=capacity.spheres)
+        self.cluster = ti.Vector.field(3, real, shape=capacity.faces)
+        self.law = contacts.law
+        if self.law.meets_faces:
+            self.corner = ti.Vector.field(3, real, shape=3 * capacity.faces)
+
+    @ti.func
+    def note_places(self, i):
+        """Compute the positions of the spheres of body i, once for all comparisons."""
+        size = self.tables.face_spheres[None]
+        position, rotation = self.state.position[i], self.state.rotation[i]
+        for face in range(4 * i, 4 * i + 4):
+            self.cluster[face] = self.contacts.cluster_centre(i, face)
+            if self.state.exposed_tick[face] >= 0:
+                for s in range(size * face, size * face + size):
+                    sphere = self.tables.sphere[s]
+                    place = position + matvec(rotation, sphere.xyz)
+                    self.sphere[s] = vec4(place[0], place[1], place[2], sphere[3])
+                if ti.static(self.law.meets_faces):
+                    for k in range(3 * face, 3 * face + 3):
+                        self.corner[k] = position + matvec(rotation, self.law.corner[k])
+
+    @ti.func
+    def compare(self, i, j, faces, start, write):
+        """Find the sphere pairs of two bodies within their margin: number, and bits of their faces.
+
+        Returns also the smallest gap of others [m], at most OUTLOOK skins beyond the margin. faces:
+        bit 4 f + g for faces f and g to compare. write: enter the pairs in the store, from start
+        on; the gap of others is not found then.
+        """
+        margin = self.contacts.margin(i, j)
+        count, hits, least = 0, 0, margin
+        if not write:
+            least += 0.5 * OUTLOOK * (self.contacts.skin[i] + self.contacts.skin[j])
+        for fg in range(16):
+            if (faces >> fg) & 1 == 1:
+                face_i, face_j = 4 * i + fg // 4, 4 * j + fg % 4
+                if self._clusters_near(face_i, face_j, least):
+                    place = start + count
+                    more = 0
+                    if ti.static(self.law.meets_faces):
+                        more, least = self._on_faces(face_i, face_j, place, margin, least, write)
+                    else:
+                        more, least = self._of_faces(face_i, face_j, place, margin, least, write)
+                    count += more
+                    hits |= ti.cast(more > 0, ti.i32) << fg
+        return count, hits, least
+
+    @ti.func
+    def _clusters_near(self, face_i, face_j, wide):
+        """Whether the balls around the spheres of two faces are nearer than wide [m]."""
+        reach = self.tables.cluster[face_i][3] + self.tables.cluster[face_j][3] + wide
+        return (self.cluster[face_j] - self.cluster[face_i]).norm_sqr() < reach * reach
+
+    @ti.func
+    def _of_faces(self, face_i, face_j, start, margin, least, write):
+        count = 0
+        size = self.tables.face_spheres[None]
+        for a in range(size * face_i, size * face_i + size):
+            mine = self.sphere[a]
+            whole = mine[3] + self.tables.cluster[face_j][3] + least
+            # A sphere far from the ball around those of the other face is as far from all of them.
+            if (self.cluster[face_j] - mine.xyz).norm_sqr() < whole * whole:
+                for b in range(size * face_j, size * face_j + size):
+                    other = self.sphere[b]
+                    reach = mine[3] + other[3]
+                    apart2 = (other.xyz - mine.xyz).norm_sqr()
+                    if apart2 < (reach + least) * (reach + least):
+                        if apart2 < (reach + margin) * (reach + margin):
+                            if write:
+                                self.store.sphere[start + count] = [a, b]
+                            count += 1
+                        else:
+                            least = ti.sqrt(apart2) - reach
+        return count, least
+
+    @ti.func
+    def _on_faces(self, face_i, face_j, start, margin, least, write):
+        """Both ways: the spheres of one face on the other, then those of the other on the one."""
+        count = 0
+        size = self.tables.face_spheres[None]
+        for turned in range(2):
+            face, other = face_i, face_j
+            if turned == 1:
+                face, other = face_j, face_i
+            for a in range(size * face, size * face + size):
+                mine = self.sphere[a]
+                whole = mine[3] + self.tables.cluster[other][3] + least
+                if (self.cluster[other] - mine.xyz).norm_sqr() < whole * whole:
+                    gap = self._gap(mine, other)
+                    if gap < margin:
+                        if write:
+                            k = start + count
+                            self.store.sphere[k][turned] = a
+                            self.store.sphere[k][1 - turned] = -1 - other
+                        count += 1
+                    elif gap < least:
+                        least = gap
+        return count, least
+
+    @ti.func
+    def _gap(self, sphere, face):
+        """Gap between a sphere and a face, whichever side it is on [m]."""
+        p, q, s = self.corner[3 * face], self.corner[3 * face + 1], self.corner[3 * face + 2]
+        return (sphere.xyz - closest_point(sphere.xyz, p, q, s)).norm() - sphere[3]

@@ -1,0 +1,33 @@
+"""Effects that a scene may list; all others are not computed, allocated or compiled."""
+
+from taichi_dem.laws.bond_damping import BondDamping
+from taichi_dem.laws.face_contact import FaceContact
+from taichi_dem.laws.friction import Friction
+from taichi_dem.laws.shear_slip import ShearSlip
+from taichi_dem.laws.slip_weakening import SlipWeakening
+from taichi_dem.laws.softening import Softening
+from taichi_dem.laws.sphere_contact import SphereContact
+from taichi_dem.laws.sticking_friction import StickingFriction
+from taichi_dem.loads.gas_pressure import GasPressure
+from taichi_dem.loads.gravity import Gravity
+from taichi_dem.loads.pressure import Pressure
+from taichi_dem.loads.quiet_boundary import QuietBoundary
+from taichi_dem.loads.supports import Fixed, PrescribedMotion, Roller
+
+__all__ = [
+    "BondDamping",
+    "FaceContact",
+    "Fixed",
+    "Friction",
+    "GasPressure",
+    "Gravity",
+    "PrescribedMotion",
+    "Pressure",
+    "QuietBoundary",
+    "Roller",
+    "ShearSlip",
+    "SlipWeakening",
+    "Softening",
+    "SphereContact",
+    "StickingFriction",
+]

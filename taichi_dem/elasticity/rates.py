@@ -1,0 +1,128 @@
+"""Explicit step limits of the bonds of a mesh: rates of each body, and the steps they allow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from taichi_dem.kit.fixed_order import (
+    inverse_factor,
+    largest_eigenvalues,
+    length,
+    parts_in_cache,
+    product,
+    transposed,
+)
+from taichi_dem.materials.body_materials import AnyMaterial
+from taichi_dem.materials.bond_rules import Constant, Density, per_bond
+from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.topology import Topology, body_properties, face_vertices
+
+
+def dashpots_of(material: AnyMaterial) -> tuple[Constant, Constant]:
+    """Normal and tangential dashpot per area of bonds [Pa s/m], numbers or rules."""
+    return material.normal_damping, material.shear_damping
+
+
+def springs_of(material: AnyMaterial) -> tuple[Constant, Constant]:
+    """Normal and tangential stiffness per area of bonds [Pa/m], numbers or rules."""
+    return material.normal_stiffness, material.shear_stiffness
+
+
+def bond_rates(
+    mesh: Mesh, topology: Topology, density: Density, coefficients: tuple[Constant, Constant]
+) -> np.ndarray:
+    """Largest eigenvalue of M^-1/2 G M^-1/2 of every body, shape (body_count,).
+
+    G is the 6x6 block with which the bonds of a body resist its velocity and spin when the
+    neighbours stand still: the sum of (A / 3) J^T diag(normal, tangential) J over the three
+    contact units of each bonded face, J the map from (velocity, spin) to the velocity at the
+    vertex (Konno et al., section 2.1, units at the vertices).  M holds mass and inertia.
+    coefficients: normal and tangential coefficient per area, numbers or rules (``springs_of``);
+    [Pa s/m] gives rates [1/s], [Pa/m] gives squared angular frequencies [1/s2].
+    """
+    return subset_rates(mesh, topology, density, coefficients, subsets=(15,))[:, 0]
+
+
+def subset_rates(
+    mesh: Mesh,
+    topology: Topology,
+    density: Density,
+    coefficients: tuple[Constant, Constant],
+    subsets: Sequence[int] = range(16),
+) -> np.ndarray:
+    """``bond_rates`` with only some of a body's bonds intact, shape (body_count, len(subsets)).
+
+    subsets: bit f of each stands for the bond at local face f; the default is all sixteen.
+    """
+    mass, centre, inertia = body_properties(mesh, density)
+    body, face = np.nonzero(topology.body_bond >= 0)
+    laws = per_bond(mesh, topology, density, coefficients)[topology.body_bond[body, face]]
+    blocks = np.zeros((mesh.body_count, 4, 6, 6))
+    blocks[body, face] = _face_blocks(mesh, body, face, centre[body], laws)
+    root = inverse_root(mass, inertia)
+    rates = np.zeros((mesh.body_count, len(subsets)))
+    for part in parts_in_cache(mesh.body_count):
+        for column, subset in enumerate(subsets):
+            total = _sum_of(blocks[part], subset)
+            rates[part, column] = scaled_eigenvalues(root[part], total)
+    return np.maximum(rates, 0.0)
+
+
+def _sum_of(blocks, subset):
+    """Sum of the blocks of the faces in a subset, in their order; blocks (n, 4, 6, 6)."""
+    total = np.zeros_like(blocks[:, 0])
+    for face in range(4):
+        if subset >> face & 1:
+            total += blocks[:, face]
+    return total
+
+
+def _face_blocks(mesh, body, face, centre, coefficients):
+    """The block G of single faces, shape (n, 6, 6); coefficients: of each, (n, 2)."""
+    vertices = face_vertices(mesh, body, face)
+    vector = geometry.area_vectors(mesh.points, vertices)
+    area = length(vector)
+    normal = vector / area[:, None]
+    normally, across = coefficients[:, 0, None, None], coefficients[:, 1, None, None]
+    law = across * np.eye(3) + (normally - across) * (normal[:, :, None] * normal[:, None, :])
+    arms = mesh.points[vertices] - centre[:, None]
+    return area[:, None, None] / 3.0 * point_blocks(arms, law)
+
+
+def point_blocks(arms: np.ndarray, law: np.ndarray) -> np.ndarray:
+    """Sum over points of J^T law J, J the map from (velocity, spin) to the point's velocity.
+
+    arms: points from the centre [m], shape (n, points, 3). law: what resists their velocity,
+    shape (n, 3, 3). Returns (n, 6, 6).
+    """
+    lever = np.zeros((*arms.shape[:2], 3, 6))
+    lever[..., :3] = np.eye(3)
+    lever[..., 3:] = -_cross_matrix(arms)  # w x r = -[r]x w
+    return product(transposed(lever), product(law[:, None], lever)).sum(axis=1)
+
+
+def _cross_matrix(vectors):
+    """Matrices [r]x with [r]x w = r x w, shape (..., 3, 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def scaled_eigenvalues(root: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+    """Largest eigenvalue of root G root^T for every 6x6 block G, shape (n,)."""
+    return largest_eigenvalues(product(root, product(blocks, transposed(root))))
+
+
+def inverse_root(mass: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """W with W^T W = M^-1 of M = diag(mass, mass, mass, inertia), shape (n, 6, 6).
+
+    W G W^T has the eigenvalues of M^-1/2 G M^-1/2.
+    """
+    root = np.zeros((len(mass), 6, 6))
+    root[:, :3, :3] = np.eye(3) / np.sqrt(mass)[:, None, None]
+    root[:, 3:, 3:] = inverse_factor(inertia)
+    return root

@@ -1,0 +1,134 @@
+"""The engine of a blast: all fields and kernels of one structure, which runs any scene of it."""
+
+from collections.abc import Iterable
+from functools import partial
+
+from taichi_dem.contact.contacts import Contacts
+from taichi_dem.contact.search import BroadPhase
+from taichi_dem.kit.engine_pool import Engine, EnginePool
+from taichi_dem.laws.base import Effect, bound_by_role
+from taichi_dem.methods import Method, structure_of
+from taichi_dem.report.readings import Readings
+from taichi_dem.stability.body_limits import limits_for
+from taichi_dem.state.capacity import LEAST, Capacity
+from taichi_dem.state.model import Model
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
+from taichi_dem.step.advance import Advance
+from taichi_dem.step.drivers import DRIVERS, SolvedStep, Step
+from taichi_dem.step.implicit.advance import SolvedAdvance
+from taichi_dem.step.implicit.solver import Solver
+from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.wake_up import WokenLists
+
+
+class Structure:
+    """Compiled structure of a scene and a method: classes of effects, kind of method.
+
+    Scenes of equal structures share kernels. effects, method: those of the first scene, of which
+    engines make copies. brute_force: contact search without cells. on_demand: laws are evaluated
+    only where they act.
+    """
+
+    def __init__(
+        self,
+        effects: Iterable[Effect],
+        method: Method,
+        brute_force: bool = False,
+        on_demand: bool = False,
+    ):
+        self.effects, self.method = tuple(effects), method
+        self.brute_force, self.on_demand = brute_force, on_demand
+        kinds = tuple(map(type, self.effects))
+        self.key = kinds, structure_of(method), brute_force, on_demand
+
+    def __eq__(self, other):
+        return self.key == other.key
+
+    def __hash__(self):
+        return hash(self.key)
+
+
+class BlastEngine(Engine):
+    """Tables, state, contact search, schedule, step and drivers of one structure.
+
+    model in its methods is a ``Model``, the scene's arrays.
+    """
+
+    advice = (
+        "take a smaller mesh, or shorter lists of contact (pairs_per_body, spheres_per_body, "
+        "neighbours_per_body)"
+    )
+
+    def declare(self) -> None:
+        """Build all parts; Taichi allocates their fields afterwards, all at once."""
+        capacity = Capacity(*self.capacity)
+        capacity.check()
+        method = self.structure.method
+        bind = partial(bound_by_role, self.structure.effects)
+        self.tables = Tables(capacity, bind, self.structure.on_demand)
+        self.state = State(self.tables)
+        self.contacts = Contacts(self.tables, self.state) if self.tables.has_contact else None
+        self.schedule = self._schedule(method)
+        self.advance = self._advance(method)
+        if self.schedule.sleeps:
+            self.schedule.woken = WokenLists(self.schedule, self.advance)
+        self.broad_phase = None
+        if self.contacts is not None:
+            told = self.schedule.start_pairs, self.schedule.limits
+            self.broad_phase = BroadPhase(self.contacts, *told, self.structure.brute_force)
+        kind = SolvedStep if method.solves else Step
+        self.step = kind(self.advance, self.schedule, self.broad_phase)
+        self.drivers = {name: driver(self.step) for name, driver in DRIVERS.items()}
+        self.readings = Readings(self.tables, self.state, self.advance)
+
+    def _schedule(self, method):
+        limits = limits_for(self.tables, self.state, self.contacts, method)
+        parts = self.tables, self.state, self.contacts
+        drifted = method.neighbour == "drifted"
+        return Schedule(*parts, method.criterion(), method.uniform, drifted, limits)
+
+    def _advance(self, method):
+        parts = self.tables, self.state, self.schedule, self.contacts
+        if method.solves:
+            return SolvedAdvance(*parts, Solver(*parts))
+        # A method may have its own order of the physics (docs/add_a_time_integrator.md).
+        return getattr(method, "advance", Advance)(*parts)
+
+    def load(self, model: Model, method: Method, max_speed: float, sleep: float = 0.0) -> None:
+        """Take over a scene, at rest and at time zero; max_speed [m/s], sleep: see ``Scene``."""
+        self.clear()
+        self.enter(model)
+        self.tables.load(model)
+        self.state.load(model, max_speed)
+        if self.contacts is not None:
+            self.contacts.load(model, method)
+            self.broad_phase.load(model, method)
+        self.schedule.load(model, method, sleep)
+        if self.advance.solver is not None:
+            self.advance.solver.load(model, method)
+        for driver in self.drivers.values():
+            driver.load()
+
+    def _lengths(self, model):
+        """Entries that a scene uses by those that a field has."""
+        room, n = Capacity(*self.capacity), model.body_count
+        lengths = {room.bodies: n, room.faces: 4 * n}
+        lengths.update({room.bonds: model.bond_count, room.units: 3 * model.bond_count})
+        if model.has_contact:
+            lengths[room.spheres] = 4 * n * model.spheres.per_face
+        return lengths
+
+    def accepts(self, model: Model) -> bool:
+        """Whether effect parameters compiled into kernels have the values of the scene."""
+        return all(effect.accepts(given) for effect, given in self.tables.matched(model))
+
+    def enter(self, model: Model) -> None:
+        """Set the counts and effects of the scene whose data are loaded."""
+        self.lengths = self._lengths(model)
+        for effect, given in self.tables.matched(model):
+            effect.stand_for(given)
+
+
+#: Engines of the session.
+ENGINES = EnginePool(BlastEngine, LEAST)

@@ -1,1 +1,0 @@
-"""Tables and state of a scene on the device."""

@@ -1,0 +1,1 @@
+"""What acts between bodies: laws of bonds, of contact and of friction."""

@@ -1,0 +1,478 @@
+"""Base class of effects, and null objects for roles in which a scene lists none.
+
+A user's effect holds numbers on the host. An engine holds a bound copy of it with fields and
+kernels, into which each scene of the engine loads its numbers. The ``role`` determines where
+``step/advance.py`` calls it, and the members that it must have (``laws.roles``): tension, shear
+and dashpot are laws of the contact units of bonds, contact and friction those of contact spheres,
+loads push bodies, supports hold them, ground drags on them. Roles ``load``, ``support`` and
+``ground`` take any number of effects, the others at most one.
+"""
+
+import copy
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any, Optional
+
+import numpy as np
+import taichi as ti
+from taichi.lang import impl
+
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.display import by_arguments
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.sealed import Sealed
+from taichi_dem.kit.types import real, vec3
+from taichi_dem.kit.validation import float_array, shown
+from taichi_dem.materials import Material
+from taichi_dem.materials.body_materials import MOST, BodyMaterials
+from taichi_dem.state.capacity import Capacity
+from taichi_dem.state.model import MANY, ROLES, SINGLE, Model
+from taichi_dem.state.pair_store import PairStore
+from taichi_dem.state.tables import Tables
+
+#: Lowest and highest displacement along x, y and z [m].
+Travel = tuple[tuple[float, ...], tuple[float, ...]]
+#: Times its strength that no bond reaches; a power of two, so that no digit changes.
+HARMLESS = 2.0**40
+#: Share of a limit from which on a law is evaluated: rounding is far below the rest.
+NEAR = 1.0 - 1e-9
+
+
+class Effect(Sealed):
+    """Base of all effects; one that has been made cannot be changed.
+
+    role: its place in the step. name: the word used in reports and on the command line, by default
+    that of the class. Kernels of a bound effect read its numbers in the field ``self.law``,
+    constants of the scene in ``self.tables`` (``state.tables.Tables``), and the fields that
+    ``declare`` has declared. Laws of bonds and contacts have a row of numbers for each pair of
+    materials: they read ``self.law[m, k]``, m the pair, in a bond ``self.tables.bond_pair[b]``.
+    """
+
+    role = ""
+    name = ""
+    #: Whether a friction law keeps a spring for each sphere pair (``roles.FrictionMemory``).
+    remembers = False
+    #: Whether a shear law keeps a residual slip of each unit (``roles.SlipMemory``).
+    remembers_slip = False
+    #: Whether a shear law may release a face (``roles.ShearFailure``).
+    releases = False
+    #: Whether a load acts by its mean from a time to a later one (``roles.VaryingLoad``).
+    varies = False
+    law: ti.Field
+    tables: Tables
+    _count: int
+
+    #: When it begins to act, in words; a scene with effects="auto" refuses a law that says nothing.
+    activation = ""
+    #: Whether it stands for no effect, which no report lists.
+    is_null = False
+    #: Whether it is compiled and never acts (``silent``).
+    is_silent = False
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Name a class that has no name: reports list effects by it."""
+        super().__init_subclass__(**options)
+        if not cls.name and not cls.is_null:
+            cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).strip("_").lower()
+
+    def __repr__(self):
+        return by_arguments(self)
+
+    def silent(self) -> "Effect":
+        """Return a copy that is compiled like this effect and never acts.
+
+        All bits, reports and findings are those of a scene that does not list it, which would be
+        compiled anew.
+
+        Returns
+        -------
+        Effect
+            The silent copy.
+
+        Raises
+        ------
+        InputError
+            The effect cannot be silent.
+        """
+        if type(self).harmless is Effect.harmless:
+            raise InputError(f"effect {self.name} cannot be silent: leave it out of the scene")
+        made = copy.copy(self)
+        vars(made).update(name="", is_silent=True)
+        return made
+
+    def harmless(self, material: Material) -> Material:
+        """Return the material with which the effect never acts, as ``silent`` needs it.
+
+        Parameters
+        ----------
+        material : Material
+            Material of the scene.
+
+        Returns
+        -------
+        Material
+            The changed material.
+        """
+        return material
+
+    def check_material(self, material: Material) -> None:
+        """Refuse a material that the effect cannot act with; a scene asks.
+
+        Parameters
+        ----------
+        material : Material
+            Material of the scene.
+
+        Raises
+        ------
+        InputError
+            The effect cannot act with it.
+        """
+
+    def numbers(self, material: Material) -> tuple:
+        """Numbers that kernels read; to change them compiles nothing.
+
+        Loads, supports and ground read them as ``self.law[0]`` and on, laws of bonds and contacts
+        as ``self.law[m, 0]`` and on, m a pair of materials.
+
+        Parameters
+        ----------
+        material : Material
+            Material of the scene; for a law what joins the two bodies (``body_materials.joined``).
+
+        Returns
+        -------
+        tuple of float
+            Numbers, in SI units [SI].
+        """
+        return ()
+
+    def declare(self, capacity: Capacity) -> None:
+        """Declare further fields, with the capacity of an engine; no field may be used here.
+
+        Parameters
+        ----------
+        capacity : Capacity
+            Numbers of bodies, bonds, units and faces that an engine has room for.
+        """
+
+    def declare_columns(self, store: PairStore) -> None:
+        """Declare data for each pair of bodies, or of spheres; called in scenes with contact.
+
+        Parameters
+        ----------
+        store : PairStore
+            Pair store, whose ``column`` and ``sphere_column`` return fields.
+        """
+
+    def load(self, model: Model) -> None:
+        """Fill the declared fields for a scene; they are zero before.
+
+        Parameters
+        ----------
+        model : Model
+            Arrays of the scene.
+
+        Raises
+        ------
+        InputError
+            The scene lacks what the effect needs.
+        """
+
+    def state(self) -> dict[str, ti.Field]:
+        """Fields that change in a run; a checkpoint holds them.
+
+        Returns
+        -------
+        dict
+            Fields by name.
+        """
+        return {}
+
+    def stress(self, material: Material, size: float) -> float:
+        """Stress that a load, support or ground may cause in a block, for estimates before a run.
+
+        Parameters
+        ----------
+        material : Material
+            Material of the scene.
+        size : float
+            Largest extent of the block [m].
+
+        Returns
+        -------
+        float
+            Stress [Pa]; NaN where it is not known.
+        """
+        return np.nan
+
+    def change_time(self) -> float:
+        """Shortest time within which a load or support changes; longer steps lose its shape.
+
+        Infinite by default.
+
+        Returns
+        -------
+        float
+            Time [s].
+        """
+        return np.inf
+
+    def travel(self) -> Travel:
+        """Bounds of the displacement that a load or support may cause along x, y and z.
+
+        Used to decide whether parts of a mesh may meet. Infinite by default.
+
+        Returns
+        -------
+        tuple of (tuple, tuple)
+            Lowest and highest displacement [m], three components each.
+        """
+        return (-np.inf,) * 3, (np.inf,) * 3
+
+    def stand_for(self, given: Optional["Effect"]) -> None:
+        """Take the attributes of this bound effect from an effect of a scene.
+
+        Parameters
+        ----------
+        given : 'Effect' or None
+            Effect of the scene; None changes nothing.
+        """
+        if given is not None:
+            self.__dict__["_given"] = vars(given)
+
+    @property
+    def stands_silent(self) -> bool:
+        """Whether the effect that this bound one stands for is silent."""
+        return bool(self._given.get("is_silent"))
+
+    def load_scene(self, model: Model) -> None:
+        """Load the numbers of the effect that this bound one stands for.
+
+        Parameters
+        ----------
+        model : Model
+            Arrays of the scene.
+        """
+        if self.stands_silent:
+            model = model.harmless(self)
+        if self._count:
+            assign(self.law, _numbers_of(self, model.materials))
+        self.load(model)
+
+    def accepts(self, given: Optional["Effect"]) -> bool:
+        """Whether kernels compiled for this effect are valid for an effect of a scene.
+
+        They are, unless they contain an attribute of it, read in a kernel, that has another value,
+        or it has another count of numbers.
+
+        Parameters
+        ----------
+        given : 'Effect' or None
+            Effect of the scene.
+
+        Returns
+        -------
+        bool
+            True where they are valid.
+        """
+        if given is None:
+            return True
+        same = (_same(vars(given).get(name), value) for name, value in self._frozen.items())
+        return _count_of(given) == self._count and all(same)
+
+    def __getattr__(self, name):
+        given = self.__dict__.get("_given", {})
+        if name not in given:
+            raise AttributeError(f"{type(self).__name__} has no {name}")
+        if impl.inside_kernel():
+            # The compiler takes the value as a constant: kernels serve no other value from now on.
+            self._frozen[name] = copy.copy(given[name])
+        return given[name]
+
+
+def bound(effect: Effect, tables: Tables) -> Any:
+    """A copy of an effect with its own fields, which belongs to an engine and serves its scenes."""
+    made = object.__new__(type(effect))
+    made.__dict__.update(_given=vars(effect), _frozen={}, tables=tables)
+    made._count = _count_of(effect)
+    if made._count:
+        one_row = effect.role in MANY
+        made.law = ti.field(real, shape=made._count if one_row else (MOST**2, made._count))
+    made.declare(tables.capacity)
+    return made
+
+
+def _count_of(effect):
+    """How many numbers an effect has."""
+    material: Any = _AnyMaterial()
+    return len(effect.numbers(material))
+
+
+def _numbers_of(effect, materials):
+    """Numbers of an effect; of laws a row for each pair of materials, ``Tables.pair``."""
+    table = [[_checked_numbers(effect, pair) for pair in row] for row in materials.pairs]
+    if effect.role in MANY:
+        return table[0][0]
+    rows = np.zeros((MOST * len(table), effect._count))
+    for a, row in enumerate(table):
+        rows[MOST * a : MOST * a + len(row)] = row
+    return rows
+
+
+def check_one_material(effect: Effect, materials: BodyMaterials) -> None:
+    """Raise InputError where a load, support or ground takes numbers that materials differ in."""
+    if effect.role in MANY and not materials.is_one:
+        own = [tuple(effect.numbers(row[k])) for k, row in enumerate(materials.pairs)]
+        if any(numbers != own[0] for numbers in own):
+            raise InputError(
+                f"effect {effect.name} takes one row of numbers for all bodies, and must get the "
+                f"same of every material of a scene, got {shown(own[0])} and others"
+            )
+
+
+def _checked_numbers(effect, material):
+    """Numbers of an effect with a material, as an array; InputError unless all are numbers."""
+    given = effect.numbers(material)
+    try:
+        found = float_array(given)
+    except (TypeError, ValueError):
+        found = np.array(np.nan)
+    if found.shape != (effect._count,) or np.isnan(found).any():
+        raise InputError(
+            f"numbers of effect {effect.name or type(effect).__name__} must be {effect._count} "
+            f"real numbers, got {shown(given)}"
+        )
+    return found
+
+
+class _AnyMaterial:
+    """Substitute for a material where only the number of constants matters."""
+
+    def __getattr__(self, name):
+        return 1.0
+
+
+def _same(first, second):
+    try:
+        return bool(np.array_equal(first, second))
+    except (TypeError, ValueError):
+        return first is second
+
+
+def along(direction: Sequence[float]) -> Travel:
+    """Travel without end in a direction, for ``Effect.travel``."""
+    low = tuple(-np.inf if x < 0.0 else 0.0 for x in direction)
+    return low, tuple(np.inf if x > 0.0 else 0.0 for x in direction)
+
+
+@ti.data_oriented
+class ElasticTension(Effect):
+    """No softening: a unit stays elastic in tension and compression and never fails."""
+
+    role = "tension"
+    is_null = True
+
+    @ti.func
+    def traction(self, m, stiffness, u, opening):
+        """Linear traction [Pa] at a normal opening [m]."""
+        return stiffness * opening
+
+    @ti.func
+    def failed(self, m, u):
+        """An elastic unit never fails."""
+        return 0
+
+    @ti.func
+    def stored(self, b, u, opening):
+        """Elastic energy per area [J/m^2]."""
+        return 0.5 * self.tables.bond_stiffness[b][0] * opening * opening
+
+    @ti.func
+    def spent(self, b, u):
+        """Nothing is spent by softening."""
+        return 0.0
+
+    @ti.func
+    def damage(self, b, u):
+        """An elastic unit is never damaged."""
+        return 0.0
+
+
+@ti.data_oriented
+class ElasticShear(Effect):
+    """No slip: a unit stays elastic in shear."""
+
+    role = "shear"
+    is_null = True
+
+    @ti.func
+    def traction(self, m, stiffness, u, sliding, pressure):
+        """Linear shear traction [Pa] (eq. 1) and no energy slipped away."""
+        return stiffness * sliding, 0.0
+
+    @ti.func
+    def stored(self, b, u, sliding):
+        """Elastic energy per area [J/m^2]."""
+        return 0.5 * self.tables.bond_stiffness[b][1] * sliding.dot(sliding)
+
+
+@ti.data_oriented
+class NoDashpot(Effect):
+    """Bonds without damping."""
+
+    role = "dashpot"
+    is_null = True
+
+    @ti.func
+    def traction(self, b, velocity):
+        """No traction at any velocity."""
+        return vec3(0.0, 0.0, 0.0)
+
+
+@ti.data_oriented
+class NoFriction(Effect):
+    """Frictionless sphere contacts."""
+
+    role = "friction"
+    is_null = True
+
+    @ti.func
+    def limit(self, m, force_normal):
+        """No friction at any normal force."""
+        return 0.0
+
+    @ti.func
+    def force(self, m, damping, force_normal, slide):
+        """No force at any sliding velocity."""
+        return vec3(0.0, 0.0, 0.0)
+
+
+#: Classes of the null objects by role; None where there is none.
+ABSENT: dict[str, Any] = {
+    "tension": ElasticTension,
+    "shear": ElasticShear,
+    "dashpot": NoDashpot,
+    "friction": NoFriction,
+    "contact": None,
+}
+
+
+def bound_by_role(effects: Iterable[Effect], tables: Tables) -> dict[str, list[Any]]:
+    """Bound copies of effects by role, null objects in roles in which none is listed."""
+    listed = {role: [e for e in effects if e.role == role] for role in ROLES}
+    for role in SINGLE:
+        if not listed[role] and ABSENT[role]:
+            listed[role] = [ABSENT[role]()]
+    return {role: [bound(effect, tables) for effect in listed[role]] for role in ROLES}
+
+
+__all__ = [
+    "ABSENT",
+    "HARMLESS",
+    "NEAR",
+    "Effect",
+    "Travel",
+    "along",
+    "bound_by_role",
+]

@@ -1,0 +1,85 @@
+"""Laws that a scene takes from its material where it names none: effects="auto" and "all"."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import shown
+from taichi_dem.laws.base import Effect
+from taichi_dem.laws.bond_damping import BondDamping
+from taichi_dem.laws.friction import Friction
+from taichi_dem.laws.roles import check_activation
+from taichi_dem.laws.shear_slip import ShearSlip
+from taichi_dem.laws.softening import Softening
+from taichi_dem.laws.sphere_contact import ONCE_BROKEN, SphereContact
+from taichi_dem.laws.sticking_friction import StickingFriction
+from taichi_dem.materials.body_materials import BodyMaterials
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.parts import parts_of
+from taichi_dem.state.model import SINGLE
+
+AUTO, ALL, LISTED = "auto", "all", "listed"
+#: Words for the effects of a scene.
+WORDS = (AUTO, ALL)
+
+
+class ChosenEffects(tuple):
+    """Effects of a scene. word: "auto", "all", or "listed" where the user listed them."""
+
+    word: str
+
+    def __new__(cls, effects: Iterable[Effect], word: str = LISTED) -> "ChosenEffects":
+        """Keep the word with the effects."""
+        made = super().__new__(cls, effects)
+        made.word = word
+        return made
+
+    def __reduce__(self):
+        return ChosenEffects, (tuple(self), self.word)
+
+
+def chosen_effects(
+    word: Any, mesh: Mesh, material: BodyMaterials, given: Iterable[Effect]
+) -> ChosenEffects:
+    """Effects for a word, "auto" or "all": laws that any of the materials needs, and those given.
+
+    given: loads, supports, and laws in place of the usual ones. Bodies may touch at outer faces
+    from the start where the mesh has several parts, else once something has broken. Raises
+    InputError for an unknown word, or, with "auto", a law whose author does not say when it begins
+    to act.
+    """
+    if word not in WORDS:
+        raise InputError(
+            f"effects must be a list of effects or one of {', '.join(map(repr, WORDS))}, "
+            f"got {shown(word)}"
+        )
+    given = tuple(given)
+    taken = {getattr(effect, "role", "") for effect in given}
+    laws = _laws(mesh, material, taken)
+    by_role = {effect.role: effect for effect in laws if effect.role not in taken}
+    chosen = [by_role[role] for role in SINGLE if role in by_role]
+    effects = ChosenEffects((*chosen, *given), word)
+    if word == AUTO:
+        for effect in effects:
+            if isinstance(effect, Effect):
+                check_activation(effect)
+    return effects
+
+
+def _laws(mesh, material, taken):
+    """The laws that a material has numbers for; coefficients of zero need none."""
+    laws = [Softening(), ShearSlip()]
+    if material.has_bond_damping:
+        laws.append(BondDamping())
+    if "contact" not in taken:
+        # Nothing meets a solid of one piece at its outer faces before something has come loose.
+        laws.append(SphereContact(outer_faces=True if _may_meet(mesh) else ONCE_BROKEN))
+    if material.friction > 0.0:
+        # Friction without springs is a dashpot's force up to its limit: none without a dashpot.
+        laws.append(Friction() if material.friction_has_dashpots else StickingFriction())
+    return laws
+
+
+def _may_meet(mesh):
+    """Whether outer faces of a mesh may meet before anything breaks."""
+    return bool(parts_of(mesh).max() > 0 or mesh.has_open_faces)

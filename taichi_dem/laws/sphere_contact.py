@@ -1,0 +1,144 @@
+"""Contact of fragments through spheres on their broken faces (Konno et al., 2.2, Fig. 5)."""
+
+from typing import Any, Union
+
+import taichi as ti
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.products import matvec
+from taichi_dem.kit.validation import between, flag, shown, whole
+from taichi_dem.laws.base import Effect
+from taichi_dem.materials import Material
+from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.physics.sphere_pair import Nearest, normal_force
+from taichi_dem.state.model import Model
+
+#: Entries of a list for each body: a thousand tetrahedra with as many take some GiB.
+_MOST = 100_000
+#: Value of outer_faces for spheres there from the first break on.
+ONCE_BROKEN = "once_broken"
+
+
+def _outer_faces(value: Any) -> Union[bool, str]:
+    """The value; InputError unless it is True, False or "once_broken"."""
+    if isinstance(value, str) and value != ONCE_BROKEN:
+        raise InputError(f"outer_faces must be True, False or {ONCE_BROKEN!r}, got {shown(value)}")
+    return value if value == ONCE_BROKEN else flag("outer_faces", value)
+
+
+@ti.data_oriented
+class SphereContact(Effect):
+    """Spheres inscribed behind free faces repel each other, without attraction.
+
+    Parameters
+    ----------
+    divisions : int, default 5
+        Equal parts of the edges of a face; 5 gives the paper's six spheres a face.
+    outer_faces : bool or str, default True
+        True: outer faces carry spheres from the start. ``"once_broken"``: from the first break of
+        any bond. False: only broken faces carry them, as in the paper, and bodies pass through each
+        other elsewhere.
+    skin : float, default 0.015
+        Gap up to which spheres enter the candidate list, at least, as a share of the radius of a
+        body; more where bodies are fast. It changes time, not results.
+    neighbours_per_body : int, default 64
+        Mean capacity of the list of neighbours.
+    pairs_per_body : int, default 24
+        Mean capacity of the list of body pairs.
+    spheres_per_body : int, default 160
+        Mean capacity of the list of sphere contacts, with those of the next search, before those
+        that they replace are freed.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range.
+
+    References
+    ----------
+    Konno et al., section 2.2.
+
+    Examples
+    --------
+    >>> SphereContact(outer_faces=False).face_spheres
+    6
+    """
+
+    role = "contact"
+    name = "sphere_contact"
+    activation = "spheres of free faces touch"
+    #: Whether spheres meet the faces of other bodies, instead of their spheres.
+    meets_faces = False
+
+    def __init__(
+        self,
+        divisions: int = 5,
+        outer_faces: Union[bool, str] = True,
+        skin: float = 0.015,
+        neighbours_per_body: int = 64,
+        pairs_per_body: int = 24,
+        spheres_per_body: int = 160,
+    ):
+        self.divisions = whole("divisions", divisions, 3, 20)
+        self.outer_faces = _outer_faces(outer_faces)
+        self.skin = between("skin", skin, 1e-6, 1.0)
+        self.neighbours_per_body = whole("neighbours_per_body", neighbours_per_body, 1, _MOST)
+        self.pairs_per_body = whole("pairs_per_body", pairs_per_body, 1, _MOST)
+        self.spheres_per_body = whole("spheres_per_body", spheres_per_body, 1, _MOST)
+
+    @property
+    def face_spheres(self) -> int:
+        """Spheres on a face."""
+        return (self.divisions - 1) * (self.divisions - 2) // 2
+
+    @property
+    def lengths(self) -> tuple:
+        """Entries for each body in the lists of pairs, sphere pairs and neighbours."""
+        return self.pairs_per_body, self.spheres_per_body, self.neighbours_per_body
+
+    def numbers(self, material: Material) -> tuple[float, ...]:
+        """Stiffness [N/m] and damping [N s/m] of a contact."""
+        return float(material.contact_stiffness), float(material.contact_damping)
+
+    def spheres(self, model: Model) -> ContactSpheres:
+        """Spheres of a model, in balls that hold all of a face, or of a body, that can touch."""
+        return spheres_of_faces(model.mesh, model.centre, self.divisions)
+
+    def watch_faces(self, exposed_faces: ti.Field) -> None:
+        """Take note of the field with a bit for each face of a body that is free."""
+
+    @ti.func
+    def nearest(self, a, b, turn, offset):
+        """Where two bodies are nearest by an entry (a, b) of the pair store, a ``Nearest``.
+
+        turn, offset: rotation and place of the second body in the frame of the first [m].
+        """
+        first, second = self.tables.sphere[a], self.tables.sphere[b]
+        apart = matvec(turn, second.xyz) + offset - first.xyz
+        size = first[3] + second[3]
+        return Nearest(first=first, apart=apart, reach=size, size=size, can_meet=1)
+
+    @ti.func
+    def face_of(self, a):
+        """Face 4 * body + f of one side of an entry of the pair store."""
+        return a // self.tables.face_spheres[None]
+
+    @ti.func
+    def normal(self, m, overlap, opening_rate):
+        """Repulsion [N] at an overlap [m] of spheres that part at opening_rate [m/s]."""
+        return normal_force(self.law[m, 0], self.law[m, 1], overlap, opening_rate)
+
+    @ti.func
+    def elastic(self, m, overlap):
+        """Spring's part of the repulsion [N]."""
+        return self.law[m, 0] * overlap
+
+    @ti.func
+    def damping(self, m):
+        """Damping coefficient of a contact [N s/m]; friction shares it (spec, section 2)."""
+        return self.law[m, 1]
+
+    @ti.func
+    def stored(self, m, overlap):
+        """Elastic energy of a contact [J]."""
+        return 0.5 * self.law[m, 0] * overlap * overlap

@@ -1,0 +1,105 @@
+"""Friction of contact spheres that stick until they slip (Cundall and Strack 1979)."""
+
+import taichi as ti
+
+from taichi_dem.kit.types import real, vec3
+from taichi_dem.kit.validation import between
+from taichi_dem.laws.base import Effect
+from taichi_dem.laws.friction import Friction
+from taichi_dem.materials import Material
+from taichi_dem.state.pair_store import PairStore
+
+
+@ti.data_oriented
+class StickingFriction(Friction):
+    """Friction with a tangential spring in each contact of two spheres, up to Coulomb's limit.
+
+    A body at rest on a slope below the friction angle stays there; with ``Friction`` it creeps. The
+    stretch of a spring turns with the first body and is lost when the spheres part.
+
+    Parameters
+    ----------
+    stiffness_ratio : float, default 0.8
+        Ratio of the stiffness of the spring to the material's contact stiffness, from 1e-6 to 1;
+        spheres of a Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
+
+    Raises
+    ------
+    InputError
+        The ratio is out of range.
+
+    Notes
+    -----
+    The effect is not in the paper.
+
+    References
+    ----------
+    Cundall and Strack, Geotechnique 29 (1979) 47.
+
+    Examples
+    --------
+    >>> StickingFriction(stiffness_ratio=0.85).stiffness_ratio
+    0.85
+    """
+
+    name = "sticking_friction"
+    activation = "spheres that touch slide"
+    remembers = True
+
+    def __init__(self, stiffness_ratio: float = 0.8):
+        self.stiffness_ratio = between("stiffness_ratio", stiffness_ratio, 1e-6, 1.0)
+
+    #: Its springs let bodies that touch remember: without a limit they would still slip.
+    harmless = Effect.harmless
+
+    def numbers(self, material: Material) -> tuple[float, ...]:
+        """Friction coefficient, and stiffness of the spring [N/m]."""
+        return material.friction, self.stiffness_ratio * float(material.contact_stiffness)
+
+    def declare_columns(self, store: PairStore) -> None:
+        """Keep the stretch [m] of the spring of each sphere pair, in the first body's frame."""
+        self.stretch = store.sphere_column("tangential_stretch", real, 3)
+
+    @ti.func
+    def follow(self, k, normal, way):
+        """Turn the spring of sphere pair k into the plane of contact and stretch it by ``way`` [m].
+
+        normal: of the contact; way: of the second sphere against the first across the normal.
+        """
+        stretch = self.stretch[k]
+        flat = stretch - stretch.dot(normal) * normal
+        # Turned, not projected: to turn with the contact takes no energy.
+        self.stretch[k] = flat * (stretch.norm() / ti.max(flat.norm(), 1e-300)) + way
+
+    @ti.func
+    def slip(self, m, k, limit, way):
+        """Shorten the spring of sphere pair k to a limit [N]; return the energy dissipated [J].
+
+        way: its stretch in this step [m]. The work of the stretch, at the mean of the forces before
+        and after, is the energy stored plus that dissipated by slipping.
+        """
+        trial = self.stretch[k]
+        longest = limit / self.law[m, 1]
+        size = trial.norm()
+        present = trial
+        if size > longest:
+            present = trial * (longest / size)
+        self.stretch[k] = present
+        return 0.5 * self.law[m, 1] * (trial - way + present).dot(trial - present)
+
+    @ti.func
+    def spring(self, m, k):
+        """Force of the spring of sphere pair k on the second sphere [N]."""
+        return -self.law[m, 1] * self.stretch[k]
+
+    @ti.func
+    def stored(self, m, k):
+        """Elastic energy in the spring of sphere pair k [J]."""
+        return 0.5 * self.law[m, 1] * self.stretch[k].norm_sqr()
+
+    @ti.func
+    def part(self, m, k):
+        """Reset the spring of sphere pair k, whose spheres have parted; return its energy [J]."""
+        energy = self.stored(m, k)
+        self.stretch[k] = vec3(0.0)
+        return energy

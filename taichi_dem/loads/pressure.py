@@ -1,0 +1,177 @@
+"""Pressure on a group of outer faces, and its history."""
+
+from abc import abstractmethod
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.likely_units import PRESSURE, in_unit
+from taichi_dem.kit.products import matvec
+from taichi_dem.kit.validation import finite, positive, shown, word
+from taichi_dem.laws.base import Effect
+from taichi_dem.loads.history import History, history_points, shortest_piece
+from taichi_dem.materials import Material
+from taichi_dem.mesh.tetrahedra import area_vectors
+from taichi_dem.mesh.topology import face_vertices, faces_of_group
+from taichi_dem.physics.rotation import zero3
+from taichi_dem.state.capacity import Capacity
+from taichi_dem.state.model import Model
+
+
+@ti.data_oriented
+class FacePressure(Effect):
+    """Base of loads that push on the faces of a group along their current normal.
+
+    A derived class has ``mean_pressure(since, until)``, in Pa, and ``changes(since, until)``,
+    nonzero where it changes between two times [s]. The area stays the mesh's.
+    """
+
+    role = "load"
+    varies = True
+
+    @abstractmethod
+    def mean_pressure(self, since: Any, until: Any) -> Any:
+        """Mean pressure from a time to a later one; a ti.func.
+
+        Parameters
+        ----------
+        since : float
+            Time [s].
+        until : float
+            Later time [s].
+
+        Returns
+        -------
+        float
+            Pressure [Pa].
+        """
+
+    def declare(self, capacity: Capacity) -> None:
+        """Loaded faces of every body: area vectors [m^2] and arms from the centre [m]."""
+        self.first = ti.field(ti.i32, shape=capacity.bodies + 1)
+        self.area = ti.Vector.field(3, ti.f64, shape=capacity.faces)
+        self.arm = ti.Vector.field(3, ti.f64, shape=capacity.faces)
+
+    def load(self, model: Model) -> None:
+        """Find the loaded faces; InputError when the mesh has no such group."""
+        body, face = faces_of_group(model.mesh, model.topology, self.group)
+        order = np.argsort(body, kind="stable")
+        body = body[order]
+        corners = face_vertices(model.mesh, body, face[order])
+        assign(self.first, np.searchsorted(body, np.arange(model.body_count + 1)))
+        assign(self.area, area_vectors(model.mesh.points, corners))
+        assign(self.arm, model.mesh.points[corners].mean(axis=1) - model.centre[body])
+
+    @ti.func
+    def acts_on(self, i):
+        """Nonzero for a body with a face in the group."""
+        return self.first[i + 1] - self.first[i]
+
+    @ti.func
+    def wrench(self, i, motion):
+        """Force [N] and torque about the centre [N m] on body i in a motion."""
+        pressure = self.mean_pressure(motion.since, motion.until)
+        force, torque = zero3(), zero3()
+        for k in range(self.first[i], self.first[i + 1]):
+            push = -pressure * self.area[k]
+            force += push
+            torque += self.arm[k].cross(push)
+        return matvec(motion.rotation, force), matvec(motion.rotation, torque)
+
+
+@ti.data_oriented
+class Pressure(FacePressure):
+    """Pressure on the faces of a group along their current normal, also after they came loose.
+
+    Parameters
+    ----------
+    group : str
+        Group of outer faces, or of inner faces without bonds, whose both sides the pressure pushes
+        apart.
+    values : float or sequence of float
+        Pressures [Pa] at the times: linear between them, constant before the first and after the
+        last. Negative values pull. A single number is a constant pressure from time zero.
+    times : sequence of float, default (0.0,)
+        Times [s], ascending.
+
+    Raises
+    ------
+    InputError
+        Times do not ascend, or values are not as many as times.
+
+    Examples
+    --------
+    >>> Pressure("top", [0.0, 1e6], times=[0.0, 1e-4]).values
+    (0.0, 1000000.0)
+    """
+
+    name = "pressure"
+
+    def __init__(self, group: str, values: Any, times: Any = (0.0,)):
+        self.group = word("group", group)
+        points = (values,) if finite(values) else values
+        self.times, self.values = history_points(times, points)
+        in_unit("largest of values", max(self.values, key=abs), PRESSURE)
+
+    @classmethod
+    def triangle(cls, group: str, peak: float, rise: float, fall: float) -> "Pressure":
+        """Triangular pulse of pressure.
+
+        Parameters
+        ----------
+        group : str
+            Group of faces.
+        peak : float
+            Peak pressure [Pa]; negative ones pull.
+        rise : float
+            Time to the peak [s]; may be 0.
+        fall : float
+            Time from the peak to zero [s].
+
+        Returns
+        -------
+        Pressure
+            The load.
+
+        Raises
+        ------
+        InputError
+            A value is out of its range.
+        """
+        rise, fall = positive("rise", rise, zero_allowed=True), positive("fall", fall)
+        if not finite(peak) or peak == 0.0:
+            raise InputError(f"peak must be a finite number other than 0, got {shown(peak)}")
+        times, values = [0.0, rise, rise + fall], [0.0, peak, 0.0]
+        first = 0 if rise > 0.0 else 1
+        return cls(group, values[first:], times[first:])
+
+    def stress(self, material: Material, size: float) -> float:
+        """The largest pressure."""
+        return max(map(abs, self.values))
+
+    def change_time(self) -> float:
+        """Shortest time between two points of the history."""
+        return shortest_piece(self.times, self.values)
+
+    def declare(self, capacity: Capacity) -> None:
+        """The loaded faces, and the history."""
+        super().declare(capacity)
+        self.history = History()
+
+    def load(self, model: Model) -> None:
+        """Find the loaded faces and load the history; InputError for an unknown group."""
+        super().load(model)
+        self.history.load(self.times, self.values)
+
+    @ti.func
+    def changes(self, since, until):
+        """Nonzero where the pressure changes between two times [s]."""
+        return self.history.changes(since, until)
+
+    @ti.func
+    def mean_pressure(self, since, until):
+        """Mean pressure [Pa] from a time to a later one [s]."""
+        return self.history.mean(since, until)

@@ -1,0 +1,314 @@
+"""Supports: bodies with a face in a group are fixed, held on a plane, or moved as prescribed."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.elementary import sine_and_cosine
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.fixed_order import length
+from taichi_dem.kit.products import matvec, transposed_matvec
+from taichi_dem.kit.types import vec3
+from taichi_dem.kit.validation import direction, positive, shown, unit_vector, word
+from taichi_dem.laws.base import Effect, Travel
+from taichi_dem.loads.history import History, history_points, shortest_piece
+from taichi_dem.materials import Material
+from taichi_dem.mesh.topology import faces_of_group
+from taichi_dem.physics.rotation import zero3
+from taichi_dem.state.capacity import Capacity
+from taichi_dem.state.model import Model
+
+#: Sine of the angle below which two normals count as parallel.
+_PARALLEL = 1e-6
+
+
+@ti.data_oriented
+class _Support(Effect):
+    """Marks the bodies that have a face in a group."""
+
+    role = "support"
+
+    def __init__(self, group: str):
+        self.group = word("group", group)
+
+    def stress(self, material: Material, size: float) -> float:
+        """None of its own."""
+        return 0.0
+
+    def travel(self) -> Travel:
+        """No displacement: the bodies are held."""
+        return (0.0,) * 3, (0.0,) * 3
+
+    def declare(self, capacity: Capacity) -> None:
+        """Marks of the supported bodies."""
+        self.marked = ti.field(ti.i32, shape=capacity.bodies)
+
+    def load(self, model: Model) -> None:
+        """Mark the supported bodies; InputError when the mesh has no such group."""
+        body, _ = faces_of_group(model.mesh, model.topology, self.group)
+        marks = np.zeros(model.body_count, dtype=np.int32)
+        marks[body] = 1
+        assign(self.marked, marks)
+
+    @ti.func
+    def acts_on(self, i):
+        """1 for a supported body, else 0."""
+        return self.marked[i]
+
+
+@ti.data_oriented
+class Fixed(_Support):
+    """Bodies with a face in the group neither move nor turn.
+
+    Parameters
+    ----------
+    group : str
+        Face group.
+
+    Examples
+    --------
+    >>> Fixed("bottom").group
+    'bottom'
+    """
+
+    name = "fixed"
+
+    @ti.func
+    def held(self, i, t, step, rotation, velocity, angular_momentum):
+        """Zero velocity and angular momentum."""
+        return zero3(), zero3()
+
+
+@ti.data_oriented
+class Roller(_Support):
+    """Bodies with a face in the group slide on its plane and turn about its normal only.
+
+    A body on several planes slides along what they have in common, and turns only where all are
+    parallel.
+
+    Parameters
+    ----------
+    group : str
+        Face group.
+    normal : sequence of float
+        Normal of the plane [-]; its length does not matter.
+
+    Raises
+    ------
+    InputError
+        The normal has no length.
+
+    Examples
+    --------
+    >>> Roller("left", normal=(1.0, 0.0, 0.0)).group
+    'left'
+    """
+
+    name = "roller"
+
+    def __init__(self, group: str, normal: Sequence[float]):
+        super().__init__(group)
+        self._normal = unit_vector("normal", normal)
+
+    def declare(self, capacity: Capacity) -> None:
+        """Direction that each body may not move in, and whether it may turn about the normal."""
+        super().declare(capacity)
+        self.across = ti.Vector.field(3, ti.f64, shape=capacity.bodies)
+        self.turns = ti.field(ti.i32, shape=capacity.bodies)
+
+    def load(self, model: Model) -> None:
+        """Share the directions that a body may not move in among the rollers that hold it."""
+        super().load(model)
+        across = np.zeros((model.body_count, 3))
+        turns = np.zeros(model.body_count, dtype=np.int32)
+        planes: dict[int, set] = {}
+        for effect in model.supports:
+            if isinstance(effect, Roller):
+                for body in faces_of_group(model.mesh, model.topology, effect.group)[0].tolist():
+                    planes.setdefault(body, set()).add(_upward(effect._normal))
+        for body in faces_of_group(model.mesh, model.topology, self.group)[0].tolist():
+            shares = _right_angled(planes[body])
+            across[body] = shares[_upward(self._normal)]
+            turns[body] = sum(any(share) for share in shares.values()) == 1
+        assign(self.across, across)
+        assign(self.turns, turns)
+
+    @ti.func
+    def held(self, i, t, step, rotation, velocity, angular_momentum):
+        """Velocity within the plane, spin about its normal."""
+        normal = self.across[i]
+        kept = zero3()
+        if self.turns[i] == 1:
+            kept = angular_momentum
+            if normal.norm_sqr() > 0.0:
+                axis = transposed_matvec(rotation, normal)
+                # The moment of the plane is normal to its normal: the component along it stays.
+                spin = angular_momentum.dot(normal) / axis.dot(matvec(self.tables.inertia[i], axis))
+                kept = matvec(rotation, matvec(self.tables.inertia[i], spin * axis))
+        return velocity - velocity.dot(normal) * normal, kept
+
+
+def _upward(normal):
+    """The later one of a normal and its opposite, in the order of their components."""
+    return max(tuple(normal.tolist()), tuple((0.0 - normal).tolist()))
+
+
+def _right_angled(planes):
+    """Directions at right angles to each other that span the normals of planes, by plane.
+
+    In an order of the planes, so that it does not depend on that of the scene. Zero for a plane
+    that those before it contain.
+    """
+    found: dict[tuple, tuple] = {}
+    for plane in sorted(planes):
+        rest = np.array(plane)
+        for other in found.values():
+            rest = rest - sum(a * b for a, b in zip(rest.tolist(), other)) * np.array(other)
+        size = float(length(rest))
+        found[plane] = tuple((rest / size).tolist()) if size > _PARALLEL else (0.0, 0.0, 0.0)
+    return found
+
+
+@ti.data_oriented
+class PrescribedMotion(_Support):
+    """Bodies with a face in the group move with a given velocity and do not turn.
+
+    Parameters
+    ----------
+    group : str
+        Face group.
+    velocity : sequence of float
+        Velocity v along x, y and z [m/s]; the bodies move with v cos(2 pi frequency t).
+    frequency : float, default 0.0
+        Frequency [Hz]; zero for a constant velocity.
+    ramp : float, default 0.0
+        Time in which the velocity rises from zero, in a straight line [s].
+    history : tuple of (sequence, sequence), optional
+        (times [s], shares), in place of a ramp: the velocity is multiplied by the shares, linear
+        between the times and constant before the first and after the last.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range, or ramp and history are both given.
+
+    Examples
+    --------
+    >>> PrescribedMotion("top", velocity=(0.0, -0.1, 0.0), ramp=1e-4).group
+    'top'
+    """
+
+    name = "prescribed_motion"
+
+    def __init__(
+        self,
+        group: str,
+        velocity: Sequence[float],
+        frequency: float = 0.0,
+        ramp: float = 0.0,
+        history: Any = None,
+    ):
+        super().__init__(group)
+        self._velocity = direction("velocity", velocity)
+        self._frequency = positive("frequency", frequency, zero_allowed=True)
+        self._ramp = positive("ramp", ramp, zero_allowed=True)
+        if history is not None and self._ramp:
+            raise InputError(f"ramp must be 0 where there is a history, got {self._ramp:g}")
+        self._points = _shares(self._ramp, history)
+        self._history = self._points if history is not None else None
+
+    def declare(self, capacity: Capacity) -> None:
+        """Marks of the bodies, and the shares of the velocity."""
+        super().declare(capacity)
+        self.shares = History()
+
+    def load(self, model: Model) -> None:
+        """Mark the bodies; InputError where another support asks for another motion."""
+        super().load(model)
+        self.shares.load(*self._points)
+        mine = set(faces_of_group(model.mesh, model.topology, self.group)[0].tolist())
+        for effect in model.supports:
+            if _allows(effect, self):
+                continue
+            both = mine & set(faces_of_group(model.mesh, model.topology, effect.group)[0].tolist())
+            if both:
+                raise InputError(
+                    f"group {self.group} of prescribed_motion must not share bodies with group "
+                    f"{effect.group} of {effect.name}, which holds them otherwise, got body "
+                    f"{min(both)} in both"
+                )
+
+    def numbers(self, material: Material) -> tuple[float, ...]:
+        """Velocity [m/s], three components, and angular frequency [rad/s]."""
+        return (*self._velocity, 2.0 * math.pi * self._frequency)
+
+    def change_time(self) -> float:
+        """Shortest time between two points of the history, or half a period."""
+        half = 0.5 / self._frequency if self._frequency else math.inf
+        return min(half, shortest_piece(*self._points)) if any(self._velocity) else math.inf
+
+    def travel(self) -> Travel:
+        """As far as it swings, or without end along a constant velocity."""
+        times, shares = (np.array(points) for points in self._points)
+        if not self._frequency:
+            back, on = _reach(times, shares)
+            ways = [sorted((_times(x, back), _times(x, on))) for x in self._velocity]
+            return tuple(way[0] for way in ways), tuple(way[1] for way in ways)
+        # By parts: |integral of s cos| is at most (|s| + the variation of s) / (angular frequency).
+        most = np.abs(shares).max() + np.abs(np.diff(shares)).sum()
+        swing = [most * abs(x) / (2.0 * math.pi * self._frequency) for x in self._velocity]
+        return tuple(-x for x in swing), tuple(swing)
+
+    @ti.func
+    def held(self, i, t, step, rotation, velocity, angular_momentum):
+        """The prescribed velocity, its shares as a mean over the step, and no spin."""
+        amplitude = vec3(self.law[0], self.law[1], self.law[2])
+        _, swing = sine_and_cosine(self.law[3] * t)
+        return amplitude * swing * self.shares.mean(t - 0.5 * step, t + 0.5 * step), zero3()
+
+
+def _shares(ramp, history):
+    """Points of the history of a velocity: times [s] and shares of it."""
+    if history is None:
+        return history_points(*(((0.0, ramp), (0.0, 1.0)) if ramp else ((0.0,), (1.0,))))
+    refused = f"history must be a pair of times and shares, got {shown(history)}"
+    if not isinstance(history, (tuple, list)) or len(history) != 2:
+        raise InputError(refused)
+    try:
+        return history_points(*history)
+    except InputError as error:
+        raise InputError(f"{refused}: {error}") from None
+
+
+def _reach(times, shares):
+    """Lowest and highest integral of shares over time [s], from zero to any time."""
+    parts = 0.5 * (shares[1:] + shares[:-1]) * np.diff(times)
+    ends = np.array([0.0, *np.cumsum([shares[0] * times[0], *parts])])
+    # Where the share changes sign within a part, the integral turns between its ends.
+    turning = shares[1:] * shares[:-1] < 0.0
+    turns = (np.abs(shares).max() * np.diff(times))[turning].sum()
+    low, high = ends.min() - turns, ends.max() + turns
+    return low if shares[-1] >= 0.0 else -np.inf, high if shares[-1] <= 0.0 else np.inf
+
+
+def _times(speed, reach):
+    return speed * reach if speed else 0.0
+
+
+def _allows(effect, motion):
+    """Whether a support of the package allows a prescribed motion."""
+    velocity = motion._velocity
+    if isinstance(effect, Fixed):
+        return not any(velocity)
+    if isinstance(effect, Roller):
+        return sum(a * b for a, b in zip(effect._normal.tolist(), velocity)) == 0.0
+    if isinstance(effect, PrescribedMotion):
+        mine, theirs = (
+            (tuple(one._velocity), one._frequency, one._points) for one in (motion, effect)
+        )
+        return mine == theirs or not any((*velocity, *effect._velocity))
+    return True

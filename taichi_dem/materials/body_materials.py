@@ -1,0 +1,292 @@
+"""Materials of the bodies of a scene, and what joins two of them: THE rule for mixed bonds.
+
+A bond or contact between two materials has springs and dashpots in series, and the lesser of both
+strengths, cohesions, frictions and fracture energies, each for itself (``joined``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Callable, Union
+
+import numpy as np
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import instance, shown
+from taichi_dem.materials.bond_rules import (
+    BondRule,
+    ByMaterials,
+    Constant,
+    ContactRule,
+    Density,
+    bond_geometry,
+    joined_constants,
+    per_bond,
+)
+from taichi_dem.materials.material import Material, check_energy, unchecked
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.topology import topology_of
+
+#: Most different materials of a scene: tables on the device have a row for each ordered pair.
+MOST = 16
+_NONE: Mapping[str, Material] = MappingProxyType({})
+#: Constants of which a bond or contact between two materials has the lesser one.
+_LEAST = ("tensile_strength", "cohesion", "friction", "fracture_energy")
+#: Constants that act in series.
+_SERIES = (
+    *("normal_stiffness", "shear_stiffness", "normal_damping", "shear_damping"),
+    *("contact_stiffness", "contact_damping"),
+)
+
+
+def joined(first: Material, second: Material) -> Material:
+    """What a bond between two materials has, and a contact of two spheres.
+
+    Stiffnesses and dashpots are in series (``bond_rules.InSeries``; of contacts 2 k1 k2 / (k1 +
+    k2), numbers by now), strengths the lesser ones. A constant that both share stays, to the bit.
+    first: of the master. Whether the fracture energy suffices is checked by a scene, bond by bond.
+    """
+    least = {name: min(getattr(first, name), getattr(second, name)) for name in _LEAST}
+    series = {
+        name: joined_constants(getattr(first, name), getattr(second, name)) for name in _SERIES
+    }
+    density = (
+        first.density if first.density == second.density else 0.5 * (first.density + second.density)
+    )
+    return unchecked(first, density=density, **least, **series)
+
+
+class BodyMaterials:
+    """Materials of the bodies of a mesh; NumPy only.
+
+    Stands for a ``Material`` wherever all bonds or all bodies are asked for: ``density`` and the
+    constants of bonds are then those of each.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    materials : tuple of Material
+        All different; number 0 is that of the bodies in no group.
+    of_body : array, shape (body_count,), int32
+        Number of the material of every body.
+    """
+
+    def __init__(self, mesh: Mesh, materials: tuple[Material, ...], of_body: np.ndarray):
+        self.mesh, self.materials, self.of_body = mesh, materials, of_body
+
+    def __repr__(self):
+        counts = np.bincount(self.of_body, minlength=len(self.materials)).tolist()
+        return f"<BodyMaterials: {len(counts)} materials, of {counts} bodies>"
+
+    @property
+    def is_one(self) -> bool:
+        """Whether all bodies have the same material."""
+        return len(self.materials) == 1
+
+    @cached_property
+    def pairs(self) -> tuple[tuple[Material, ...], ...]:
+        """What joins material a and b, entry a, b; contacts have numbers."""
+        own = [self._on_mesh(k) for k in range(len(self.materials))]
+        return tuple(
+            tuple(one if one is other else joined(one, other) for other in own) for one in own
+        )
+
+    def _on_mesh(self, k):
+        """Material k with the numbers that contacts of its bodies have."""
+        material, bodies = self.materials[k], np.flatnonzero(self.of_body == k)
+        chosen: Any = slice(None) if self.is_one or not len(bodies) else bodies
+        given = {name: getattr(material, name) for name in ("contact_stiffness", "contact_damping")}
+        numbers = {
+            name: rule.of_mesh(self.mesh, material.density, chosen)
+            for name, rule in given.items()
+            if isinstance(rule, ContactRule)
+        }
+        return replace(material, **numbers) if numbers else material
+
+    def changed(self, change: Callable[[Material], Material]) -> BodyMaterials:
+        """The same bodies with each material changed by a function."""
+        return BodyMaterials(self.mesh, tuple(map(change, self.materials)), self.of_body)
+
+    @property
+    def density(self) -> Density:
+        """Density [kg/m3] of all bodies, or of each, (body_count,)."""
+        if self.is_one:
+            return self.materials[0].density
+        return np.array([material.density for material in self.materials])[self.of_body]
+
+    @property
+    def normal_stiffness(self) -> Constant:
+        """Normal stiffness of bonds per area [Pa/m]: a number or a rule."""
+        return self._constant("normal_stiffness")
+
+    @property
+    def shear_stiffness(self) -> Constant:
+        """Tangential stiffness of bonds per area [Pa/m]: a number or a rule."""
+        return self._constant("shear_stiffness")
+
+    @property
+    def normal_damping(self) -> Constant:
+        """Normal dashpot of bonds per area [Pa s/m]: a number or a rule."""
+        return self._constant("normal_damping")
+
+    @property
+    def shear_damping(self) -> Constant:
+        """Tangential dashpot of bonds per area [Pa s/m]: a number or a rule."""
+        return self._constant("shear_damping")
+
+    def _constant(self, name):
+        if self.is_one:
+            return getattr(self.materials[0], name)
+        rows = tuple(tuple(getattr(pair, name) for pair in row) for row in self.pairs)
+        return ByMaterials(rows, self.of_body)
+
+    @property
+    def has_bond_damping(self) -> bool:
+        """Whether bonds of any material have dashpots."""
+        return any(material.has_bond_damping for material in self.materials)
+
+    @property
+    def has_contact_damping(self) -> bool:
+        """Whether contacts of any material have dashpots."""
+        return any(material.has_contact_damping for material in self.materials)
+
+    @property
+    def friction(self) -> float:
+        """Largest friction coefficient."""
+        return max(material.friction for material in self.materials)
+
+    @property
+    def friction_has_dashpots(self) -> bool:
+        """Whether contacts of every material with friction have dashpots."""
+        return all(each.has_contact_damping for each in self.materials if each.friction > 0.0)
+
+    def least(self, name: str) -> float:
+        """Least value of a strength or of the fracture energy, by the name of the constant."""
+        return min(getattr(material, name) for material in self.materials)
+
+    def of_links(self, bodies: np.ndarray, value: Callable[[Material], float]) -> Any:
+        """A number of what joins two bodies, for pairs of them (n, 2): an array (n,).
+
+        value: of a material, as ``lambda material: material.cohesion``. One number for all where
+        all bodies have the same material.
+        """
+        if self.is_one:
+            return value(self.pairs[0][0])
+        table = np.array([[value(pair) for pair in row] for row in self.pairs])
+        kinds = self.of_body[bodies]
+        return table[kinds[:, 0], kinds[:, 1]]
+
+    def of_contacts(self, name: str) -> Any:
+        """Largest constant of the contacts that a body can have [N/m, N s/m], (body_count,).
+
+        name: of the constant. One number for all where all bodies have the same material.
+        """
+        if self.is_one:
+            return getattr(self.pairs[0][0], name)
+        most = [max(float(getattr(pair, name)) for pair in row) for row in self.pairs]
+        return np.array(most)[self.of_body]
+
+    def checked_pairs(self) -> tuple[Material, ...]:
+        """Every material, and what joins two in a bond, with the numbers of its softest bond.
+
+        Raises InputError where the fracture energy is too small for a bond: the larger the
+        elements, the softer their bonds, and the more energy they have stored when they reach their
+        strength; and a bond between two materials has the lesser of both energies.
+        """
+        ruled = any(
+            isinstance(getattr(each, name), BondRule)
+            for each in self.materials
+            for name in ("normal_stiffness", "shear_stiffness")
+        )
+        if self.is_one and not ruled:
+            return self.materials
+        topology = topology_of(self.mesh)
+        if not topology.bond_count:
+            return self.materials
+        bodies = np.stack([topology.master, topology.slave], axis=1)
+        springs = self.normal_stiffness, self.shear_stiffness
+        stiffness = per_bond(self.mesh, topology, self.density, springs)
+        kinds = self.of_body[bodies]
+        found = []
+        for a, row in enumerate(self.pairs):
+            for b, pair in enumerate(row):
+                bonds = np.flatnonzero((kinds == (a, b)).all(axis=1))
+                if len(bonds):
+                    found.append(self._softest(pair, bonds, stiffness[bonds], topology, a != b))
+        return tuple(found)
+
+    def _softest(self, pair, bonds, stiffness, topology, mixed):
+        """What joins some bonds with the least of their stiffnesses, its energy checked."""
+        place = int(stiffness[:, 0].argmin())
+        bond, normal, shear = bonds[place], stiffness[place, 0], stiffness[:, 1].min()
+        numbers = {"normal_stiffness": float(normal), "shear_stiffness": float(shear)}
+        made = unchecked(pair, **numbers)
+        distance = bond_geometry(self.mesh, topology, self.density).distance[bond]
+        where = f" at bond {bond}, whose bodies are {distance:.4g} m apart"
+        if mixed:
+            where += " and of two materials, of which it has the lesser strength and energy"
+        check_energy(made, where)
+        return made
+
+
+#: One material for all bodies, or those of each.
+AnyMaterial = Union[Material, BodyMaterials]
+
+
+def body_materials(mesh: Mesh, material: Any, by_group: Any = _NONE) -> BodyMaterials:
+    """Materials of the bodies of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    material : Material
+        Of all bodies in no group.
+    by_group : dict of str to Material, optional
+        Material of the bodies in a body group. Equal ones count as one.
+
+    Raises
+    ------
+    InputError
+        For another type, a group that the mesh does not have, a body in two groups of different
+        materials, or more than ``MOST`` different ones.
+    """
+    instance("material", material, Material)
+    mapped = isinstance(by_group, Mapping)
+    if not mapped or not all(isinstance(given, Material) for given in by_group.values()):
+        raise InputError(
+            f"materials must be a dict of body group to Material, got {shown(by_group)}"
+        )
+    kinds, of_body = [material], np.zeros(mesh.body_count, dtype=np.int32)
+    giver: dict[str, int] = {}
+    for name, given in by_group.items():
+        bodies = mesh.group_bodies(name)
+        if given not in kinds:
+            kinds.append(given)
+        number, before = kinds.index(given), giver.copy()
+        for other in (other for other in before if before[other] != number):
+            both = np.intersect1d(bodies, mesh.body_groups[other])
+            if len(both):
+                raise InputError(
+                    f"materials must give each body one material, but body {both[0]} is in the "
+                    f"groups {other} and {name}, which have different ones"
+                )
+        giver[name], of_body[bodies] = number, number
+    if len(kinds) > MOST:
+        raise InputError(f"materials must be at most {MOST} different ones, got {len(kinds)}")
+    return _without_unused(mesh, kinds, of_body)
+
+
+def _without_unused(mesh, kinds, of_body):
+    """Materials that a body has, the default first where one is left with it."""
+    used = np.unique(of_body)
+    place = np.full(len(kinds), -1, dtype=np.int32)
+    place[used] = np.arange(len(used))
+    return BodyMaterials(mesh, tuple(kinds[k] for k in used), place[of_body])
+
+
+def laid_out(mesh: Mesh, material: AnyMaterial) -> BodyMaterials:
+    """Materials of the bodies of a mesh, from one for all of them or as they are."""
+    return material if isinstance(material, BodyMaterials) else body_materials(mesh, material)

@@ -1,0 +1,271 @@
+"""Material of the bodies and of the bonds between them, in SI units."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.likely_units import ANGLE, DENSITY, MODULUS, STRENGTH, in_unit
+from taichi_dem.kit.validation import LARGEST, SMALLEST, finite, plain_fields, positive, shown
+from taichi_dem.materials.bond_rules import (
+    BondRule,
+    Constant,
+    ContactRule,
+    ContactShareOfCritical,
+    FaceStiffness,
+    ModulusOverDistance,
+    Rule,
+    ShareOfCritical,
+)
+from taichi_dem.materials.moduli import bond_moduli
+
+#: Fields whose number tells by its size when another unit is meant.
+_QUANTITIES = {
+    "density": DENSITY,
+    "tensile_strength": STRENGTH,
+    "cohesion": STRENGTH,
+}
+_MAY_BE_ZERO = frozenset(
+    {"normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"}
+)
+#: Kind of rule that may stand for a number, by field.
+_RULES: dict[str, type] = {
+    **dict.fromkeys(
+        ("normal_stiffness", "shear_stiffness", "normal_damping", "shear_damping"), BondRule
+    ),
+    **dict.fromkeys(("contact_stiffness", "contact_damping"), ContactRule),
+}
+
+
+@dataclass(frozen=True)
+class Material:
+    """Constants of one homogeneous material (Konno et al., sections 2.1 and 2.2, Table 1).
+
+    Stiffnesses and dashpots are numbers, the same for all bonds, or rules by which they follow from
+    moduli and the sizes of the bodies (``from_elastic``).
+
+    Parameters
+    ----------
+    density : float
+        Density [kg/m^3].
+    normal_stiffness : float or rule
+        Normal stiffness of a bond per area [Pa/m].
+    shear_stiffness : float or rule
+        Shear stiffness of a bond per area [Pa/m].
+    normal_damping : float or rule
+        Normal dashpot of a bond per area [Pa s/m].
+    shear_damping : float or rule
+        Shear dashpot of a bond per area [Pa s/m].
+    tensile_strength : float
+        Tensile strength of a bond [Pa].
+    cohesion : float
+        Cohesion of a bond [Pa].
+    friction : float
+        Friction coefficient of bonds and of contact spheres.
+    fracture_energy : float
+        Fracture energy of mode I [J/m^2].
+    contact_stiffness : float or rule
+        Stiffness of one sphere contact [N/m].
+    contact_damping : float or rule
+        Dashpot of one sphere contact [N s/m].
+
+    Raises
+    ------
+    InputError
+        A value is not finite, negative, or zero where it must be positive; or a bond would fail
+        before it reaches its strength.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> replace(CONCRETE, friction=0.4).friction
+    0.4
+    """
+
+    density: float
+    normal_stiffness: Constant
+    shear_stiffness: Constant
+    normal_damping: Constant
+    shear_damping: Constant
+    tensile_strength: float
+    cohesion: float
+    friction: float
+    fracture_energy: float
+    contact_stiffness: Constant
+    contact_damping: Constant
+
+    def __post_init__(self):
+        plain_fields(self)
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if not isinstance(value, _RULES.get(field.name, ())):
+                _check_number(field.name, value)
+            if field.name in _QUANTITIES:
+                in_unit(field.name, value, _QUANTITIES[field.name])
+        if not isinstance(self.normal_stiffness, BondRule):
+            check_energy(self)
+
+    @classmethod
+    def from_elastic(
+        cls,
+        *,
+        young: float,
+        poisson: float,
+        density: float,
+        tensile_strength: float,
+        fracture_energy: float,
+        friction_angle: float,
+        cohesion: float,
+        damping_ratio: float = 0.05,
+    ) -> Material:
+        """Make a material from measured values; bonds are stiffer where bodies are closer.
+
+        Young's modulus and Poisson's ratio of a block then do not depend on the size of its
+        elements: a bond has the stiffness modulus / distance per area (``elasticity.moduli``).
+        Contact spheres are as stiff as the bond that they replace
+        (``elasticity.bond_rules.FaceStiffness``).
+
+        Parameters
+        ----------
+        young : float
+            Young's modulus of a block [Pa].
+        poisson : float
+            Poisson's ratio of a block, from -0.2 to 0.45 [-].
+        density : float
+            Density [kg/m^3].
+        tensile_strength : float
+            Tensile strength of a bond [Pa].
+        fracture_energy : float
+            Fracture energy of mode I of a bond [J/m^2].
+        friction_angle : float
+            Friction angle of bonds and of spheres [degrees].
+        cohesion : float
+            Cohesion of a bond [Pa].
+        damping_ratio : float, default 0.05
+            Share of the critical damping of a bond between its two bodies, and of contacts; 0 for
+            none.
+
+        Returns
+        -------
+        Material
+            The material.
+
+        Raises
+        ------
+        InputError
+            A value is out of its range. Whether the fracture energy suffices for the largest
+            elements is checked by the scene, which has the mesh.
+
+        Examples
+        --------
+        >>> rock = Material.from_elastic(
+        ...     young=30e9, poisson=0.2, density=2400.0, tensile_strength=5e6,
+        ...     fracture_energy=100.0, friction_angle=35.0, cohesion=10e6,
+        ... )
+        >>> round(rock.friction, 3)
+        0.7
+        """
+        normal, shear = bond_moduli(young, poisson)
+        in_unit("young", young, MODULUS)
+        ratio = positive("damping_ratio", damping_ratio, zero_allowed=True)
+        return cls(
+            density=density,
+            normal_stiffness=ModulusOverDistance(normal),
+            shear_stiffness=ModulusOverDistance(shear),
+            normal_damping=ShareOfCritical(ratio, normal) if ratio else 0.0,
+            shear_damping=ShareOfCritical(ratio, shear) if ratio else 0.0,
+            tensile_strength=tensile_strength,
+            cohesion=cohesion,
+            friction=math.tan(math.radians(_checked_angle(friction_angle))),
+            fracture_energy=fracture_energy,
+            contact_stiffness=FaceStiffness(normal),
+            contact_damping=ContactShareOfCritical(ratio, normal) if ratio else 0.0,
+        )
+
+    @property
+    def has_bond_damping(self) -> bool:
+        """Whether bonds have dashpots."""
+        constants = self.normal_damping, self.shear_damping
+        return any(isinstance(value, Rule) or value > 0.0 for value in constants)
+
+    @property
+    def has_contact_damping(self) -> bool:
+        """Whether contacts have dashpots."""
+        value = self.contact_damping
+        return isinstance(value, Rule) or value > 0.0
+
+    @property
+    def onset_opening(self) -> float:
+        """Opening at which softening begins [m] (Konno et al., Fig 2: u_E)."""
+        return self.tensile_strength / float(self.normal_stiffness)
+
+    @property
+    def failure_opening(self) -> float:
+        """Opening at which the traction has fallen to zero [m], from the area under the curve."""
+        return 2.0 * self.fracture_energy / self.tensile_strength
+
+    @property
+    def softening_slope(self) -> float:
+        """Fall of the traction with the opening beyond the onset, a positive number [Pa/m]."""
+        return self.tensile_strength / (self.failure_opening - self.onset_opening)
+
+
+def check_energy(material: Material, where: str = "") -> None:
+    """Raise InputError where a bond would fail before it reaches its strength.
+
+    where: which bond, in words, for a stiffness that is not the same for all.
+    """
+    if material.failure_opening <= material.onset_opening:
+        least = material.tensile_strength**2 / (2.0 * float(material.normal_stiffness))
+        raise InputError(
+            f"fracture_energy must be larger than tensile_strength^2 / (2 normal_stiffness) = "
+            f"{least:.6g} J/m2{where}, or the bond would fail before it reaches its strength, "
+            f"got {material.fracture_energy}"
+        )
+
+
+def unchecked(material: Material, **values: Any) -> Material:
+    """A copy of a material with other values, without a check."""
+    made = object.__new__(Material)
+    made.__dict__.update(vars(material), **values)
+    return made
+
+
+def _checked_angle(angle: Any) -> float:
+    """Angle of friction [degrees]; InputError unless it is a number from 0 and below 90."""
+    if not finite(angle) or not 0.0 <= float(angle) < 90.0:
+        raise InputError(
+            f"friction_angle must be a number from 0 to below 90 degrees, got {shown(angle)}"
+        )
+    return in_unit("friction_angle", float(angle), ANGLE)
+
+
+def _check_number(name, value):
+    """Raise InputError unless ``value`` is a finite number in the range of the field ``name``."""
+    zero_allowed = name in _MAY_BE_ZERO
+    inside = finite(value) and (SMALLEST <= value <= LARGEST or (value == 0.0 and zero_allowed))
+    if not inside:
+        allowed = "at least 0" if zero_allowed else "positive"
+        raise InputError(
+            f"{name} must be a finite number, {allowed} and, where it is not 0, from {SMALLEST:g} "
+            f"to {LARGEST:g}, got {shown(value)}"
+        )
+
+
+#: Concrete of Konno et al., Table 1; the adhesive stress is both tensile strength and cohesion.
+CONCRETE = Material(
+    density=2390.0,
+    normal_stiffness=450e9,
+    shear_stiffness=90e9,
+    normal_damping=22.6e6,
+    shear_damping=10.1e6,
+    tensile_strength=6.66e6,
+    cohesion=6.66e6,
+    friction=0.58,
+    fracture_energy=99.67,
+    contact_stiffness=1.5e9,
+    contact_damping=3.08e6,
+)

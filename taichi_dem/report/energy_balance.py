@@ -1,0 +1,221 @@
+"""Energy and momentum account of a run, term by term (spec, section 6).
+
+work of loads and supports + energy at the start = kinetic + bond strain + sphere strain
++ bond dashpots + slip + softening + release + friction + sphere dashpots + ground dashpots
+- injected + residual.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Optional
+
+import numpy as np
+
+from taichi_dem.contact.contacts import Contacts
+from taichi_dem.report.readings import Readings
+from taichi_dem.state.model import Model
+from taichi_dem.state.state import State
+
+#: Tables of bodies, bonds and pairs that the terms are summed from.
+EnergyTables = tuple[np.ndarray, np.ndarray, np.ndarray]
+#: Terms of the account in the order of tables and files, all in J.
+TERMS = (
+    "kinetic",
+    "bond_strain",
+    "sphere_strain",
+    "bond_dashpot",
+    "softening",
+    "release",
+    "slip",
+    "sphere_dashpot",
+    "friction",
+    "ground_dashpot",
+    "injected",
+    "load_work",
+    "support_work",
+    "residual",
+)
+
+#: Terms that the bodies hold; all others are booked as they are given or taken.
+_HELD = ("kinetic", "bond_strain", "sphere_strain", "residual")
+
+
+#: Terms that the energy put in and injected goes into.
+_SPENT = tuple(name for name in TERMS if name not in ("injected", "load_work", "support_work"))
+#: Share of the energy beyond which an account counts as open.
+OPEN = 0.5
+#: Share of the energy put in from which on injected energy is told.
+NOTED = 0.01
+#: Share of all impulses of loads and supports, by their sizes, below which no momentum is a scale.
+_LEAST_SHARE = 1e-6
+
+
+def unexplained_share(account: Mapping[str, float], round_off: float = 0.0) -> float:
+    """Residual of an account over all energy that went through it; NaN where a term is none.
+
+    round_off: energy [J] below which all may be rounding.
+    """
+    through = sum(abs(value) for name, value in account.items() if name != "residual")
+    return abs(account["residual"]) / max(through, 100.0 * round_off, 1e-300)
+
+
+def injected_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
+    """Energy that releases injected, in words, from ``NOTED`` of the energy put in on; else "".
+
+    Put in: work of loads and supports, and the energy at the start, which the residual leaves.
+    round_off: energy [J] up to which all may be rounding.
+    """
+    start = sum(value if name in _SPENT else -value for name, value in account.items())
+    put_in = abs(account["load_work"]) + abs(account["support_work"]) + abs(start)
+    if account["injected"] < NOTED * put_in or account["injected"] <= round_off:
+        return ""
+    share = 100.0 * account["injected"] / max(put_in, 1e-300)
+    return (
+        f"{account['injected']:.6g} J by overlaps of faces as they broke, {share:.3g} % of the "
+        "energy put in, which no load gave (docs/limits.md)"
+    )
+
+
+def open_account(account: Mapping[str, float], round_off: float) -> tuple[str, ...]:
+    """Sentence about an account that explains less than half of its energy; else none."""
+    share = unexplained_share(account, round_off)
+    if share <= OPEN:
+        return ()
+    return (
+        f"the account of energy leaves {account['residual']:.3g} J unexplained, {share:.2g} of all "
+        "that went through it: take a shorter step, or begin with velocities of bonded bodies that "
+        "dashpots do not stop within one",
+    )
+
+
+class EnergyBalance:
+    """Energy balance: sums of booked terms, and stored energies computed by the laws of the step.
+
+    readings: the ``Readings`` of a run. contacts: its ``Contacts``, None without.
+    """
+
+    def __init__(
+        self, model: Model, state: State, readings: Readings, contacts: Optional[Contacts]
+    ):
+        self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
+        self.start_energy, self.start = 0.0, np.zeros(len(TERMS))
+        accounts = len(model.loads) + 1 + len(model.ground)
+        self.start_works = np.zeros((model.body_count, accounts))
+        first = self.account()
+        self.start_energy = first["kinetic"] + first["bond_strain"] + first["sphere_strain"]
+        # Half a step of what acts from the start is booked at time zero.
+        self.start = np.array([0.0 if name in _HELD else first[name] for name in TERMS])
+        self.start_works = self._works()
+        self.start_momentum = self.momentum()
+
+    def saved(self) -> dict[str, np.ndarray]:
+        """Data for a checkpoint, arrays by name."""
+        start = np.array([self.start_energy, *self.start_momentum, *self.start])
+        return {"start": start, "works": self.start_works.copy()}
+
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Restore the data that ``saved`` returned."""
+        self.start_energy, self.start_momentum = float(saved["start"][0]), saved["start"][1:7]
+        self.start, self.start_works = saved["start"][7:], saved["works"].copy()
+
+    def account(self, tables: Optional[EnergyTables] = None) -> dict[str, float]:
+        """All terms in J by name; residual is the unexplained remainder.
+
+        tables: those of ``tables``, if they have been read already.
+        """
+        body, bond, pair = self.tables() if tables is None else tables
+        terms = {
+            "kinetic": body[:, 0].sum(),
+            "bond_strain": bond[:, 0].sum(),
+            "sphere_strain": pair[:, 0].sum(),
+            "bond_dashpot": bond[:, 1].sum(),
+            "softening": bond[:, 4].sum(),
+            "release": bond[:, 3].sum(),
+            "slip": bond[:, 2].sum(),
+            "sphere_dashpot": body[:, 3].sum() + pair[:, 1].sum(),
+            "friction": body[:, 4].sum() + pair[:, 2].sum(),
+            "injected": body[:, 5].sum() + pair[:, 3].sum(),
+            "ground_dashpot": body[:, 6].sum(),
+            "load_work": body[:, 1].sum(),
+            "support_work": body[:, 2].sum(),
+        }
+        terms = {name: terms[name] - self.start[TERMS.index(name)] for name in terms}
+        terms["residual"] = self._residual(terms)
+        return {name: float(value) for name, value in terms.items()}
+
+    def tables(self) -> EnergyTables:
+        """Tables that the terms are summed from [J].
+
+        A row a body: kinetic, loads, supports, sphere dashpots, friction, injected, ground. A row a
+        bond: strain, dashpot, slip, release, softening. A row a pair: strain, dashpots, friction,
+        injected, so far as its first body has not taken them.
+        """
+        with self.readings.held():
+            return self.readings.bodies(), self.readings.bonds(), self.readings.pairs()
+
+    def _residual(self, terms):
+        given = terms["load_work"] + terms["support_work"] + terms["injected"] + self.start_energy
+        return given - sum(terms[name] for name in _SPENT if name != "residual")
+
+    def load_work(self, index: int) -> float:
+        """Work of one load [J], by its place in the scene's list of loads."""
+        return float(self.load_works(index).sum())
+
+    def load_works(self, index: int) -> np.ndarray:
+        """Work of one load on every body [J], (body_count,)."""
+        return self._works()[:, index]
+
+    def _works(self):
+        """Work of each load, of all supports and of each ground on every body, since the start."""
+        return self.readings.works() - self.start_works
+
+    def ground_heats(self, index: int) -> np.ndarray:
+        """Heat [J] in the dashpots of one ground at every body, (body_count,), by its place."""
+        return 0.0 - self._works()[:, len(self.model.loads) + 1 + index]
+
+    def support_works(self, index: int) -> np.ndarray:
+        """Work [J] of all supports on the bodies that one of them holds, (body_count,).
+
+        NaN for a body that it does not hold.
+        """
+        marks = np.zeros(self.model.body_count, dtype=np.int32)
+        self.readings.supported(index, marks)
+        return np.where(marks == 1, self._works()[:, len(self.model.loads)], np.nan)
+
+    def momentum(self) -> np.ndarray:
+        """Linear [N s] and angular momentum about the origin [N m s], less external impulses."""
+        return _own(self.readings.momentum())
+
+    def momentum_errors(self) -> tuple[float, float]:
+        """Errors of linear and angular momentum, relative to the momentum exchanged.
+
+        The scale is the sum over bodies of the size of momentum, or of load impulse if that is
+        larger; at least a millionth of the impulses of loads and supports added by their sizes, of
+        which nothing is left where a support takes what a load gives.
+        """
+        rows = self.readings.momentum()
+        # The squares of a run that has diverged may be beyond all numbers.
+        with np.errstate(over="ignore", invalid="ignore"):
+            lost = _own(rows) - self.start_momentum
+            linear, angular = _exchanged(rows)
+            return np.linalg.norm(lost[:3]) / linear, np.linalg.norm(lost[3:]) / angular
+
+    def momentum_exchanged(self, total: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Size of the momentum of bodies, or of their load impulse if larger [N s], summed.
+
+        total: sum of a number of each body over every part.
+        """
+        rows = self.readings.momentum()
+        sizes = (np.linalg.norm(rows[:, k : k + 3], axis=1) for k in (0, 6))
+        return np.max([total(one) for one in (*sizes, _LEAST_SHARE * rows[:, 12])], axis=0)
+
+
+def _own(rows):
+    """Linear and angular momentum of all bodies less what loads and supports gave, (6,)."""
+    return rows[:, :6].sum(axis=0) - rows[:, 6:12].sum(axis=0)
+
+
+def _exchanged(rows):
+    """Linear and angular momentum that bodies have, or have got from loads if that is more."""
+    sizes = [np.linalg.norm(rows[:, k : k + 3], axis=1).sum() for k in (0, 3, 6, 9)]
+    given = _LEAST_SHARE * rows[:, 12:].sum(axis=0)
+    return max(*sizes[0::2], given[0], 1e-300), max(*sizes[1::2], given[1], 1e-300)

@@ -1,0 +1,274 @@
+"""Readings of a run: tables of energy, momentum and shares that kernels fill for the host."""
+
+import contextlib
+from collections.abc import Iterator
+from typing import Any, Optional
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.kit.allocation import values
+from taichi_dem.kit.types import vec3
+from taichi_dem.state.state import State
+from taichi_dem.state.tables import Tables
+from taichi_dem.step.advance import Advance
+from taichi_dem.step.half_step import HalfStep
+
+
+@ti.data_oriented
+class Readings:
+    """Kernels that read booked terms, or compute others by the laws of the step.
+
+    Arrays that methods fill or return have the counts of the scene.
+    """
+
+    def __init__(self, tables: Tables, state: State, advance: Advance):
+        self.tables, self.state, self.advance = tables, state, advance
+        self.contacts, self.half_step = advance.contacts, HalfStep(advance)
+        self._held: Optional[dict[str, Any]] = None
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Read each table once in the block, in which the run stands still; blocks may nest."""
+        outer = self._held
+        self._held = {} if outer is None else outer
+        try:
+            yield
+        finally:
+            self._held = outer
+
+    def _once(self, name, read):
+        """Result of read(), which inside of ``held`` is called once under a name."""
+        if self._held is None:
+            return read()
+        if name not in self._held:
+            self._held[name] = read()
+        return self._held[name]
+
+    def rubbing(self) -> tuple[np.ndarray, np.ndarray]:
+        """Both bodies of every pair near each other, (pairs, 2), and of their contacts, (3, pairs).
+
+        Sums of friction, of its limit [N], and of its power [W].
+        """
+        _, table = self.pushes()
+        bodies = self.contacts.store.near_bodies() if len(table) else np.zeros((0, 2), np.int32)
+        return bodies, table[:, 2:].T
+
+    def pushes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
+
+        Summed in the order of the pairs, so that no thread changes a bit. Also the heat of each
+        pair's dashpots and friction by which the booked one is behind [J], and the sums of
+        ``rubbing``, (pairs, 5).
+        """
+        return self._once("pushes", self._pushes)
+
+    def _pushes(self):
+        pushed = np.zeros((int(values(self.tables.body_count)), 6))
+        count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
+        table = np.zeros((count, 17))
+        if count:
+            bodies = self.contacts.store.near_bodies()
+            self._push(table)
+            for side in range(2):
+                np.add.at(pushed, bodies[:, side], table[:, 6 * side : 6 * side + 6])
+        return pushed, table[:, 12:]
+
+    @ti.kernel
+    def _push(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        """Impulse and moment of every pair's contacts on both bodies in half a step, and heats."""
+        for a in range(self.contacts.store.near_count[None]):
+            p = self.contacts.store.near_slot[a]
+            found, half = self.advance.forces_now(p), self.half_step.pair_step(p)
+            for k in ti.static(range(3)):
+                table[a, k], table[a, 3 + k] = -half * found.force[k], half * found.moment_i[k]
+                table[a, 6 + k], table[a, 9 + k] = half * found.force[k], half * found.moment_j[k]
+            table[a, 12], table[a, 13] = half * found.dragged, half * found.rubbed
+            table[a, 14], table[a, 15], table[a, 16] = found.rub, found.bound, found.rubbed
+
+    def bodies(self) -> np.ndarray:
+        """Kinetic energy, work of loads, supports, contact heats, ground's heat [J], (n, 7)."""
+        table, ground = self._present(), len(self.tables.loads) + 16
+        return np.column_stack([table[:, :6], 0.0 - table[:, ground:].sum(axis=1)])
+
+    def motion(self) -> np.ndarray:
+        """Velocity, spin and angular momentum of every body at the time of its position, (n, 9)."""
+        return self._present()[:, 6:15]
+
+    def works(self) -> np.ndarray:
+        """Work of each load, of all supports, of each ground, on every body [J], (n, accounts)."""
+        return self._present()[:, 15:]
+
+    def step_back(self) -> None:
+        """Set the velocities, which are given at time zero, half a step back."""
+        self._table(back=1)
+
+    def _present(self):
+        return self._once("table", self._table)
+
+    def _table(self, back=0):
+        pushed, _ = self.pushes()
+        table = np.zeros((len(pushed), 16 + len(self.tables.drives)))
+        self._visit(pushed, back, table)
+        return table
+
+    @ti.kernel
+    def _visit(
+        self,
+        pushed: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        back: ti.i32,
+        table: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    ):
+        """Bring what is recorded of bodies to the present, or set them back; one for all uses."""
+        for i in range(self.tables.body_count[None]):
+            linear, angular = vec3(0.0), vec3(0.0)
+            for k in ti.static(range(3)):
+                linear[k], angular[k] = pushed[i, k], pushed[i, 3 + k]
+            velocity, momentum, works = self.half_step.visit(i, linear, angular, back)
+            spin = self.advance.spin(i, momentum)
+            moving = self.tables.mass[i] * velocity.norm_sqr()
+            table[i, 0] = 0.5 * (moving + momentum.dot(spin))
+            for k in ti.static(range(3)):
+                table[i, 6 + k], table[i, 9 + k] = velocity[k], spin[k]
+                table[i, 12 + k] = momentum[k]
+                if ti.static(self.tables.has_contact):
+                    table[i, 3 + k] = self.state.contact_heat[i][k]
+            for e in ti.static(range(len(self.tables.drives) + 1)):
+                table[i, 15 + e] = self.state.load_work[i][e] + works[e]
+            for e in ti.static(range(len(self.tables.loads))):
+                table[i, 1] = table[i, 1] + table[i, 15 + e]
+            table[i, 2] = table[i, ti.static(15 + len(self.tables.loads))]
+
+    def bonds(self) -> np.ndarray:
+        """Strain, dashpot, slip, release and softening energy of every bond [J], (n, 5)."""
+        return self._bonds()[:, :5]
+
+    def damage(self) -> np.ndarray:
+        """Mean damage of the units of every bond, 1 once it is released, (n,)."""
+        return self._bonds()[:, 5]
+
+    def active_bonds(self) -> np.ndarray:
+        """Whether a unit of every bond has softened, and whether one has slipped, (n, 2)."""
+        return self._bonds()[:, 6:8] > 0.0
+
+    def residual_slip(self) -> np.ndarray:
+        """Largest residual slip of the units of every bond that holds [m], (n,).
+
+        Zero for released bonds, and for shear laws that keep none.
+        """
+        return self._bonds()[:, 8]
+
+    def _bonds(self):
+        return self._once("bonds", self._bond_table)
+
+    def _bond_table(self):
+        table = np.zeros((int(values(self.tables.bond_count)), 9))
+        self._visit_bonds(table)
+        return table
+
+    @ti.kernel
+    def _visit_bonds(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        """Fill in all that is read of bonds; one kernel, as each takes its time to compile."""
+        for b in range(self.tables.bond_count[None]):
+            table[b, 0] = self.advance.bond_energy(b)
+            if ti.static(self.tables.has_bond_heat):
+                for k in ti.static(range(3)):
+                    table[b, 1 + k] = self.state.bond_heat[b][k]
+                table[b, 1] = table[b, 1] + self.half_step.bond_heat(b)
+            holds = self.state.broken_tick[b] < 0
+            for q in range(3):
+                u = 3 * b + q
+                spent = self.tables.tension.spent(b, u)
+                table[b, 4] = table[b, 4] + self.tables.unit_area[b] * spent
+                if holds:
+                    table[b, 5] = table[b, 5] + self.tables.tension.damage(b, u) / 3.0
+                self._note_laws(table, b, u, holds)
+            if not holds:
+                table[b, 5] = 1.0
+
+    @ti.func
+    def _note_laws(self, table: ti.template(), b, u, holds):
+        """Note whether unit u of bond b has softened or slipped, and how far it has slipped."""
+        if ti.static(hasattr(self.tables.tension, "is_active")):
+            table[b, 6] = ti.max(table[b, 6], ti.cast(self.tables.tension.is_active(b, u), ti.f64))
+        if ti.static(hasattr(self.tables.shear, "is_active")):
+            table[b, 7] = ti.max(table[b, 7], ti.cast(self.tables.shear.is_active(b, u), ti.f64))
+        if ti.static(self.tables.shear.remembers_slip):
+            if holds:
+                table[b, 8] = ti.max(table[b, 8], self.tables.shear.residual_slip(u).norm())
+
+    def pairs(self) -> np.ndarray:
+        """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""
+        _, heats = self.pushes()
+        table = np.zeros((len(heats), 4))
+        if len(heats):
+            self._pairs(table)
+            table[:, 1:3] += heats[:, :2]
+        return table
+
+    @ti.kernel
+    def _pairs(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        for a in range(self.contacts.store.near_count[None]):
+            p = self.contacts.store.near_slot[a]
+            table[a, 0] = self.contacts.pair_energy(p)
+            for k in ti.static(range(3)):
+                table[a, 1 + k] = self.contacts.store.heat[p][k]
+
+    @ti.kernel
+    def supported(self, index: ti.i32, marks: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+        """Mark the bodies on which one of the supports acts."""
+        for i in range(self.tables.body_count[None]):
+            for e in ti.static(range(len(self.tables.supports))):
+                if e == index and self.tables.supports[e].acts_on(i):
+                    marks[i] = 1
+
+    def momentum(self) -> np.ndarray:
+        """Momentum of every body; impulses of loads and supports, their sums and sizes, (n, 14)."""
+        state, here = self.state, slice(int(values(self.tables.body_count)))
+        names = "velocity", "angular_momentum", "position", "load_impulse", "impulse_sizes"
+        velocity, spun, place, given, sizes = (values(getattr(state, n), here) for n in names)
+        # Numbers of a run that has diverged may be beyond all.
+        with np.errstate(over="ignore", invalid="ignore"):
+            linear = values(self.tables.mass, here)[:, None] * velocity
+            angular = spun + np.cross(place, linear)
+        return np.column_stack([linear, angular, given, sizes])
+
+    @ti.kernel
+    def left_out(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        """Bound of impulse [N s] and energy [J] that each bond has left out while it slept."""
+        for b in range(self.tables.bond_count[None]):
+            slots = self.tables.bond_slots[b]
+            found = self.advance.schedule.sleeping.left_out[b]
+            if not self.advance.schedule.sleeping.both_awake(slots[0] >> 2, slots[1] >> 2):
+                found = self.advance.schedule.woken.left_out(b, False)
+            table[b, 0], table[b, 1] = found[0], found[1]
+
+    @ti.kernel
+    def bond_shares(self, share: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+        """Lower each bond's entry to the share of its dashpots that the present steps leave."""
+        for b in range(self.tables.bond_count[None]):
+            if self.state.broken_tick[b] < 0:
+                share[b] = ti.min(share[b], self.advance.bond_share(b))
+
+    @ti.kernel
+    def contact_shares(
+        self,
+        share: ti.types.ndarray(dtype=ti.f64, ndim=1),
+        taken: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    ):
+        """Note how far the steps of touching bodies limit their sphere dashpots.
+
+        share: least share, where dashpots are limited; else taken: largest part of a speed that
+        they take in a step.
+        """
+        for a in range(self.contacts.store.near_count[None]):
+            p = self.contacts.store.near_slot[a]
+            count = self.contacts.touching(p)
+            if count > 0:
+                i, j = self.contacts.store.body[p][0], self.contacts.store.body[p][1]
+                if ti.static(self.advance.limited):
+                    ti.atomic_min(share[i], self.advance.contact_share(i, j))
+                else:
+                    rate = count * self.contacts.law.damping(self.tables.pair(i, j))
+                    rate *= 1.0 / self.tables.mass[i] + 1.0 / self.tables.mass[j]
+                    ti.atomic_max(taken[i], rate * self.advance.schedule.pair_step(i, j))

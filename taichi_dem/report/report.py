@@ -1,0 +1,278 @@
+"""The short report at the end of a run."""
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Optional
+
+from taichi_dem.kit.display import in_brief
+from taichi_dem.report.certificate import Certificate
+from taichi_dem.report.energy_balance import injected_words
+from taichi_dem.report.shared_volume import Interpenetration
+
+#: Keys of the JSON file that differ from the attribute's name.
+_JSON_KEYS = {"effect_activity": "acted", "missing_effects": "missed"}
+
+
+@dataclass(frozen=True)
+class Report:
+    """Figures and cost of a run.
+
+    Parameters
+    ----------
+    method : str
+        Name of the method.
+    driver : str
+        Driver that ran, and those that were measured.
+    effects : tuple of str
+        Names of the effects.
+    until_s : float
+        Simulated time [s].
+    body_count : int
+        Number of bodies.
+    bond_count : int
+        Number of bonds.
+    broken_faces : int
+        Number of released bonds.
+    smallest_step_s : float
+        Shortest step of a body [s].
+    substeps : int
+        Ticks at which a body was active.
+    body_updates : int
+        Updates of bodies.
+    bond_evaluations : int
+        Evaluations of bonds.
+    pair_evaluations : int
+        Evaluations of contact pairs.
+    sweeps : int
+        Sweeps over all dashpots where they are solved, else 0.
+    uniform_evaluations : int
+        Bonds and pairs that one step for all would have evaluated in the same substeps.
+    searches : int
+        Updates of the contact lists.
+    energy_balance : dict
+        Energy terms [J] by name.
+    linear_momentum_error : float
+        Unexplained momentum, as a share of that exchanged.
+    angular_momentum_error : float
+        Unexplained angular momentum, as a share of that exchanged.
+    compile_seconds : float
+        Time spent on compiling [s].
+    run_seconds : float
+        Wall time spent stepping [s].
+    run_cpu_seconds : float
+        CPU time spent stepping [s].
+    effect_activity : tuple of EffectUse
+        Activity of each effect.
+    missing_effects : tuple of MissingEffect
+        Effects that were left out and needed.
+    unresolved : tuple of str
+        Sentences about bonds and contacts for which the step was too long.
+    bound_by : dict
+        Number of bodies at the end by the criterion that bounds their step, see
+        ``step_control.CRITERIA``.
+    round_off_J : float, default 0.0
+        Energies below this may be round-off [J].
+    unconverged_steps : int, default 0
+        Steps whose sweeps ended before impulses agreed.
+    worst_residual : float, default 0.0
+        Their largest residual, as a share of the speed of the fastest body.
+    interpenetration : Interpenetration, optional
+        Volume that bodies shared, where it was measured.
+    bond_slip : tuple of BondSlip, default ()
+        The bond that slipped farthest; empty where none slipped.
+    measured_speedup : float, optional
+        Ratio of the CPU time of one step for all to that of the run, where it was measured.
+    known_error : str, default ""
+        What is known of the error, in words.
+    certificate : Certificate, optional
+        What acted and what was left out, with effects="auto".
+    """
+
+    method: str
+    driver: str
+    effects: tuple
+    until_s: float
+    body_count: int
+    bond_count: int
+    broken_faces: int
+    smallest_step_s: float
+    substeps: int
+    body_updates: int
+    bond_evaluations: int
+    pair_evaluations: int
+    sweeps: int
+    uniform_evaluations: int
+    searches: int
+    energy_balance: dict
+    linear_momentum_error: float
+    angular_momentum_error: float
+    compile_seconds: float
+    run_seconds: float
+    run_cpu_seconds: float
+    effect_activity: tuple
+    missing_effects: tuple
+    unresolved: tuple
+    bound_by: dict
+    round_off_J: float = 0.0
+    unconverged_steps: int = 0
+    worst_residual: float = 0.0
+    interpenetration: Optional[Interpenetration] = None
+    bond_slip: tuple = ()
+    measured_speedup: Optional[float] = None
+    known_error: str = ""
+    certificate: Optional[Certificate] = None
+
+    def __repr__(self):
+        took = f"{self.run_seconds:.3g} s run"
+        return in_brief(self, self.outcome, took, "print it for all figures")
+
+    @property
+    def outcome(self) -> str:
+        """Method, simulated time and broken bonds in words."""
+        broken = f"{self.broken_faces:,} of {self.bond_count:,} bonds broken"
+        return f"{self.method}, {self.until_s:.4g} s simulated, {broken}"
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Sentences about effects that were missed, slip of bonds, and a step that was too long."""
+        slipped = (str(slip) for slip in self.bond_slip if slip.excessive)
+        missing = (str(missing) for missing in self.missing_effects)
+        return (*missing, *slipped, *self.unresolved)
+
+    @property
+    def contact_evaluations(self) -> int:
+        """Bonds and contact pairs evaluated."""
+        return self.bond_evaluations + self.pair_evaluations
+
+    @property
+    def ideal_gain(self) -> float:
+        """Ratio of bodies times substeps to body updates, the gain if pairs cost nothing."""
+        return self.body_count * self.substeps / max(1, self.body_updates)
+
+    @property
+    def boundary_gain(self) -> float:
+        """Ratio of the evaluations of one step for all to those that were made."""
+        return self.uniform_evaluations / max(1, self.contact_evaluations)
+
+    @property
+    def energy_residual_fraction(self) -> float:
+        """Unexplained energy as a share of the work put in or of the energy held."""
+        return abs(self.energy_balance["residual"]) / max(*self._given_and_held(), 1e-300)
+
+    def _given_and_held(self):
+        """Work put in, and energy held at the end [J]."""
+        given = abs(self.energy_balance["load_work"]) + abs(self.energy_balance["support_work"])
+        return given, self.energy_balance["kinetic"] + self.energy_balance["bond_strain"]
+
+    @property
+    def unexplained(self) -> str:
+        """The residual in words: a share of the work put in, unless all energies are round-off."""
+        given, held = self._given_and_held()
+        if max(given, held) <= self.round_off_J:
+            return f"{abs(self.energy_balance['residual']):.2g} J; all energies are round-off"
+        whole = "the energy held" if held > given else "it"
+        return f"{100.0 * self.energy_residual_fraction:.3g} % of {whole}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """All figures, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Figures by name.
+        """
+        gains = "ideal_gain", "boundary_gain"
+        derived = ("contact_evaluations", *gains, "energy_residual_fraction", "needs")
+        plain = replace(self, certificate=None)
+        figures = {_JSON_KEYS.get(name, name): value for name, value in asdict(plain).items()}
+        figures["certificate"] = self.certificate and self.certificate.as_dict()
+        return {**figures, **{name: getattr(self, name) for name in derived}}
+
+    def _effect_rows(self):
+        """Rows with the activity of each effect."""
+        if not self.effect_activity:
+            return (("effects", "none"),)
+        rows = [f"{use.effect}: {use}" for use in self.effect_activity]
+        return (("effects", rows[0]), *(("", row) for row in rows[1:]))
+
+    def _bound_words(self):
+        """Criteria that bound the steps, with the number of bodies."""
+        words = ((name.replace("_", " "), n) for name, n in self.bound_by.items())
+        return ", ".join(f"{name} ({n} bodies)" for name, n in words)
+
+    def _gain_row(self):
+        """Row with the gain from steps of different length, where there are any."""
+        if self.body_updates == self.body_count * self.substeps:
+            return ()
+        ideal, reached = f"{self.ideal_gain:.2f}", f"{self.boundary_gain:.2f}"
+        words = f"{ideal} ideal, {reached} with pairs at the finer step"
+        if self.measured_speedup is not None:
+            words += f", {self.measured_speedup:.2f} measured"
+        return (("gain over uniform", words),)
+
+    def _sweeps_row(self):
+        """Row with the sweeps over all dashpots, for methods that solve them."""
+        if not self.sweeps:
+            return ()
+        words = f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"
+        return (("sweeps", f"{words}, {self.unconverged_steps:,} substeps unconverged"),)
+
+    def _injected_row(self):
+        """Row with the energy that breaking faces injected, where it counts."""
+        words = injected_words(self.energy_balance, self.round_off_J)
+        return (("injected", words),) if words else ()
+
+    def _certificate_rows(self):
+        """Rows with what was left out; what acted stands among the effects."""
+        if self.certificate is None:
+            return ()
+        parts = str(self.certificate).splitlines()[len(self.certificate.acting) :]
+        return tuple(("certificate" if not k else "", part) for k, part in enumerate(parts))
+
+    def _error_rows(self):
+        """Rows with what is known of the error."""
+        parts = self.known_error.split("; ") if self.known_error else ()
+        return tuple((name, part) for name, part in zip(("known of the error", "", ""), parts))
+
+    def __str__(self):
+        """A table of some twenty lines, then one line for every effect that was missed."""
+        rows = [
+            ("method", f"{self.method}, {self.driver} driver"),
+            *self._effect_rows(),
+            (
+                "simulated",
+                f"{self.until_s:.4g} s, {self.broken_faces} of {self.bond_count} bonds broken",
+            ),
+            ("smallest step", f"{self.smallest_step_s:.3g} s"),
+            ("steps bound by", self._bound_words()),
+            ("substeps", f"{self.substeps:,}"),
+            (
+                "evaluations",
+                f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs, "
+                f"{self.body_updates:,} bodies",
+            ),
+            *(("largest bond slip", slip.figure) for slip in self.bond_slip),
+            *self._gain_row(),
+            *self._sweeps_row(),
+            ("contact searches", f"{self.searches:,}"),
+            ("interpenetration", str(self.interpenetration or "not looked for")),
+            (
+                "work put in",
+                f"{self.energy_balance['load_work'] + self.energy_balance['support_work']:.6g} J",
+            ),
+            ("energy residual", self.unexplained),
+            *self._injected_row(),
+            *self._error_rows(),
+            *self._certificate_rows(),
+            (
+                "momentum error",
+                f"{self.linear_momentum_error:.1e} linear, "
+                f"{self.angular_momentum_error:.1e} angular",
+            ),
+            (
+                "time",
+                f"{self.compile_seconds:.1f} s before the first step, "
+                f"{self.run_seconds:.1f} s run ({self.run_cpu_seconds:.1f} s of CPU)",
+            ),
+        ]
+        lines = [f"{name:18s} {text}" for name, text in rows]
+        return "\n".join([*lines, *(f"warning: {need}" for need in self.needs)])

@@ -1,0 +1,159 @@
+"""Constants of a scene as arrays: bodies, bonds and contact spheres."""
+
+import copy
+from collections.abc import Iterable
+from functools import cached_property
+from typing import Any, Callable
+
+import numpy as np
+
+from taichi_dem.elasticity.rates import dashpots_of, springs_of, subset_rates
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.fixed_order import length, product, transposed
+from taichi_dem.materials import Material
+from taichi_dem.materials.body_materials import AnyMaterial, BodyMaterials, laid_out
+from taichi_dem.materials.bond_rules import per_bond
+from taichi_dem.mesh.colouring import edge_colours
+from taichi_dem.mesh.contact_spheres import ContactSpheres
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.tetrahedra import area_vectors
+from taichi_dem.mesh.topology import body_properties, topology_of
+
+#: Roles that take one effect, in the order in which effects are listed, bound and reported.
+SINGLE = ("tension", "shear", "dashpot", "friction", "contact")
+#: Roles that take any number.
+MANY = ("load", "support", "ground")
+ROLES = (*SINGLE, *MANY)
+
+
+class Model:
+    """Constant arrays of a scene and its effects by role; NumPy only.
+
+    mesh: of the scene. materials: of its bodies, a ``BodyMaterials``. material: the first of them,
+    with the numbers that its contacts have in the mesh.
+    topology: its faces and bonds. body_mass [kg], centre [m] and body_inertia [kg m^2], body_radius
+    [m] (of the ball around a body): an entry a body. by_role: lists of effects. contact: the effect
+    of this role, None without.
+    Source: Konno et al., section 2.
+    """
+
+    def __init__(self, mesh: Mesh, material: AnyMaterial, effects: Iterable[Any]):
+        self.mesh, self.materials = mesh, laid_out(mesh, material)
+        self.material = self.materials.pairs[0][0]
+        self.topology = topology_of(mesh)
+        self.body_count, self.bond_count = mesh.body_count, self.topology.bond_count
+        self.body_mass, self.centre, self.body_inertia = body_properties(
+            mesh, self.materials.density
+        )
+        corners = mesh.points[mesh.tetrahedra] - self.centre[:, None]
+        self.body_radius = length(corners).max(axis=1)
+        self.by_role = {role: [e for e in effects if e.role == role] for role in ROLES}
+        self.contact: Any = next(iter(self.by_role["contact"]), None)
+        self.has_contact = self.contact is not None
+
+    def __repr__(self):
+        bodies, bonds = counted(self.body_count, "body"), counted(self.bond_count, "bond")
+        return in_brief(self, bodies, bonds, *(effect.name for effect in self.effects))
+
+    @property
+    def body_materials(self) -> BodyMaterials:
+        """The same as ``materials``, under the name that a scene has for them."""
+        return self.materials
+
+    def harmless(self, effect: Any) -> "Model":
+        """A copy with the materials with which an effect never acts."""
+        made = copy.copy(self)
+        made.materials = self.materials.changed(effect.harmless)
+        made.material = made.materials.pairs[0][0]
+        return made
+
+    def of_bonds(self, value: Callable[[Material], float]) -> Any:
+        """A number of what joins the bodies of each bond, an array (n,), or one for all."""
+        links = np.stack([self.topology.master, self.topology.slave], axis=1)
+        return self.materials.of_links(links, value)
+
+    @property
+    def effects(self) -> tuple:
+        """All effects in the order of roles; those of one role in that of the scene."""
+        return tuple(effect for role in ROLES for effect in self.by_role[role])
+
+    @property
+    def loads(self) -> tuple:
+        """Effects of the role load, in the order of the scene."""
+        return tuple(self.by_role["load"])
+
+    @property
+    def supports(self) -> tuple:
+        """Effects of the role support, in the order of the scene."""
+        return tuple(self.by_role["support"])
+
+    @property
+    def ground(self) -> tuple:
+        """Effects of the role ground, in the order of the scene."""
+        return tuple(self.by_role["ground"])
+
+    @cached_property
+    def spheres(self) -> ContactSpheres:
+        """``ContactSpheres`` of every face; with contact only."""
+        return self.contact.spheres(self)
+
+    @cached_property
+    def dashpot_rates(self) -> np.ndarray:
+        """Rate of the dashpots of every body for each subset of its bonds [1/s], (n, 16)."""
+        silent = [effect for effect in self.by_role["dashpot"] if effect.is_silent]
+        acting = self.harmless(silent[0]) if silent else self
+        return self._subset_rates(dashpots_of(acting.materials))
+
+    @cached_property
+    def spring_rates(self) -> np.ndarray:
+        """Squared angular frequency of the springs of every body likewise [1/s2], (n, 16)."""
+        return self._subset_rates(springs_of(self.materials))
+
+    def _subset_rates(self, coefficients):
+        return subset_rates(self.mesh, self.topology, self.materials.density, coefficients)
+
+    @cached_property
+    def bond_colours(self) -> np.ndarray:
+        """Colour of every bond, (n,): bonds of one colour share no body."""
+        links = np.stack([self.topology.master, self.topology.slave], axis=1)
+        return edge_colours(links, self.body_count)
+
+    @cached_property
+    def bonds(self) -> dict[str, np.ndarray]:
+        """Arrays of all bonds by name.
+
+        slots (n, 2): master's and slave's face as 4 body + local face. frame (n, 3, 3): normal, xi
+        and eta in the master's body frame. area (n,): of a contact unit, so far as it is bonded
+        [m^2]. on_master, on_slave (n, 3, 3): vertices in the face frame and in the slave's body
+        frame [m].
+        """
+        top, points = self.topology, self.mesh.points
+        slots = np.stack([4 * top.master + top.master_face, 4 * top.slave + top.slave_face], axis=1)
+        corners = points[top.vertices]
+        area = area_vectors(points, top.vertices)
+        size = length(area)
+        xi = corners[:, 1] - corners[:, 0]
+        xi /= length(xi)[:, None]
+        normal = area / size[:, None]
+        frame = np.stack([normal, xi, np.cross(normal, xi)], axis=1)
+        from_master = corners - self.centre[top.master][:, None]
+        return {
+            "slots": slots.astype(np.int32),
+            "frame": frame,
+            "area": size / 3.0 * top.bonded_share,
+            "on_master": product(from_master, transposed(frame)),
+            "on_slave": corners - self.centre[top.slave][:, None],
+        }
+
+    @property
+    def bond_stiffness(self) -> np.ndarray:
+        """Normal and shear stiffness of every bond per area [Pa/m], (bond_count, 2)."""
+        return self._per_bond(springs_of(self.materials))
+
+    @property
+    def bond_damping(self) -> np.ndarray:
+        """Normal and shear dashpot of every bond per area [Pa s/m], (bond_count, 2)."""
+        return self._per_bond(dashpots_of(self.materials))
+
+    def _per_bond(self, constants):
+        return per_bond(self.mesh, self.topology, self.materials.density, constants)

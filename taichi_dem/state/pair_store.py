@@ -1,0 +1,208 @@
+"""The pair store: everything that belongs to a pair of bodies that are near, in a slot of its own.
+
+A pair keeps its slot from its first near sphere pair until the last has left and no impulse is
+pending. Only the functions here allocate and free slots and places of sphere pairs.
+"""
+
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.types import real, vec3
+from taichi_dem.state.pair_columns import Columns
+
+#: Sphere pairs that may be out of use, beside as many as are in use, before the rest is packed.
+SLACK = 4096
+
+
+@ti.data_oriented
+class PairStore:
+    """Slots of near pairs of bodies, their sphere pairs, and the order in which pairs are visited.
+
+    Of a slot: body: the two bodies, first < second; first .. last: places in sphere of the sphere
+    pairs that a search has found; waiting: 1 for a side with a pending impulse; impulse[2 p +
+    side]: pending impulse [N s] and moment about the body's centre [N m s], read only if waiting is
+    1, as most pairs do not touch. heat: energy into dashpots, friction, and injected [J], until the
+    first body takes it. deepest: overlap as a share of the distance at which the spheres touch.
+    is_new: 1 until the limits of a step include the pair; sphere_place: new place of its sphere
+    pairs while a search writes them.
+    Of a sphere pair: sphere: the two spheres; owner: slot of the pair, where its places begin.
+    slot_limit, sphere_limit: largest numbers for the scene; fields have the capacity of the engine.
+    columns, sphere_columns: declared by others. A column is zero when its pair comes near, or its
+    sphere pair is found, and keeps its value as long as that lasts.
+
+    Pairs are visited by (first body, second body), whatever the order of slots, so sums have one
+    order that does not depend on the history of searches. near_count: number of near pairs.
+    near_slot: their slots, in order. first_of[i]: place there of the first pair whose first body is
+    i; second_slot: from second_start[i] on, slots of the pairs whose second body is i.
+    """
+
+    scratch_fields = ("sphere_place",)
+
+    def __init__(self, bodies: int, slots: int, spheres: int):
+        self.slots, self.spheres = slots, spheres
+        self.slot_limit, self.sphere_limit = (ti.field(ti.i32, shape=()) for _ in range(2))
+        self._allocate_slots(slots)
+        self.sphere = ti.Vector.field(2, ti.i32, shape=spheres)
+        self.owner = ti.field(ti.i32, shape=spheres)
+        self.sphere_count, self.sphere_end = (ti.field(ti.i32, shape=()) for _ in range(2))
+        self.columns, self.sphere_columns = Columns(slots), Columns(spheres)
+        self.near_count = ti.field(ti.i32, shape=())
+        self.near_slot = ti.field(ti.i32, shape=slots)
+        self.first_of = ti.field(ti.i32, shape=bodies + 1)
+        self.second_start = ti.field(ti.i32, shape=bodies + 2)
+        self.second_slot = ti.field(ti.i32, shape=slots)
+
+    def _allocate_slots(self, slots):
+        self.body, self.waiting = (ti.Vector.field(2, ti.i32, shape=slots) for _ in range(2))
+        self.first, self.last, self.is_new = (ti.field(ti.i32, shape=slots) for _ in range(3))
+        self.sphere_place, self.free = (ti.field(ti.i32, shape=slots) for _ in range(2))
+        self.impulse = ti.Vector.field(6, real, shape=2 * slots)
+        self.heat = ti.Vector.field(3, real, shape=slots)
+        self.deepest = ti.field(real, shape=slots)
+        self.free_count, self.used_end = (ti.field(ti.i32, shape=()) for _ in range(2))
+
+    def column(self, name: str, kind: Any, width: int = 0) -> ti.Field:
+        """Field with an entry a slot; kind: data type, width: components, 0 for a number.
+
+        Raises InputError for a name that is in use.
+        """
+        return self.columns.declare(name, kind, width)
+
+    def sphere_column(self, name: str, kind: Any, width: int = 0) -> ti.Field:
+        """The same with an entry a sphere pair."""
+        return self.sphere_columns.declare(name, kind, width)
+
+    def clear(self) -> None:
+        """Free all slots; for a run that begins again."""
+        for field in (self.first, self.last, self.first_of, self.second_start, self.free_count):
+            assign(field, 0)
+        for field in (self.used_end, self.sphere_count, self.sphere_end, self.near_count):
+            assign(field, 0)
+
+    def near_table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Near pairs in order: both bodies (n, 2), number of sphere pairs (n,) and deepest (n,)."""
+        slots = values(self.near_slot, slice(int(values(self.near_count))))
+        counts = values(self.last, slots) - values(self.first, slots)
+        return values(self.body, slots), counts, values(self.deepest, slots)
+
+    def near_bodies(self) -> np.ndarray:
+        """Both bodies of every near pair, in order, (n, 2)."""
+        return values(self.body, values(self.near_slot, slice(int(values(self.near_count)))))
+
+    @ti.func
+    def allocate(self, i, j):
+        """Slot for a pair of two bodies, all of it zero; -1 where none is left."""
+        p, left = -1, self.free_count[None] - 1
+        if left >= 0:
+            p = self.free[left]
+            self.free_count[None] = left
+        elif self.used_end[None] < self.slot_limit[None]:
+            p = self.used_end[None]
+            self.used_end[None] = p + 1
+        if p >= 0:
+            self.body[p] = [i, j]
+            self.clear_slot(p)
+        return p
+
+    @ti.func
+    def clear_slot(self, p):
+        """Reset the slot of a pair."""
+        self.first[p], self.last[p], self.waiting[p], self.is_new[p] = 0, 0, [0, 0], 1
+        self.heat[p], self.deepest[p] = vec3(0.0), 0.0
+        for slot in range(2 * p, 2 * p + 2):
+            self.impulse[slot] = ti.Vector.zero(real, 6)
+        self.columns.clear(p)
+
+    @ti.func
+    def release(self, p):
+        """Free the slot of a pair and the places of its sphere pairs."""
+        self.remove_spheres(p)
+        self.free[self.free_count[None]] = p
+        self.free_count[None] = self.free_count[None] + 1
+
+    @ti.func
+    def waits(self, p):
+        """Whether an impulse or heat waits for a body of a pair."""
+        return self.waiting[p][0] == 1 or self.waiting[p][1] == 1
+
+    @ti.func
+    def remove_spheres(self, p):
+        """Free the places of the sphere pairs of a pair."""
+        self.first[p], self.last[p] = 0, 0
+
+    @ti.func
+    def reserve_spheres(self, p, count):
+        """Find new places for the sphere pairs of a pair; 1 when there are none."""
+        start = self.sphere_end[None]
+        lacking = ti.cast(start + count > self.sphere_limit[None], ti.i32)
+        if lacking == 0:
+            self.sphere_place[p], self.owner[start] = start, p
+            self.sphere_end[None] = start + count
+        return lacking
+
+    @ti.func
+    def replace_spheres(self, p, count):
+        """Replace the sphere pairs of a pair by those at its new places.
+
+        Those that were present before keep their columns; those of the others are zero.
+        """
+        start = self.sphere_place[p]
+        end = start + count
+        if ti.static(len(self.sphere_columns) > 0):
+            for k in range(start, end):
+                former = self._former(p, self.sphere[k], k - start)
+                if former >= 0:
+                    self.sphere_columns.copy(former, k)
+                else:
+                    self.sphere_columns.clear(k)
+        self.first[p], self.last[p] = start, end
+
+    @ti.func
+    def _former(self, p, spheres, nth):
+        """Present place of two spheres of a pair, -1 where they are not listed.
+
+        nth: where they would be if nothing had come or gone before them.
+        """
+        first, last, found = self.first[p], self.last[p], -1
+        if first + nth < last:
+            if self._is(first + nth, spheres):
+                found = first + nth
+        if found < 0:
+            for k in range(first, last):
+                if self._is(k, spheres):
+                    found = k
+        return found
+
+    @ti.func
+    def _is(self, k, spheres):
+        same = self.sphere[k] == spheres
+        return same.all()
+
+    @ti.func
+    def pack_if_sparse(self):
+        """Pack the sphere pairs where too many places are out of use."""
+        end, used = self.sphere_end[None], self.sphere_count[None]
+        if end > 2 * used + SLACK or end > self.sphere_limit[None] // 2:
+            self.pack_spheres()
+
+    @ti.func
+    def pack_spheres(self):
+        """Move the sphere pairs that are in use together."""
+        k, packed = 0, 0
+        while k < self.sphere_end[None]:
+            p = self.owner[k]
+            count = 0
+            if self.first[p] == k:
+                count = self.last[p] - k
+            for a in range(count):
+                self.sphere[packed + a] = self.sphere[k + a]
+                self.sphere_columns.copy(k + a, packed + a)
+            if count > 0:
+                self.owner[packed] = p
+                self.first[p], self.last[p] = packed, packed + count
+            packed += count
+            k += ti.max(1, count)
+        self.sphere_end[None] = packed

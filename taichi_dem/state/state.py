@@ -1,0 +1,218 @@
+"""Everything that changes in a run; checkpoints hold this and the effects' own state."""
+
+from typing import Optional
+
+import numpy as np
+import taichi as ti
+from numpy.typing import ArrayLike
+
+from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.types import real
+from taichi_dem.materials.body_materials import MOST
+from taichi_dem.mesh.topology import Topology
+from taichi_dem.physics.fracture import coulomb_limit
+from taichi_dem.physics.rotation_arrays import spins, turned_bodies
+from taichi_dem.state.activity import Activity
+from taichi_dem.state.body_motion import BodyMotion
+from taichi_dem.state.model import Model
+from taichi_dem.state.tables import Tables
+from taichi_dem.state.timeline import NEVER
+
+#: Motion of a body that is given, by name.
+_GIVEN = ("position", "orientation", "velocity", "spin")
+
+
+def unserved_limits(model: Model) -> np.ndarray:
+    """Tensile strength, cohesion [Pa] and friction that no effect of a model serves, else inf.
+
+    A row for each pair of materials, ``Tables.pair``.
+    """
+    served = {effect.role for effect in model.effects if effect.name}
+    rows = np.zeros((MOST**2, 3))
+    for a, row in enumerate(model.materials.pairs):
+        for b, pair in enumerate(row):
+            strength = np.inf if "tension" in served else pair.tensile_strength
+            cohesion = np.inf if "shear" in served else pair.cohesion
+            friction = 0.0 if "shear" in served else pair.friction
+            rows[MOST * a + b] = strength, cohesion, friction
+    return rows
+
+
+@ti.data_oriented
+class State:
+    """Motion of the bodies, pending impulses, fracture and the energy account.
+
+    position [m], velocity [m/s], orientation (unit quaternion, scalar first), angular_momentum [kg
+    m^2/s] in world axes; rotation (matrix) and spin [rad/s] follow from them and are stored so that
+    neighbours need not compute them. A body's motion is that of its own last tick.
+    level: step dt0 / 2^level. bound: its criterion, an index into ``step_control.CRITERIA``.
+    last_tick: when the body was last advanced. lag: time [s] by which what it has taken of each
+    load is behind its position.
+    slot: impulse [N s] and its moment about the body's centre [N m s] that face f of body i has
+    gathered since then, entry 4 i + f.
+    broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
+    carries contact spheres; with contact only.
+    bond_heat: energy taken from each bond by dashpots, slip and release [J]; not for elastic bonds.
+    contact_heat: energy taken by sphere dashpots and by friction, and energy injected by releases
+    [J], booked to the first body of a pair; with contact only. injected_tick: last tick whose
+    releases have been booked there.
+    load_work: work [J], one component a load, one for all supports, one a ground; load_impulse:
+    total impulse of all of them on a body (linear, and angular about the origin); impulse_sizes:
+    sums of the sizes of both. tick: present time.
+    bad_body: lowest body out of bounds, body_count if none.
+    active_effects: bits of each body: of the loads, then the supports, then the ground that changed
+    its motion, CONTACT and RUBBED. limits: tensile strength, cohesion [Pa] and friction coefficient
+    of each pair of materials, whose excess in a bond is noted, without bound where an effect serves
+    them; passed: ticks at
+    which a bond first exceeded its tensile and its shear limit, NEVER before. activity: the
+    ``Activity`` of bonds whose laws act on demand, else None.
+    """
+
+    def __init__(self, tables: Tables):
+        n, bonds = tables.capacity.bodies, tables.capacity.bonds
+        self.tables = tables
+        self.activity = Activity(tables) if tables.on_demand else None
+        self.position = ti.Vector.field(3, real, shape=n)
+        self.orientation = ti.Vector.field(4, real, shape=n)
+        self.rotation = ti.Matrix.field(3, 3, real, shape=n)
+        self.velocity = ti.Vector.field(3, real, shape=n)
+        self.spin = ti.Vector.field(3, real, shape=n)
+        self.angular_momentum = ti.Vector.field(3, real, shape=n)
+        self.level = ti.field(ti.i32, shape=n)
+        self.bound = ti.field(ti.i32, shape=n)
+        self.last_tick = ti.field(ti.i64, shape=n)
+        if tables.loads:
+            self.lag = ti.Vector.field(len(tables.loads), real, shape=n)
+        self.slot = ti.Vector.field(6, real, shape=tables.capacity.faces)
+        self.broken_tick = ti.field(ti.i64, shape=bonds)
+        if tables.has_bond_heat:
+            self.bond_heat = ti.Vector.field(3, real, shape=bonds)
+        if tables.has_contact:
+            self.exposed_tick = ti.field(ti.i64, shape=tables.capacity.faces)
+            self.contact_heat = ti.Vector.field(3, real, shape=n)
+            self.injected_tick = ti.field(ti.i64, shape=())
+        self.active_effects = ti.field(ti.i64, shape=n)
+        self.limits = ti.Vector.field(3, real, shape=MOST**2)
+        self.passed = ti.Vector.field(2, ti.i64, shape=bonds)
+        accounts = len(tables.loads) + 1 + len(tables.ground)
+        self.load_work = ti.Vector.field(accounts, real, shape=n)
+        self.load_impulse = ti.Vector.field(6, real, shape=n)
+        self.impulse_sizes = ti.Vector.field(2, real, shape=n)
+        self.tick = ti.field(ti.i64, shape=())
+        self.bad_body = ti.field(ti.i32, shape=())
+        self.max_speed2 = ti.field(real, shape=())
+
+    def load(self, model: Model, max_speed: float) -> None:
+        """Put the bodies where the mesh has them, at rest; all fields are zero before."""
+        n = model.body_count
+        if self.tables.has_contact:
+            assign(self.exposed_tick, np.full(4 * n, NEVER))
+        assign(self.max_speed2, max_speed**2)
+        assign(self.broken_tick, np.full(model.bond_count, NEVER))
+        assign(self.bad_body, n)
+        assign(self.passed, np.full((model.bond_count, 2), NEVER))
+        assign(self.limits, unserved_limits(model))
+        if self.activity is not None:
+            self.activity.load(model)
+        self.set_motion(model.centre)
+
+    def set_motion(
+        self,
+        position: ArrayLike,
+        orientation: Optional[ArrayLike] = None,
+        velocity: Optional[ArrayLike] = None,
+        spin: Optional[ArrayLike] = None,
+    ) -> None:
+        """Set the motion of all bodies, arrays of a row each or one row for all.
+
+        position [m], orientation (unit quaternions, not turned by default), velocity [m/s] and
+        spin [rad/s] in world axes, zero by default.
+        """
+        given = (position, orientation, velocity, spin)
+        rest = ([0.0] * 3, [1.0, 0.0, 0.0, 0.0], [0.0] * 3, [0.0] * 3)
+        rows = [still if part is None else part for part, still in zip(given, rest)]
+        shapes = [(self.body_count, len(still)) for still in rest]
+        shaped = [np.broadcast_to(part, shape) for part, shape in zip(rows, shapes)]
+        whole = [np.ascontiguousarray(part, dtype=np.float64) for part in shaped]
+        inertia = values(self.tables.inertia, slice(self.body_count))
+        found = turned_bodies(whole[1], whole[3], inertia)
+        names = (*_GIVEN, "rotation", "angular_momentum")
+        for name, part in zip(names, (*whole, *found)):
+            assign(getattr(self, name), part)
+
+    @ti.func
+    def note_active(self, i, bits):
+        """Note that effects, given as bits, have changed the motion of body i."""
+        # Seldom news: a comparison spares the atomic operation, which parallel pairs need.
+        if self.active_effects[i] & bits != bits:
+            ti.atomic_or(self.active_effects[i], bits)
+            if ti.static(self.tables.on_demand):
+                self.activity.note_touch(i, bits, self.tick[None])
+
+    @ti.func
+    def note_passed(self, m, b, pull, shear2):
+        """Note that a bond exceeds a limit that no listed effect serves.
+
+        m: pair of its materials. pull: traction of one of its units [Pa]; shear2: square of that
+        across [Pa^2].
+        """
+        limits = self.limits[m]
+        if pull > limits[0]:
+            self._note_first(b, 0)
+        bound = coulomb_limit(limits[1], limits[2], -pull)
+        if shear2 > bound * bound:
+            self._note_first(b, 1)
+
+    @ti.func
+    def _note_first(self, b, limit: ti.template()):
+        if self.passed[b][limit] < 0:
+            self.passed[b][limit] = self.tick[None]
+
+    @ti.func
+    def body_motion(self, i, time, step, since, until):
+        """Present motion of body i, for loads in a step [s] from a time: ``BodyMotion``."""
+        return BodyMotion(
+            position=self.position[i],
+            rotation=self.rotation[i],
+            velocity=self.velocity[i],
+            spin=self.spin[i],
+            time=time,
+            step=step,
+            since=since,
+            until=until,
+        )
+
+    @property
+    def body_count(self) -> int:
+        """Bodies of the scene."""
+        return int(values(self.tables.body_count))
+
+    def expose(self, topology: Topology, outer: bool) -> None:
+        """Put contact spheres on faces without a bond from the start.
+
+        outer: on all of them, else on those that another body lies behind.
+        """
+        marks, chosen = values(self.exposed_tick), topology.is_open | outer
+        marks[4 * topology.outer_body[chosen] + topology.outer_face[chosen]] = 0
+        assign(self.exposed_tick, marks)
+
+    def motion(self) -> dict[str, np.ndarray]:
+        """Arrays of the bodies' motion by name.
+
+        position, velocity, spin, angular_momentum (n, 3), orientation (n, 4), rotation (n, 3, 3)
+        and level (n,).
+        """
+        here = slice(self.body_count)
+        names = (*_GIVEN, "angular_momentum", "rotation", "level")
+        found = {name: values(getattr(self, name), here) for name in names}
+        # The stored spin is that of the orientation before the last turn.
+        inverse = values(self.tables.inertia_inverse, here)
+        found["spin"] = spins(found["rotation"], inverse, found["angular_momentum"])
+        return found
+
+    def fields(self) -> dict[str, ti.Field]:
+        """Every field that changes, by name, the bound effects' state included."""
+        own = {k: v for k, v in vars(self).items() if isinstance(v, (ti.Field,))}
+        for effect in self.tables.effects:
+            own.update(effect.state())
+        return own

@@ -1,0 +1,160 @@
+"""Constant tables of the scene that an engine holds, as fields, and the effects bound to them."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.fixed_order import inverse
+from taichi_dem.kit.types import real
+from taichi_dem.materials.body_materials import MOST
+from taichi_dem.state.capacity import Capacity
+from taichi_dem.state.model import MANY, ROLES, SINGLE, Model
+
+#: Binds the effects of a structure to its tables; gives them by role.
+Bind = Callable[["Tables"], dict[str, list[Any]]]
+
+
+@ti.data_oriented
+class Tables:
+    """Device side of a ``Model``, which kernels only read.
+
+    body_count, bond_count: of the scene; fields have the capacity of the engine.
+    mass [kg] and inertia [kg m^2] with their inverses, radius (of the ball around the body, [m])
+    and, with contact, extent (of that around its spheres, [m]) have one entry a body. bond_slots
+    names the two faces of a bond as 4 * body + local face, master first; bond_frame has rows
+    normal, xi, eta in the master's body frame; bond_stiffness normal and shear [Pa/m].
+    vertex_master (face frame) and vertex_slave (body frame) [m] have one entry a contact unit,
+    unit_area [m^2] one a bond. neighbour is the body behind local face f, entry 4 * body + f, -1
+    where it is outer; face_bond the bond there. face_spheres: contact spheres on a face; those of
+    face k begin at entry k * face_spheres.
+    material: number of the material of a body. bond_pair: of the pair of materials of a bond, the
+    row of its numbers in the table of a law, as ``pair`` gives it for two bodies.
+    on_demand: whether laws are evaluated only where they act.
+    Body frames coincide with the world axes at the start. Source: Konno et al., section 2.
+    """
+
+    constant_fields = (
+        *("body_count", "bond_count", "mass", "mass_inverse", "radius", "extent", "inertia"),
+        *("inertia_inverse", "bond_slots", "bond_frame", "bond_stiffness", "unit_area"),
+        *("vertex_master", "vertex_slave", "neighbour", "face_bond", "sphere", "cluster"),
+        *("face_spheres", "material", "bond_pair"),
+    )
+
+    # Bound effects by role; null objects where the scene lists none, contact is None then.
+    tension: Any
+    shear: Any
+    dashpot: Any
+    friction: Any
+    contact: Any
+
+    def __init__(self, capacity: Capacity, bind: Bind, on_demand: bool = False):
+        self.capacity, self.on_demand = capacity, on_demand
+        self.body_count, self.bond_count = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
+        self._declare_bodies(capacity.bodies)
+        self._declare_bonds(capacity)
+        self._take(bind(self))
+        if self.has_contact:
+            self._declare_spheres(capacity)
+
+    def _take(self, by_role):
+        """Take the bound effects by role."""
+        for role in SINGLE:
+            setattr(self, role, by_role[role][0] if by_role[role] else None)
+        self.loads, self.supports, self.ground = (tuple(by_role[role]) for role in MANY)
+        self.effects = tuple(effect for role in ROLES for effect in by_role[role])
+        self.drives = self._drives()
+        self.has_contact = self.contact is not None
+        self.has_bond_heat = any(effect.name for effect in (self.tension, self.shear, self.dashpot))
+
+    def _drives(self):
+        """Loads and ground with the row of their impulse, account of work, and bit of activity."""
+        loads, held = len(self.loads), len(self.supports)
+        pushes = [(effect, e, e, e) for e, effect in enumerate(self.loads)]
+        drags = [
+            (effect, loads + e, loads + 1 + e, loads + held + e)
+            for e, effect in enumerate(self.ground)
+        ]
+        return (*pushes, *drags)
+
+    def _declare_bodies(self, n):
+        self.mass = ti.field(real, shape=n)
+        self.mass_inverse = ti.field(real, shape=n)
+        self.radius = ti.field(real, shape=n)
+        self.material = ti.field(ti.i32, shape=n)
+        self.inertia = ti.Matrix.field(3, 3, real, shape=n)
+        self.inertia_inverse = ti.Matrix.field(3, 3, real, shape=n)
+
+    def _declare_bonds(self, capacity):
+        bonds, units = capacity.bonds, capacity.units
+        self.bond_slots = ti.Vector.field(2, ti.i32, shape=bonds)
+        self.bond_frame = ti.Matrix.field(3, 3, real, shape=bonds)
+        self.bond_stiffness = ti.Vector.field(2, real, shape=bonds)
+        self.unit_area = ti.field(real, shape=bonds)
+        self.bond_pair = ti.field(ti.i32, shape=bonds)
+        self.vertex_master = ti.Vector.field(3, real, shape=units)
+        self.vertex_slave = ti.Vector.field(3, real, shape=units)
+        self.neighbour = ti.field(ti.i32, shape=capacity.faces)
+        self.face_bond = ti.field(ti.i32, shape=capacity.faces)
+
+    def _declare_spheres(self, capacity):
+        self.face_spheres = ti.field(ti.i32, shape=())
+        self.sphere = ti.Vector.field(4, real, shape=capacity.spheres)
+        self.cluster = ti.Vector.field(4, real, shape=capacity.faces)
+        self.extent = ti.field(real, shape=capacity.bodies)
+
+    def load(self, model: Model) -> None:
+        """Take over a model; all fields are zero before."""
+        assign(self.body_count, model.body_count)
+        assign(self.bond_count, model.bond_count)
+        assign(self.mass, model.body_mass)
+        assign(self.mass_inverse, 1.0 / model.body_mass)
+        assign(self.radius, model.body_radius)
+        assign(self.inertia, model.body_inertia)
+        assign(self.inertia_inverse, inverse(model.body_inertia))
+        self._load_bonds(model)
+        of_body, top = model.materials.of_body, model.topology
+        assign(self.material, of_body)
+        assign(self.bond_pair, MOST * of_body[top.master] + of_body[top.slave])
+        if self.has_contact:
+            self._load_spheres(model.spheres)
+        for effect in self.effects:
+            effect.load_scene(model)
+
+    @ti.func
+    def pair(self, i, j):
+        """Pair of materials of two bodies: the row of its numbers in the table of a law."""
+        return MOST * self.material[i] + self.material[j]
+
+    def matched(self, model: Model) -> list[tuple[Any, Any]]:
+        """Pairs of an effect bound here and the corresponding one of a model.
+
+        The latter is None for a null object.
+        """
+        listed = {role: iter(effects) for role, effects in model.by_role.items()}
+        return [(effect, next(listed[effect.role], None)) for effect in self.effects]
+
+    def _load_bonds(self, model):
+        bonds = model.bonds
+        slots, first = bonds["slots"], np.arange(model.bond_count, dtype=np.int32)
+        neighbour = np.full((2, 4 * model.body_count), -1, dtype=np.int32)
+        for side in range(2):
+            neighbour[0, slots[:, side]] = slots[:, 1 - side] >> 2
+            neighbour[1, slots[:, side]] = first
+        assign(self.neighbour, neighbour[0])
+        assign(self.face_bond, neighbour[1])
+        assign(self.bond_slots, slots)
+        assign(self.bond_frame, bonds["frame"])
+        assign(self.bond_stiffness, model.bond_stiffness)
+        assign(self.unit_area, bonds["area"])
+        assign(self.vertex_master, bonds["on_master"].reshape(-1, 3))
+        assign(self.vertex_slave, bonds["on_slave"].reshape(-1, 3))
+
+    def _load_spheres(self, spheres):
+        ball = np.concatenate([spheres.centre, spheres.radius[..., None]], axis=-1)
+        assign(self.face_spheres, spheres.per_face)
+        assign(self.sphere, ball.reshape(-1, 4))
+        assign(self.cluster, spheres.cluster.reshape(-1, 4))
+        assign(self.extent, spheres.extent)
