@@ -7,7 +7,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.products import matvec, stacked
+from taichi_dem.kit.products import matvec, norm, stacked
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.laws.sphere_contact import ONCE_BROKEN
 from taichi_dem.methods import Method
@@ -80,7 +80,7 @@ class Contacts:
             branch = self.state.position[j] - self.state.position[i]
             turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
             near = self.law.nearest(a, b, turn, offset)
-            gap = near.apart.norm() - near.reach
+            gap = norm(near.apart) - near.reach
             if near.can_meet == 0:
                 gap = AWAY
         else:
@@ -92,7 +92,7 @@ class Contacts:
         on_first = matvec(self.state.rotation[i], self.tables.sphere[a].xyz)
         on_second = matvec(self.state.rotation[j], self.tables.sphere[b].xyz)
         apart = self.state.position[j] + on_second - self.state.position[i] - on_first
-        return apart.norm() - self.tables.sphere[a][3] - self.tables.sphere[b][3]
+        return norm(apart) - self.tables.sphere[a][3] - self.tables.sphere[b][3]
 
     @ti.func
     def pair_energy(self, p):
@@ -201,14 +201,14 @@ class Contacts:
     @ti.func
     def _speed(self, i, velocity, spin):
         """Bound of the speed of any point on the spheres of body i [m/s]."""
-        return velocity.norm() + spin.norm() * self.tables.extent[i]
+        return norm(velocity) + norm(spin) * self.tables.extent[i]
 
     @ti.func
     def approach(self, i, j):
         """Bound of the speed at which spheres of two bodies approach each other [m/s]."""
         between = self.state.velocity[j] - self.state.velocity[i]
         first = self._speed(i, between, self.state.spin[i])
-        return first + self.state.spin[j].norm() * self.tables.extent[j]
+        return first + norm(self.state.spin[j]) * self.tables.extent[j]
 
     @ti.func
     def margin(self, i, j):

@@ -3,7 +3,7 @@
 import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
-from taichi_dem.kit.products import matvec
+from taichi_dem.kit.products import matvec, norm, squared
 from taichi_dem.kit.types import real, vec4
 from taichi_dem.physics.triangle import closest_point
 
@@ -75,7 +75,7 @@ class NarrowPhase:
     def _clusters_near(self, face_i, face_j, wide):
         """Whether the balls around the spheres of two faces are nearer than wide [m]."""
         reach = self.tables.cluster[face_i][3] + self.tables.cluster[face_j][3] + wide
-        return (self.cluster[face_j] - self.cluster[face_i]).norm_sqr() < reach * reach
+        return squared(self.cluster[face_j] - self.cluster[face_i]) < reach * reach
 
     @ti.func
     def _of_faces(self, face_i, face_j, start, margin, least, write):
@@ -85,11 +85,11 @@ class NarrowPhase:
             mine = self.sphere[a]
             whole = mine[3] + self.tables.cluster[face_j][3] + least
             # A sphere far from the ball around those of the other face is as far from all of them.
-            if (self.cluster[face_j] - mine.xyz).norm_sqr() < whole * whole:
+            if squared(self.cluster[face_j] - mine.xyz) < whole * whole:
                 for b in range(size * face_j, size * face_j + size):
                     other = self.sphere[b]
                     reach = mine[3] + other[3]
-                    apart2 = (other.xyz - mine.xyz).norm_sqr()
+                    apart2 = squared(other.xyz - mine.xyz)
                     if apart2 < (reach + least) * (reach + least):
                         if apart2 < (reach + margin) * (reach + margin):
                             if write:
@@ -111,7 +111,7 @@ class NarrowPhase:
             for a in range(size * face, size * face + size):
                 mine = self.sphere[a]
                 whole = mine[3] + self.tables.cluster[other][3] + least
-                if (self.cluster[other] - mine.xyz).norm_sqr() < whole * whole:
+                if squared(self.cluster[other] - mine.xyz) < whole * whole:
                     gap = self._gap(mine, other)
                     if gap < margin:
                         if write:
@@ -127,4 +127,4 @@ class NarrowPhase:
     def _gap(self, sphere, face):
         """Gap between a sphere and a face, whichever side it is on [m]."""
         p, q, s = self.corner[3 * face], self.corner[3 * face + 1], self.corner[3 * face + 2]
-        return (sphere.xyz - closest_point(sphere.xyz, p, q, s)).norm() - sphere[3]
+        return norm(sphere.xyz - closest_point(sphere.xyz, p, q, s)) - sphere[3]

@@ -3,6 +3,7 @@
 import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
+from taichi_dem.kit.products import norm, squared
 from taichi_dem.kit.types import real
 
 #: Reach of the list around a body, in body skins and in skins: a longer list against fewer of them.
@@ -39,8 +40,8 @@ class Reach:
     def notice(self, i):
         """Note whether body i, which is being searched, has left its reach."""
         # Upper bound on the displacement of any point: a matrix norm bounds that of its product.
-        way = (self.state.position[i] - self.placed_at[i]).norm()
-        way += (self.state.rotation[i] - self.turned_to[i]).norm() * self.tables.extent[i]
+        way = norm(self.state.position[i] - self.placed_at[i])
+        way += norm(self.state.rotation[i] - self.turned_to[i]) * self.tables.extent[i]
         if not way + self.contacts.body_skin[i] < self.reach[i]:
             self.left[i] = 1
             self.escaped[ti.atomic_add(self.escaped_count[None], 1)] = i
@@ -53,7 +54,7 @@ class Reach:
         self.ball[i] = self.tables.extent[i] + self.reach[i]
         ahead = AHEAD * self.contacts.pace[0] * self.state.velocity[i]
         most = SHARE * (self.reach[i] - self.contacts.body_skin[i])
-        ahead *= most / ti.max(ahead.norm(), most)
+        ahead *= most / ti.max(norm(ahead), most)
         self.placed_at[i] = self.state.position[i] + ahead
         self.turned_to[i] = self.state.rotation[i]
         for face in range(4 * i, 4 * i + 4):
@@ -73,7 +74,7 @@ class Reach:
         place: of the other ball's centre [m]; ball: its radius [m].
         """
         reach = ball + self.ball[j]
-        return (self.placed_at[j] - place).norm_sqr() < reach * reach
+        return squared(self.placed_at[j] - place) < reach * reach
 
     @ti.func
     def faces_near(self, i, j):
@@ -88,9 +89,9 @@ class Reach:
         """Faces of body j, a bit each, that are near a face of another body."""
         faces, reach = 0, self.tables.cluster[face][3] + wide
         whole = reach + self.tables.extent[j]
-        if (self.placed_at[j] - self.cluster[face]).norm_sqr() < whole * whole:
+        if squared(self.placed_at[j] - self.cluster[face]) < whole * whole:
             for g in range(4):
                 other = reach + self.tables.cluster[4 * j + g][3]
                 apart = self.cluster[4 * j + g] - self.cluster[face]
-                faces |= ti.cast(apart.norm_sqr() < other * other, ti.i32) << g
+                faces |= ti.cast(squared(apart) < other * other, ti.i32) << g
         return faces

@@ -20,6 +20,7 @@ from taichi.lang import impl
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.products import dot
 from taichi_dem.kit.sealed import Sealed
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import float_array, shown
@@ -414,7 +415,7 @@ class ElasticShear(Effect):
     @ti.func
     def stored(self, b, u, sliding):
         """Elastic energy per area [J/m^2]."""
-        return 0.5 * self.tables.bond_stiffness[b][1] * sliding.dot(sliding)
+        return 0.5 * self.tables.bond_stiffness[b][1] * dot(sliding, sliding)
 
 
 @ti.data_oriented

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import taichi as ti
 
+from taichi_dem.kit import fixed_order
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.fixed_order import dot, length
-from taichi_dem.kit.products import matvec, transposed_matvec
+from taichi_dem.kit.fixed_order import length
+from taichi_dem.kit.products import dot, matvec, squared, transposed_matvec
 from taichi_dem.kit.types import real, vec4
 from taichi_dem.laws.sphere_contact import SphereContact
 from taichi_dem.mesh.contact_spheres import ContactSpheres
@@ -105,7 +106,10 @@ class FaceContact(SphereContact):
         corners = _corners(model).reshape(-1, 3, 3)
         normal = area_vectors(corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3))
         normal /= length(normal)[:, None]
-        assign(self.plane, np.concatenate([normal, dot(normal, corners[:, 0])[:, None]], axis=1))
+        assign(
+            self.plane,
+            np.concatenate([normal, fixed_order.dot(normal, corners[:, 0])[:, None]], axis=1),
+        )
         assign(self.corner, corners.reshape(-1, 3))
 
     @ti.func
@@ -138,7 +142,7 @@ class FaceContact(SphereContact):
         point, chosen, least = centre, -1, _FAR
         highest, top, within = -_FAR, -1, True
         for f in range(4 * i, 4 * i + 4):
-            height = self.plane[f].xyz.dot(centre) - self.plane[f][3]
+            height = dot(self.plane[f].xyz, centre) - self.plane[f][3]
             within = within and height < 0.0
             if (self.exposed_faces[i] >> (f - 4 * i)) & 1 == 1:
                 if height > highest:
@@ -149,8 +153,8 @@ class FaceContact(SphereContact):
                     on_f = closest_point(
                         centre, self.corner[k], self.corner[k + 1], self.corner[k + 2]
                     )
-                    if (centre - on_f).norm_sqr() < least:
-                        point, chosen, least = on_f, f, (centre - on_f).norm_sqr()
+                    if squared(centre - on_f) < least:
+                        point, chosen, least = on_f, f, squared(centre - on_f)
         apart, reach, can_meet = centre - point, radius, chosen == face
         if within:
             # The mirror image of the centre in front of the face has the same overlap.

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import taichi as ti
 
+from taichi_dem.kit.products import dot, squared
 from taichi_dem.laws.base import HARMLESS, NEAR, Effect
 from taichi_dem.materials import Material
 from taichi_dem.physics.fracture import coulomb_limit, slip_beyond
@@ -49,7 +50,7 @@ class ShearSlip(Effect):
     def begins(self, m, stiffness, sliding, pressure):
         """1 where a unit that never slipped comes near its limit at a pressure [Pa], else 0."""
         limit = NEAR * coulomb_limit(self.law[m, 0], self.law[m, 1], pressure)
-        return ti.cast(stiffness * stiffness * sliding.norm_sqr() > limit * limit, ti.i32)
+        return ti.cast(stiffness * stiffness * squared(sliding) > limit * limit, ti.i32)
 
     @ti.func
     def traction(self, m, stiffness, u, sliding, pressure):
@@ -58,10 +59,10 @@ class ShearSlip(Effect):
         elastic = sliding - self.slip[u]
         spent = 0.0
         # Squares first: almost every unit stays elastic and needs no root.
-        if stiffness * stiffness * elastic.dot(elastic) > limit * limit:
+        if stiffness * stiffness * dot(elastic, elastic) > limit * limit:
             slip = slip_beyond(stiffness, limit, elastic)
             # Mean of the tractions before and after, so that stored plus spent is exact.
-            spent = (stiffness * (elastic - 0.5 * slip)).dot(slip)
+            spent = dot(stiffness * (elastic - 0.5 * slip), slip)
             self.slip[u] = self.slip[u] + slip
             elastic -= slip
         return stiffness * elastic, spent
@@ -69,7 +70,7 @@ class ShearSlip(Effect):
     @ti.func
     def is_active(self, b, u):
         """1 for a unit that has slipped, else 0."""
-        return ti.cast(self.slip[u].norm_sqr() > 0.0, ti.i32)
+        return ti.cast(squared(self.slip[u]) > 0.0, ti.i32)
 
     @ti.func
     def residual_slip(self, u):
@@ -80,4 +81,4 @@ class ShearSlip(Effect):
     def stored(self, b, u, sliding):
         """Elastic energy per area [J/m^2]."""
         elastic = sliding - self.slip[u]
-        return 0.5 * self.tables.bond_stiffness[b][1] * elastic.dot(elastic)
+        return 0.5 * self.tables.bond_stiffness[b][1] * dot(elastic, elastic)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import taichi as ti
 
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.products import dot, norm, squared
 from taichi_dem.kit.types import vec2
 from taichi_dem.kit.validation import positive
 from taichi_dem.laws.base import HARMLESS, NEAR, Effect
@@ -93,7 +94,7 @@ class SlipWeakening(Effect):
     def begins(self, m, stiffness, sliding, pressure):
         """1 where a unit that never slipped comes near its limit at a pressure [Pa], else 0."""
         limit = NEAR * coulomb_limit(self.law[m, 0], self.law[m, 1], pressure)
-        return ti.cast(stiffness * stiffness * sliding.norm_sqr() > limit * limit, ti.i32)
+        return ti.cast(stiffness * stiffness * squared(sliding) > limit * limit, ti.i32)
 
     @ti.func
     def traction(self, m, stiffness, u, sliding, pressure):
@@ -103,8 +104,8 @@ class SlipWeakening(Effect):
         limit = coulomb_limit(ti.max(0.0, cohesion), self.law[m, 1], pressure)
         elastic = sliding - vec2(unit[0], unit[1])
         spent = 0.0
-        if stiffness * stiffness * elastic.dot(elastic) > limit * limit:
-            reach = elastic.norm()
+        if stiffness * stiffness * dot(elastic, elastic) > limit * limit:
+            reach = norm(elastic)
             rubbing = self.law[m, 1] * pressure
             length = weakening_slip(stiffness, self.law[m, 3], cohesion, rubbing, reach)
             # Mean of the tractions before and after, so that stored plus spent is exact.
@@ -134,4 +135,4 @@ class SlipWeakening(Effect):
     def stored(self, b, u, sliding):
         """Elastic energy per area [J/m^2]."""
         elastic = sliding - self.residual_slip(u)
-        return 0.5 * self.tables.bond_stiffness[b][1] * elastic.dot(elastic)
+        return 0.5 * self.tables.bond_stiffness[b][1] * dot(elastic, elastic)

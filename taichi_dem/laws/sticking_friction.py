@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_dem.kit.products import dot, norm, squared
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import between
 from taichi_dem.laws.base import Effect
@@ -67,9 +68,9 @@ class StickingFriction(Friction):
         normal: of the contact; way: of the second sphere against the first across the normal.
         """
         stretch = self.stretch[k]
-        flat = stretch - stretch.dot(normal) * normal
+        flat = stretch - dot(stretch, normal) * normal
         # Turned, not projected: to turn with the contact takes no energy.
-        self.stretch[k] = flat * (stretch.norm() / ti.max(flat.norm(), 1e-300)) + way
+        self.stretch[k] = flat * (norm(stretch) / ti.max(norm(flat), 1e-300)) + way
 
     @ti.func
     def slip(self, m, k, limit, way):
@@ -80,12 +81,12 @@ class StickingFriction(Friction):
         """
         trial = self.stretch[k]
         longest = limit / self.law[m, 1]
-        size = trial.norm()
+        size = norm(trial)
         present = trial
         if size > longest:
             present = trial * (longest / size)
         self.stretch[k] = present
-        return 0.5 * self.law[m, 1] * (trial - way + present).dot(trial - present)
+        return 0.5 * self.law[m, 1] * dot(trial - way + present, trial - present)
 
     @ti.func
     def spring(self, m, k):
@@ -95,7 +96,7 @@ class StickingFriction(Friction):
     @ti.func
     def stored(self, m, k):
         """Elastic energy in the spring of sphere pair k [J]."""
-        return 0.5 * self.law[m, 1] * self.stretch[k].norm_sqr()
+        return 0.5 * self.law[m, 1] * squared(self.stretch[k])
 
     @ti.func
     def part(self, m, k):

@@ -9,7 +9,7 @@ import taichi as ti
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import PRESSURE, in_unit
-from taichi_dem.kit.products import matvec
+from taichi_dem.kit.products import cross, matvec
 from taichi_dem.kit.validation import finite, positive, shown, word
 from taichi_dem.laws.base import Effect
 from taichi_dem.loads.history import History, history_points, shortest_piece
@@ -78,7 +78,7 @@ class FacePressure(Effect):
         for k in range(self.first[i], self.first[i + 1]):
             push = -pressure * self.area[k]
             force += push
-            torque += self.arm[k].cross(push)
+            torque += cross(self.arm[k], push)
         return matvec(motion.rotation, force), matvec(motion.rotation, torque)
 
 

@@ -11,7 +11,7 @@ from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length
-from taichi_dem.kit.products import matvec, transposed_matvec
+from taichi_dem.kit.products import dot, matvec, squared, transposed_matvec
 from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import direction, positive, shown, unit_vector, word
 from taichi_dem.laws.base import Effect, Travel
@@ -144,12 +144,14 @@ class Roller(_Support):
         kept = zero3()
         if self.turns[i] == 1:
             kept = angular_momentum
-            if normal.norm_sqr() > 0.0:
+            if squared(normal) > 0.0:
                 axis = transposed_matvec(rotation, normal)
                 # The moment of the plane is normal to its normal: the component along it stays.
-                spin = angular_momentum.dot(normal) / axis.dot(matvec(self.tables.inertia[i], axis))
+                spin = dot(angular_momentum, normal) / dot(
+                    axis, matvec(self.tables.inertia[i], axis)
+                )
                 kept = matvec(rotation, matvec(self.tables.inertia[i], spin * axis))
-        return velocity - velocity.dot(normal) * normal, kept
+        return velocity - dot(velocity, normal) * normal, kept
 
 
 def _upward(normal):

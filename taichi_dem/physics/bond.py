@@ -7,7 +7,7 @@ vertex on both bodies and the relative velocity is taken there: angular momentum
 
 import taichi as ti
 
-from taichi_dem.kit.products import matmul, matmul_transposed, matvec
+from taichi_dem.kit.products import cross, matmul, matmul_transposed, matvec
 
 
 @ti.dataclass
@@ -41,7 +41,7 @@ def bond_motion(frame, branch, rotation_i, rotation_j, velocity, spin_i, spin_j)
         branch=branch,
         offset=matvec(axes, branch),
         turn=matmul(axes, rotation_j),
-        velocity=matvec(axes, velocity - spin_i.cross(branch)),
+        velocity=matvec(axes, velocity - cross(spin_i, branch)),
         spin=matvec(axes, spin_j - spin_i),
     )
 
@@ -64,4 +64,4 @@ def unit_opening(motion, arm, vertex_master):
 @ti.func
 def unit_velocity(motion, arm):
     """Relative velocity at the slave's vertex in the face frame [m/s]."""
-    return motion.velocity + motion.spin.cross(arm)
+    return motion.velocity + cross(motion.spin, arm)

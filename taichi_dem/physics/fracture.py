@@ -6,6 +6,7 @@ unit is an opening that starts at the onset u_E = f_t / k_n and follows the larg
 
 import taichi as ti
 
+from taichi_dem.kit.products import norm
 from taichi_dem.kit.types import vec2
 
 
@@ -37,7 +38,7 @@ def coulomb_limit(cohesion, friction, pressure):
 def slip_beyond(stiffness, limit, sliding):
     """Slip that brings an elastic sliding [m] back onto the limit (eq. 2); zero below it."""
     slip = vec2(0.0, 0.0)
-    reach = sliding.norm()
+    reach = norm(sliding)
     if stiffness * reach > limit:
         slip = sliding * ((reach - limit / stiffness) / reach)
     return slip

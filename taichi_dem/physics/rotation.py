@@ -4,6 +4,8 @@ import taichi as ti
 
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.products import (
+    cross,
+    dot,
     matmul,
     matmul_transposed,
     matvec,
@@ -50,7 +52,7 @@ def turned(q, spin, dt):
     round-off there and several times cheaper: steps of a blast turn a body by 1e-6 rad.
     """
     half = 0.5 * dt * spin
-    angle2 = half.dot(half)
+    angle2 = dot(half, half)
     sinc = 1.0 - _6TH * angle2 * (1.0 - _20TH * angle2 * (1.0 - _42TH * angle2))
     cosine = 1.0 - 0.5 * angle2 * (1.0 - _12TH * angle2 * (1.0 - _30TH * angle2))
     if angle2 > 1e-3:
@@ -59,7 +61,7 @@ def turned(q, spin, dt):
         sinc = sine / angle
     turn = quaternion_product(vec4(cosine, sinc * half[0], sinc * half[1], sinc * half[2]), q)
     # One Newton step of 1/sqrt is exact here: the norm is 1 to round-off before and after.
-    return turn * (1.5 - 0.5 * turn.dot(turn))
+    return turn * (1.5 - 0.5 * dot(turn, turn))
 
 
 @ti.func
@@ -92,7 +94,7 @@ def mean_spin(rotation, inertia_inverse, angular_momentum, spin, dt):
     At a constant L the spin changes by J^-1 (L x w), with J^-1 = R I^-1 R^T in the world frame:
     the spin an angular momentum of L + dt/2 L x w has now. With it the turn is of second order.
     """
-    ahead = angular_momentum + 0.5 * dt * angular_momentum.cross(spin)
+    ahead = angular_momentum + 0.5 * dt * cross(angular_momentum, spin)
     return spin_of(rotation, inertia_inverse, ahead)
 
 

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.kit.products import matvec
+from taichi_dem.kit.products import dot, matvec, norm, squared
 
 #: Bits of ``State.active_effects`` beside those of loads and supports: of sphere contact and of its
 #: friction.
@@ -25,7 +25,7 @@ def friction_force(coefficient, damping, force_normal, slide):
     Sliding friction coefficient * force_normal, but never more than damping * |slide|, which
     keeps it from chattering where the sliding stops.
     """
-    speed = slide.norm()
+    speed = norm(slide)
     force = 0.0 * slide
     if speed > 0.0:
         force = slide * (-ti.min(coefficient * force_normal, damping * speed) / speed)
@@ -35,7 +35,7 @@ def friction_force(coefficient, damping, force_normal, slide):
 @ti.func
 def cut_to(vector, bound):
     """The vector, shortened to a bound where it is longer."""
-    size = vector.norm()
+    size = norm(vector)
     if size > bound:
         vector *= bound / size
     return vector
@@ -47,8 +47,8 @@ def add_within(held, more, bound):
 
     held: vector no longer than the bound.
     """
-    square, along = more.norm_sqr(), held.dot(more)
-    left = ti.max(0.0, bound * bound - held.norm_sqr())
+    square, along = squared(more), dot(held, more)
+    left = ti.max(0.0, bound * bound - squared(held))
     share = 1.0
     if square + 2.0 * along > left:
         root = ti.sqrt(along * along + square * left)
@@ -80,7 +80,7 @@ class Nearest:
 def is_within(surfaces, margin):
     """Whether the surfaces of a ``Nearest`` are nearer than a margin [m]."""
     wide = surfaces.reach + margin
-    return surfaces.can_meet == 1 and surfaces.apart.norm_sqr() < wide * wide
+    return surfaces.can_meet == 1 and squared(surfaces.apart) < wide * wide
 
 
 @ti.dataclass
@@ -102,7 +102,7 @@ def meeting(first, reach, apart, rotation):
 
     rotation: of the first body.
     """
-    distance = ti.max(apart.norm(), 1e-30)
+    distance = ti.max(norm(apart), 1e-30)
     overlap = reach - distance
     normal = matvec(rotation, apart) / distance
     arm = matvec(rotation, first.xyz) + (first[3] - 0.5 * overlap) * normal
@@ -115,6 +115,6 @@ def active_bits(push, rub):
     active = ti.i64(0)
     if push > 0.0:
         active = ti.i64(CONTACT)
-        if rub.norm_sqr() > 0.0:
+        if squared(rub) > 0.0:
             active = ti.i64(CONTACT | RUBBED)
     return active

@@ -2,15 +2,17 @@
 
 import taichi as ti
 
+from taichi_dem.kit.products import dot
+
 
 @ti.func
 def closest_point(c, p, q, s):
     """Closest point to c of the triangle with the corners p, q and s [m]."""
     first, second = q - p, s - p
     from_p, from_q, from_s = c - p, c - q, c - s
-    p1, p2 = first.dot(from_p), second.dot(from_p)
-    q1, q2 = first.dot(from_q), second.dot(from_q)
-    s1, s2 = first.dot(from_s), second.dot(from_s)
+    p1, p2 = dot(first, from_p), dot(second, from_p)
+    q1, q2 = dot(first, from_q), dot(second, from_q)
+    s1, s2 = dot(first, from_s), dot(second, from_s)
     at_s, at_q, at_p = p1 * q2 - q1 * p2, s1 * p2 - p1 * s2, q1 * s2 - s1 * q2
     point = p
     if p1 <= 0.0 and p2 <= 0.0:

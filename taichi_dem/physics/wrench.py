@@ -6,7 +6,7 @@ A twist is (velocity, spin), a wrench (force, moment), both at one point. Blocks
 
 import taichi as ti
 
-from taichi_dem.kit.products import matmul, matmul_transposed, transposed_matmul
+from taichi_dem.kit.products import inverse3, matmul, matmul_transposed, transposed_matmul
 from taichi_dem.kit.types import mat3
 
 
@@ -64,8 +64,8 @@ def plus(one, other):
 @ti.func
 def inverse(block):
     """Inverse of a positive definite block, by its Schur complement."""
-    first = block.a.inverse()
+    first = inverse3(block.a)
     across = matmul(first, block.b)
-    last = (block.c - transposed_matmul(block.b, across)).inverse()
+    last = inverse3(block.c - transposed_matmul(block.b, across))
     b = -matmul(across, last)
     return Block(a=first - matmul_transposed(b, across), b=b, c=last)

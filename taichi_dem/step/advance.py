@@ -11,7 +11,7 @@ from typing import Optional
 import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
-from taichi_dem.kit.products import stacked, transposed_matvec
+from taichi_dem.kit.products import cross, dot, norm, squared, stacked, transposed_matvec
 from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
@@ -87,7 +87,7 @@ class Advance(BondLaws, ContactForce):
                 sliding = vec2(opening[1], opening[2])
                 shear, spent = self.shear(m, b, u, stiffness[1], sliding, -pull)
                 if ti.static(self.notes_limits):
-                    self.state.note_passed(m, b, pull, shear.norm_sqr())
+                    self.state.note_passed(m, b, pull, squared(shear))
                 traction = vec3(pull, shear[0], shear[1])
                 if ti.static(self.has_dashpot):
                     velocity = unit_velocity(motion, arm)
@@ -95,9 +95,9 @@ class Advance(BondLaws, ContactForce):
                     if ti.static(self.limited):
                         drag *= scale
                     traction += drag
-                    dragged += drag.dot(velocity)
+                    dragged += dot(drag, velocity)
                 force += traction
-                torque += arm.cross(traction)
+                torque += cross(arm, traction)
                 slipped += spent
                 failed |= self.has_failed(m, b, u, pull)
             dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
@@ -172,7 +172,7 @@ class Advance(BondLaws, ContactForce):
         """Add opposite impulses to master and slave; moment is about the slave's centre."""
         linear = transposed_matvec(motion.axes, impulse)
         angular = transposed_matvec(motion.axes, moment)
-        self._add(slots[0], linear, angular + motion.branch.cross(linear))
+        self._add(slots[0], linear, angular + cross(motion.branch, linear))
         self._add(slots[1], -linear, -angular)
 
     @ti.func
@@ -211,7 +211,7 @@ class Advance(BondLaws, ContactForce):
             motion = self.solver.bonds.mean(b, motion)
         for q in range(3):
             velocity = unit_velocity(motion, unit_arm(motion, self.tables.vertex_slave[3 * b + q]))
-            power += scale * self.tables.dashpot.traction(b, velocity).dot(velocity)
+            power += scale * dot(self.tables.dashpot.traction(b, velocity), velocity)
         return power * self.tables.unit_area[b]
 
     @ti.func
@@ -243,7 +243,7 @@ class Advance(BondLaws, ContactForce):
         self._drift(i, elapsed, velocity, momentum, spin)
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
         self.state.spin[i] = spin
-        self.schedule.choose_level(i, velocity.norm_sqr())
+        self.schedule.choose_level(i, squared(velocity))
 
     @ti.func
     def _drift(self, i, elapsed, velocity, momentum, spin):
@@ -258,11 +258,9 @@ class Advance(BondLaws, ContactForce):
             self.schedule.sleeping.stir(i, self, elapsed, velocity, momentum)
         if ti.static(self.has_contact):
             self.contacts.moved(i, velocity, spin, elapsed)
-        speed2 = velocity.norm_sqr()
+        speed2 = squared(velocity)
         # One comparison finds runaway, infinity and NaN; "v != v" would be folded away.
-        if not (
-            speed2 + spin.norm_sqr() * self.tables.radius[i] ** 2 < self.state.max_speed2[None]
-        ):
+        if not (speed2 + squared(spin) * self.tables.radius[i] ** 2 < self.state.max_speed2[None]):
             ti.atomic_min(self.state.bad_body[None], i)
 
     @ti.func
@@ -326,9 +324,9 @@ class Advance(BondLaws, ContactForce):
             if effect.acts_on(i):
                 push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
                 twist = vec3(kick[e, 3], kick[e, 4], kick[e, 5])
-                if push.norm_sqr() + twist.norm_sqr() > 0.0:
+                if squared(push) + squared(twist) > 0.0:
                     self.state.note_active(i, ti.i64(1 << bit))
-                work = push.dot(velocity) + twist.dot(self.spin(i, momentum))
+                work = dot(push, velocity) + dot(twist, self.spin(i, momentum))
                 self._book(i, account, work, push, twist)
 
     @ti.func
@@ -353,7 +351,7 @@ class Advance(BondLaws, ContactForce):
                     i, half, elapsed, self.state.rotation[i], velocity, momentum
                 )
                 held = 1
-                if (velocity - before).norm_sqr() + (momentum - spun).norm_sqr() > 0.0:
+                if squared(velocity - before) + squared(momentum - spun) > 0.0:
                     self.state.note_active(i, ti.i64(ti.static(self._support_bit(effect))))
         mean = 0.5 * (self.state.velocity[i] + velocity)
         mean_momentum = 0.5 * (self.state.angular_momentum[i] + momentum)
@@ -361,7 +359,7 @@ class Advance(BondLaws, ContactForce):
         if ti.static(len(self.tables.supports) > 0):
             if held == 1:
                 push, twist = self.tables.mass[i] * (velocity - free), momentum - free_momentum
-                work = push.dot(mean) + twist.dot(self.spin(i, mean_momentum))
+                work = dot(push, mean) + dot(twist, self.spin(i, mean_momentum))
                 self._book(i, ti.static(len(self.tables.loads)), work, push, twist)
         return velocity, momentum
 
@@ -369,6 +367,6 @@ class Advance(BondLaws, ContactForce):
     def _book(self, i, account, work, push, twist):
         """Book work [J] to an account, and impulse and moment about the origin to body i."""
         self.state.load_work[i][account] = self.state.load_work[i][account] + work
-        twist += self.state.position[i].cross(push)
+        twist += cross(self.state.position[i], push)
         self.state.load_impulse[i] = self.state.load_impulse[i] + stacked(push, twist)
-        self.state.impulse_sizes[i] = self.state.impulse_sizes[i] + vec2(push.norm(), twist.norm())
+        self.state.impulse_sizes[i] = self.state.impulse_sizes[i] + vec2(norm(push), norm(twist))

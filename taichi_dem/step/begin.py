@@ -5,6 +5,7 @@ from typing import Any
 
 import taichi as ti
 
+from taichi_dem.kit.products import squared
 from taichi_dem.step.active_list import Everyone, Once
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.schedule import Schedule
@@ -55,7 +56,7 @@ class Begin:
     @ti.func
     def choose_level(self, i):
         """Choose the first level of body i."""
-        self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
+        self.schedule.choose_level(i, squared(self.state.velocity[i]))
 
     @ti.func
     def fill_lists(self, one):

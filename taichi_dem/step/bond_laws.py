@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_dem.kit.products import dot, norm, squared
 from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.physics.bond import unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import zero3
@@ -11,7 +12,7 @@ from taichi_dem.state.activity import SLIP, SOFTENING
 @ti.func
 def beyond(opening, rounding):
     """An opening [m], shorter by a rounding; zero where it is no longer."""
-    length = opening.norm()
+    length = norm(opening)
     return opening * (ti.max(0.0, length - rounding) / ti.max(length, 1e-300))
 
 
@@ -65,7 +66,7 @@ class BondLaws:
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = beyond(unit_opening(motion, arm, self.tables.vertex_master[u]), rounding)
             pull, sliding = ti.abs(opening[0]), vec2(opening[1], opening[2])
-            energy += 0.5 * (stiffness[0] * pull * pull + stiffness[1] * sliding.norm_sqr())
+            energy += 0.5 * (stiffness[0] * pull * pull + stiffness[1] * squared(sliding))
             if ti.static(self.on_demand[SOFTENING]):
                 begins |= self.tables.tension.begins(m, stiffness[0], factor * pull)
             if ti.static(self.on_demand[SLIP]):
@@ -88,8 +89,8 @@ class BondLaws:
             before = beyond(opening - last * unit_velocity(motion, arm), rounding)
             pull = vec3(stiffness[0], stiffness[1], stiffness[1]) * before
             force += pull + self.tables.dashpot.traction(b, before / elapsed)
-            energy += 0.5 * pull.dot(opening)
-        return self.tables.unit_area[b] * vec2(elapsed * force.norm(), ti.abs(energy))
+            energy += 0.5 * dot(pull, opening)
+        return self.tables.unit_area[b] * vec2(elapsed * norm(force), ti.abs(energy))
 
     @ti.func
     def has_failed(self, m, b, u, pull):

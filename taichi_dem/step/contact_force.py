@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_dem.kit.products import cross, dot, norm
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import place_in, zero3
 from taichi_dem.physics.sphere_pair import active_bits, add_within, is_within, meeting
@@ -94,7 +95,7 @@ class ContactForce:
                 met = meeting(near.first, near.reach, near.apart, self.state.rotation[i])
                 overlap, normal, arm = met.overlap, met.normal, met.arm
                 velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
-                rate = velocity.dot(normal)
+                rate = dot(velocity, normal)
                 slide = velocity - rate * normal
                 push = self.contacts.law.normal(m, overlap, self._limited(rate, scale))
                 drag = self._limited(self.contacts.law.damping(m), scale)
@@ -102,12 +103,12 @@ class ContactForce:
                 pushed = push * normal + rub
                 active |= active_bits(push, rub)
                 force += pushed
-                moment_i -= arm.cross(pushed)
-                moment_j += (arm - branch).cross(pushed)
+                moment_i -= cross(arm, pushed)
+                moment_j += cross(arm - branch, pushed)
                 dragged += (self.contacts.law.elastic(m, overlap) - push) * rate
-                rubbed -= (rub - stuck).dot(slide)
+                rubbed -= dot(rub - stuck, slide)
                 slipped += spent
-                all_rub += rub.norm()
+                all_rub += norm(rub)
                 all_bound += self.tables.friction.limit(m, push)
                 deepest = ti.max(deepest, overlap / near.size)
             elif ti.static(stepping):
@@ -160,7 +161,7 @@ class ContactForce:
 
     @ti.func
     def _velocity_at(self, i, arm):
-        return self.state.velocity[i] + self.state.spin[i].cross(arm)
+        return self.state.velocity[i] + cross(self.state.spin[i], arm)
 
     @ti.func
     def contact_share(self, i, j):

@@ -7,6 +7,7 @@ first order in a force becomes one of second order in half a step.
 
 import taichi as ti
 
+from taichi_dem.kit.products import dot
 from taichi_dem.kit.types import real
 from taichi_dem.step.advance import Advance
 
@@ -117,7 +118,7 @@ class HalfStep:
                         account[place] = account[place] + work
                 if ti.static(len(self.tables.supports) > 0):
                     push = self.tables.mass[i] * (velocity - (before + linear))
-                    work = push.dot(mean) + (momentum - (spun + angular)).dot(turning)
+                    work = dot(push, mean) + dot(momentum - (spun + angular), turning)
                     account[ti.static(len(self.tables.loads))] = work
         return velocity, momentum, account
 

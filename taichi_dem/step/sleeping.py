@@ -11,6 +11,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.products import norm, squared
 from taichi_dem.kit.types import real
 from taichi_dem.mesh.parts import parts_of
 from taichi_dem.state.model import Model
@@ -92,7 +93,7 @@ class Sleeping:
         for effect in ti.static(self.acting):
             if effect.acts_on(i) != 0:
                 stirred = True
-        moving = state.velocity[i].norm_sqr() + state.spin[i].norm_sqr()
+        moving = squared(state.velocity[i]) + squared(state.spin[i])
         if stirred or moving > 0.0:
             self.awake[i] = STIRRED
             self.since[i] = 0
@@ -126,8 +127,8 @@ class Sleeping:
         advance: with the new position of the body. elapsed: its step [s].
         """
         if self.awake[i] == AWAKE:
-            spin = angular_momentum.norm() * self.tables.mass_inverse[i] / self.tables.radius[i]
-            is_fast = velocity.norm_sqr() + spin * spin > self.bound2[self.part[i]]
+            spin = norm(angular_momentum) * self.tables.mass_inverse[i] / self.tables.radius[i]
+            is_fast = squared(velocity) + spin * spin > self.bound2[self.part[i]]
             if self._opens(i, is_fast, advance):
                 self.awake[i], self.stride[i] = STIRRED, elapsed
                 for f in range(4):
@@ -195,7 +196,7 @@ class Sleeping:
         for a in range(self.chunk_first[c], self.chunk_first[c + 1]):
             i = self.members[a]
             if self.awake[i] != ASLEEP:
-                total += self.tables.mass[i] * state.velocity[i].norm()
+                total += self.tables.mass[i] * norm(state.velocity[i])
         self.sums[c] = total
 
     @ti.func

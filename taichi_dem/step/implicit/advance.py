@@ -3,6 +3,7 @@
 import taichi as ti
 
 from taichi_dem.kit.allocation import raise_to
+from taichi_dem.kit.products import squared
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.step.advance import Advance
 
@@ -27,7 +28,7 @@ class SolvedAdvance(Advance):
             pushed, twisted = self.ground.total(self.solver.ground.impulse[i])
             linear, angular = linear + pushed, angular + twisted
         self.solver.velocities.predict(i, self, linear, angular)
-        raise_to(self.solver.speed2, self.state.velocity[i].norm_sqr())
+        raise_to(self.solver.speed2, squared(self.state.velocity[i]))
 
     @ti.func
     def body(self, i):
@@ -44,7 +45,7 @@ class SolvedAdvance(Advance):
         # The next step begins with the spin in the new orientation.
         self.state.spin[i] = self.spin(i, momentum)
         self.solver.velocities.update_inertia(i, self)
-        self.schedule.choose_level(i, velocity.norm_sqr())
+        self.schedule.choose_level(i, squared(velocity))
 
     @ti.func
     def forces_now(self, p):

@@ -3,6 +3,7 @@
 import numpy as np
 import taichi as ti
 
+from taichi_dem.kit import products
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.lanes import LANES, by_lane, cross, dot, product, transposed_product
 from taichi_dem.kit.products import matmul_transposed, matvec, stacked, transposed_matmul
@@ -136,7 +137,7 @@ class BondDashpots:
     def _twist(self, i, j, branch):
         """Twist of a bond at the present time, slave against master."""
         spin = self.state.spin[i]
-        linear = self.state.velocity[j] - self.state.velocity[i] - spin.cross(branch)
+        linear = self.state.velocity[j] - self.state.velocity[i] - products.cross(spin, branch)
         angular = self.state.spin[j] - spin
         return stacked(linear, angular)
 

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.kit.products import matvec
+from taichi_dem.kit.products import matvec, squared
 from taichi_dem.kit.types import real
 from taichi_dem.physics.ground import braked_twist, twist_of
 from taichi_dem.physics.rotation import world_tensor
@@ -60,4 +60,4 @@ class GroundSweeps:
         for k in ti.static(range(3)):
             self.impulse[i][e, k] = self.impulse[i][e, k] + force[k]
             self.impulse[i][e, 3 + k] = self.impulse[i][e, 3 + k] + moment[k]
-        return velocity.norm_sqr()
+        return squared(velocity)

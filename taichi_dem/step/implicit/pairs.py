@@ -4,7 +4,7 @@ import taichi as ti
 
 from taichi_dem.contact.cell_grid import group
 from taichi_dem.contact.contacts import Contacts
-from taichi_dem.kit.products import matvec
+from taichi_dem.kit.products import cross, dot, matvec, norm, squared
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import place_in, unit3, zero3
 from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to, is_within, meeting
@@ -140,7 +140,7 @@ class PairDashpots:
                 self.push[end] = push + self.contacts.law.damping(m) * ti.min(overlap, 0.0)
                 self.share[end] = self._share(i, j, branch, arm, normal)
                 force += self.impulse[k]
-                moment += arm.cross(self.impulse[k])
+                moment += cross(arm, self.impulse[k])
                 deepest = ti.max(deepest, overlap / near.size)
                 if ti.static(self.springs.present):
                     self.pull[end] = zero3()
@@ -163,9 +163,9 @@ class PairDashpots:
     def _way(self, i, j, branch, arm, normal, elapsed):
         """Tangential displacement of a contact's second sphere against the first in a time [m]."""
         spin = self.state.spin[i]
-        velocity = self.state.velocity[j] + self.state.spin[j].cross(arm)
-        velocity -= self.state.velocity[i] + spin.cross(arm + branch)
-        return elapsed * (velocity - velocity.dot(normal) * normal)
+        velocity = self.state.velocity[j] + cross(self.state.spin[j], arm)
+        velocity -= self.state.velocity[i] + cross(spin, arm + branch)
+        return elapsed * (velocity - dot(velocity, normal) * normal)
 
     @ti.func
     def _share(self, i, j, branch, arm, normal):
@@ -173,22 +173,22 @@ class PairDashpots:
         other = arm + branch
         slack = self.velocities.slack(i) + self.velocities.slack(j)
         # trace([r]x^T A [r]x) and n [r]x^T A [r]x n, for both bodies.
-        first, second = other.cross(normal), arm.cross(normal)
-        along = normal.dot(matvec(slack, normal))
+        first, second = cross(other, normal), cross(arm, normal)
+        along = dot(normal, matvec(slack, normal))
         turn_i, turn_j = self.velocities.turn[i], self.velocities.turn[j]
-        along += first.dot(matvec(turn_i, first)) + second.dot(matvec(turn_j, second))
+        along += dot(first, matvec(turn_i, first)) + dot(second, matvec(turn_j, second))
         across = slack.trace()
         for c in ti.static(range(3)):
             axis = unit3()[:, c]
-            first, second = other.cross(axis), arm.cross(axis)
-            across += first.dot(matvec(turn_i, first))
-            across += second.dot(matvec(turn_j, second))
+            first, second = cross(other, axis), cross(arm, axis)
+            across += dot(first, matvec(turn_i, first))
+            across += dot(second, matvec(turn_j, second))
         return ti.Vector([along, across - along])
 
     @ti.func
     def _deposit(self, p, branch, force, moment):
         """Add the first guess to both bodies: impulse on the second, moment about its centre."""
-        around = moment + branch.cross(force)
+        around = moment + cross(branch, force)
         self.contacts.add_impulse(p, 0, -force, -around)
         self.contacts.add_impulse(p, 1, force, moment)
 
@@ -209,11 +209,11 @@ class PairDashpots:
     def _visit(self, m, c, i, j, branch, damping):
         k, arm, share = self.entry[c], self.arm[c], self.share[c]
         linear, angular = self.velocities.apart(i, j, branch)
-        found = self._answer(m, c, linear + angular.cross(arm), damping)
+        found = self._answer(m, c, linear + cross(angular, arm), damping)
         step = self.impulse[k] - found
         self.impulse[k] = found
-        self.velocities.pull(i, j, branch, step, arm.cross(step))
-        return share[0] * share[0] * step.norm_sqr()
+        self.velocities.pull(i, j, branch, step, cross(arm, step))
+        return share[0] * share[0] * squared(step)
 
     @ti.func
     def _answer(self, m, c, velocity, damping):
@@ -222,13 +222,13 @@ class PairDashpots:
         velocity: of the second sphere against the first, with the present impulse [m/s].
         """
         normal, share, held = self.normal[c], self.share[c], self.impulse[self.entry[c]]
-        pressed, rate = held.dot(normal), velocity.dot(normal)
+        pressed, rate = dot(held, normal), dot(velocity, normal)
         # The opening rate without this contact's own impulse, and the law solved for the impulse.
         free = rate - share[0] * pressed
         found = ti.max(0.0, (self.push[c] - damping * free) / (1.0 + damping * share[0])) * normal
         if ti.static(self.has_friction):
             slide = velocity - rate * normal - share[1] * (held - pressed * normal)
-            bound = self.tables.friction.limit(m, found.dot(normal))
+            bound = self.tables.friction.limit(m, dot(found, normal))
             stick = -damping / (1.0 + damping * share[1])
             if ti.static(self.springs.present):
                 pull = cut_to(self.pull[c], bound)
@@ -251,15 +251,15 @@ class PairDashpots:
             m = self.tables.pair(i, j)
             damping = self.schedule.step_seconds[0] * self.contacts.law.damping(m)
             spin = self.state.spin[i]
-            before = self.state.velocity[j] - self.state.velocity[i] - spin.cross(branch)
+            before = self.state.velocity[j] - self.state.velocity[i] - cross(spin, branch)
             linear = 0.5 * (after + before)
             angular = 0.5 * (turned + self.state.spin[j] - spin)
             start = self.store.first[p]
             dragged, rubbed, active = 0.0, 0.0, ti.i64(0)
             for c in range(start, start + self.touching[p]):
-                velocity, normal = linear + angular.cross(self.arm[c]), self.normal[c]
-                impulse = self._answer(m, c, after + turned.cross(self.arm[c]), damping)
-                pressed, rate = impulse.dot(normal), velocity.dot(normal)
+                velocity, normal = linear + cross(angular, self.arm[c]), self.normal[c]
+                impulse = self._answer(m, c, after + cross(turned, self.arm[c]), damping)
+                pressed, rate = dot(impulse, normal), dot(velocity, normal)
                 dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
                 rub = impulse - pressed * normal
                 active |= active_bits(pressed, rub)
@@ -267,7 +267,7 @@ class PairDashpots:
                     stuck, spent = self._slip(m, p, c, i, j, pressed)
                     rub -= stuck
                     rubbed += spent
-                rubbed -= rub.dot(velocity)
+                rubbed -= dot(rub, velocity)
             if active != 0:
                 self.state.note_active(i, active)
                 self.state.note_active(j, active)
@@ -290,11 +290,11 @@ class PairDashpots:
             met = meeting(near.first, near.reach, near.apart, self.state.rotation[i])
             arm = met.arm - branch
             force += pushed
-            moment_i -= met.arm.cross(pushed)
-            moment_j += arm.cross(pushed)
-            velocity = self.state.velocity[j] + self.state.spin[j].cross(arm)
-            velocity -= self.state.velocity[i] + self.state.spin[i].cross(met.arm)
-            rate, pressed = velocity.dot(met.normal), pushed.dot(met.normal)
+            moment_i -= cross(met.arm, pushed)
+            moment_j += cross(arm, pushed)
+            velocity = self.state.velocity[j] + cross(self.state.spin[j], arm)
+            velocity -= self.state.velocity[i] + cross(self.state.spin[i], met.arm)
+            rate, pressed = dot(velocity, met.normal), dot(pushed, met.normal)
             spring = 0.0
             if near.can_meet == 1:
                 spring = self.contacts.law.elastic(m, ti.max(met.overlap, 0.0))
@@ -302,8 +302,8 @@ class PairDashpots:
             rub = pushed - pressed * met.normal
             if ti.static(self.springs.present):
                 rub -= self.springs.force(m, k, self.state.rotation[i])
-            rubbed -= rub.dot(velocity)
-            all_rub += rub.norm()
+            rubbed -= dot(rub, velocity)
+            all_rub += norm(rub)
             all_bound += self.tables.friction.limit(m, pressed)
         return PairForces(
             force=force,

@@ -10,7 +10,7 @@ from taichi_dem.kit.lanes import (
     row_of,
     scaled,
 )
-from taichi_dem.kit.products import matvec, stacked, transposed_matvec
+from taichi_dem.kit.products import cross, matvec, stacked, transposed_matvec
 from taichi_dem.kit.types import real, vec6
 from taichi_dem.physics.rotation import unit3, world_tensor
 from taichi_dem.state.state import State
@@ -108,17 +108,17 @@ class Velocities:
         """Velocity of body j against i at j's centre, and spin of j against i."""
         first, second = self.twist[i], self.twist[j]
         spin = first[3:6]
-        return second[0:3] - first[0:3] - spin.cross(branch), second[3:6] - spin
+        return second[0:3] - first[0:3] - cross(spin, branch), second[3:6] - spin
 
     @ti.func
     def pull(self, i, j, branch, force, moment):
         """Apply an impulse and a moment at j's centre to body i, and the opposite to j."""
-        turned = matvec(self.turn[i], moment + branch.cross(force))
+        turned = matvec(self.turn[i], moment + cross(branch, force))
         back = matvec(self.turn[j], moment)
         first, second = force, force
         if ti.static(self.has_supports):
             first, second = matvec(self.hold[i], force), matvec(self.hold[j], force)
-            self._add_impulse(i, force, moment + branch.cross(force))
+            self._add_impulse(i, force, moment + cross(branch, force))
             self._add_impulse(j, -force, -moment)
         else:
             first, second = self.lightness[i] * force, self.lightness[j] * force
