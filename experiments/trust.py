@@ -22,7 +22,12 @@ from taichi_dem.kit.validation import choice
 
 NAME = "trust"
 SETTINGS = {
-    "only": (None, ("bar_wave", "rotation"), study.several(str), "cases by name, all by default"),
+    "only": (
+        None,
+        ("bar_wave", "joint", "rotation"),
+        study.several(str),
+        "cases by name, all by default",
+    ),
     "meshes": (5, 2, study.whole(1, 100), "random meshes of each size, 5"),
     "sizes": (3, 1, study.whole(1, 3), "sizes of element in the plates, 3"),
     "seed": (0, 0, study.whole(0, 10**6), "of the first mesh, 0"),

@@ -3,6 +3,7 @@
 from taichi_dem.laws.bond_damping import BondDamping
 from taichi_dem.laws.face_contact import FaceContact
 from taichi_dem.laws.friction import Friction
+from taichi_dem.laws.mixed_mode import MixedMode
 from taichi_dem.laws.shear_slip import ShearSlip
 from taichi_dem.laws.slip_weakening import SlipWeakening
 from taichi_dem.laws.softening import Softening
@@ -21,6 +22,7 @@ __all__ = [
     "Friction",
     "GasPressure",
     "Gravity",
+    "MixedMode",
     "PrescribedMotion",
     "Pressure",
     "QuietBoundary",

@@ -66,7 +66,7 @@ class ByHand(Advance):
         """Elastic traction of three units, given to both bodies."""
         if self.state.broken_tick[b] < 0:
             slots = self.tables.bond_slots[b]
-            motion = self._motion(b, slots)
+            motion = self.motion_of(b)
             k, force, torque = self.tables.bond_stiffness[b], zero3(), zero3()
             m = self.tables.bond_pair[b]
             for q in range(3):

@@ -21,7 +21,7 @@ from taichi_dem.kit.validation import (
     told_apart,
     word,
 )
-from taichi_dem.laws.base import Effect, check_one_material
+from taichi_dem.laws.base import PARTS_OF_BOND, Effect, check_one_material
 from taichi_dem.laws.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
 from taichi_dem.laws.roles import check_effect
 from taichi_dem.materials import Material
@@ -327,6 +327,13 @@ def _check_roles(effects):
                 f"effects {' and '.join(others)} both take the role {effect.role}: list one"
             )
     roles = {effect.role for effect in single}
+    parts = [e.name for e in single if e.role in PARTS_OF_BOND]
+    if "bond" in roles and parts:
+        whole = next(effect.name for effect in single if effect.role == "bond")
+        raise InputError(
+            f"effect {whole} is the whole law of bonds, opening and sliding: leave out "
+            f"{' and '.join(parts)}"
+        )
     if "friction" in roles and "contact" not in roles:
         raise InputError("effect friction acts in sphere contacts: list SphereContact too")
 

@@ -32,7 +32,14 @@ class BondProbe:
         self.centre = self.model.centre
         self._slots = self.tables.bond_slots[0].to_numpy()
         fields = self.state.fields()
-        names = ("softening_unit", "shear_slip", "broken_tick", "exposed_tick", "bond_heat")
+        names = (
+            "softening_unit",
+            "shear_slip",
+            "mixed_mode",
+            "broken_tick",
+            "exposed_tick",
+            "bond_heat",
+        )
         self._changing = [(fields[n], fields[n].to_numpy()) for n in names if n in fields]
 
     def reset(self):
@@ -104,7 +111,7 @@ class BondProbe:
     @ti.kernel
     def _spent(self, spent: ti.types.ndarray(dtype=ti.f64, ndim=1)):
         for q in range(3):
-            spent[q] = self.tables.tension.spent(0, q)
+            spent[q] = self.tables.bond.spent(0, q)
 
 
 @ti.data_oriented

@@ -10,6 +10,7 @@ from _trust.blast import blast
 from _trust.branching import branching
 from _trust.crack import crack
 from _trust.disc import disc
+from _trust.joint import joint
 from _trust.rotation import rotation
 from _trust.slope import slope
 from _trust.spall import spall
@@ -21,6 +22,7 @@ CASES = {
     "disc": disc,
     "crack": crack,
     "branching": branching,
+    "joint": joint,
     "blast": blast,
     "slope": slope,
     "rotation": rotation,

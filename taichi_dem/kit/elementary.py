@@ -7,6 +7,8 @@ multiply-adds, and NumPy's between versions. Plain sums and products are rounded
 import numpy as np
 import taichi as ti
 
+from taichi_dem.kit.products import expression, once
+
 #: Powers of 32 that bring any number into [1, 32); steps from there to the last bit.
 _POWERS, _NEWTON_STEPS = (128, 64, 32, 16, 8, 4, 2, 1), 8
 #: A quarter turn as a sum: the first two have 33 bits, so that whole multiples of them are exact.
@@ -19,18 +21,18 @@ _C1, _C2, _C3 = 4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015
 _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11
 
 
-@ti.pyfunc
+@expression
 def _of_rest(angle):
     """Sine and cosine of what an angle [rad] is beyond whole quarter turns, and their number.
 
     Within -pi/4 and pi/4; the number of quarter turns is 0 to 3. In Python also of arrays.
     """
-    turns = (_QUARTERS_PER_RADIAN * angle + 0.5) // 1.0
-    r = angle - turns * _QUARTER[0] - turns * _QUARTER[1] - turns * _QUARTER[2]
-    z = r * r
+    turns = once((_QUARTERS_PER_RADIAN * angle + 0.5) // 1.0)
+    r = once(angle - turns * _QUARTER[0] - turns * _QUARTER[1] - turns * _QUARTER[2])
+    z = once(r * r)
     sine = r + r * z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * _S6)))))
     rest = z * z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6)))))
-    half = 1.0 - 0.5 * z
+    half = once(1.0 - 0.5 * z)
     cosine = half + ((1.0 - half - 0.5 * z) + rest)
     quarter = turns - 4.0 * (turns // 4.0)
     return sine, cosine, quarter
@@ -51,11 +53,11 @@ def sine_and_cosine(angle):
     return sine, cosine
 
 
-@ti.pyfunc
+@expression
 def sine_shortfall(angle):
     """1 - sin(angle) / angle of an angle [rad] of at most pi / 2, without a difference."""
-    square, rest = angle * angle, 1.0
-    for k in ti.static(range(10, 0, -1)):
+    square, rest = once(angle * angle), 1.0
+    for k in range(10, 0, -1):
         rest = 1.0 - square / ((2.0 * k + 2.0) * (2.0 * k + 3.0)) * rest
     return square / 6.0 * rest
 

@@ -21,11 +21,16 @@ from taichi_dem.kit.types import mat3, vec3, vec6
 _AXES = range(3)
 
 
+def once(value: Any) -> Any:
+    """A value that is evaluated here, where it is used more than once; in Python itself."""
+    return impl.expr_init(value) if impl.inside_kernel() else value
+
+
 def expression(function: Callable[..., Any]) -> Callable[..., Any]:
     """A function that kernels may call as it is; its arguments are evaluated once."""
 
     def built(*given):
-        return function(*(impl.expr_init(each) for each in given))
+        return function(*map(once, given))
 
     built.__name__, built.__doc__ = function.__name__, function.__doc__
     # Without this attribute Taichi warns of a function that it does not know.
@@ -119,7 +124,7 @@ def inverse3(m):
         - entry(m, 1, 0) * (entry(m, 0, 1) * entry(m, 2, 2) - entry(m, 2, 1) * entry(m, 0, 2))
         + entry(m, 2, 0) * (entry(m, 0, 1) * entry(m, 1, 2) - entry(m, 1, 1) * entry(m, 0, 2))
     )
-    share = impl.expr_init(1.0 / determinant)
+    share = once(1.0 / determinant)
     return mat3([[share * minor(c, r) for c in _AXES] for r in _AXES])
 
 

@@ -2,10 +2,10 @@
 
 A user's effect holds numbers on the host. An engine holds a bound copy of it with fields and
 kernels, into which each scene of the engine loads its numbers. The ``role`` determines where
-``step/advance.py`` calls it, and the members that it must have (``laws.roles``): tension, shear
-and dashpot are laws of the contact units of bonds, contact and friction those of contact spheres,
-loads push bodies, supports hold them, ground drags on them. Roles ``load``, ``support`` and
-``ground`` take any number of effects, the others at most one.
+``step/advance.py`` calls it, and the members that it must have (``laws.roles``): bond, or
+tension and shear, and dashpot are laws of the contact units of bonds, contact and friction those of
+contact spheres, loads push bodies, supports hold them, ground drags on them. Roles ``load``,
+``support`` and ``ground`` take any number of effects, the others at most one.
 """
 
 import copy
@@ -24,10 +24,11 @@ from taichi_dem.kit.products import dot
 from taichi_dem.kit.sealed import Sealed
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import float_array, shown
+from taichi_dem.laws.bond import Separable
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import MOST, BodyMaterials
 from taichi_dem.state.capacity import Capacity
-from taichi_dem.state.model import MANY, ROLES, SINGLE, Model
+from taichi_dem.state.model import MANY, ROLES, Model
 from taichi_dem.state.pair_store import PairStore
 from taichi_dem.state.tables import Tables
 
@@ -57,6 +58,9 @@ class Effect(Sealed):
     remembers_slip = False
     #: Whether a shear law may release a face (``roles.ShearFailure``).
     releases = False
+    #: Whether a law of bonds spends energy in slip, and whether it limits tension and shear alike.
+    rubs = False
+    is_whole = True
     #: Whether a load acts by its mean from a time to a later one (``roles.VaryingLoad``).
     varies = False
     law: ti.Field
@@ -449,23 +453,27 @@ class NoFriction(Effect):
         return vec3(0.0, 0.0, 0.0)
 
 
-#: Classes of the null objects by role; None where there is none.
+#: Roles of which a law of the role bond takes the place.
+PARTS_OF_BOND = ("tension", "shear")
+#: Classes of the null objects by role.
 ABSENT: dict[str, Any] = {
     "tension": ElasticTension,
     "shear": ElasticShear,
     "dashpot": NoDashpot,
     "friction": NoFriction,
-    "contact": None,
 }
 
 
-def bound_by_role(effects: Iterable[Effect], tables: Tables) -> dict[str, list[Any]]:
-    """Bound copies of effects by role, null objects in roles in which none is listed."""
+def bound_by_role(effects: Iterable[Effect], tables: Tables) -> tuple[dict[str, list[Any]], Any]:
+    """Bound copies of effects by role, null objects where none is listed; the law of bonds."""
     listed = {role: [e for e in effects if e.role == role] for role in ROLES}
-    for role in SINGLE:
-        if not listed[role] and ABSENT[role]:
-            listed[role] = [ABSENT[role]()]
-    return {role: [bound(effect, tables) for effect in listed[role]] for role in ROLES}
+    for role, absent in ABSENT.items():
+        if not listed[role] and not (listed["bond"] and role in PARTS_OF_BOND):
+            listed[role] = [absent()]
+    by_role = {role: [bound(effect, tables) for effect in listed[role]] for role in ROLES}
+    if by_role["bond"]:
+        return by_role, by_role["bond"][0]
+    return by_role, Separable(by_role["tension"][0], by_role["shear"][0])
 
 
 __all__ = [

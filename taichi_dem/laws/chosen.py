@@ -5,7 +5,7 @@ from typing import Any
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
-from taichi_dem.laws.base import Effect
+from taichi_dem.laws.base import PARTS_OF_BOND, Effect
 from taichi_dem.laws.bond_damping import BondDamping
 from taichi_dem.laws.friction import Friction
 from taichi_dem.laws.roles import check_activation
@@ -56,6 +56,8 @@ def chosen_effects(
     given = tuple(given)
     taken = {getattr(effect, "role", "") for effect in given}
     laws = _laws(mesh, material, taken)
+    if "bond" in taken:
+        taken |= {*PARTS_OF_BOND}
     by_role = {effect.role: effect for effect in laws if effect.role not in taken}
     chosen = [by_role[role] for role in SINGLE if role in by_role]
     effects = ChosenEffects((*chosen, *given), word)

@@ -15,8 +15,44 @@ from taichi_dem.physics.wrench import Block
 from taichi_dem.state.body_motion import BodyMotion
 
 
+class BondLaw(Protocol):
+    """Law of a bond's contact units, opening and sliding together; role "bond".
+
+    jump: normal opening and two components of the sliding [m]; stiffness: normal and shear [Pa/m].
+    Beside its members it says ``rubs``, whether slip may spend energy, ``remembers_slip``, whether
+    ``residual_slip(u)`` stays when the traction is gone, and ``is_whole``, whether it serves both
+    the limit in tension and that in shear.
+    """
+
+    def traction(
+        self, m: int, u: int, stiffness: ti.Vector, jump: ti.Vector
+    ) -> tuple[ti.Vector, float]:
+        """Traction [Pa], three components, and energy per area slipped away now [J/m^2]."""
+
+    def failed(self, m: int, u: int, traction: ti.Vector) -> int:
+        """1 once the unit transmits nothing any more at a traction [Pa], else 0."""
+
+    def stored(self, b: int, u: int, jump: ti.Vector) -> tuple[float, float]:
+        """Elastic energy per area of opening and of sliding [J/m^2]."""
+
+    def spent(self, b: int, u: int) -> float:
+        """Energy per area [J/m^2] that damage has spent in the unit."""
+
+    def damage(self, b: int, u: int) -> float:
+        """0 intact to 1 failed."""
+
+    def acted(self, b: int, u: int) -> int:
+        """Bits of the parts of the law that have changed the unit: 1, or 1 and 2."""
+
+    def begins(self, m: int, stiffness: ti.Vector, jump: ti.Vector) -> int:
+        """Bits of the parts near whose limit a unit comes that the law never changed.
+
+        Elsewhere the traction must be stiffness times jump to the bit, and nothing else may happen.
+        """
+
+
 class TensionLaw(Protocol):
-    """Normal law of a bond's contact units; role "tension"."""
+    """Normal law of a bond's contact units, for itself; role "tension"."""
 
     def traction(self, m: int, stiffness: float, u: int, opening: float) -> float:
         """Traction [Pa] at a normal opening [m]."""
@@ -35,7 +71,7 @@ class TensionLaw(Protocol):
 
 
 class ShearLaw(Protocol):
-    """Tangential law of a bond's contact units; role "shear".
+    """Tangential law of a bond's contact units, for itself; role "shear".
 
     One with ``remembers_slip = True`` also keeps the contract ``SlipMemory``, one with ``releases =
     True`` the contract ``ShearFailure``.
@@ -229,6 +265,7 @@ class Activation(Protocol):
 
 #: Contract of each role.
 CONTRACTS = {
+    "bond": BondLaw,
     "tension": TensionLaw,
     "shear": ShearLaw,
     "dashpot": DashpotLaw,
@@ -249,8 +286,10 @@ FURTHER = {
 }
 
 
+_OF_BONDS = ("bond", "tension", "shear")
 #: What a law does, by role: a class that changes it has to say anew when it begins to act.
 _DOES = {
+    "bond": ("traction", "failed"),
     "tension": ("traction", "failed"),
     "shear": ("traction", "failed"),
     "dashpot": ("traction",),
@@ -261,12 +300,12 @@ _DOES = {
 
 def check_activation(effect: Any) -> None:
     """Raise InputError for a law that has no rule for effects="auto"; loads and supports act."""
-    if effect.role in ("tension", "shear") and effect.is_silent:
+    if effect.role in _OF_BONDS and effect.is_silent:
         raise InputError(
             "effects 'auto' must have laws of bonds that act, as it looks for no limit beside "
             f"theirs, got a silent {type(effect).name}: list the effects, or take 'all'"
         )
-    rules = ("activation", "begins") if effect.role in ("tension", "shear") else ("activation",)
+    rules = ("activation", "begins") if effect.role in _OF_BONDS else ("activation",)
     order = [kind.__name__ for kind in type(effect).__mro__]
     for rule in rules if effect.role in _DOES else ():
         said = _first(type(effect), rule)

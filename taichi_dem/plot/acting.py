@@ -18,6 +18,7 @@ _NEVER = "#E4E0D6"
 TITLES = {
     "softening": "softening of a bond",
     "slip": "slip of a bond",
+    "damage": "damage of a bond",
     "contact": "contact",
     "friction": "friction",
     "awake": "body evaluated",

@@ -70,7 +70,7 @@ class BondSlips:
 
     def __init__(self, model: Model, readings: Readings):
         self.model, self.readings = model, readings
-        (law,) = model.by_role["shear"] or (None,)
+        (law,) = model.by_role["bond"] or model.by_role["shear"] or (None,)
         self.present = model.bond_count > 0 and getattr(law, "remembers_slip", False)
         self.weakens = getattr(law, "releases", False)
         self.share, self.time_s, self.bond, self.most = 0.0, 0.0, -1, 0

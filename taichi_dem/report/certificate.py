@@ -13,17 +13,20 @@ from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.report.estimates import Estimate, estimates_after
 from taichi_dem.report.missing_effects import bond_rounding
 from taichi_dem.report.part_scales import PartScales
-from taichi_dem.state.activity import LATER, SLIP, SOFTENING
+from taichi_dem.state.activity import LATER
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.timeline import MACRO_TICKS, NEVER
-from taichi_dem.step.audit import KINDS
 from taichi_dem.step.schedule import Schedule
 
-#: What is skipped of each kind of ``step.audit``, in words.
-_SKIPPED = dict(zip(KINDS, ("softening", "slip", "bonds asleep")))
 #: Times at which effects began on bodies, by the role that they have in a report.
-_TIMES = {"tension": "softening", "shear": "slip", "contact": "contact", "friction": "friction"}
+_TIMES = {
+    "bond": "damage",
+    "tension": "softening",
+    "shear": "slip",
+    "contact": "contact",
+    "friction": "friction",
+}
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ class Certificate:
 
     @property
     def law_ratio(self) -> float:
-        """Factor by which evaluations of softening and slip are fewer than with effects="all"."""
+        """Factor by which evaluations of the law of bonds are fewer than with effects="all"."""
         return self.all_law_evaluations / max(1, self.law_evaluations)
 
     @property
@@ -147,7 +150,7 @@ class Certificate:
         skipped = 100.0 * (1.0 - self.law_evaluations / max(1, self.all_law_evaluations))
         lines = [
             *map(str, self.acting),
-            f"softening and slip: {skipped:.3g} % of their evaluations skipped",
+            f"law of bonds: {skipped:.3g} % of its evaluations skipped",
             self._sleep_line(),
             *(f"left out: {estimate}" for estimate in self.left_out),
             *(f"audit: {audit}" for audit in self.audits if audit.skipped),
@@ -180,8 +183,9 @@ def acting_since(model: Model, state: State, schedule: Schedule) -> dict[str, np
     own = np.append(bonds, [[np.nan, np.nan]], axis=0)[model.topology.body_bond]
     first = np.fmin.reduce(own, axis=1, initial=np.nan)
     awake = _times(schedule.sleeping.since.to_numpy()[:n], NEVER, seconds)
-    found = first[:, SOFTENING], first[:, SLIP], bodies[:, 0], bodies[:, 1], awake
-    return dict(zip((*_TIMES.values(), "awake"), found))
+    laws = ("damage",) if model.by_role["bond"] else ("softening", "slip")
+    times = zip(("contact", "friction"), bodies.T)
+    return {**dict(zip(laws, first.T)), **dict(times), "awake": awake}
 
 
 def _times(ticks, never, tick_seconds):
@@ -196,15 +200,15 @@ def certificate_of(run: Any, report: Any) -> Certificate:
     model, state, schedule, now = run.model, run.state, run.schedule, run.time_s
     since = acting_since(model, state, schedule)
     evaluated, laws = _law_evaluations(model, state, schedule)
-    skipped = *(laws - evaluated), _bond_steps_asleep(model, since["awake"], now, schedule)
+    skipped = _bond_steps_asleep(model, since["awake"], now, schedule)
     awake = np.nan_to_num(since["awake"], nan=now)
     scales = PartScales(model, parts_of(model.mesh))
     energy = _energy(run, scales)
     impulse, left_energy = _left_out(run, scales, energy)
     return Certificate(
         acting=tuple(_acting(model, use, since) for use in report.effect_activity),
-        law_evaluations=int(evaluated.sum()),
-        all_law_evaluations=int(laws.sum()),
+        law_evaluations=evaluated,
+        all_law_evaluations=laws,
         sleep=float(schedule.sleeping.share[None]),
         asleep=float(awake.mean() / now) if now > 0.0 else 0.0,
         impulse=impulse,
@@ -217,10 +221,11 @@ def certificate_of(run: Any, report: Any) -> Certificate:
 
 
 def _law_evaluations(model, state, schedule):
-    """Evaluations of softening and slip, a unit each: those made, and those of effects="all"."""
-    evaluated = state.activity.evaluated.to_numpy()[: model.bond_count].sum(axis=0)
-    units = 3 * (int(schedule.evaluations[5]) + model.bond_count)
-    return evaluated, units * np.array(state.activity.laws, dtype=np.int64)
+    """Evaluations of the law of bonds, a unit each: those made, and those of effects="all"."""
+    if not any(model.by_role[role] for role in ("bond", "tension", "shear")):
+        return 0, 0
+    evaluated = state.activity.evaluated.to_numpy()[: model.bond_count].sum()
+    return int(evaluated), 3 * (int(schedule.evaluations[5]) + model.bond_count)
 
 
 def _energy(run, scales):
@@ -264,11 +269,8 @@ def _acting(model, use, since):
 
 
 def _audits(audit, skipped):
-    counts = zip(_SKIPPED.values(), skipped, audit.audited.to_numpy(), audit.misses.to_numpy())
-    return tuple(
-        Audit(max(int(most), int(audited)), int(audited), int(missed), what)
-        for what, most, audited, missed in counts
-    )
+    audited, missed = int(audit.audited[None]), int(audit.misses[None])
+    return (Audit(max(skipped, audited), audited, missed, "bonds asleep"),)
 
 
 def _bond_steps_asleep(model, awake, now, schedule):

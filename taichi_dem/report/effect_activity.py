@@ -17,7 +17,7 @@ _EPSILON = np.finfo(np.float64).eps
 _THROUGH_BONDS = ("bond_strain", "bond_dashpot", "softening", "release", "slip")
 #: Roles judged by whether they acted: a crack, slip, wall or sticking contact can decide the
 #: outcome at little energy.
-_STEERING = ("tension", "shear", "contact", "friction", "support", "ground")
+_STEERING = ("bond", "tension", "shear", "contact", "friction", "support", "ground")
 #: Roles that define the problem, so that they are kept whatever work they did.
 _POSED = {
     "load": "a load is part of the question",
@@ -87,7 +87,9 @@ def _by_role(model, energy_balance, tables, active, rounding, effect):
     damped = _count(bond[:, 1] > rounding.heat)
     # A shear law may release bonds where no law of tension is listed.
     alone = not any(one.role == "tension" for one in _listed(model))
+    changed, whole = _count(marks.any(axis=1)), ("softening", "release", "slip")
     return {
+        "bond": (effect, "bonds damaged", changed, whole),
         "tension": (effect, "bonds softened", _count(marks[:, 0]), ("softening", "release")),
         "shear": (effect, "bonds slipped", _count(marks[:, 1]), ("slip", *("release",) * alone)),
         "dashpot": (effect, "bonds damped", damped, ("bond_dashpot",)),

@@ -105,8 +105,8 @@ def unserved(model: Model) -> dict[str, MissingEffect]:
     roles = {effect.role for effect in model.effects if effect.name}
     material = model.materials
     listed = {
-        "tension": "tension" not in roles,
-        "shear": "shear" not in roles,
+        "tension": not roles & {"bond", "tension"},
+        "shear": not roles & {"bond", "shear"},
         "dashpot": "dashpot" not in roles and material.has_bond_damping,
         "contact": "contact" not in roles,
         "friction": "contact" in roles and "friction" not in roles and material.friction > 0.0,

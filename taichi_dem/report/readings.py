@@ -8,7 +8,9 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.products import norm
 from taichi_dem.kit.types import vec3
+from taichi_dem.state.activity import PARTS
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.advance import Advance
@@ -148,7 +150,7 @@ class Readings:
         return self._bonds()[:, 5]
 
     def active_bonds(self) -> np.ndarray:
-        """Whether a unit of every bond has softened, and whether one has slipped, (n, 2)."""
+        """Whether each part of its law has changed a unit of every bond, (n, 2)."""
         return self._bonds()[:, 6:8] > 0.0
 
     def residual_slip(self) -> np.ndarray:
@@ -178,10 +180,10 @@ class Readings:
             holds = self.state.broken_tick[b] < 0
             for q in range(3):
                 u = 3 * b + q
-                spent = self.tables.tension.spent(b, u)
+                spent = self.tables.bond.spent(b, u)
                 table[b, 4] = table[b, 4] + self.tables.unit_area[b] * spent
                 if holds:
-                    table[b, 5] = table[b, 5] + self.tables.tension.damage(b, u) / 3.0
+                    table[b, 5] = table[b, 5] + self.tables.bond.damage(b, u) / 3.0
                 self._note_laws(table, b, u, holds)
             if not holds:
                 table[b, 5] = 1.0
@@ -189,13 +191,13 @@ class Readings:
     @ti.func
     def _note_laws(self, table: ti.template(), b, u, holds):
         """Note whether unit u of bond b has softened or slipped, and how far it has slipped."""
-        if ti.static(hasattr(self.tables.tension, "is_active")):
-            table[b, 6] = ti.max(table[b, 6], ti.cast(self.tables.tension.is_active(b, u), ti.f64))
-        if ti.static(hasattr(self.tables.shear, "is_active")):
-            table[b, 7] = ti.max(table[b, 7], ti.cast(self.tables.shear.is_active(b, u), ti.f64))
-        if ti.static(self.tables.shear.remembers_slip):
+        bits = self.tables.bond.acted(b, u)
+        for part in ti.static(range(PARTS)):
+            if bits & (1 << part) != 0:
+                table[b, 6 + part] = 1.0
+        if ti.static(self.tables.bond.remembers_slip):
             if holds:
-                table[b, 8] = ti.max(table[b, 8], self.tables.shear.residual_slip(u).norm())
+                table[b, 8] = ti.max(table[b, 8], norm(self.tables.bond.residual_slip(u)))
 
     def pairs(self) -> np.ndarray:
         """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""

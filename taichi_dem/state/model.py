@@ -20,7 +20,7 @@ from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import body_properties, topology_of
 
 #: Roles that take one effect, in the order in which effects are listed, bound and reported.
-SINGLE = ("tension", "shear", "dashpot", "friction", "contact")
+SINGLE = ("bond", "tension", "shear", "dashpot", "friction", "contact")
 #: Roles that take any number.
 MANY = ("load", "support", "ground")
 ROLES = (*SINGLE, *MANY)

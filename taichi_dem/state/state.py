@@ -31,9 +31,9 @@ def unserved_limits(model: Model) -> np.ndarray:
     rows = np.zeros((MOST**2, 3))
     for a, row in enumerate(model.materials.pairs):
         for b, pair in enumerate(row):
-            strength = np.inf if "tension" in served else pair.tensile_strength
-            cohesion = np.inf if "shear" in served else pair.cohesion
-            friction = 0.0 if "shear" in served else pair.friction
+            strength = np.inf if served & {"bond", "tension"} else pair.tensile_strength
+            cohesion = np.inf if served & {"bond", "shear"} else pair.cohesion
+            friction = 0.0 if served & {"bond", "shear"} else pair.friction
             rows[MOST * a + b] = strength, cohesion, friction
     return rows
 

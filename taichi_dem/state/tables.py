@@ -11,10 +11,10 @@ from taichi_dem.kit.fixed_order import inverse
 from taichi_dem.kit.types import real
 from taichi_dem.materials.body_materials import MOST
 from taichi_dem.state.capacity import Capacity
-from taichi_dem.state.model import MANY, ROLES, SINGLE, Model
+from taichi_dem.state.model import MANY, ROLES, Model
 
-#: Binds the effects of a structure to its tables; gives them by role.
-Bind = Callable[["Tables"], dict[str, list[Any]]]
+#: Binds the effects of a structure to its tables; gives them by role, and the law of bonds.
+Bind = Callable[["Tables"], tuple[dict[str, list[Any]], Any]]
 
 
 @ti.data_oriented
@@ -44,8 +44,7 @@ class Tables:
     )
 
     # Bound effects by role; null objects where the scene lists none, contact is None then.
-    tension: Any
-    shear: Any
+    bond: Any
     dashpot: Any
     friction: Any
     contact: Any
@@ -55,19 +54,20 @@ class Tables:
         self.body_count, self.bond_count = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
         self._declare_bodies(capacity.bodies)
         self._declare_bonds(capacity)
-        self._take(bind(self))
+        self._take(*bind(self))
         if self.has_contact:
             self._declare_spheres(capacity)
 
-    def _take(self, by_role):
-        """Take the bound effects by role."""
-        for role in SINGLE:
-            setattr(self, role, by_role[role][0] if by_role[role] else None)
+    def _take(self, by_role, bond):
+        """Take the bound effects by role, and the law of bonds."""
+        self.bond = bond
+        self.dashpot, self.friction = by_role["dashpot"][0], by_role["friction"][0]
+        self.contact = by_role["contact"][0] if by_role["contact"] else None
         self.loads, self.supports, self.ground = (tuple(by_role[role]) for role in MANY)
         self.effects = tuple(effect for role in ROLES for effect in by_role[role])
         self.drives = self._drives()
         self.has_contact = self.contact is not None
-        self.has_bond_heat = any(effect.name for effect in (self.tension, self.shear, self.dashpot))
+        self.has_bond_heat = bool(self.dashpot.name) or not bond.is_null
 
     def _drives(self):
         """Loads and ground with the row of their impulse, account of work, and bit of activity."""

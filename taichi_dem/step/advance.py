@@ -11,14 +11,12 @@ from typing import Optional
 import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
-from taichi_dem.kit.products import cross, dot, norm, squared, stacked, transposed_matvec
+from taichi_dem.kit.products import cross, dot, norm, squared, stacked
 from taichi_dem.kit.types import real, vec2, vec3
-from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
-from taichi_dem.stability.body_limits import RELEASE
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
-from taichi_dem.step.bond_laws import BondLaws
+from taichi_dem.step.bond import BondStep
 from taichi_dem.step.contact_force import ContactForce
 from taichi_dem.step.ground import GroundDashpots
 from taichi_dem.step.implicit.solver import Solver
@@ -28,7 +26,7 @@ from taichi_dem.step.tangential_springs import TangentialSprings
 
 
 @ti.data_oriented
-class Advance(BondLaws, ContactForce):
+class Advance(BondStep, ContactForce):
     """The order in which physics and effects act; see the module.
 
     staggered: whether velocities are half a step behind positions, as the leapfrog's are. An order
@@ -47,9 +45,9 @@ class Advance(BondLaws, ContactForce):
     ):
         self.tables, self.state, self.schedule = tables, state, schedule
         self.activity = state.activity
-        self.on_demand = state.activity.laws if tables.on_demand else (False, False)
-        # Where both laws act on demand, none is missing and none is to be watched for.
-        self.notes_limits = not all(self.on_demand)
+        self.on_demand = tables.on_demand and not tables.bond.is_null
+        # Where all laws act on demand, none is missing and none is to be watched for.
+        self.notes_limits = not (self.on_demand and tables.bond.is_whole)
         self.load_times, self.ground = LoadTimes(tables, state), GroundDashpots(tables, state)
         self.solver, self.solves = solver, solver is not None
         self.solves_bonds = self.solves and solver.has_bonds
@@ -62,171 +60,7 @@ class Advance(BondLaws, ContactForce):
         self.limits, self.retimes = schedule.limits, schedule.retimes
         self.has_limits = schedule.has_limits
         self.limited = self.has_limits and schedule.limits.limited
-        self.shear_releases = tables.shear.releases
-        self.has_heat = self.has_dashpot or bool(tables.shear.name)
-
-    @ti.func
-    def bond(self, b):
-        """Evaluate the three contact units of a bond; release it when one of them fails."""
-        if self._is_pending(b):
-            slots = self.tables.bond_slots[b]
-            scale = 1.0
-            if ti.static(self.limited):
-                scale = self.bond_share(b)
-            motion = self._motion(b, slots)
-            if ti.static(self.solves_bonds):
-                motion = self.solver.bonds.mean(b, motion)
-            stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
-            force, torque, failed = zero3(), zero3(), 0
-            dragged, slipped = 0.0, 0.0
-            for q in range(3):
-                u = 3 * b + q
-                arm = unit_arm(motion, self.tables.vertex_slave[u])
-                opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-                pull = self.pull(m, b, u, stiffness[0], opening[0])
-                sliding = vec2(opening[1], opening[2])
-                shear, spent = self.shear(m, b, u, stiffness[1], sliding, -pull)
-                if ti.static(self.notes_limits):
-                    self.state.note_passed(m, b, pull, squared(shear))
-                traction = vec3(pull, shear[0], shear[1])
-                if ti.static(self.has_dashpot):
-                    velocity = unit_velocity(motion, arm)
-                    drag = self.tables.dashpot.traction(b, velocity)
-                    if ti.static(self.limited):
-                        drag *= scale
-                    traction += drag
-                    dragged += dot(drag, velocity)
-                force += traction
-                torque += cross(arm, traction)
-                slipped += spent
-                failed |= self.has_failed(m, b, u, pull)
-            dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
-            area = self.tables.unit_area[b]
-            if failed == 0:
-                self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
-                if ti.static(self.has_heat):
-                    heat = area * vec3(dragged * dt, slipped, 0.0)
-                    self.state.bond_heat[b] = self.state.bond_heat[b] + heat
-            else:
-                if ti.static(self.tables.has_bond_heat):
-                    heat = area * vec3(0.0, slipped, self._stored(b, motion))
-                    self.state.bond_heat[b] = self.state.bond_heat[b] + heat
-                self._release(b, slots)
-            if ti.static(self.solves_bonds):
-                self._renew(b, slots, motion, failed, dragged * (area * dt))
-
-    @ti.func
-    def _renew(self, b, slots, motion, failed, dragged):
-        """Pass the present twist of a bond to the solver, or remove the bond; dragged [J]."""
-        if failed == 0:
-            self.solver.bonds.begin(b, slots[0] >> 2, slots[1] >> 2, motion.branch)
-        else:
-            self.solver.bonds.end(b)
-            if ti.static(self.tables.has_bond_heat):
-                # Dashpots are booked for the step before: it was full, though a unit fails now.
-                self.state.bond_heat[b][0] = self.state.bond_heat[b][0] + dragged
-
-    @ti.func
-    def _is_pending(self, b):
-        """Whether a bond holds and has not applied its impulse for the coming step already."""
-        pending = self.state.broken_tick[b] < 0
-        if ti.static(self.retimes):
-            slots = self.tables.bond_slots[b]
-            pending = pending and self.schedule.applied_until.is_pending(
-                b, slots[0] >> 2, slots[1] >> 2
-            )
-        return pending
-
-    @ti.func
-    def _bond_step(self, b, i, j):
-        """Time [s] for which a bond applies its force now."""
-        dt = 0.0
-        if ti.static(self.retimes):
-            dt = self.schedule.applied_until.apply_bond(b, i, j)
-        else:
-            dt = self.schedule.pair_step(i, j)
-        return dt
-
-    @ti.func
-    def bond_share(self, b):
-        """Share of its coefficient that a bond's limited dashpot keeps: the smaller of two."""
-        i, j = self.tables.bond_slots[b][0] >> 2, self.tables.bond_slots[b][1] >> 2
-        first = self.limits.bond_share(i, self.schedule.own_step(i))
-        return ti.min(first, self.limits.bond_share(j, self.schedule.own_step(j)))
-
-    @ti.func
-    def _motion(self, b, slots):
-        i, j = slots[0] >> 2, slots[1] >> 2
-        return bond_motion(
-            self.tables.bond_frame[b],
-            self.state.position[j] - self.state.position[i],
-            self.state.rotation[i],
-            self.state.rotation[j],
-            self.state.velocity[j] - self.state.velocity[i],
-            self.state.spin[i],
-            self.state.spin[j],
-        )
-
-    @ti.func
-    def _pull_together(self, slots, motion, impulse, moment):
-        """Add opposite impulses to master and slave; moment is about the slave's centre."""
-        linear = transposed_matvec(motion.axes, impulse)
-        angular = transposed_matvec(motion.axes, moment)
-        self._add(slots[0], linear, angular + cross(motion.branch, linear))
-        self._add(slots[1], -linear, -angular)
-
-    @ti.func
-    def _add(self, slot, linear, angular):
-        self.state.slot[slot] = self.state.slot[slot] + stacked(linear, angular)
-
-    @ti.func
-    def _stored(self, b, motion):
-        """Elastic energy per area summed over the units of a bond [J/m^2]."""
-        energy = 0.0
-        for q in range(3):
-            u = 3 * b + q
-            arm = unit_arm(motion, self.tables.vertex_slave[u])
-            opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-            energy += self.tables.tension.stored(b, u, opening[0])
-            energy += self.tables.shear.stored(b, u, vec2(opening[1], opening[2]))
-        return energy
-
-    @ti.func
-    def bond_energy(self, b):
-        """Elastic energy stored in a bond now [J]; zero once it is released."""
-        energy = 0.0
-        if self.state.broken_tick[b] < 0:
-            motion = self._motion(b, self.tables.bond_slots[b])
-            energy = self.tables.unit_area[b] * self._stored(b, motion)
-        return energy
-
-    @ti.func
-    def bond_power(self, b):
-        """Power that the dashpots of an intact bond take now [W]."""
-        slots, power, scale = self.tables.bond_slots[b], 0.0, 1.0
-        motion = self._motion(b, slots)
-        if ti.static(self.limited):
-            scale = self.bond_share(b)
-        if ti.static(self.solves_bonds):
-            motion = self.solver.bonds.mean(b, motion)
-        for q in range(3):
-            velocity = unit_velocity(motion, unit_arm(motion, self.tables.vertex_slave[3 * b + q]))
-            power += scale * dot(self.tables.dashpot.traction(b, velocity), velocity)
-        return power * self.tables.unit_area[b]
-
-    @ti.func
-    def _release(self, b, slots):
-        """Release a bond with a failed unit: its faces carry contact spheres from now on."""
-        tick = self.state.tick[None]
-        self.state.broken_tick[b] = tick
-        for side in ti.static(range(2)):
-            if ti.static(self.has_contact):
-                self.state.exposed_tick[slots[side]] = tick
-            self.schedule.note_change(slots[side] >> 2)
-            if ti.static(self.has_limits):
-                self.limits.notice(slots[side] >> 2, RELEASE)
-        if ti.static(self.has_contact):
-            self.contacts.search_requested[None] = 1
+        self.has_heat = self.has_dashpot or tables.bond.rubs
 
     @ti.func
     def body(self, i):

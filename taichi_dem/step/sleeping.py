@@ -11,9 +11,11 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.products import norm, squared
-from taichi_dem.kit.types import real
+from taichi_dem.kit.products import dot, norm, squared
+from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.mesh.parts import parts_of
+from taichi_dem.physics.bond import unit_arm, unit_opening, unit_velocity
+from taichi_dem.physics.rotation import zero3
 from taichi_dem.state.model import Model
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS, NEVER
@@ -25,6 +27,13 @@ _CHUNK = 256
 _EVERY, _EARLY = 16, 64
 #: Roundings of a coordinate that the opening of a bond at rest may show.
 _ROUNDINGS = 16.0
+
+
+@ti.func
+def beyond(opening, rounding):
+    """An opening [m], shorter by a rounding; zero where it is no longer."""
+    size = norm(opening)
+    return opening * (ti.max(0.0, size - rounding) / ti.max(size, 1e-300))
 
 
 @ti.data_oriented
@@ -78,6 +87,44 @@ class Sleeping:
         assign(self.chunk_first, np.append(first, len(part)))
 
     @ti.func
+    def at_rest(self, b, factor, rounding, advance):
+        """Energy that the springs of a bond hold [J], and nonzero where its law would begin.
+
+        Of what the bond is opened beyond a rounding [m]; the law begins at this opening times a
+        factor, pressed as pulled.
+        """
+        stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
+        motion, energy, begins = advance.motion_of(b), 0.0, 0
+        for u in range(3 * b, 3 * b + 3):
+            arm = unit_arm(motion, self.tables.vertex_slave[u])
+            opening = beyond(unit_opening(motion, arm, self.tables.vertex_master[u]), rounding)
+            pull, sliding = ti.abs(opening[0]), vec2(opening[1], opening[2])
+            energy += 0.5 * (stiffness[0] * pull * pull + stiffness[1] * squared(sliding))
+            if ti.static(not self.tables.bond.is_null):
+                jump = factor * vec3(pull, opening[1], opening[2])
+                begins |= self.tables.bond.begins(m, stiffness, jump)
+        return self.tables.unit_area[b] * energy, begins
+
+    @ti.func
+    def withheld(self, b, elapsed, last, rounding, advance):
+        """Impulse [N s] and energy [J] of a bond that was not evaluated for a time [s].
+
+        last: time [s] since the last evaluation that it missed. The springs' force has grown to
+        what it was then; the dashpots' impulse is that of the mean velocity. Energy: what springs
+        hold now, less the work of a leapfrog's coming step. Of what exceeds a rounding [m].
+        """
+        stiffness, force, energy = self.tables.bond_stiffness[b], zero3(), 0.0
+        motion = advance.motion_of(b)
+        for u in range(3 * b, 3 * b + 3):
+            arm = unit_arm(motion, self.tables.vertex_slave[u])
+            opening = unit_opening(motion, arm, self.tables.vertex_master[u])
+            before = beyond(opening - last * unit_velocity(motion, arm), rounding)
+            pull = vec3(stiffness[0], stiffness[1], stiffness[1]) * before
+            force += pull + self.tables.dashpot.traction(b, before / elapsed)
+            energy += 0.5 * dot(pull, opening)
+        return self.tables.unit_area[b] * vec2(elapsed * norm(force), ti.abs(energy))
+
+    @ti.func
     def begin(self, i, advance):
         """Wake body i at the start where something acts on it or it moves, or none may sleep.
 
@@ -87,7 +134,7 @@ class Sleeping:
         for f in range(4):
             b = self.tables.face_bond[4 * i + f]
             if b >= 0:
-                energy, _ = advance.at_rest(b, 1.0, self.rounding(i, state))
+                energy, _ = self.at_rest(b, 1.0, self.rounding(i, state), advance)
                 if energy > 0.0:
                     stirred = True
         for effect in ti.static(self.acting):
@@ -170,7 +217,8 @@ class Sleeping:
         It is where a law would begin at the opening over the share, or the lighter body would get
         more than a speed from it; speed2: its square [(m/s)^2].
         """
-        energy, begins = advance.at_rest(b, 1.0 / self.share[None], self.rounding(i, advance.state))
+        rounding = self.rounding(i, advance.state)
+        energy, begins = self.at_rest(b, 1.0 / self.share[None], rounding, advance)
         lighter = ti.min(self.tables.mass[i], self.tables.mass[j])
         return energy, begins != 0 or 2.0 * energy > lighter * speed2
 

@@ -133,5 +133,5 @@ class WokenLists:
         if 0 <= first and first < self.state.tick[None]:
             elapsed = self.schedule.seconds(self.state.tick[None] - first)
             rounding = self.sleeping.rounding(i, self.state)
-            found = self.advance.withheld(b, elapsed, last, rounding)
+            found = self.sleeping.withheld(b, elapsed, last, rounding, self.advance)
         return found

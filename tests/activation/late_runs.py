@@ -24,8 +24,8 @@ BITS = (
 class Run:
     """What is left of a run of a scene or its twin, whose engine goes on to others.
 
-    before: what acted before the effect may. since, evaluated: of each bond and law, of those that
-    are evaluated on demand. misses: what the audit found, by kind.
+    before: what acted before the effect may. since: of each bond and part of its law; evaluated: of
+    each bond. misses: what the audit of sleep found.
     """
 
     def __init__(self, name, word, needed=True, method=METHOD, driver="resident", **options):
@@ -44,7 +44,7 @@ class Run:
         if word == "auto":
             activity = made.state.activity
             self.since, self.evaluated = activity.since.to_numpy(), activity.evaluated.to_numpy()
-            self.misses = made.step.audit.misses.to_numpy().tolist()
+            self.misses = int(made.step.audit.misses[None])
 
     @property
     def way(self):

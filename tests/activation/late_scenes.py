@@ -119,7 +119,7 @@ def peaks(late):
     listed = [*laws, effects.SphereContact(outer_faces=True), *late.loads]
     run = simulation(late, Scene(late.mesh, strengths(), listed))
     run.advance_to(round(late.until / STEP))
-    law = run.tables.tension if late.role == "tension" else run.tables.shear
+    law = run.tables.bond.tension if late.role == "tension" else run.tables.bond.shear
     units = law.peak.to_numpy()[: 3 * run.model.bond_count]
     found = units.reshape(-1, 3).max(axis=1)
     order = np.argsort(found)[::-1]

@@ -51,12 +51,10 @@ def test_bodies_of_a_broken_bond_have_softened_before_it_broke(result):
         assert (result.acting_since["softening"][side[broken]] < result.broken_time[broken]).all()
 
 
-def test_evaluations_skipped_and_made_add_up(result):
+def test_fewer_evaluations_are_made_than_there_are(result):
     found, report = result.certificate, result.report
-    softening, slip = found.audits[0].skipped, found.audits[1].skipped
-    assert found.law_evaluations + softening + slip == found.all_law_evaluations
     assert found.law_ratio == found.all_law_evaluations / found.law_evaluations > 1.0
-    assert found.all_law_evaluations <= 6 * (report.bond_evaluations + report.bond_count)
+    assert found.all_law_evaluations <= 3 * (report.bond_evaluations + report.bond_count)
 
 
 def test_share_asleep_is_the_mean_time_until_bodies_wake(result):
@@ -68,7 +66,7 @@ def test_share_asleep_is_the_mean_time_until_bodies_wake(result):
 def test_a_certificate_that_does_not_hold_says_so(result):
     found = result.certificate
     assert found.holds and "does not hold" not in str(found)
-    missed = replace(found, audits=(Audit(1000, 10, 1, "softening"), *found.audits[1:]))
+    missed = replace(found, audits=(Audit(1000, 10, 1, "bonds asleep"),))
     for wrong in (missed, replace(found, impulse=2.0 * found.sleep)):
         assert not wrong.holds and "does not hold" in str(wrong)
 

@@ -145,6 +145,7 @@ def _effects():
         "PrescribedMotion": {**group, "velocity": (1.0, 0.0, 0.0)},
         "Pressure": {**group, "values": [0.0, 1e6], **times},
         "Roller": {**group, "normal": (1.0, 0.0, 0.0)},
+        "MixedMode": {"shear_energy": 500.0, "exponent": 1.5},
         "SlipWeakening": {"fracture_energy": 100.0},
         **dict.fromkeys(("Fixed", "QuietBoundary"), group),
     }

@@ -135,9 +135,9 @@ def test_shear_ends_in_the_coulomb_plateau(pair, pressure):
 
 def test_shear_limit_does_not_fall_below_zero(pair):
     """With friction 2 a tension of 6 MPa leaves c - 12 MPa < 0: no shear at all."""
-    pair.tables.shear.law[0, 1] = 2.0
+    pair.tables.bond.shear.law[0, 1] = 2.0
     traction = pair.open([6e6 / K_N, 3e-5, 4e-5])
-    pair.tables.shear.law[0, 1] = FRICTION
+    pair.tables.bond.shear.law[0, 1] = FRICTION
     assert np.abs(traction[1:]).max() <= SHEAR_ERROR
 
 

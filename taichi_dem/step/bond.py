@@ -1,0 +1,199 @@
+"""Advance one bond: its law, its dashpots, its impulse on both bodies, its release."""
+
+import taichi as ti
+
+from taichi_dem.kit.products import cross, dot, squared, stacked, transposed_matvec
+from taichi_dem.kit.types import vec2, vec3
+from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
+from taichi_dem.physics.rotation import zero3
+from taichi_dem.stability.body_limits import RELEASE
+
+
+@ti.data_oriented
+class BondStep:
+    """What a bond does when it is due: the part of ``Advance``, which owns all that is used here.
+
+    on_demand: whether the law of bonds is asked only near its limits.
+    """
+
+    @ti.func
+    def bond(self, b):
+        """Evaluate the three contact units of a bond; release it when one of them fails."""
+        if self._is_pending(b):
+            slots = self.tables.bond_slots[b]
+            scale = 1.0
+            if ti.static(self.limited):
+                scale = self.bond_share(b)
+            motion = self.motion_of(b)
+            if ti.static(self.solves_bonds):
+                motion = self.solver.bonds.mean(b, motion)
+            stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
+            force, torque, failed = zero3(), zero3(), 0
+            dragged, slipped = 0.0, 0.0
+            for q in range(3):
+                u = 3 * b + q
+                arm = unit_arm(motion, self.tables.vertex_slave[u])
+                opening = unit_opening(motion, arm, self.tables.vertex_master[u])
+                traction, spent, broken = self.by_law(m, b, u, stiffness, opening)
+                if ti.static(self.notes_limits):
+                    across = vec2(traction[1], traction[2])
+                    self.state.note_passed(m, b, traction[0], squared(across))
+                if ti.static(self.has_dashpot):
+                    velocity = unit_velocity(motion, arm)
+                    drag = self.tables.dashpot.traction(b, velocity)
+                    if ti.static(self.limited):
+                        drag *= scale
+                    traction += drag
+                    dragged += dot(drag, velocity)
+                force += traction
+                torque += cross(arm, traction)
+                slipped += spent
+                failed |= broken
+            dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
+            area = self.tables.unit_area[b]
+            if failed == 0:
+                self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
+                if ti.static(self.has_heat):
+                    heat = area * vec3(dragged * dt, slipped, 0.0)
+                    self.state.bond_heat[b] = self.state.bond_heat[b] + heat
+            else:
+                if ti.static(self.tables.has_bond_heat):
+                    heat = area * vec3(0.0, slipped, self._stored(b, motion))
+                    self.state.bond_heat[b] = self.state.bond_heat[b] + heat
+                self._release(b, slots)
+            if ti.static(self.solves_bonds):
+                self._renew(b, slots, motion, failed, dragged * (area * dt))
+
+    @ti.func
+    def by_law(self, m, b, u, stiffness, opening):
+        """Traction of a unit [Pa], energy per area slipped away now [J/m^2], 1 where it has failed.
+
+        On demand the law is asked only once the bond has come near a limit of it: below, it is
+        linear to the bit (tests/unit/test_bond_laws.py).
+        """
+        traction = vec3(stiffness[0], stiffness[1], stiffness[1]) * opening
+        slipped, failed, acts = 0.0, 0, True
+        if ti.static(self.on_demand):
+            near = self.tables.bond.begins(m, stiffness, opening)
+            acts = self.activity.is_active(b, near, self.state.tick[None])
+        if ti.static(not self.tables.bond.is_null):
+            if acts:
+                traction, slipped = self.tables.bond.traction(m, u, stiffness, opening)
+                failed = self.tables.bond.failed(m, u, traction)
+        return traction, slipped, failed
+
+    @ti.func
+    def _renew(self, b, slots, motion, failed, dragged):
+        """Pass the present twist of a bond to the solver, or remove the bond; dragged [J]."""
+        if failed == 0:
+            self.solver.bonds.begin(b, slots[0] >> 2, slots[1] >> 2, motion.branch)
+        else:
+            self.solver.bonds.end(b)
+            if ti.static(self.tables.has_bond_heat):
+                # Dashpots are booked for the step before: it was full, though a unit fails now.
+                self.state.bond_heat[b][0] = self.state.bond_heat[b][0] + dragged
+
+    @ti.func
+    def _is_pending(self, b):
+        """Whether a bond holds and has not applied its impulse for the coming step already."""
+        pending = self.state.broken_tick[b] < 0
+        if ti.static(self.retimes):
+            slots = self.tables.bond_slots[b]
+            pending = pending and self.schedule.applied_until.is_pending(
+                b, slots[0] >> 2, slots[1] >> 2
+            )
+        return pending
+
+    @ti.func
+    def _bond_step(self, b, i, j):
+        """Time [s] for which a bond applies its force now."""
+        dt = 0.0
+        if ti.static(self.retimes):
+            dt = self.schedule.applied_until.apply_bond(b, i, j)
+        else:
+            dt = self.schedule.pair_step(i, j)
+        return dt
+
+    @ti.func
+    def bond_share(self, b):
+        """Share of its coefficient that a bond's limited dashpot keeps: the smaller of two."""
+        i, j = self.tables.bond_slots[b][0] >> 2, self.tables.bond_slots[b][1] >> 2
+        first = self.limits.bond_share(i, self.schedule.own_step(i))
+        return ti.min(first, self.limits.bond_share(j, self.schedule.own_step(j)))
+
+    @ti.func
+    def motion_of(self, b):
+        """Relative motion of the two bodies of a bond now, a ``BondMotion``."""
+        slots = self.tables.bond_slots[b]
+        i, j = slots[0] >> 2, slots[1] >> 2
+        return bond_motion(
+            self.tables.bond_frame[b],
+            self.state.position[j] - self.state.position[i],
+            self.state.rotation[i],
+            self.state.rotation[j],
+            self.state.velocity[j] - self.state.velocity[i],
+            self.state.spin[i],
+            self.state.spin[j],
+        )
+
+    @ti.func
+    def _pull_together(self, slots, motion, impulse, moment):
+        """Add opposite impulses to master and slave; moment is about the slave's centre."""
+        linear = transposed_matvec(motion.axes, impulse)
+        angular = transposed_matvec(motion.axes, moment)
+        self._add(slots[0], linear, angular + cross(motion.branch, linear))
+        self._add(slots[1], -linear, -angular)
+
+    @ti.func
+    def _add(self, slot, linear, angular):
+        self.state.slot[slot] = self.state.slot[slot] + stacked(linear, angular)
+
+    @ti.func
+    def _stored(self, b, motion):
+        """Elastic energy per area summed over the units of a bond [J/m^2]."""
+        energy = 0.0
+        for q in range(3):
+            u = 3 * b + q
+            arm = unit_arm(motion, self.tables.vertex_slave[u])
+            opening = unit_opening(motion, arm, self.tables.vertex_master[u])
+            normal, tangential = self.tables.bond.stored(b, u, opening)
+            energy += normal
+            energy += tangential
+        return energy
+
+    @ti.func
+    def bond_energy(self, b):
+        """Elastic energy stored in a bond now [J]; zero once it is released."""
+        energy = 0.0
+        if self.state.broken_tick[b] < 0:
+            motion = self.motion_of(b)
+            energy = self.tables.unit_area[b] * self._stored(b, motion)
+        return energy
+
+    @ti.func
+    def bond_power(self, b):
+        """Power that the dashpots of an intact bond take now [W]."""
+        power, scale = 0.0, 1.0
+        motion = self.motion_of(b)
+        if ti.static(self.limited):
+            scale = self.bond_share(b)
+        if ti.static(self.solves_bonds):
+            motion = self.solver.bonds.mean(b, motion)
+        for q in range(3):
+            velocity = unit_velocity(motion, unit_arm(motion, self.tables.vertex_slave[3 * b + q]))
+            power += scale * dot(self.tables.dashpot.traction(b, velocity), velocity)
+        return power * self.tables.unit_area[b]
+
+    @ti.func
+    def _release(self, b, slots):
+        """Release a bond with a failed unit: its faces carry contact spheres from now on."""
+        tick = self.state.tick[None]
+        self.state.broken_tick[b] = tick
+        for side in ti.static(range(2)):
+            if ti.static(self.has_contact):
+                self.state.exposed_tick[slots[side]] = tick
+            self.schedule.note_change(slots[side] >> 2)
+            if ti.static(self.has_limits):
+                self.limits.notice(slots[side] >> 2, RELEASE)
+        if ti.static(self.has_contact):
+            self.contacts.search_requested[None] = 1
