@@ -11,6 +11,12 @@ def itself(a):
     return a
 
 
+@ti.func
+def first_key(member):
+    """Key function of lists in which all are active at the start."""
+    return 0
+
+
 @ti.data_oriented
 class Once:
     """List of one member, for phases that run once a substep."""

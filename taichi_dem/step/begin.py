@@ -1,4 +1,4 @@
-"""The start of a run: first levels, full lists, bonds of the first tick."""
+"""The start of a run: first levels and full lists, then the bonds of the first tick."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,31 +16,33 @@ Phases = tuple[tuple[Any, Callable[..., Any]], ...]
 
 @ti.data_oriented
 class Begin:
-    """Phases of the start of a run, pairs as those of a ``Step``; advance.bond is in both."""
+    """Phases before and after the bonds of the first tick, which the step's kernel evaluates."""
 
     def __init__(self, advance: Advance, schedule: Schedule):
         self.advance, self.schedule, self.state = advance, schedule, advance.state
         self.bodies = Everyone(advance.tables.body_count)
         self.bonds = Everyone(advance.tables.bond_count)
 
-    def phases(self) -> Phases:
-        """All of them, in their order."""
+    def before(self) -> Phases:
+        """Those before the bonds."""
         schedule = self.schedule
         asleep: Phases = ()
         limited: Phases = ()
         if schedule.has_limits:
             limited = ((self.bodies, schedule.limits.refresh),)
         if schedule.sleeps:
-            asleep = (self.bodies, self.stir), (self.bodies, self.schedule.sleeping.begin_beside)
+            asleep = (self.bodies, self.stir), (self.bodies, schedule.sleeping.begin_beside)
         return (
             (Once(), self.reset),
             *limited,
             *asleep,
             (self.bodies, self.choose_level),
             (Once(), self.fill_lists),
-            # Those that sleep act once, and are listed later.
-            (self.bonds if schedule.sleeps else schedule.bonds, self.advance.bond),
         )
+
+    def after(self) -> Phases:
+        """Those after them: bonds that sleep have acted once, and leave the list."""
+        return ((Once(), self.fill_lists_again),) if self.schedule.sleeps else ()
 
     @ti.func
     def reset(self, one):
@@ -60,22 +62,29 @@ class Begin:
 
     @ti.func
     def fill_lists(self, one):
-        """Fill all lists."""
+        """Fill all lists; that of bonds with all of them."""
         self.schedule.start_all()
+
+    @ti.func
+    def fill_lists_again(self, one):
+        """Fill the list of bonds with those that are awake."""
+        self.schedule.list_members()
 
 
 @ti.data_oriented
 class SolvedBegin(Begin):
     """The same where all dashpots are solved together: with their first guesses."""
 
-    def phases(self) -> Phases:
-        """All of them, in their order."""
-        *before, bonds = super().phases()
+    def before(self) -> Phases:
+        """Those before the bonds."""
         guessed: Phases = ()
         if self.advance.solver.has_bonds:
             guessed = ((self.bonds, self.advance.solver.bonds.first),)
-        inertia = self.bodies, self.update_inertia
-        return (*before, inertia, *guessed, bonds, (self.bonds, self.undo))
+        return (*super().before(), (self.bodies, self.update_inertia), *guessed)
+
+    def after(self) -> Phases:
+        """Those after them."""
+        return (*super().after(), (self.bonds, self.undo))
 
     @ti.func
     def update_inertia(self, i):
@@ -90,56 +99,3 @@ class SolvedBegin(Begin):
         if ti.static(self.schedule.sleeps and self.advance.solver.has_bonds):
             if self.schedule.bonds.key[b] < 0:
                 self.advance.solver.bonds.end(b)
-
-
-@ti.data_oriented
-class Members:
-    """Members of a phase at the start and in a substep; None where it has none.
-
-    begin in its functions: 1 at the start, 0 in a substep.
-    """
-
-    def __init__(self, first: Any, active: Any):
-        self.first, self.active = first, active
-        self.at_start, self.in_substeps = first is not None, active is not None
-        self.alike = first is active
-
-    @ti.func
-    def count(self, begin, low):
-        """Number of members."""
-        count = 0
-        if ti.static(self.alike):
-            count = self.first.count(low)
-        else:
-            if ti.static(self.at_start):
-                count += begin * self.first.count(low)
-            if ti.static(self.in_substeps):
-                count += (1 - begin) * self.active.count(low)
-        return count
-
-    @ti.func
-    def pick(self, begin, a):
-        """Member at place a."""
-        member = 0
-        if ti.static(self.alike or not self.in_substeps):
-            member = self.first.pick(a)
-        elif ti.static(not self.at_start):
-            member = self.active.pick(a)
-        else:
-            member = begin * self.first.pick(a) + (1 - begin) * self.active.pick(a)
-        return member
-
-
-def joined(first: Phases, phases: Phases, common: Callable[..., Any]) -> Phases:
-    """Phases of the start and of a substep in a row, for one kernel; a function of both is once.
-
-    So the bonds, which take longest to compile, are compiled once. common: that function; what is
-    before and after it keeps its order.
-    """
-    (place,) = (k for k, (_, item) in enumerate(first) if item == common)
-    alone = [(Members(members, None), item) for members, item in first]
-    steps = (
-        (Members(first[place][0] if item == common else None, active), item)
-        for active, item in phases
-    )
-    return (*alone[:place], *steps, *alone[place + 1 :])

@@ -15,7 +15,7 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.step.active_list import Once
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.audit import Audit
-from taichi_dem.step.begin import Begin, Phases, SolvedBegin, joined
+from taichi_dem.step.begin import Begin, Phases, SolvedBegin
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
 from taichi_dem.step.schedule import Schedule
@@ -38,8 +38,8 @@ class Step:
     A substep begins with the contacts of the present tick, whose bonds are evaluated already, and
     ends with the bonds of the next: between substeps the contact lists can be renewed.
 
-    search: the ``BroadPhase`` that does so, None for a scene without contact. first_phases: those
-    of the start of a run.
+    search: the ``BroadPhase`` that does so, None for a scene without contact. start_phases: those
+    of the start of a run before its bonds, and after them.
     """
 
     begin: type[Begin] = Begin
@@ -53,7 +53,8 @@ class Step:
             self.audit = Audit(self.advance.tables, self.state, self.schedule, self.advance)
         self.parts = self._parts()
         self.phases = self._phases()
-        self.first_phases = self.begin(advance, schedule).phases()
+        begin = self.begin(advance, schedule)
+        self.start_phases = begin.before(), begin.after()
 
     def _phases(self):
         """All phases of a substep in a row, for one serial kernel."""
@@ -101,6 +102,17 @@ class Step:
         if self.schedule.retimes:
             phases += ((limits, WakeUp(self.advance, self.schedule).wake_up),)
         return (*phases, (Once(), self.schedule.apply_changes))
+
+    def is_of_start(self, item: object) -> bool:
+        """Whether a phase also belongs to the start of a run: that of the bonds does."""
+        return item == self.advance.bond
+
+    @ti.kernel
+    def start(self, last: ti.template()):
+        """Run the phases of the start before the bonds, or the last, after them."""
+        for members, item in ti.static(self.start_phases[last]):
+            for a in range(members.count(0)):
+                item(members.pick(a))
 
     @ti.func
     def halted(self):
@@ -223,7 +235,6 @@ class Resident:
 
     def __init__(self, step: Step):
         self.step = step
-        self.phases = joined(step.first_phases, step.phases, step.advance.bond)
         self.load()
 
     def load(self) -> None:
@@ -232,7 +243,9 @@ class Resident:
 
     def begin(self) -> None:
         """Run the phases of the start; compiles the kernel."""
+        self.step.start(0)
         self._run(1, 0, 1)
+        self.step.start(1)
 
     def prepare(self) -> None:
         """Make a requested search, without a step."""
@@ -254,7 +267,7 @@ class Resident:
 
     @ti.kernel
     def _run(self, begin: ti.i32, end_tick: ti.i64, substeps: ti.i32) -> ti.i32:
-        # The start and a substep share what takes long to compile: the bonds.
+        # At the start the bonds act alone: what takes longest to compile is compiled once.
         done = 0
         low = ti.static(self.step.schedule.low)
         ti.loop_config(serialize=True)
@@ -267,9 +280,12 @@ class Resident:
             finished = self.step.state.tick[None] >= end_tick or self.step.halted() == 1
             if s == substeps or (finished and begin == 0):
                 break
-            for members, item in ti.static(self.phases):
-                for a in range(members.count(begin, low[None])):
-                    item(members.pick(begin, a))
+            for members, item in ti.static(self.step.phases):
+                count = members.count(low[None])
+                if ti.static(not self.step.is_of_start(item)):
+                    count *= 1 - begin
+                for a in range(count):
+                    item(members.pick(a))
             done = s + 1
         return done
 
@@ -287,19 +303,15 @@ class Parallel:
         """Nothing depends on the scene."""
 
     def begin(self) -> None:
-        """Run the phases of the start; compiles their kernel."""
-        self._begin()
-
-    @ti.kernel
-    def _begin(self):
-        for members, item in ti.static(self.step.first_phases):
-            for a in range(members.count(0)):
-                item(members.pick(a))
+        """Run the phases of the start; compiles their kernels."""
+        self.step.start(0)
+        self._run(len(self.step.parts) - 1, 0, 0, 1)
+        self.step.start(1)
 
     def prepare(self) -> None:
         """Make a requested search, without a step; compiles the kernels."""
         for part in range(len(self.step.parts)):
-            self._run(part, 0, 0)
+            self._run(part, 0, 0, 0)
         if self.step.has_contact:
             self.step.search.renew()
 
@@ -319,18 +331,21 @@ class Parallel:
         """Run all parts of a substep, and a requested search; nonzero at the end or a halt."""
         state = 0
         for part in range(len(self.step.parts)):
-            state = self._run(part, end_tick, 1)
+            state = self._run(part, end_tick, 1, 1)
             while self.step.repeats(part):
-                state = self._run(part, end_tick, 1)
+                state = self._run(part, end_tick, 1, 1)
         if state & _SEARCH:
             self.step.search.renew()
         return state & ~_SEARCH
 
     @ti.kernel
-    def _run(self, part: ti.template(), end_tick: ti.i64, share: ti.i32) -> ti.i32:
-        # With a share of 0 the kernel is compiled and does nothing.
+    def _run(self, part: ti.template(), end_tick: ti.i64, rest: ti.i32, bonds: ti.i32) -> ti.i32:
+        # bonds, rest: 1 to run the phase of the bonds, and all others; 0 and 0 compile the kernel.
         low = ti.static(self.step.schedule.low)
         for active, item in ti.static(self.step.parts[part]):
+            share = rest
+            if ti.static(self.step.is_of_start(item)):
+                share = bonds
             for a in range(share * active.count(low[None])):
                 item(active.pick(a))
         finished = ti.cast(self.step.state.tick[None] >= end_tick, ti.i32)

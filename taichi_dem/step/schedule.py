@@ -23,7 +23,7 @@ from taichi_dem.state.timeline import (
     device_coarsest_active,
     device_ticks_of,
 )
-from taichi_dem.step.active_list import ActiveList, itself
+from taichi_dem.step.active_list import ActiveList, first_key, itself
 from taichi_dem.step.applied_until import AppliedUntil
 from taichi_dem.step.level_limit import LevelLimit
 from taichi_dem.step.sleeping import ASLEEP, Sleeping
@@ -238,6 +238,9 @@ class Schedule:
         if ti.static(self.spreads):
             self.level_limit.note_all()
         self.list_members()
+        if ti.static(self.sleeps):
+            # Those that sleep act once.
+            self.bonds.fill(self.tables.bond_count[None], itself, first_key)
         if ti.static(self.has_contact):
             self._list_pairs()
         self._find_finest()

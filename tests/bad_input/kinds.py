@@ -69,7 +69,8 @@ def is_right(value, text):
 
 #: Kind of each number and word by the name of the parameter; of a call alone as "Call.name".
 KINDS = {
-    "positive": """density young tensile_strength fracture_energy shear_energy exponent normal_stiffness shear_stiffness
+    "positive": """density young tensile_strength fracture_energy shear_energy exponent
+        normal_stiffness shear_stiffness
         contact_stiffness dt0 dt distance tolerance refresh safety angle ahead peak rise fall
         decay_ratio skin stiffness_ratio p_speed s_speed max_speed scale width height length radius
         thickness element size particle_mass diameter reference_speed wall_young v_max mass

@@ -3,7 +3,8 @@
 Along a way of fixed direction the force is that of a triangle: stiffness K up to x_0, a straight
 line down to zero at x_1, with K x_0^2 = e_0, K x_0 x_1 = 2 G, and by Benzeggagh and Kenane
 
-    B = k_s s^2 / K,  e_0 = f_t^2 / k_n + (c^2 / k_s - f_t^2 / k_n) B^n,  G = G_I + (G_II - G_I) B^n.
+    B = k_s s^2 / K,  G = G_I + (G_II - G_I) B^n,
+    e_0 = f_t^2 / k_n + (c^2 / k_s - f_t^2 / k_n) B^n.
 
 Openings are known to OPENING_ERROR (test_bond_law), tractions to the stiffness times that; the
 line falls no steeper than K where x_1 is at least 2 x_0.
