@@ -6,7 +6,8 @@ from functools import partial
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.contact.search import BroadPhase
 from taichi_dem.kit.engine_pool import Engine, EnginePool
-from taichi_dem.laws.base import Effect, bound_by_role
+from taichi_dem.laws.base import Effect
+from taichi_dem.laws.bound import bound_by_role
 from taichi_dem.methods import Method, structure_of
 from taichi_dem.report.readings import Readings
 from taichi_dem.stability.body_limits import limits_for

@@ -16,7 +16,7 @@ from taichi_dem.materials import CONCRETE
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.methods import Uniform
 from taichi_dem.physics.bond import unit_arm, unit_opening
-from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
+from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned
 from taichi_dem.scene import Scene
 from taichi_dem.simulation import Simulation
 from taichi_dem.step.advance import Advance
@@ -67,7 +67,7 @@ class ByHand(Advance):
         if self.state.broken_tick[b] < 0:
             slots = self.tables.bond_slots[b]
             motion = self.motion_of(b)
-            k, force, torque = self.tables.bond_stiffness[b], zero3(), zero3()
+            k, force, torque = self.tables.bond_stiffness[b], vec3(0.0), vec3(0.0)
             m = self.tables.bond_pair[b]
             for q in range(3):
                 u = 3 * b + q
@@ -87,7 +87,7 @@ class ByHand(Advance):
     def body(self, i):
         """Take the impulses, move and turn."""
         elapsed = self.schedule.elapsed(i)
-        linear, angular = zero3(), zero3()
+        linear, angular = vec3(0.0), vec3(0.0)
         for f in range(4):
             taken = self.state.slot[4 * i + f]
             linear += taken[0:3]

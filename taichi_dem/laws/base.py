@@ -10,7 +10,7 @@ contact spheres, loads push bodies, supports hold them, ground drags on them. Ro
 
 import copy
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, Optional
 
 import numpy as np
@@ -24,11 +24,10 @@ from taichi_dem.kit.products import dot
 from taichi_dem.kit.sealed import Sealed
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import float_array, shown
-from taichi_dem.laws.bond import Separable
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import MOST, BodyMaterials
 from taichi_dem.state.capacity import Capacity
-from taichi_dem.state.model import MANY, ROLES, Model
+from taichi_dem.state.model import MANY, Model
 from taichi_dem.state.pair_store import PairStore
 from taichi_dem.state.tables import Tables
 
@@ -463,19 +462,6 @@ ABSENT: dict[str, Any] = {
     "friction": NoFriction,
 }
 
-
-def bound_by_role(effects: Iterable[Effect], tables: Tables) -> tuple[dict[str, list[Any]], Any]:
-    """Bound copies of effects by role, null objects where none is listed; the law of bonds."""
-    listed = {role: [e for e in effects if e.role == role] for role in ROLES}
-    for role, absent in ABSENT.items():
-        if not listed[role] and not (listed["bond"] and role in PARTS_OF_BOND):
-            listed[role] = [absent()]
-    by_role = {role: [bound(effect, tables) for effect in listed[role]] for role in ROLES}
-    if by_role["bond"]:
-        return by_role, by_role["bond"][0]
-    return by_role, Separable(by_role["tension"][0], by_role["shear"][0])
-
-
 __all__ = [
     "ABSENT",
     "HARMLESS",
@@ -483,5 +469,5 @@ __all__ = [
     "Effect",
     "Travel",
     "along",
-    "bound_by_role",
+    "bound",
 ]

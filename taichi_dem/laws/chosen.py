@@ -6,11 +6,10 @@ from typing import Any
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
 from taichi_dem.laws.base import PARTS_OF_BOND, Effect
+from taichi_dem.laws.bond import ShearSlip, Softening
 from taichi_dem.laws.bond_damping import BondDamping
 from taichi_dem.laws.friction import Friction
 from taichi_dem.laws.roles import check_activation
-from taichi_dem.laws.shear_slip import ShearSlip
-from taichi_dem.laws.softening import Softening
 from taichi_dem.laws.sphere_contact import ONCE_BROKEN, SphereContact
 from taichi_dem.laws.sticking_friction import StickingFriction
 from taichi_dem.materials.body_materials import BodyMaterials

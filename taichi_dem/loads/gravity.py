@@ -10,7 +10,6 @@ from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import direction
 from taichi_dem.laws.base import Effect, Travel, along
 from taichi_dem.materials import Material
-from taichi_dem.physics.rotation import zero3
 
 
 @ti.data_oriented
@@ -55,4 +54,4 @@ class Gravity(Effect):
     @ti.func
     def wrench(self, i, motion):
         """Force [N] and torque about the centre [N m] on body i."""
-        return self.tables.mass[i] * vec3(self.law[0], self.law[1], self.law[2]), zero3()
+        return self.tables.mass[i] * vec3(self.law[0], self.law[1], self.law[2]), vec3(0.0)

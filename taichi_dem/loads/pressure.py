@@ -10,13 +10,13 @@ from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import PRESSURE, in_unit
 from taichi_dem.kit.products import cross, matvec
+from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import finite, positive, shown, word
 from taichi_dem.laws.base import Effect
 from taichi_dem.loads.history import History, history_points, shortest_piece
 from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
-from taichi_dem.physics.rotation import zero3
 from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import Model
 
@@ -74,7 +74,7 @@ class FacePressure(Effect):
     def wrench(self, i, motion):
         """Force [N] and torque about the centre [N m] on body i in a motion."""
         pressure = self.mean_pressure(motion.since, motion.until)
-        force, torque = zero3(), zero3()
+        force, torque = vec3(0.0), vec3(0.0)
         for k in range(self.first[i], self.first[i + 1]):
             push = -pressure * self.area[k]
             force += push

@@ -18,7 +18,6 @@ from taichi_dem.laws.base import Effect, Travel
 from taichi_dem.loads.history import History, history_points, shortest_piece
 from taichi_dem.materials import Material
 from taichi_dem.mesh.topology import faces_of_group
-from taichi_dem.physics.rotation import zero3
 from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import Model
 
@@ -80,7 +79,7 @@ class Fixed(_Support):
     @ti.func
     def held(self, i, t, step, rotation, velocity, angular_momentum):
         """Zero velocity and angular momentum."""
-        return zero3(), zero3()
+        return vec3(0.0), vec3(0.0)
 
 
 @ti.data_oriented
@@ -141,7 +140,7 @@ class Roller(_Support):
     def held(self, i, t, step, rotation, velocity, angular_momentum):
         """Velocity within the plane, spin about its normal."""
         normal = self.across[i]
-        kept = zero3()
+        kept = vec3(0.0)
         if self.turns[i] == 1:
             kept = angular_momentum
             if squared(normal) > 0.0:
@@ -270,7 +269,7 @@ class PrescribedMotion(_Support):
         """The prescribed velocity, its shares as a mean over the step, and no spin."""
         amplitude = vec3(self.law[0], self.law[1], self.law[2])
         _, swing = sine_and_cosine(self.law[3] * t)
-        return amplitude * swing * self.shares.mean(t - 0.5 * step, t + 0.5 * step), zero3()
+        return amplitude * swing * self.shares.mean(t - 0.5 * step, t + 0.5 * step), vec3(0.0)
 
 
 def _shares(ramp, history):

@@ -12,7 +12,7 @@ from taichi_dem.kit.products import (
     transposed_matmul,
     transposed_matvec,
 )
-from taichi_dem.kit.types import mat3, vec3, vec4
+from taichi_dem.kit.types import mat3, vec4
 
 # A chain of divisions would take as long as all else that turns a body.
 _6TH, _12TH, _20TH, _30TH, _42TH = (1.0 / n for n in (6, 12, 20, 30, 42))
@@ -96,12 +96,6 @@ def mean_spin(rotation, inertia_inverse, angular_momentum, spin, dt):
     """
     ahead = angular_momentum + 0.5 * dt * cross(angular_momentum, spin)
     return spin_of(rotation, inertia_inverse, ahead)
-
-
-@ti.func
-def zero3():
-    """The zero vector, as a start for sums."""
-    return vec3(0.0, 0.0, 0.0)
 
 
 @ti.func

@@ -13,7 +13,7 @@ import taichi as ti
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.products import cross, dot, norm, squared, stacked
 from taichi_dem.kit.types import real, vec2, vec3
-from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
+from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.bond import BondStep
@@ -110,7 +110,7 @@ class Advance(BondStep, ContactForce):
     @ti.func
     def _gathered(self, i):
         """Collect the impulse and moment in the slots of a body, always summed in one order."""
-        linear, angular = zero3(), zero3()
+        linear, angular = vec3(0.0), vec3(0.0)
         for f in range(4):
             taken = self.state.slot[4 * i + f]
             linear += taken[0:3]

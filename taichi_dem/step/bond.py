@@ -5,7 +5,6 @@ import taichi as ti
 from taichi_dem.kit.products import cross, dot, squared, stacked, transposed_matvec
 from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
-from taichi_dem.physics.rotation import zero3
 from taichi_dem.stability.body_limits import RELEASE
 
 
@@ -28,7 +27,7 @@ class BondStep:
             if ti.static(self.solves_bonds):
                 motion = self.solver.bonds.mean(b, motion)
             stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
-            force, torque, failed = zero3(), zero3(), 0
+            force, torque, failed = vec3(0.0), vec3(0.0), 0
             dragged, slipped = 0.0, 0.0
             for q in range(3):
                 u = 3 * b + q

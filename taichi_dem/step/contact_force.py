@@ -4,7 +4,7 @@ import taichi as ti
 
 from taichi_dem.kit.products import cross, dot, norm
 from taichi_dem.kit.types import real, vec3
-from taichi_dem.physics.rotation import place_in, zero3
+from taichi_dem.physics.rotation import place_in
 from taichi_dem.physics.sphere_pair import active_bits, add_within, is_within, meeting
 from taichi_dem.stability.body_limits import HIT
 
@@ -80,7 +80,7 @@ class ContactForce:
         branch = self.state.position[j] - self.state.position[i]
         # Most candidates do not touch: tested in the first body's frame, at half the cost.
         turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
-        force, moment_i, moment_j = zero3(), zero3(), zero3()
+        force, moment_i, moment_j = vec3(0.0), vec3(0.0), vec3(0.0)
         dragged, rubbed, slipped, deepest = 0.0, 0.0, 0.0, 0.0
         all_rub, all_bound = 0.0, 0.0
         scale, near_count, active, m = 1.0, 0, ti.i64(0), self.tables.pair(i, j)
@@ -130,7 +130,7 @@ class ContactForce:
     @ti.func
     def _rub(self, m, k, i, normal, push, drag, slide, elapsed, stepping: ti.template()):
         """Friction on the second sphere and the spring's part of it [N]; energy of slipping [J]."""
-        rub, stuck, spent = zero3(), zero3(), 0.0
+        rub, stuck, spent = vec3(0.0), vec3(0.0), 0.0
         if ti.static(self.springs.present):
             rotation, bound = self.state.rotation[i], self.tables.friction.limit(m, push)
             if ti.static(stepping):

@@ -15,7 +15,6 @@ from taichi_dem.kit.products import dot, norm, squared
 from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.mesh.parts import parts_of
 from taichi_dem.physics.bond import unit_arm, unit_opening, unit_velocity
-from taichi_dem.physics.rotation import zero3
 from taichi_dem.state.model import Model
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS, NEVER
@@ -113,7 +112,7 @@ class Sleeping:
         what it was then; the dashpots' impulse is that of the mean velocity. Energy: what springs
         hold now, less the work of a leapfrog's coming step. Of what exceeds a rounding [m].
         """
-        stiffness, force, energy = self.tables.bond_stiffness[b], zero3(), 0.0
+        stiffness, force, energy = self.tables.bond_stiffness[b], vec3(0.0), 0.0
         motion = advance.motion_of(b)
         for u in range(3 * b, 3 * b + 3):
             arm = unit_arm(motion, self.tables.vertex_slave[u])

@@ -9,7 +9,6 @@ from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.types import vec3
 from taichi_dem.laws.base import Effect, ElasticShear, ElasticTension
-from taichi_dem.physics.rotation import zero3
 
 NOWHERE = ((1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
 
@@ -64,7 +63,7 @@ class Push(Marked):
             swing, _ = sine_and_cosine(math.pi * phase)
             share = swing * swing
         push = share * self.tables.mass[i] * vec3(self.law[0], self.law[1], self.law[2])
-        return push, zero3()
+        return push, vec3(0.0)
 
 
 @ti.data_oriented
@@ -80,10 +79,10 @@ class Mover(Marked):
     @ti.func
     def held(self, i, t, step, rotation, velocity, angular_momentum):
         """Velocity at a time and no spin."""
-        allowed = zero3()
+        allowed = vec3(0.0)
         if t > self.law[3]:
             allowed = vec3(self.law[0], self.law[1], self.law[2])
-        return allowed, zero3()
+        return allowed, vec3(0.0)
 
 
 @ti.data_oriented

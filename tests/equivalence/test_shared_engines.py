@@ -24,9 +24,9 @@ from taichi_dem import (
 )
 from taichi_dem.engine import ENGINES
 from taichi_dem.kit import allocation
+from taichi_dem.kit.types import vec3
 from taichi_dem.laws.base import Effect
 from taichi_dem.mesh.shapes import bar, single
-from taichi_dem.physics.rotation import zero3
 from taichi_dem.state.timeline import NEVER
 
 #: Largest steps of a run: bonds break at the left end, and what they held touches.
@@ -167,9 +167,9 @@ class Careless(Effect):
     @ti.func
     def wrench(self, i, motion):
         """A force along x."""
-        force = zero3()
+        force = vec3(0.0)
         force[0] = self.push * self.tables.mass[i]
-        return force, zero3()
+        return force, vec3(0.0)
 
 
 def test_a_number_that_a_kernel_read_as_a_constant_is_never_another_scenes():

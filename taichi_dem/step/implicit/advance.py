@@ -4,7 +4,7 @@ import taichi as ti
 
 from taichi_dem.kit.allocation import raise_to
 from taichi_dem.kit.products import squared
-from taichi_dem.physics.rotation import zero3
+from taichi_dem.kit.types import vec3
 from taichi_dem.step.advance import Advance
 
 
@@ -35,7 +35,7 @@ class SolvedAdvance(Advance):
         """Bring a body to the present tick with the velocities found by the sweeps."""
         elapsed = self.schedule.elapsed(i)
         velocity, momentum = self.solver.velocities.found(i)
-        _, _, kick = self._loaded(i, elapsed, zero3(), zero3())
+        _, _, kick = self._loaded(i, elapsed, vec3(0.0), vec3(0.0))
         if ti.static(self.ground.present):
             kick = self.ground.noted(kick, self.solver.ground.impulse[i])
         velocity, momentum = self._supported(i, elapsed, kick, velocity, momentum)

@@ -6,7 +6,7 @@ from taichi_dem.contact.cell_grid import group
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.products import cross, dot, matvec, norm, squared
 from taichi_dem.kit.types import real, vec3
-from taichi_dem.physics.rotation import place_in, unit3, zero3
+from taichi_dem.physics.rotation import place_in, unit3
 from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to, is_within, meeting
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
@@ -121,7 +121,7 @@ class PairDashpots:
         branch = self.state.position[j] - self.state.position[i]
         turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
         ahead, m = dt * self.contacts.approach(i, j), self.tables.pair(i, j)
-        force, moment, deepest, parted = zero3(), zero3(), 0.0, 0.0
+        force, moment, deepest, parted = vec3(0.0), vec3(0.0), 0.0, 0.0
         elapsed = 0.0
         if ti.static(self.springs.present):
             elapsed = self.springs.elapsed(p)
@@ -143,14 +143,14 @@ class PairDashpots:
                 moment += cross(arm, self.impulse[k])
                 deepest = ti.max(deepest, overlap / near.size)
                 if ti.static(self.springs.present):
-                    self.pull[end] = zero3()
+                    self.pull[end] = vec3(0.0)
                     if overlap > 0.0:
                         way = self._way(i, j, branch, arm, normal, elapsed)
                         self.springs.follow(k, self.state.rotation[i], normal, way)
                         self.pull[end] = dt * self.springs.force(m, k, self.state.rotation[i])
                 end += 1
             else:
-                self.impulse[k] = zero3()
+                self.impulse[k] = vec3(0.0)
             if not is_within(near, 0.0):
                 parted += self.springs.part(m, k)
         self.store.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
@@ -281,7 +281,7 @@ class PairDashpots:
         branch = self.state.position[j] - self.state.position[i]
         turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
         m = self.tables.pair(i, j)
-        force, moment_i, moment_j, dragged, rubbed = zero3(), zero3(), zero3(), 0.0, 0.0
+        force, moment_i, moment_j, dragged, rubbed = vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0
         all_rub, all_bound = 0.0, 0.0
         for k in range(self.store.first[p], self.store.last[p]):
             pushed = self.impulse[k] / dt
