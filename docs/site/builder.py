@@ -42,11 +42,18 @@ def contents():
         if line.startswith("# "):
             parts.append((line[2:], []))
         elif line and parts:
-            parts[-1][1].append(line)
+            parts[-1][1].extend(fitting(line))
     listed = {line for _, lines in parts for line in lines}
     there = sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))
     more = [name for name in there if name not in listed]
     return [*parts, ("More pages", more)] if more else parts
+
+
+def fitting(line):
+    """The line itself, or the pages that it fits where it has a star."""
+    if "*" not in line:
+        return [line]
+    return sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob(line))
 
 
 def file_of(path):

@@ -124,9 +124,9 @@ class Material:
         """Make a material from measured values; bonds are stiffer where bodies are closer.
 
         Young's modulus and Poisson's ratio of a block then do not depend on the size of its
-        elements: a bond has the stiffness modulus / distance per area (``elasticity.moduli``).
+        elements: a bond has the stiffness modulus / distance per area (``materials.moduli``).
         Contact spheres are as stiff as the bond that they replace
-        (``elasticity.bond_rules.FaceStiffness``).
+        (``materials.bond_rules.FaceStiffness``).
 
         Parameters
         ----------

@@ -9,7 +9,8 @@ from tests.scenes import ROOT
 
 FOLDER = Path(ROOT)
 PAGES = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "RELEASE.md")
-PAGES += tuple(sorted(f"docs/{path.name}" for path in (FOLDER / "docs").glob("*.md")))
+for _pattern in ("docs/*.md", "docs/decisions/*.md"):
+    PAGES += tuple(sorted(path.relative_to(FOLDER).as_posix() for path in FOLDER.glob(_pattern)))
 
 
 def text_of(page):

@@ -125,6 +125,11 @@ def test_the_site_lists_every_page_once():
     assert set(PAGES) <= set(listed) and len(set(listed)) == len(listed)
 
 
+def test_every_decision_has_a_line_on_the_first_page_of_decisions():
+    pages = [page.rpartition("/")[2] for page in PAGES if page.startswith("docs/decisions/0")]
+    assert pages == list(links("docs/decisions/README.md"))
+
+
 @pytest.mark.slow
 def test_the_site_has_no_broken_link(tmp_path):
     build(tmp_path / "site")
