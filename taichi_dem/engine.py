@@ -19,8 +19,8 @@ from taichi_dem.step.advance import Advance
 from taichi_dem.step.drivers import DRIVERS, SolvedStep, Step
 from taichi_dem.step.implicit.advance import SolvedAdvance
 from taichi_dem.step.implicit.solver import Solver
-from taichi_dem.step.schedule import Schedule
-from taichi_dem.step.wake_up import WokenLists
+from taichi_dem.step.multirate.schedule import Schedule
+from taichi_dem.step.multirate.wake_up import WokenLists
 
 
 class Structure:

@@ -40,7 +40,7 @@ from taichi_dem.state.timeline import MACRO_TICKS, NEVER
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.auto_driver import MEASURED, AutoDriver, driver_name
 from taichi_dem.step.drivers import DRIVERS, Step
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 from taichi_dem.step_control import counted_criteria
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.

@@ -17,7 +17,7 @@ from taichi_dem.state.activity import LATER
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.timeline import MACRO_TICKS, NEVER
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 
 #: Times at which effects began on bodies, by the role that they have in a report.
 _TIMES = {

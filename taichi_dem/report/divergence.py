@@ -14,7 +14,7 @@ from taichi_dem.report.shared_volume import SharedVolume
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.step.drivers import CALL_SECONDS
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 
 #: Unexplained energy beyond which a run counts as diverged, as a share of the energy present.
 ENERGY_FROM_NOWHERE = 0.5

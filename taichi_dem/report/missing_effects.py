@@ -17,7 +17,7 @@ from taichi_dem.scene import REMEDY, remedy
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.timeline import NEVER
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 
 _EPSILON = np.finfo(np.float64).eps
 #: Roundings of a coordinate by which two bodies side by side may seem to overlap.

@@ -14,7 +14,7 @@ from taichi_dem.state.activity import PARTS
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.half_step import HalfStep
+from taichi_dem.step.multirate.half_step import HalfStep
 
 
 @ti.data_oriented

@@ -12,7 +12,7 @@ from taichi_dem.stability.quality import quality_report
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 
 #: Share of all energy that an account may leave unexplained while the step is not to blame. Steps
 #: at half of their limits, those that are advised, leave some per cent.

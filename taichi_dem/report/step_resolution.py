@@ -11,7 +11,7 @@ from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.timeline import MAX_LEVEL, NEVER
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 
 #: Least share of its coefficient at which a limited dashpot still represents the material.
 LEAST_SHARE = 0.5

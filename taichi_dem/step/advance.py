@@ -21,7 +21,7 @@ from taichi_dem.step.contact_force import ContactForce
 from taichi_dem.step.ground import GroundDashpots
 from taichi_dem.step.implicit.solver import Solver
 from taichi_dem.step.load_times import LoadTimes
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 from taichi_dem.step.tangential_springs import TangentialSprings
 
 

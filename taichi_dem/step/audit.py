@@ -9,7 +9,7 @@ import taichi as ti
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 
 #: One bond in so many is looked at; a power of two.
 RATE = 1024

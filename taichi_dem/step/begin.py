@@ -6,9 +6,9 @@ from typing import Any
 import taichi as ti
 
 from taichi_dem.kit.products import squared
-from taichi_dem.step.active_list import Everyone, Once
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.lists import Everyone, Once
+from taichi_dem.step.multirate.schedule import Schedule
 
 #: Pairs of a list and the function that is called with each member that is active.
 Phases = tuple[tuple[Any, Callable[..., Any]], ...]

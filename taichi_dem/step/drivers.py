@@ -12,14 +12,14 @@ import taichi as ti
 
 from taichi_dem.contact.search import BroadPhase
 from taichi_dem.kit.allocation import values
-from taichi_dem.step.active_list import Once
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.audit import Audit
 from taichi_dem.step.begin import Begin, Phases, SolvedBegin
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
-from taichi_dem.step.schedule import Schedule
-from taichi_dem.step.wake_up import Chunks, WakeUp
+from taichi_dem.step.multirate.lists import Once
+from taichi_dem.step.multirate.schedule import Schedule
+from taichi_dem.step.multirate.wake_up import Chunks, WakeUp
 
 #: The parallel driver is called for about this long [s] between two checks of divergence, progress
 #: and Ctrl-C.

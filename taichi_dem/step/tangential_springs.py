@@ -8,7 +8,7 @@ from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.products import matvec, transposed_matvec
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 
 
 @ti.data_oriented

@@ -18,8 +18,8 @@ from taichi_dem.scene import Scene
 from taichi_dem.simulate import run_simulation
 from taichi_dem.simulation import Simulation
 from taichi_dem.state.timeline import MAX_LEVEL
-from taichi_dem.step.active_list import Once
 from taichi_dem.step.drivers import Resident, Step
+from taichi_dem.step.multirate.lists import Once
 
 #: What is counted: bonds, contact pairs, and the pairs of spheres that are compared in these.
 KINDS = ("bonds", "pairs", "spheres")

@@ -5,7 +5,7 @@ import taichi as ti
 
 from taichi_dem.state import timeline
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL, coarsest_active
-from taichi_dem.step.active_list import ActiveList, itself
+from taichi_dem.step.multirate.lists import ActiveList, itself
 from taichi_dem.step_control import Displacement
 
 

@@ -15,7 +15,7 @@ from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.implicit.velocities import Velocities
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 
 #: Colours that links of at most four a body can need: a link meets six others at most.
 BOND_COLOURS = 7

@@ -9,7 +9,7 @@ from taichi_dem.physics.rotation import world_tensor
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.implicit.velocities import Velocities
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 
 
 @ti.data_oriented

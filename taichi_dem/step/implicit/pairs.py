@@ -12,7 +12,7 @@ from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.contact_force import PairForces
 from taichi_dem.step.implicit.velocities import Velocities
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 from taichi_dem.step.tangential_springs import TangentialSprings
 
 #: Colours of pairs that share no body; pairs without a free one are visited last, in turn.

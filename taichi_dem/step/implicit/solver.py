@@ -16,7 +16,7 @@ from taichi_dem.step.implicit.bonds import BOND_COLOURS, BondDashpots
 from taichi_dem.step.implicit.ground import GroundSweeps
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
 from taichi_dem.step.implicit.velocities import Velocities
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 
 
 @ti.data_oriented

@@ -23,9 +23,8 @@ from taichi_dem.state.timeline import (
     device_coarsest_active,
     device_ticks_of,
 )
-from taichi_dem.step.active_list import ActiveList, first_key, itself
-from taichi_dem.step.applied_until import AppliedUntil
-from taichi_dem.step.level_limit import LevelLimit
+from taichi_dem.step.multirate.lists import ActiveList, first_key, itself
+from taichi_dem.step.multirate.neighbours import AppliedUntil, LevelLimit
 from taichi_dem.step.sleeping import ASLEEP, Sleeping
 from taichi_dem.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 

@@ -4,7 +4,7 @@ import taichi as ti
 
 from taichi_dem.kit.types import vec2
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.multirate.schedule import Schedule
 from taichi_dem.step.sleeping import ASLEEP
 
 
