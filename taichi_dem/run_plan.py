@@ -1,18 +1,21 @@
-"""When a run is sampled, photographed, observed and reported; all of these are observers of it."""
+"""When a run is sampled, photographed, observed and reported."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Optional, Union
+from typing import Callable, Optional, Union
 
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import LEAST_SHARE, Listener, Progress
+from taichi_dem.kit.progress.progress import LEAST_SHARE, Listener, Pace, Progress
 from taichi_dem.kit.validation import is_whole, progress_option, shown
-from taichi_dem.observers import Every, Observer, ObserverCalls, checked_observers
+from taichi_dem.methods import Method
+from taichi_dem.observers import Every, Observer, RunView, checked_observers
+from taichi_dem.output.receivers import receivers_among
 from taichi_dem.output.record import Recorder
 from taichi_dem.scene import Scene
-from taichi_dem.simulation import Simulation
+from taichi_dem.simulation import Simulation, macro_steps
 
+Call = Callable[[RunView], object]
 #: Progress is reported this often [s].
 _REPORT_SECONDS = 0.2
 #: Most samples or frames of a run: each reads all bodies.
@@ -59,98 +62,84 @@ def progress_of(simulation: Simulation, until: float) -> RunProgress:
 
 
 class RunPlan:
-    """Checked answer to when a run is sampled, photographed, observed and reported.
+    """When a run is sampled, photographed, observed and reported, checked before it begins.
 
-    last: number of largest steps of dt0 [s]. Raises InputError.
+    last: number of largest steps. receivers: those among the observers. Raises InputError.
     """
 
     def __init__(
         self,
-        last: int,
-        dt0: float,
+        scene: Scene,
+        method: Method,
+        until: float,
         samples: int,
         frames: int,
         observers: Sequence[Observer],
         progress: Union[Listener, str, None],
     ):
+        self.dt0, self.last = method.dt0, macro_steps(until, method.dt0)
         _check_count("samples", samples, 1)
         _check_count("frames", frames, 0)
         progress_option("progress", progress)
-        self.last, self.dt0, self.samples, self.frames = last, dt0, samples, frames
-        self.observers = checked_observers(observers)
-        ObserverCalls(self.observers, last, dt0, samples)
-
-    def check_scene(self, scene: Scene) -> None:
-        """Let the observers that want it look at the scene of the run; they raise InputError."""
-        for observer in self.observers:
-            check = getattr(observer, "check_scene", None)
-            if check is not None:
-                check(scene)
+        self.samples, self.frames = samples, frames
+        self.observed = [
+            (one.observe, one.when.marks(self.last, self.dt0, samples), one.when.wall_s)
+            for one in checked_observers(observers)
+        ]
+        for one in observers:
+            if hasattr(one, "check_scene"):
+                one.check_scene(scene)
+        self.receivers = receivers_among(observers)
 
     def calls(
         self, simulation: Simulation, recorder: Recorder, report_progress: Optional[Listener]
-    ) -> ObserverCalls:
-        """ObserverCalls of a run: samples and frames come before the user's observers."""
-        observers: list[Any] = [_Sampler(simulation, recorder)]
-        observers += [_Photographer(recorder, self.frames), *self.observers]
+    ) -> "Calls":
+        """Calls of a run: samples and frames come before the user's observers."""
+
+        def sample(_):
+            with simulation.readings.held():
+                simulation.sample()
+                recorder.sample()
+
+        made = Calls()
+        made.add(sample, self._evenly(self.samples))
+        if self.frames:
+            made.add(lambda _: recorder.snapshot(), self._evenly(self.frames))
+        for observed in self.observed:
+            made.add(*observed)
         if report_progress is not None:
-            until = self.last * self.dt0
-            observers.append(_Reporter(simulation, until, report_progress))
-        return ObserverCalls(observers, self.last, self.dt0, self.samples)
+            tell, until = report_progress, self.last * self.dt0
+            made.add(lambda _: tell(progress_of(simulation, until)), {self.last}, _REPORT_SECONDS)
+        return made
+
+    def _evenly(self, count):
+        return Every(samples=1).marks(self.last, self.dt0, count)
 
 
-class _Sampler:
-    """Adds rows to the time series, and samples missing effects."""
+class Calls:
+    """What is called with a view at which of the largest steps, and what by the clock; in order."""
 
-    when = Every(samples=1)
+    def __init__(self) -> None:
+        self.at: dict[int, list[Call]] = {}
+        self.paced: list[tuple[Call, Pace]] = []
 
-    def __init__(self, simulation, recorder):
-        self.simulation, self.recorder = simulation, recorder
+    def add(self, call: Call, steps: set[int], wall_s: Optional[float] = None) -> None:
+        """Add a call at steps, and every so much wall time [s]."""
+        for step in steps:
+            self.at.setdefault(step, []).append(call)
+        if wall_s is not None:
+            self.paced.append((call, Pace(wall_s)))
 
-    def observe(self, view):
-        """Sample."""
-        with self.simulation.readings.held():
-            self.simulation.sample()
-            self.recorder.sample()
+    def at_step(self, step: int, view: RunView) -> None:
+        """Make the calls of a step."""
+        for call in self.at.get(step, ()):
+            call(view)
 
-
-class _EvenlySpaced:
-    """A number of times after the start; none for 0.
-
-    Apart from its observer: one that named itself would keep its simulation until the next
-    collection of garbage, and the engine would put its data aside meanwhile.
-    """
-
-    def __init__(self, count):
-        self.count = count
-
-    def marks(self, last, dt, samples):
-        """Largest steps at which to call."""
-        return Every(samples=1).marks(last, dt, self.count) if self.count else set()
-
-
-class _Photographer:
-    """Keeps a number of frames after the one at the start."""
-
-    def __init__(self, recorder, count):
-        self.when, self.recorder = _EvenlySpaced(count), recorder
-
-    def observe(self, view):
-        """Keep a frame."""
-        self.recorder.snapshot()
-
-
-class _Reporter:
-    """Reports progress towards a time [s]."""
-
-    when = Every(wall_s=_REPORT_SECONDS)
-
-    def __init__(self, simulation, until, report_progress):
-        self.simulation, self.until, self.report_progress = simulation, until, report_progress
-
-    def observe(self, view):
-        """Report."""
-        self.report_progress(progress_of(self.simulation, self.until))
+    def by_clock(self, view: RunView) -> None:
+        """Make the calls whose wall time has passed."""
+        for call, pace in self.paced:
+            if pace.should_report():
+                call(view)
 
 
 def _check_count(name, value, least):
