@@ -208,22 +208,6 @@ class Scene:
         bonds = "dashpot" in roles and material.has_bond_damping
         return bonds or (touching and "contact" in roles and material.has_contact_damping)
 
-    def has(self, name: str) -> bool:
-        """Whether an effect is listed.
-
-        Parameters
-        ----------
-        name : str
-            Name of the effect.
-
-        Returns
-        -------
-        bool
-            True where it is listed.
-        """
-        word("name", name)
-        return any(effect.name == name for effect in self.effects)
-
 
 def kind_of(scene: Scene) -> Hashable:
     """Kind of a scene: classes of its effects, and number of its bodies."""
