@@ -63,8 +63,6 @@ class Simulation(Uncopied):
     driver : str, default "auto"
         ``"resident"``, ``"parallel"``, or ``"auto"``: parallel on a GPU and for large scenes; for
         those of middle size on several threads, the faster one by measurement.
-    brute_force : bool, default False
-        Contact search without cells, for tests.
 
     Attributes
     ----------
@@ -101,9 +99,7 @@ class Simulation(Uncopied):
     # None before the start.
     energy_balance: Any
 
-    def __init__(
-        self, scene: Scene, method: Method, driver: str = "auto", brute_force: bool = False
-    ):
+    def __init__(self, scene: Scene, method: Method, driver: str = "auto"):
         instance("scene", scene, Scene)
         check_method(method)
         choice("driver", driver, ("auto", *DRIVERS))
@@ -113,8 +109,7 @@ class Simulation(Uncopied):
         self.scene, self.method, self.solves = scene, method, method.solves
         self.model = Model(scene.mesh, scene.body_materials, scene.effects)
         name = driver_name(driver, self.model.bond_count)
-        flag("brute_force", brute_force)
-        structure = Structure(scene.effects, method, brute_force, scene.on_demand)
+        structure = Structure(scene.effects, method, scene.on_demand)
         self.loan = ENGINES.borrow(structure, capacity_of(self.model), self.model, "simulation")
         self._take_parts()
         self._load()
@@ -196,8 +191,7 @@ class Simulation(Uncopied):
 
     def _check_reset(self, scene, method, model):
         engine = self.loan.engine
-        brute_force = engine.structure.brute_force
-        if Structure(scene.effects, method, brute_force, scene.on_demand) != engine.structure:
+        if Structure(scene.effects, method, scene.on_demand) != engine.structure:
             raise InputError(
                 "reset must have a scene and a method of the same structure, kinds of effects and "
                 f"of steps, got {scene!r} and {method!r}: make a new Simulation"
