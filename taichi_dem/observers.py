@@ -1,6 +1,5 @@
 """Observers of a run: objects that ``simulate`` calls with a read-only view of it."""
 
-import inspect
 import math
 from dataclasses import dataclass
 from typing import Any, Callable, ClassVar, Optional, Protocol, Union
@@ -395,19 +394,8 @@ def checked_observers(observers: Any) -> tuple:
             raise InputError(
                 f"observers[{place}] must have a member when, an Every or an At, got {shown(when)}"
             )
-        if not _takes_one(getattr(one, "observe", None)):
-            got = shown(getattr(one, "observe", None))
-            raise InputError(f"observers[{place}] must have a method observe(view), got {got}")
+        if isinstance(one, type) or not callable(getattr(one, "observe", None)):
+            raise InputError(
+                f"observers[{place}] must have a method observe(view), got {shown(one)}"
+            )
     return tuple(observers)
-
-
-def _takes_one(observe):
-    """Whether something can be called with a view; a method without its object cannot."""
-    try:
-        inspect.signature(observe).bind(None)
-    except TypeError:
-        return False
-    except ValueError:
-        # Functions of other languages may hide their signature.
-        return callable(observe)
-    return True

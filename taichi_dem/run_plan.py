@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import Callable, Optional, Union
 
 from taichi_dem.kit.display import prefixed
-from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import LEAST_SHARE, Listener, Pace, Progress
-from taichi_dem.kit.validation import is_whole, progress_option, shown
+from taichi_dem.kit.validation import progress_option, whole
 from taichi_dem.methods import Method
 from taichi_dem.observers import Every, Observer, RunView, checked_observers
 from taichi_dem.output.receivers import receivers_among
@@ -78,8 +77,8 @@ class RunPlan:
         progress: Union[Listener, str, None],
     ):
         self.dt0, self.last = method.dt0, macro_steps(until, method.dt0)
-        _check_count("samples", samples, 1)
-        _check_count("frames", frames, 0)
+        whole("samples", samples, 1, _MOST_RECORDS)
+        whole("frames", frames, 0, _MOST_RECORDS)
         progress_option("progress", progress)
         self.samples, self.frames = samples, frames
         self.observed = [
@@ -140,11 +139,3 @@ class Calls:
         for call, pace in self.paced:
             if pace.should_report():
                 call(view)
-
-
-def _check_count(name, value, least):
-    if not is_whole(value) or not least <= value <= _MOST_RECORDS:
-        raise InputError(
-            f"{name} must be a whole number of at least {least} and at most {_MOST_RECORDS}, "
-            f"got {shown(value)}"
-        )

@@ -187,19 +187,16 @@ def _opened(scene, method, checkpoint, resume, plan):
 
 def _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays):
     """Writer of checkpoints, after a resumed run has been restored."""
-    if checkpoint is None and resume is None:
-        return NoCheckpointWriter()
-    saved = saved_run(simulation, recorder)
     if arrays:
-        saved.restore(arrays, resume)
+        saved_run(simulation, recorder).restore(arrays, resume)
+    if checkpoint is None:
+        return NoCheckpointWriter()
 
     def now():
         """Present largest step, and time [s]."""
         return simulation.state.tick[None] // MACRO_TICKS, simulation.time_s
 
-    if checkpoint is None:
-        return NoCheckpointWriter()
-    return CheckpointWriter(checkpoint, saved, now)
+    return CheckpointWriter(checkpoint, saved_run(simulation, recorder), now)
 
 
 def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
