@@ -11,6 +11,7 @@ from _blast import EFFECTS
 from _effects_frozen import paired_costs, states_of_run
 from _effects_runs import PEAK
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Material, Scene, read_mesh, simulate
+from taichi_dem.demo import figures_of_certificate
 
 #: Effects in the order in which they are added; the load is always there.
 ORDER = ("bond_damping", "softening", "shear_slip", "sphere_contact", "friction")
@@ -93,17 +94,8 @@ def scene_of(material, peak, names):
 def certificate(until, step):
     """Figures of the certificate of the paper's blast with effects="auto"."""
     scene = scene_of(CONCRETE, PEAK, AUTO)
-    found = simulate(
-        scene, until=until, method=ImplicitDashpots(step), samples=1
-    ).report.certificate
-    misses = sum(audit.misses for audit in found.audits)
-    audited = sum(audit.audited for audit in found.audits)
-    return {
-        "fracture_evaluations_ratio": (found.law_ratio, "1"),
-        "asleep_percent": (100.0 * found.asleep, "%"),
-        "audited": (audited, "1"),
-        "audit_misses": (misses, "1"),
-    }
+    found = simulate(scene, until=until, method=ImplicitDashpots(step), samples=1)
+    return figures_of_certificate(found.certificate)
 
 
 def middles(count, until):

@@ -14,11 +14,10 @@ from taichi_dem.engine import ENGINES, Structure
 from taichi_dem.engine_view import PartView
 from taichi_dem.kit import runtime
 from taichi_dem.kit.display import counted, in_brief
-from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, instance, positive, shown, told_apart, whole
-from taichi_dem.loads.gas_pressure import GasPressure
 from taichi_dem.methods import Method, check_method
 from taichi_dem.report.bond_slip import BondSlips
 from taichi_dem.report.certificate import acting_since, certificate_of
@@ -374,17 +373,6 @@ class Simulation(Uncopied):
             steps *= 1.0 + self.sweeps() / max(1, int(self.schedule.evaluations[0]))
         return float(members @ steps) / self.method.dt0
 
-    def gas_work(self) -> float:
-        """Work of the gas pressure.
-
-        Returns
-        -------
-        float
-            Work [J], zero without gas.
-        """
-        places = [k for k, load in enumerate(self.model.loads) if isinstance(load, GasPressure)]
-        return sum(self.energy_balance.load_work(place) for place in places)
-
     def report(self, brief: bool = False) -> Report:
         """Report of the run so far.
 
@@ -480,6 +468,3 @@ def macro_steps(until: float, dt0: float) -> int:
             f"until must be at most {most} s, {MOST_STEPS} largest steps of {dt0:g} s, got {got}"
         )
     return max(1, math.ceil(steps - 1e-9))
-
-
-__all__ = ["Simulation", "SimulationDiverged", "macro_steps"]
