@@ -16,6 +16,7 @@ from taichi_dem.kit.validation import (
     between,
     finite,
     flag,
+    instance,
     positive,
     shown,
     told_apart,
@@ -115,7 +116,8 @@ class Scene:
     body_materials: ClassVar[BodyMaterials]
 
     def __post_init__(self):
-        _check_body(self)
+        instance("mesh", self.mesh, Mesh)
+        instance("material", self.material, Material)
         object.__setattr__(self, "mesh", _bonded(self))
         laid = body_materials(self.mesh, self.material, self.materials)
         object.__setattr__(self, "body_materials", laid)
@@ -284,13 +286,6 @@ def _sleep_of(scene):
     if sleep and not scene.on_demand:
         raise InputError(f"sleep must be 0 unless effects is 'auto', got {sleep:g}")
     return sleep
-
-
-def _check_body(scene):
-    if not isinstance(scene.mesh, Mesh):
-        raise InputError(f"mesh must be a Mesh (see read_mesh), got {type(scene.mesh).__name__}")
-    if not isinstance(scene.material, Material):
-        raise InputError(f"material must be a Material, got {type(scene.material).__name__}")
 
 
 def _check_types(scene):
