@@ -67,6 +67,9 @@ class Method(Protocol):
         """
 
 
+_MEMBERS = members_of(Method)
+
+
 def check_method(method: object) -> None:
     """Refuse a method that does not keep the contract ``Method``.
 
@@ -80,14 +83,13 @@ def check_method(method: object) -> None:
     InputError
         It is no method, or lacks a member, which is named.
     """
-    wanted = members_of(Method)
-    missing = [name for name in wanted if not hasattr(method, name)]
-    if isinstance(method, type) or len(missing) > len(wanted) // 2:
+    missing = [name for name in _MEMBERS if not hasattr(method, name)]
+    if isinstance(method, type) or len(missing) > len(_MEMBERS) // 2:
         raise InputError(f"method must be one such as ImplicitDashpots(), got {shown(method)}")
     if missing:
         raise InputError(
             f"method {type(method).__name__} must have a member {missing[0]}; methods have "
-            f"{', '.join(wanted)}"
+            f"{', '.join(_MEMBERS)}"
         )
 
 

@@ -382,20 +382,3 @@ class RunView(Uncopied):
 def _locked(array):
     array.flags.writeable = False
     return array
-
-
-def checked_observers(observers: Any) -> tuple:
-    """Observers as a tuple; InputError for one without a member, or with a wrong one."""
-    if not isinstance(observers, (list, tuple)):
-        raise InputError(f"observers must be a list of observers, got {shown(observers)}")
-    for place, one in enumerate(observers):
-        when = getattr(one, "when", None)
-        if not isinstance(when, (Every, At)):
-            raise InputError(
-                f"observers[{place}] must have a member when, an Every or an At, got {shown(when)}"
-            )
-        if isinstance(one, type) or not callable(getattr(one, "observe", None)):
-            raise InputError(
-                f"observers[{place}] must have a method observe(view), got {shown(one)}"
-            )
-    return tuple(observers)

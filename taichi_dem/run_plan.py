@@ -1,18 +1,20 @@
 """When a run is sampled, photographed, observed and reported."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Callable, Optional, Union
 
 from taichi_dem.kit.display import prefixed
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import LEAST_SHARE, Listener, Pace, Progress
-from taichi_dem.kit.validation import progress_option, whole
+from taichi_dem.kit.validation import positive, progress_option, shown, told_apart, whole
 from taichi_dem.methods import Method
-from taichi_dem.observers import Every, Observer, RunView, checked_observers
-from taichi_dem.output.receivers import receivers_among
+from taichi_dem.observers import At, Every, Observer, RunView
+from taichi_dem.output.receivers import Receivers
 from taichi_dem.output.record import Recorder
 from taichi_dem.scene import Scene
-from taichi_dem.simulation import Simulation, macro_steps
+from taichi_dem.simulation import MOST_STEPS, Simulation
 
 Call = Callable[[RunView], object]
 #: Progress is reported this often [s].
@@ -83,12 +85,12 @@ class RunPlan:
         self.samples, self.frames = samples, frames
         self.observed = [
             (one.observe, one.when.marks(self.last, self.dt0, samples), one.when.wall_s)
-            for one in checked_observers(observers)
+            for one in _checked(observers)
         ]
         for one in observers:
             if hasattr(one, "check_scene"):
                 one.check_scene(scene)
-        self.receivers = receivers_among(observers)
+        self.receivers = _receivers_among(observers)
 
     def calls(
         self, simulation: Simulation, recorder: Recorder, report_progress: Optional[Listener]
@@ -139,3 +141,41 @@ class Calls:
         for call, pace in self.paced:
             if pace.should_report():
                 call(view)
+
+
+def macro_steps(until: float, dt0: float) -> int:
+    """Number of largest steps that reach a time [s]; InputError unless it can be counted to."""
+    steps = positive("until", until) / dt0
+    if steps > MOST_STEPS:
+        got, most = told_apart(until, MOST_STEPS * dt0)
+        raise InputError(
+            f"until must be at most {most} s, {MOST_STEPS} largest steps of {dt0:g} s, got {got}"
+        )
+    return max(1, math.ceil(steps - 1e-9))
+
+
+def _checked(observers):
+    """Observers as a tuple; InputError for one without a member, or with a wrong one."""
+    if not isinstance(observers, (list, tuple)):
+        raise InputError(f"observers must be a list of observers, got {shown(observers)}")
+    for place, one in enumerate(observers):
+        when = getattr(one, "when", None)
+        if not isinstance(when, (Every, At)):
+            raise InputError(
+                f"observers[{place}] must have a member when, an Every or an At, got {shown(when)}"
+            )
+        if isinstance(one, type) or not callable(getattr(one, "observe", None)):
+            raise InputError(
+                f"observers[{place}] must have a method observe(view), got {shown(one)}"
+            )
+    return tuple(observers)
+
+
+def _receivers_among(observers):
+    """Receivers among observers; InputError where two have one name."""
+    found = [one for one in observers if isinstance(one, Receivers)]
+    names = [name for one in found for name in one.points]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f"observers must have receivers of different names, got {twice[0]} twice")
+    return found

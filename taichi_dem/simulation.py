@@ -2,7 +2,6 @@
 
 import contextlib
 import copy
-import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -17,7 +16,7 @@ from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
-from taichi_dem.kit.validation import choice, flag, instance, positive, shown, told_apart, whole
+from taichi_dem.kit.validation import choice, flag, instance, shown, whole
 from taichi_dem.methods import Method, check_method
 from taichi_dem.report.bond_slip import BondSlips
 from taichi_dem.report.certificate import acting_since, certificate_of
@@ -457,14 +456,3 @@ class Simulation(Uncopied):
             Times [s], shape (body_count,), by name; NaN for never.
         """
         return acting_since(self.model, self.state, self.schedule)
-
-
-def macro_steps(until: float, dt0: float) -> int:
-    """Number of largest steps that reach a time [s]; InputError unless it can be counted to."""
-    steps = positive("until", until) / dt0
-    if steps > MOST_STEPS:
-        got, most = told_apart(until, MOST_STEPS * dt0)
-        raise InputError(
-            f"until must be at most {most} s, {MOST_STEPS} largest steps of {dt0:g} s, got {got}"
-        )
-    return max(1, math.ceil(steps - 1e-9))
