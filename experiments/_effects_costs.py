@@ -1,16 +1,17 @@
 """Costs of a step of the blast with other effects, from the same states (``cost_of_effects.py``).
 
 The functions are called in a process of their own, where all candidates are alive at once and take
-turns. A cost is a dict of the numbers in a ``StepCost``.
+turns. A cost is a dict of numbers, see ``paired_costs``.
 """
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 from _blast import EFFECTS
+from _effects_frozen import paired_costs, states_of_run
 from _effects_runs import PEAK
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Material, Scene, read_mesh, simulate
-from taichi_dem.paired_cost import paired_cost, states_of_run
+from taichi_dem.demo import figures_of_certificate
 
 #: Effects in the order in which they are added; the load is always there.
 ORDER = ("bond_damping", "softening", "shear_slip", "sphere_contact", "friction")
@@ -60,7 +61,7 @@ def blast_costs(scenes, until, step, states, **timing):
     for scene, names in scenes.items():
         if set(names) & set(REPLACING):
             begun[scene] = states_of_run(candidates[scene], method, times)
-    return told(paired_cost(candidates, begun, method, **timing))
+    return paired_costs(candidates, begun, method, **timing)
 
 
 def list_costs(scenes, until, step, states, **timing):
@@ -75,7 +76,7 @@ def list_costs(scenes, until, step, states, **timing):
         lists = {BEST: best, AUTO: AUTO, EVERY: ORDER}
         candidates = {name: scene_of(material, peak, names) for name, names in lists.items()}
         begun = {name: states_of_run(one, method, times) for name, one in candidates.items()}
-        found[scene] = told(paired_cost(candidates, begun, method, **timing))
+        found[scene] = paired_costs(candidates, begun, method, **timing)
     return found
 
 
@@ -93,25 +94,10 @@ def scene_of(material, peak, names):
 def certificate(until, step):
     """Figures of the certificate of the paper's blast with effects="auto"."""
     scene = scene_of(CONCRETE, PEAK, AUTO)
-    found = simulate(
-        scene, until=until, method=ImplicitDashpots(step), samples=1
-    ).report.certificate
-    misses = sum(audit.misses for audit in found.audits)
-    audited = sum(audit.audited for audit in found.audits)
-    return {
-        "fracture_evaluations_ratio": (found.law_ratio, "1"),
-        "asleep_percent": (100.0 * found.asleep, "%"),
-        "audited": (audited, "1"),
-        "audit_misses": (misses, "1"),
-    }
+    found = simulate(scene, until=until, method=ImplicitDashpots(step), samples=1)
+    return figures_of_certificate(found.certificate)
 
 
 def middles(count, until):
     """Times [s] in the middle of equal parts of a run."""
     return [until * (k + 0.5) / count for k in range(count)]
-
-
-def told(costs):
-    """Costs by name, as dicts of numbers."""
-    parts = {name: asdict(cost) for name, cost in costs.items()}
-    return {name: {**part.pop("timing"), **part} for name, part in parts.items()}

@@ -6,11 +6,11 @@ from functools import partial
 import numpy as np
 
 from _blast import EFFECTS
+from _effects_stripped import elastic_step_seconds
 from ca_damper import Automaton, Batch, Oscillator, SceneTable, Spheres
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.errors import SimulationDiverged
-from taichi_dem.measured_overhead import elastic_step_seconds
 
 FILLINGS = {"spheres": Spheres, "automaton": partial(Automaton, rules="paper")}
 PEAK = 575e6

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from _closed_forms import bond_shear, bond_tension
 from taichi_dem import CONCRETE, Every, effects
-from taichi_dem.closed_forms import bond_shear, bond_tension
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, picture
 from taichi_dem.kit.study import Table

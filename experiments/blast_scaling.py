@@ -27,12 +27,12 @@ import numpy as np
 
 from _blast import blast_parser, paper_scene
 from _scaling_threads import ROUNDS, thread_gains
+from _scaling_work import record_workload
+from _scaling_workers import WAYS, Workers, draw_acceleration, draw_cuts, draw_shares
 from taichi_dem import Multirate, ProgressBar
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, PURPLE, RED, picture
-from taichi_dem.workload import WAYS, Workers, record_workload
-from taichi_dem.workload.picture import draw_acceleration, draw_cuts, draw_shares
 
 NAME = "blast_scaling"
 SETTINGS = {
@@ -67,8 +67,8 @@ options_parser = partial(blast_parser, NAME, __doc__, (), settings=SETTINGS)
 def run(options):
     """Record, simulate, measure, picture."""
     scene, at = paper_scene(options.mesh), study.output_paths(options.out)
-    counting = {"until": options.until, "every": options.every, "title": "blast"}
-    workload, simulation = record_workload(scene, Multirate(DT0, options.l), **counting)
+    counting = options.until, options.every
+    workload, simulation = record_workload(scene, Multirate(DT0, options.l), *counting)
     workers = Workers(workload)
     shared = {way: {n: workers.share(way, n) for n in options.counts} for way in WAYS}
     bar, block = gains = measured(options)

@@ -15,17 +15,26 @@ alone, without compiling.
 """
 
 import sys
+from dataclasses import asdict
 from functools import partial
 
 import numpy as np
 
+from _accuracy_steps import (
+    SPLIT,
+    Outcome,
+    StepStudy,
+    displacement_error,
+    energy_error,
+    faces_error,
+    outcome_of,
+)
 from _blast import blast_parser, paper_scene
-from taichi_dem import ImplicitDashpots, Multirate, ProgressBar, StepControl, Uniform, outcome
+from taichi_dem import ImplicitDashpots, Multirate, ProgressBar, StepControl, Uniform
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import power, seconds, styles_of
 from taichi_dem.kit.study.work_precision import percent
 from taichi_dem.kit.study.work_precision_picture import picture_errors, picture_work_precision
-from taichi_dem.step_study import StepStudy
 
 NAME = "cost_of_accuracy_blast"
 TARGETS = (0.1, 0.01, 0.001)
@@ -73,14 +82,14 @@ SETTINGS = {
 }
 #: Errors by the picture's words, the displacements' first.
 MEASURES = {
-    "displacement field": outcome.displacement_error,
-    "faces broken in one only": outcome.faces_error,
-    "energy split / work of the gas": outcome.energy_error,
+    "displacement field": displacement_error,
+    "faces broken in one only": faces_error,
+    "energy split / work of the gas": energy_error,
 }
-SPLIT = (*outcome.SPLIT, "load_work")
+TERMS = (*SPLIT, "load_work")
 COLUMNS = (
     "method step disturbed displacement_error faces_error energy_error broken_faces evaluations "
-    f"cpu_s wall_s compile_s residual reached_s {' '.join(f'{term}_J' for term in SPLIT)} failure"
+    f"cpu_s wall_s compile_s residual reached_s {' '.join(f'{term}_J' for term in TERMS)} failure"
 )
 #: Times are of one thread.
 options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS, threads=1)
@@ -95,7 +104,7 @@ def run(options):
     points = [point for one in studies.values() for point in one.points(reference)]
     floors = {name: one.floor for name, one in studies.items() if one.twins}
     titles = {name: style.label for name, style in styles_of(studies).items()}
-    check = outcome.displacement_error([*studies[CHECK].runs.values()][-1], reference)
+    check = displacement_error([*studies[CHECK].runs.values()][-1], reference)
     study.give_answers(options.out, points, TARGETS, floors, titles)
     rows = [row_of(("reference", np.nan, 0), reference, reference)]
     for name, one in studies.items():
@@ -123,9 +132,9 @@ def reference_of(scene, options, folder):
     place = folder / "references", "implicit", (scene, method, options.until), ("taichi_dem",)
     with ProgressBar("reference") as bar:
         job = {"driver": options.driver, "progress": bar}
-        made = partial(outcome.outcome_of, scene, method, options.until, **job)
-        found, kept = study.cached(*place, lambda: made().as_dict())
-    return outcome.Outcome(**found), kept
+        made = partial(outcome_of, scene, method, options.until, **job)
+        found, kept = study.cached(*place, lambda: asdict(made()))
+    return Outcome(**found), kept
 
 
 def study_of(name, steps, scene, options):
@@ -148,7 +157,7 @@ def row_of(key, run, reference):
     """Row of runs.csv: all errors of a run, its cost and its energy split."""
     errors = [np.nan if run.failure else error(run, reference) for error in MEASURES.values()]
     cost = run.evaluations, run.cpu_s, run.wall_s, run.compile_seconds, run.residual, run.reached_s
-    energy = [run.energy[term] for term in SPLIT]
+    energy = [run.energy[term] for term in TERMS]
     # A comma would end the cell.
     return (*key, *errors, len(run.broken), *cost, *energy, run.failure.replace(",", ";"))
 
@@ -194,7 +203,7 @@ def figures_of(points, studies, reference):
     figures = {}
     paper = studies["uniform"].runs.get(PAPER_L) if "uniform" in studies else None
     if paper:
-        error = outcome.displacement_error(paper, reference)
+        error = displacement_error(paper, reference)
         figures = {"paper_rule_seconds": (paper.cpu_s, "s"), "paper_rule_error": (error, "1")}
     fixed = [point for point in points if point.method == "fixed"]
     if fixed:

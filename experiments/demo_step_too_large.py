@@ -21,8 +21,8 @@ from _step_too_large import TABLE, Struck, caption, corner_speed, write
 from taichi_dem.kit import study
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.mesh.shapes import bar
+from taichi_dem.run_plan import macro_steps
 from taichi_dem.simulate import result_of
-from taichi_dem.simulation import macro_steps
 
 NAME = "demo_step_too_large"
 SETTINGS = {

@@ -27,21 +27,12 @@ class Structure:
     """Compiled structure of a scene and a method: classes of effects, kind of method.
 
     Scenes of equal structures share kernels. effects, method: those of the first scene, of which
-    engines make copies. brute_force: contact search without cells. on_demand: laws are evaluated
-    only where they act.
+    engines make copies. on_demand: laws are evaluated only where they act.
     """
 
-    def __init__(
-        self,
-        effects: Iterable[Effect],
-        method: Method,
-        brute_force: bool = False,
-        on_demand: bool = False,
-    ):
-        self.effects, self.method = tuple(effects), method
-        self.brute_force, self.on_demand = brute_force, on_demand
-        kinds = tuple(map(type, self.effects))
-        self.key = kinds, structure_of(method), brute_force, on_demand
+    def __init__(self, effects: Iterable[Effect], method: Method, on_demand: bool = False):
+        self.effects, self.method, self.on_demand = tuple(effects), method, on_demand
+        self.key = tuple(map(type, self.effects)), structure_of(method), on_demand
 
     def __eq__(self, other):
         return self.key == other.key
@@ -77,7 +68,7 @@ class BlastEngine(Engine):
         self.broad_phase = None
         if self.contacts is not None:
             told = self.schedule.start_pairs, self.schedule.limits
-            self.broad_phase = BroadPhase(self.contacts, *told, self.structure.brute_force)
+            self.broad_phase = BroadPhase(self.contacts, *told)
         kind = SolvedStep if method.solves else Step
         self.step = kind(self.advance, self.schedule, self.broad_phase)
         self.drivers = {name: driver(self.step) for name, driver in DRIVERS.items()}

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import LARGEST, direction, shown
+from taichi_dem.kit.validation import direction, real_numbers, shown
 from taichi_dem.mesh.mesh import Mesh, volumes
 
 #: A vector for all bodies, one for each body group by name, a row for each body, or a function
@@ -54,13 +54,13 @@ def _rows(name, given, mesh, centre) -> tuple[np.ndarray, list[_Shared]]:
     if isinstance(given, Mapping) and given:
         return _by_group(name, given, mesh)
     found = given(centre.copy()) if callable(given) else given
-    array = _numbers(found)
+    array = real_numbers(name, found)
     one = array.shape == (3,) and not callable(given)
     if not (one or array.shape == centre.shape):
         raise InputError(
             f"{name} must be three numbers, for all bodies or by body group, or three for each of "
-            f"{len(centre)} bodies, as an array or by a function of their centres, all finite and "
-            f"none above {LARGEST:g}, got {shown(found)}"
+            f"{len(centre)} bodies, as an array or by a function of their centres, "
+            f"got {shown(found)}"
         )
     shared = [(np.arange(len(centre)), array)] if one else []
     return np.array(np.broadcast_to(array, centre.shape)), shared
@@ -93,17 +93,6 @@ def _bodies_of(name, given, group, mesh):
         raise InputError(
             f"{name} must have names of body groups, got {shown(given)}: {error}"
         ) from None
-
-
-def _numbers(found):
-    """Finite numbers as an array of floats; an empty one for anything else."""
-    try:
-        array = np.array(found)
-    except (TypeError, ValueError, OverflowError):
-        return np.zeros(0)
-    # In 64 bits first: in 32 the limit itself would be infinite.
-    numbers = array.astype(np.float64) if array.dtype.kind in "iuf" else np.zeros(0)
-    return numbers if (np.abs(numbers) <= LARGEST).all() else np.zeros(0)
 
 
 def _middle(mesh, centre, bodies):

@@ -4,24 +4,16 @@ The gains of a ``Report`` count evaluations. Changes of lists, tests for active 
 lines that are used in part cost time beside them.
 """
 
-import contextlib
-from dataclasses import is_dataclass, replace
-from typing import Optional
+from dataclasses import replace
 
 import numpy as np
 
-from taichi_dem.kit.errors import SimulationDiverged
-from taichi_dem.kit.progress.progress import listening
-from taichi_dem.kit.validation import LARGEST
+from taichi_dem.kit.validation import LARGEST, instance, positive
 from taichi_dem.simulation import Simulation
 from taichi_dem.state.timeline import NEVER
 
 #: Substeps to begin with.
 _FIRST = 64
-#: Share of a run's CPU time that the measurement takes at its end, and the most of it [s].
-SHARE, MOST_SECONDS = 0.1, 0.5
-#: Shorter runs are not measured [s].
-LEAST_RUN = 0.5
 #: Fields that a twin does not copy: clock, steps, pending impulses, and account.
 _ANEW = (
     *("level", "bound", "tick", "last_tick", "injected_tick", "slot", "max_speed2", "bad_body"),
@@ -29,28 +21,34 @@ _ANEW = (
 )
 
 
-def speedup_of_run(simulation: Simulation) -> Optional[float]:
-    """Call ``measured_speedup`` for a share of the run's own time; None if not measurable.
+def measured_speedup(simulation: Simulation, seconds: float = 0.5) -> float:
+    """CPU time that one step for all would have taken, over that of a run so far.
 
-    That is where the run was too short, or where its twin diverges, although the run did not.
+    The number of evaluations with one step is counted during the run. Their cost is measured on a
+    twin in the same engine: it begins at the present state, and all of its bodies take the smallest
+    step present.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Simulation that was stepped, by a ``Multirate``.
+    seconds : float, default 0.5
+        CPU time of the measurement [s].
+
+    Returns
+    -------
+    float
+        The ratio; 1 for a run that had one step for all.
+
+    Raises
+    ------
+    InputError
+        An argument is out of its range.
+    SimulationDiverged
+        The twin leaves its bounds.
     """
-    spent = simulation.run_cpu_seconds
-    if simulation.method.uniform or spent < LEAST_RUN or not is_dataclass(simulation.method):
-        return None
-    # The run is over: its listeners are told nothing of a twin.
-    with contextlib.suppress(SimulationDiverged), listening(lambda _: None):
-        return measured_speedup(simulation, min(MOST_SECONDS, SHARE * spent))
-    return None
-
-
-def measured_speedup(simulation: Simulation, seconds: float = MOST_SECONDS) -> float:
-    """CPU time that one step for all would have taken, over that of the run; 1 if it had one step.
-
-    The number of evaluations with one step is counted during the run. Their cost is measured for a
-    number of CPU seconds on a twin in the same engine: it begins at the present state, and all of
-    its bodies take the smallest step present.
-    Raises SimulationDiverged when the twin leaves its bounds.
-    """
+    instance("simulation", simulation, Simulation)
+    positive("seconds", seconds)
     if simulation.method.uniform or simulation.run_cpu_seconds == 0.0:
         return 1.0
     report = simulation.report()

@@ -67,6 +67,9 @@ class Method(Protocol):
         """
 
 
+_MEMBERS = members_of(Method)
+
+
 def check_method(method: object) -> None:
     """Refuse a method that does not keep the contract ``Method``.
 
@@ -80,31 +83,14 @@ def check_method(method: object) -> None:
     InputError
         It is no method, or lacks a member, which is named.
     """
-    wanted = members_of(Method)
-    missing = [name for name in wanted if not hasattr(method, name)]
-    if isinstance(method, type) or len(missing) > len(wanted) // 2:
+    missing = [name for name in _MEMBERS if not hasattr(method, name)]
+    if isinstance(method, type) or len(missing) > len(_MEMBERS) // 2:
         raise InputError(f"method must be one such as ImplicitDashpots(), got {shown(method)}")
     if missing:
         raise InputError(
             f"method {type(method).__name__} must have a member {missing[0]}; methods have "
-            f"{', '.join(wanted)}"
+            f"{', '.join(_MEMBERS)}"
         )
-
-
-def _check_options(method):
-    if method.control is not None and not isinstance(method.control, StepControl):
-        raise InputError(f"control must be a StepControl or None, got {shown(method.control)}")
-    choice("dashpot", method.dashpot, DASHPOTS)
-    floor = method.control.dashpot_floor if method.control is not None else 0.0
-    if floor > 0.0 and method.dashpot != "limited":
-        raise InputError(f"dashpot_floor must be 0 unless dashpot is 'limited', got {floor!r}")
-
-
-def _steps_ahead(method):
-    rule = method.control
-    if rule is None and method.dashpot == "limited":
-        rule = StepControl()
-    return rule.ahead if rule is not None else 0.0
 
 
 def structure_of(method: Any) -> Hashable:
@@ -151,25 +137,81 @@ def order_of(method: Any, damped: bool, varying: bool) -> Optional[int]:
     int or None
         None where the method declares none.
     """
-    declared = vars(type(method)).get("order")
+    kind = type(method)
+    declared = kind.order if kind.__module__ == __name__ else vars(kind).get("order")
     return declared(method, damped, varying) if callable(declared) else None
 
 
-def _explicit_order(method, damped, varying):
-    """Dashpots lag by half a step; limited ones are those of another material at each step."""
-    if damped and method.dashpot == "limited":
-        return None
-    return 1 if damped or varying else 2
+class _Explicit:
+    """What explicit methods share, whether bodies step by one level or by levels of their own."""
 
+    dt0: float
+    distance: Optional[float]
+    control: Optional[StepControl]
+    neighbour: str
+    dashpot: str
+    uniform: bool
+    solves = False
 
-def _suffix(method):
-    """Suffix of a name for control and limited dashpots."""
-    controlled = "_controlled" if method.control is not None else ""
-    return controlled + ("_limited" if method.dashpot == "limited" else "")
+    def __post_init__(self):
+        plain_fields(self)
+        positive("dt0", self.dt0)
+        # Without a limit of the way there is one level only.
+        if self.distance is not None or not self.uniform:
+            positive("distance", self.distance)
+        choice("neighbour", self.neighbour, NEIGHBOURS)
+        choice("dashpot", self.dashpot, DASHPOTS)
+        self._check_control()
+
+    def _check_control(self):
+        rule = self.control
+        if rule is not None and not isinstance(rule, StepControl):
+            raise InputError(f"control must be a StepControl or None, got {shown(rule)}")
+        floor = rule.dashpot_floor if rule is not None else 0.0
+        if floor > 0.0 and self.dashpot != "limited":
+            raise InputError(f"dashpot_floor must be 0 unless dashpot is 'limited', got {floor!r}")
+
+    @property
+    def name(self) -> str:
+        """Short name for tables."""
+        kind = "uniform" if self.uniform else f"multirate_{self.neighbour}"
+        controlled = "_controlled" if self.control is not None else ""
+        return kind + controlled + ("_limited" if self.dashpot == "limited" else "")
+
+    @property
+    def steps_ahead(self) -> float:
+        """Steps of a body by which its contacts are counted before they touch."""
+        rule = self.control or (StepControl() if self.dashpot == "limited" else None)
+        return rule.ahead if rule is not None else 0.0
+
+    def order(self, damped: bool, varying: bool) -> Optional[int]:
+        """Order of the error in the step, see ``order_of``.
+
+        Dashpots lag by half a step; limited ones are those of another material at each step.
+
+        Parameters
+        ----------
+        damped : bool
+            Whether a dashpot acts.
+        varying : bool
+            Whether bodies or times had steps of their own.
+
+        Returns
+        -------
+        int or None
+            None where no order is known.
+        """
+        if damped and self.dashpot == "limited":
+            return None
+        return 1 if damped or varying else 2
+
+    def criterion(self) -> Union[FixedStep, Displacement]:
+        """Step rule for the schedule."""
+        return FixedStep() if self.distance is None else Displacement()
 
 
 @dataclass(frozen=True)
-class Uniform:
+class Uniform(_Explicit):
     """One step for all bodies, explicit.
 
     Parameters
@@ -207,49 +249,10 @@ class Uniform:
 
     uniform = True
     neighbour = "held"
-    solves = False
-
-    def __post_init__(self):
-        plain_fields(self)
-        positive("dt0", self.dt0)
-        if self.distance is not None:
-            positive("distance", self.distance)
-        _check_options(self)
-
-    @property
-    def name(self) -> str:
-        """Short name for tables."""
-        return f"uniform{_suffix(self)}"
-
-    @property
-    def steps_ahead(self) -> float:
-        """Steps of a body by which its contacts are counted before they touch."""
-        return _steps_ahead(self)
-
-    def order(self, damped: bool, varying: bool) -> Optional[int]:
-        """Order of the error in the step, see ``order_of``.
-
-        Parameters
-        ----------
-        damped : bool
-            Whether a dashpot acts.
-        varying : bool
-            Whether bodies or times had steps of their own.
-
-        Returns
-        -------
-        int or None
-            None where no order is known.
-        """
-        return _explicit_order(self, damped, varying)
-
-    def criterion(self) -> Union[FixedStep, Displacement]:
-        """Step rule for the schedule."""
-        return FixedStep() if self.distance is None else Displacement()
 
 
 @dataclass(frozen=True)
-class Multirate:
+class Multirate(_Explicit):
     """Steps that differ by powers of two from body to body, explicit, with shared impulses.
 
     Parameters
@@ -290,45 +293,6 @@ class Multirate:
     dashpot: str = "full"
 
     uniform = False
-    solves = False
-
-    def __post_init__(self):
-        plain_fields(self)
-        positive("dt0", self.dt0)
-        positive("distance", self.distance)
-        choice("neighbour", self.neighbour, NEIGHBOURS)
-        _check_options(self)
-
-    @property
-    def name(self) -> str:
-        """Short name for tables."""
-        return f"multirate_{self.neighbour}{_suffix(self)}"
-
-    @property
-    def steps_ahead(self) -> float:
-        """Steps of a body by which its contacts are counted before they touch."""
-        return _steps_ahead(self)
-
-    def order(self, damped: bool, varying: bool) -> Optional[int]:
-        """Order of the error in the step, see ``order_of``.
-
-        Parameters
-        ----------
-        damped : bool
-            Whether a dashpot acts.
-        varying : bool
-            Whether bodies or times had steps of their own.
-
-        Returns
-        -------
-        int or None
-            None where no order is known.
-        """
-        return _explicit_order(self, damped, varying)
-
-    def criterion(self) -> Displacement:
-        """Step rule for the schedule."""
-        return Displacement()
 
 
 @dataclass(frozen=True)

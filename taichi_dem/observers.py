@@ -1,27 +1,24 @@
 """Observers of a run: objects that ``simulate`` calls with a read-only view of it."""
 
-import inspect
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Callable, Optional, Protocol, Union
+from typing import Any, Callable, ClassVar, Optional, Protocol, Union
 
 import numpy as np
 
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import Pace
 from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import instance, plain_fields, positive, shown, told_apart, whole
 from taichi_dem.methods import Method
 from taichi_dem.output.record import Frame, Recorder
 from taichi_dem.report.report import Report
-from taichi_dem.simulation import Simulation
+from taichi_dem.simulation import MOST_STEPS, Simulation
 from taichi_dem.state.model import Model
 from taichi_dem.state.timeline import MACRO_TICKS, NEVER
 
-#: Largest steps that can be counted to, and calls of an observer in a run.
-_MOST_STEPS, _MOST_CALLS = 2**42, 1_000_000
+#: Calls of an observer in a run.
+_MOST_CALLS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -68,7 +65,7 @@ class Every:
             )
         value = getattr(self, given[0])
         if given[0] in ("steps", "samples"):
-            whole(given[0], value, 1, _MOST_STEPS)
+            whole(given[0], value, 1, MOST_STEPS)
         else:
             positive(given[0], value)
 
@@ -129,6 +126,9 @@ class At:
     """
 
     times_s: tuple
+
+    #: Not among the options: none of the calls comes by the clock.
+    wall_s: ClassVar[None] = None
 
     def __post_init__(self):
         plain_fields(self)
@@ -382,64 +382,3 @@ class RunView(Uncopied):
 def _locked(array):
     array.flags.writeable = False
     return array
-
-
-def checked_observers(observers: Any) -> tuple:
-    """Observers as a tuple; InputError for one without a member, or with a wrong one."""
-    if not isinstance(observers, (list, tuple)):
-        raise InputError(f"observers must be a list of observers, got {shown(observers)}")
-    for place, one in enumerate(observers):
-        when = getattr(one, "when", None)
-        if not isinstance(when, (Every, At)):
-            raise InputError(
-                f"observers[{place}] must have a member when, an Every or an At, got {shown(when)}"
-            )
-        if not _takes_one(getattr(one, "observe", None)):
-            got = shown(getattr(one, "observe", None))
-            raise InputError(f"observers[{place}] must have a method observe(view), got {got}")
-    return tuple(observers)
-
-
-def _takes_one(observe):
-    """Whether something can be called with a view; a method without its object cannot."""
-    try:
-        inspect.signature(observe).bind(None)
-    except TypeError:
-        return False
-    except ValueError:
-        # Functions of other languages may hide their signature.
-        return callable(observe)
-    return True
-
-
-class ObserverCalls:
-    """Which observers are called at which of the largest steps, and which by the clock.
-
-    Observers of one step are called in their order. ``when`` is read once.
-    """
-
-    def __init__(self, observers: Iterable[Any], last: int, dt: float, samples: int):
-        self._at: dict[int, list[Any]] = {}
-        self._paced: list[tuple[Any, Pace]] = []
-        for observer in observers:
-            when = observer.when
-            for step in when.marks(last, dt, samples):
-                self._at.setdefault(step, []).append(observer)
-            if getattr(when, "wall_s", None) is not None:
-                self._paced.append((observer, Pace(when.wall_s)))
-
-    @property
-    def steps(self) -> set[int]:
-        """Largest steps at which an observer is called, a set."""
-        return set(self._at)
-
-    def at_step(self, step: int, view: RunView) -> None:
-        """Call the observers of a step."""
-        for observer in self._at.get(step, ()):
-            observer.observe(view)
-
-    def by_clock(self, view: RunView) -> None:
-        """Call the observers whose wall time has passed."""
-        for observer, pace in self._paced:
-            if pace.should_report():
-                observer.observe(view)

@@ -1,18 +1,22 @@
-"""When a run is sampled, photographed, observed and reported; all of these are observers of it."""
+"""When a run is sampled, photographed, observed and reported."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Optional, Union
+from typing import Callable, Optional, Union
 
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import LEAST_SHARE, Listener, Progress
-from taichi_dem.kit.validation import is_whole, progress_option, shown
-from taichi_dem.observers import Every, Observer, ObserverCalls, checked_observers
+from taichi_dem.kit.progress.progress import LEAST_SHARE, Listener, Pace, Progress
+from taichi_dem.kit.validation import positive, progress_option, shown, told_apart, whole
+from taichi_dem.methods import Method
+from taichi_dem.observers import At, Every, Observer, RunView
+from taichi_dem.output.receivers import Receivers
 from taichi_dem.output.record import Recorder
 from taichi_dem.scene import Scene
-from taichi_dem.simulation import Simulation
+from taichi_dem.simulation import MOST_STEPS, Simulation
 
+Call = Callable[[RunView], object]
 #: Progress is reported this often [s].
 _REPORT_SECONDS = 0.2
 #: Most samples or frames of a run: each reads all bodies.
@@ -59,103 +63,119 @@ def progress_of(simulation: Simulation, until: float) -> RunProgress:
 
 
 class RunPlan:
-    """Checked answer to when a run is sampled, photographed, observed and reported.
+    """When a run is sampled, photographed, observed and reported, checked before it begins.
 
-    last: number of largest steps of dt0 [s]. Raises InputError.
+    last: number of largest steps. receivers: those among the observers. Raises InputError.
     """
 
     def __init__(
         self,
-        last: int,
-        dt0: float,
+        scene: Scene,
+        method: Method,
+        until: float,
         samples: int,
         frames: int,
         observers: Sequence[Observer],
         progress: Union[Listener, str, None],
     ):
-        _check_count("samples", samples, 1)
-        _check_count("frames", frames, 0)
+        self.dt0, self.last = method.dt0, macro_steps(until, method.dt0)
+        whole("samples", samples, 1, _MOST_RECORDS)
+        whole("frames", frames, 0, _MOST_RECORDS)
         progress_option("progress", progress)
-        self.last, self.dt0, self.samples, self.frames = last, dt0, samples, frames
-        self.observers = checked_observers(observers)
-        ObserverCalls(self.observers, last, dt0, samples)
-
-    def check_scene(self, scene: Scene) -> None:
-        """Let the observers that want it look at the scene of the run; they raise InputError."""
-        for observer in self.observers:
-            check = getattr(observer, "check_scene", None)
-            if check is not None:
-                check(scene)
+        self.samples, self.frames = samples, frames
+        self.observed = [
+            (one.observe, one.when.marks(self.last, self.dt0, samples), one.when.wall_s)
+            for one in _checked(observers)
+        ]
+        for one in observers:
+            if hasattr(one, "check_scene"):
+                one.check_scene(scene)
+        self.receivers = _receivers_among(observers)
 
     def calls(
         self, simulation: Simulation, recorder: Recorder, report_progress: Optional[Listener]
-    ) -> ObserverCalls:
-        """ObserverCalls of a run: samples and frames come before the user's observers."""
-        observers: list[Any] = [_Sampler(simulation, recorder)]
-        observers += [_Photographer(recorder, self.frames), *self.observers]
+    ) -> "Calls":
+        """Calls of a run: samples and frames come before the user's observers."""
+
+        def sample(_):
+            with simulation.readings.held():
+                simulation.sample()
+                recorder.sample()
+
+        made = Calls()
+        made.add(sample, self._evenly(self.samples))
+        if self.frames:
+            made.add(lambda _: recorder.snapshot(), self._evenly(self.frames))
+        for observed in self.observed:
+            made.add(*observed)
         if report_progress is not None:
-            until = self.last * self.dt0
-            observers.append(_Reporter(simulation, until, report_progress))
-        return ObserverCalls(observers, self.last, self.dt0, self.samples)
+            tell, until = report_progress, self.last * self.dt0
+            made.add(lambda _: tell(progress_of(simulation, until)), {self.last}, _REPORT_SECONDS)
+        return made
+
+    def _evenly(self, count):
+        return Every(samples=1).marks(self.last, self.dt0, count)
 
 
-class _Sampler:
-    """Adds rows to the time series, and samples missing effects."""
+class Calls:
+    """What is called with a view at which of the largest steps, and what by the clock; in order."""
 
-    when = Every(samples=1)
+    def __init__(self) -> None:
+        self.at: dict[int, list[Call]] = {}
+        self.paced: list[tuple[Call, Pace]] = []
 
-    def __init__(self, simulation, recorder):
-        self.simulation, self.recorder = simulation, recorder
+    def add(self, call: Call, steps: set[int], wall_s: Optional[float] = None) -> None:
+        """Add a call at steps, and every so much wall time [s]."""
+        for step in steps:
+            self.at.setdefault(step, []).append(call)
+        if wall_s is not None:
+            self.paced.append((call, Pace(wall_s)))
 
-    def observe(self, view):
-        """Sample."""
-        with self.simulation.readings.held():
-            self.simulation.sample()
-            self.recorder.sample()
+    def at_step(self, step: int, view: RunView) -> None:
+        """Make the calls of a step."""
+        for call in self.at.get(step, ()):
+            call(view)
 
-
-class _EvenlySpaced:
-    """A number of times after the start; none for 0.
-
-    Apart from its observer: one that named itself would keep its simulation until the next
-    collection of garbage, and the engine would put its data aside meanwhile.
-    """
-
-    def __init__(self, count):
-        self.count = count
-
-    def marks(self, last, dt, samples):
-        """Largest steps at which to call."""
-        return Every(samples=1).marks(last, dt, self.count) if self.count else set()
+    def by_clock(self, view: RunView) -> None:
+        """Make the calls whose wall time has passed."""
+        for call, pace in self.paced:
+            if pace.should_report():
+                call(view)
 
 
-class _Photographer:
-    """Keeps a number of frames after the one at the start."""
-
-    def __init__(self, recorder, count):
-        self.when, self.recorder = _EvenlySpaced(count), recorder
-
-    def observe(self, view):
-        """Keep a frame."""
-        self.recorder.snapshot()
-
-
-class _Reporter:
-    """Reports progress towards a time [s]."""
-
-    when = Every(wall_s=_REPORT_SECONDS)
-
-    def __init__(self, simulation, until, report_progress):
-        self.simulation, self.until, self.report_progress = simulation, until, report_progress
-
-    def observe(self, view):
-        """Report."""
-        self.report_progress(progress_of(self.simulation, self.until))
-
-
-def _check_count(name, value, least):
-    if not is_whole(value) or not least <= value <= _MOST_RECORDS:
+def macro_steps(until: float, dt0: float) -> int:
+    """Number of largest steps that reach a time [s]; InputError unless it can be counted to."""
+    steps = positive("until", until) / dt0
+    if steps > MOST_STEPS:
+        got, most = told_apart(until, MOST_STEPS * dt0)
         raise InputError(
-            f"{name} must be a whole number of at least {least} and at most {_MOST_RECORDS}, "
-            f"got {shown(value)}"
+            f"until must be at most {most} s, {MOST_STEPS} largest steps of {dt0:g} s, got {got}"
         )
+    return max(1, math.ceil(steps - 1e-9))
+
+
+def _checked(observers):
+    """Observers as a tuple; InputError for one without a member, or with a wrong one."""
+    if not isinstance(observers, (list, tuple)):
+        raise InputError(f"observers must be a list of observers, got {shown(observers)}")
+    for place, one in enumerate(observers):
+        when = getattr(one, "when", None)
+        if not isinstance(when, (Every, At)):
+            raise InputError(
+                f"observers[{place}] must have a member when, an Every or an At, got {shown(when)}"
+            )
+        if isinstance(one, type) or not callable(getattr(one, "observe", None)):
+            raise InputError(
+                f"observers[{place}] must have a method observe(view), got {shown(one)}"
+            )
+    return tuple(observers)
+
+
+def _receivers_among(observers):
+    """Receivers among observers; InputError where two have one name."""
+    found = [one for one in observers if isinstance(one, Receivers)]
+    names = [name for one in found for name in one.points]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f"observers must have receivers of different names, got {twice[0]} twice")
+    return found

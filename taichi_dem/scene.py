@@ -16,6 +16,7 @@ from taichi_dem.kit.validation import (
     between,
     finite,
     flag,
+    instance,
     positive,
     shown,
     told_apart,
@@ -115,7 +116,8 @@ class Scene:
     body_materials: ClassVar[BodyMaterials]
 
     def __post_init__(self):
-        _check_body(self)
+        instance("mesh", self.mesh, Mesh)
+        instance("material", self.material, Material)
         object.__setattr__(self, "mesh", _bonded(self))
         laid = body_materials(self.mesh, self.material, self.materials)
         object.__setattr__(self, "body_materials", laid)
@@ -208,22 +210,6 @@ class Scene:
         bonds = "dashpot" in roles and material.has_bond_damping
         return bonds or (touching and "contact" in roles and material.has_contact_damping)
 
-    def has(self, name: str) -> bool:
-        """Whether an effect is listed.
-
-        Parameters
-        ----------
-        name : str
-            Name of the effect.
-
-        Returns
-        -------
-        bool
-            True where it is listed.
-        """
-        word("name", name)
-        return any(effect.name == name for effect in self.effects)
-
 
 def kind_of(scene: Scene) -> Hashable:
     """Kind of a scene: classes of its effects, and number of its bodies."""
@@ -300,13 +286,6 @@ def _sleep_of(scene):
     if sleep and not scene.on_demand:
         raise InputError(f"sleep must be 0 unless effects is 'auto', got {sleep:g}")
     return sleep
-
-
-def _check_body(scene):
-    if not isinstance(scene.mesh, Mesh):
-        raise InputError(f"mesh must be a Mesh (see read_mesh), got {type(scene.mesh).__name__}")
-    if not isinstance(scene.material, Material):
-        raise InputError(f"material must be a Material, got {type(scene.material).__name__}")
 
 
 def _check_types(scene):

@@ -16,16 +16,14 @@ from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, Owner, RunSnapshot, opened
 from taichi_dem.kit.validation import AUTO, FileName, instance, told_apart, word
 from taichi_dem.loads.history import unresolved_histories
-from taichi_dem.measured_speedup import speedup_of_run
 from taichi_dem.methods import Method, check_method
 from taichi_dem.observers import Observer, RunView
 from taichi_dem.output.hole_monitor import watched_groups
-from taichi_dem.output.receivers import receivers_among
 from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
 from taichi_dem.run_plan import RunPlan
 from taichi_dem.scene import Scene, scene_warnings
-from taichi_dem.simulation import Simulation, macro_steps
+from taichi_dem.simulation import Simulation
 from taichi_dem.state.timeline import MACRO_TICKS
 
 
@@ -106,10 +104,8 @@ def simulate(
     instance("scene", scene, Scene)
     check_method(method)
     word("title", title)
-    last = macro_steps(until, method.dt0)
-    plan = RunPlan(last, method.dt0, samples, frames, observers, progress)
-    receivers = _checked_receivers(plan, scene)
-    arrays = _opened(scene, method, checkpoint, resume, last)
+    plan = RunPlan(scene, method, until, samples, frames, observers, progress)
+    arrays = _opened(scene, method, checkpoint, resume, plan)
     if output is not None:
         output_folder(output)
     for sentence in (*scene_warnings(scene), *unresolved_histories(scene.effects, method.dt0)):
@@ -118,16 +114,10 @@ def simulate(
         simulation, recorder = _started(Simulation(scene, method, driver))
         writer = _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays)
         error = _run_saved(simulation, recorder, writer, plan, report_progress)
-        result = _result(simulation, recorder, error, receivers)
-        if error is None:
-            report = replace(result.report, measured_speedup=speedup_of_run(simulation))
-            result = replace(result, report=report)
+        result = _result(simulation, recorder, error, plan)
     if output is not None:
         _write(result, output, writer)
-    if error is not None:
-        error.result = result
-        raise error
-    return result
+    return _given(result, error)
 
 
 def run_simulation(
@@ -146,15 +136,16 @@ def run_simulation(
     brief: whether the report leaves out all that needs a comparison of the bodies at the end.
     """
     instance("simulation", simulation, Simulation)
-    last = macro_steps(until, simulation.method.dt0)
-    plan = RunPlan(last, simulation.method.dt0, samples, frames, observers, progress)
-    receivers = _checked_receivers(plan, simulation.scene)
+    plan = RunPlan(simulation.scene, simulation.method, until, samples, frames, observers, progress)
     with reporting(progress, title) as report_progress:
         simulation, recorder = _started(simulation)
-        writer = NoCheckpointWriter()
-        error = _run_saved(simulation, recorder, writer, plan, report_progress)
-    result = _result(simulation, recorder, error, receivers, brief)
-    result = replace(result, start=simulation.first_motion)
+        error = _run_saved(simulation, recorder, NoCheckpointWriter(), plan, report_progress)
+    result = _result(simulation, recorder, error, plan, brief)
+    return _given(replace(result, start=simulation.first_motion), error)
+
+
+def _given(result, error):
+    """A result; of a run that left its bounds the exception that holds it."""
     if error is not None:
         error.result = result
         raise error
@@ -181,35 +172,31 @@ def _started(simulation):
     return simulation, recorder
 
 
-def _opened(scene, method, checkpoint, resume, last):
+def _opened(scene, method, checkpoint, resume, plan):
     """Arrays by name to resume from, or None. Raises InputError for an unusable checkpoint."""
     if isinstance(checkpoint, Checkpoint):
         # Refuses too many of them, before anything is done.
-        checkpoint.marks(last, method.dt0)
+        checkpoint.marks(plan.last, plan.dt0)
     arrays = opened(checkpoint, resume, lambda: run_identity(scene, method))
     begin = int(np.asarray(arrays.get("field/state.tick", 0)).max(initial=0)) if arrays else 0
-    if begin > last * MACRO_TICKS:
-        seconds = method.dt0 / MACRO_TICKS
-        got, least = told_apart(last * method.dt0, begin * seconds)
+    if begin > plan.last * MACRO_TICKS:
+        got, least = told_apart(plan.last * plan.dt0, begin * (plan.dt0 / MACRO_TICKS))
         raise InputError(f"until must be at least {least} s, where {resume} begins, got {got}")
     return arrays
 
 
 def _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays):
     """Writer of checkpoints, after a resumed run has been restored."""
-    if checkpoint is None and resume is None:
-        return NoCheckpointWriter()
-    saved = saved_run(simulation, recorder)
     if arrays:
-        saved.restore(arrays, resume)
+        saved_run(simulation, recorder).restore(arrays, resume)
+    if checkpoint is None:
+        return NoCheckpointWriter()
 
     def now():
         """Present largest step, and time [s]."""
         return simulation.state.tick[None] // MACRO_TICKS, simulation.time_s
 
-    if checkpoint is None:
-        return NoCheckpointWriter()
-    return CheckpointWriter(checkpoint, saved, now)
+    return CheckpointWriter(checkpoint, saved_run(simulation, recorder), now)
 
 
 def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
@@ -281,7 +268,7 @@ def _run(simulation, recorder, writer, plan, calls):
     """
     view = RunView(simulation, recorder)
     seen = simulation.state.tick[None] if recorder.rows else -1
-    marks = sorted(calls.steps | writer.marks(plan.last, plan.dt0))
+    marks = sorted({*calls.at, *writer.marks(plan.last, plan.dt0)})
     for step in (mark for mark in marks if mark * MACRO_TICKS > seen):
 
         def between(end=step * MACRO_TICKS):
@@ -305,14 +292,8 @@ def _write(result, folder, writer):
         raise InputError(f"{error}{writer.last_good()}") from None
 
 
-def _checked_receivers(plan, scene):
-    """Receivers among the observers, after all of these have seen the scene."""
-    plan.check_scene(scene)
-    return receivers_among(plan.observers)
-
-
-def _result(simulation, recorder, error, receivers, brief=False):
-    received = [one.received() for one in receivers]
+def _result(simulation, recorder, error, plan, brief=False):
+    received = [one.received() for one in plan.receivers]
     return Result(
         scene=simulation.scene,
         method=simulation.method,

@@ -2,7 +2,6 @@
 
 import contextlib
 import copy
-import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -14,11 +13,10 @@ from taichi_dem.engine import ENGINES, Structure
 from taichi_dem.engine_view import PartView
 from taichi_dem.kit import runtime
 from taichi_dem.kit.display import counted, in_brief
-from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
-from taichi_dem.kit.validation import choice, flag, instance, positive, shown, told_apart, whole
-from taichi_dem.loads.gas_pressure import GasPressure
+from taichi_dem.kit.validation import choice, flag, instance, shown, whole
 from taichi_dem.methods import Method, check_method
 from taichi_dem.report.bond_slip import BondSlips
 from taichi_dem.report.certificate import acting_since, certificate_of
@@ -63,8 +61,6 @@ class Simulation(Uncopied):
     driver : str, default "auto"
         ``"resident"``, ``"parallel"``, or ``"auto"``: parallel on a GPU and for large scenes; for
         those of middle size on several threads, the faster one by measurement.
-    brute_force : bool, default False
-        Contact search without cells, for tests.
 
     Attributes
     ----------
@@ -101,9 +97,7 @@ class Simulation(Uncopied):
     # None before the start.
     energy_balance: Any
 
-    def __init__(
-        self, scene: Scene, method: Method, driver: str = "auto", brute_force: bool = False
-    ):
+    def __init__(self, scene: Scene, method: Method, driver: str = "auto"):
         instance("scene", scene, Scene)
         check_method(method)
         choice("driver", driver, ("auto", *DRIVERS))
@@ -113,8 +107,7 @@ class Simulation(Uncopied):
         self.scene, self.method, self.solves = scene, method, method.solves
         self.model = Model(scene.mesh, scene.body_materials, scene.effects)
         name = driver_name(driver, self.model.bond_count)
-        flag("brute_force", brute_force)
-        structure = Structure(scene.effects, method, brute_force, scene.on_demand)
+        structure = Structure(scene.effects, method, scene.on_demand)
         self.loan = ENGINES.borrow(structure, capacity_of(self.model), self.model, "simulation")
         self._take_parts()
         self._load()
@@ -196,8 +189,7 @@ class Simulation(Uncopied):
 
     def _check_reset(self, scene, method, model):
         engine = self.loan.engine
-        brute_force = engine.structure.brute_force
-        if Structure(scene.effects, method, brute_force, scene.on_demand) != engine.structure:
+        if Structure(scene.effects, method, scene.on_demand) != engine.structure:
             raise InputError(
                 "reset must have a scene and a method of the same structure, kinds of effects and "
                 f"of steps, got {scene!r} and {method!r}: make a new Simulation"
@@ -380,17 +372,6 @@ class Simulation(Uncopied):
             steps *= 1.0 + self.sweeps() / max(1, int(self.schedule.evaluations[0]))
         return float(members @ steps) / self.method.dt0
 
-    def gas_work(self) -> float:
-        """Work of the gas pressure.
-
-        Returns
-        -------
-        float
-            Work [J], zero without gas.
-        """
-        places = [k for k, load in enumerate(self.model.loads) if isinstance(load, GasPressure)]
-        return sum(self.energy_balance.load_work(place) for place in places)
-
     def report(self, brief: bool = False) -> Report:
         """Report of the run so far.
 
@@ -475,17 +456,3 @@ class Simulation(Uncopied):
             Times [s], shape (body_count,), by name; NaN for never.
         """
         return acting_since(self.model, self.state, self.schedule)
-
-
-def macro_steps(until: float, dt0: float) -> int:
-    """Number of largest steps that reach a time [s]; InputError unless it can be counted to."""
-    steps = positive("until", until) / dt0
-    if steps > MOST_STEPS:
-        got, most = told_apart(until, MOST_STEPS * dt0)
-        raise InputError(
-            f"until must be at most {most} s, {MOST_STEPS} largest steps of {dt0:g} s, got {got}"
-        )
-    return max(1, math.ceil(steps - 1e-9))
-
-
-__all__ = ["Simulation", "SimulationDiverged", "macro_steps"]

@@ -1,17 +1,16 @@
 """An output of a scene to a tolerance: the program chooses method and step, and gives a bar."""
 
 import math
-from typing import Any, Optional, Union
+from typing import Optional, Union
 
 from taichi_dem.accuracy.job import Job
 from taichi_dem.accuracy.search import Search
 from taichi_dem.goals import Goal
 from taichi_dem.kit.accuracy import plans
 from taichi_dem.kit.accuracy.answer import Answer, Plan
-from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, instance, positive, shown
+from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive
 from taichi_dem.scene import Scene, kind_of
 
 
@@ -70,8 +69,8 @@ def solve(
     instance("scene", scene, Scene)
     instance("goal", goal, Goal).check_scene(scene)
     positive("until", until)
-    _share("tolerance", tolerance, 1.0)
-    _share("confidence", confidence, math.nextafter(1.0, 0.0))
+    between("tolerance", tolerance, SMALLEST, 1.0)
+    between("confidence", confidence, SMALLEST, math.nextafter(1.0, 0.0))
     budget = math.inf if budget_s is None else positive("budget_s", budget_s)
     first = 0 if plan is None else instance("plan", plan, Plan).begin
     job = Job(scene, until, goal, tolerance, confidence)
@@ -80,10 +79,3 @@ def solve(
     if math.isfinite(answer.plan.parting_s):
         plans.remember(kind_of(scene), plans.parting(answer.plan.parting_s, until))
     return answer
-
-
-def _share(name: str, value: Any, most: float) -> None:
-    """InputError unless a value is above 0 and at most this."""
-    if positive(name, value) > most:
-        bound = "at most 1" if most == 1.0 else "below 1"
-        raise InputError(f"{name} must be above 0 and {bound}, got {shown(value)}")

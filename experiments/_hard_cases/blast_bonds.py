@@ -7,9 +7,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from _closed_forms import LinearBonds, damped_opening
 from _hard_cases._blast_run import ACCURACY, AREA, EPS, FREE, TOUCHING, Run
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
-from taichi_dem.closed_forms import LinearBonds, damped_opening
 from taichi_dem.kit.study.cases import Cases
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single, with_neighbours

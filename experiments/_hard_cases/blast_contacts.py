@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from _closed_forms import damped_opening, velocity_after_impact
 from _hard_cases._blast_run import (
     FREE,
     MASS,
@@ -15,7 +16,6 @@ from _hard_cases._blast_run import (
     soon,
 )
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
-from taichi_dem.closed_forms import damped_opening, velocity_after_impact
 from taichi_dem.kit.study.cases import Cases
 from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import checked_mesh

@@ -5,10 +5,10 @@ from functools import partial
 
 import numpy as np
 
+from _closed_forms import damped_opening
 from _hard_cases._blast_run import AREA, EDGE, EPS, FREE, MASS, TOUCHING, Run, beside, right_half
 from _hard_cases.blast_bonds import apart, free
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Uniform, effects, simulate
-from taichi_dem.closed_forms import damped_opening
 from taichi_dem.kit.study.cases import Cases
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single

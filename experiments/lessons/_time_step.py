@@ -17,8 +17,8 @@ from taichi_dem.kit.plot_style import BLACK, GREY, RED, seconds, styled, styles_
 from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.plot.bodies import draw_bodies
+from taichi_dem.run_plan import macro_steps
 from taichi_dem.simulate import result_of, run_simulation
-from taichi_dem.simulation import macro_steps
 
 LENGTH, WIDTH, CELLS = 0.4, 0.05, (12, 1, 1)
 #: Steps to choose from [s], and that of the truth.

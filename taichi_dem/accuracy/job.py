@@ -34,17 +34,14 @@ class Job:
 
     def methods(self) -> "Methods":
         """The method for this scene, at any step."""
-        scene, material = self.scene, self.scene.body_materials
-        present = {effect.role for effect in scene.effects if effect.name}
-        damped = "dashpot" in present and material.has_bond_damping
-        damped |= "contact" in present and material.has_contact_damping
-        change = min((effect.change_time() for effect in scene.effects), default=math.inf)
+        change = min((effect.change_time() for effect in self.scene.effects), default=math.inf)
         longest = self._longest_step()
         step = max(min(longest, change), longest / _MOST_TIMES)
         steps = max(_FEWEST, math.ceil(self.until / step))
         # A pulse within a step is a kick, which lies between the steps of two levels by chance.
         order = 2.0 if step <= change else 1.0
-        return Methods(ImplicitDashpots if damped else Uniform, self.until, steps, order)
+        kind = ImplicitDashpots if self.scene.damped() else Uniform
+        return Methods(kind, self.until, steps, order)
 
     def _longest_step(self):
         """Longest step that all springs bear [s]: solved dashpots leave no other limit.

@@ -16,14 +16,14 @@ class CellGrid:
     """Sorts all bodies by cell, so that neighbours are sought in the cells nearby only.
 
     ball: radius of the ball around a body within which others are near whose balls it meets [m].
-    member: bodies, cell by cell. brute_force: a single cell.
+    member: bodies, cell by cell.
     """
 
     scratch_fields = ("first", "member", "cell", "counts", "corner", "edge", "largest")
 
-    def __init__(self, tables: Tables, state: State, ball: ti.Field, brute_force: bool = False):
+    def __init__(self, tables: Tables, state: State, ball: ti.Field):
         n = tables.capacity.bodies
-        self.tables, self.state, self.ball, self.brute_force = tables, state, ball, brute_force
+        self.tables, self.state, self.ball = tables, state, ball
         self.first = ti.field(ti.i32, shape=4 * n + 66)
         self.member = ti.field(ti.i32, shape=n)
         self.cell = ti.field(ti.i32, shape=n)
@@ -71,8 +71,6 @@ class CellGrid:
             mean += self.ball[i] / self.tables.body_count[None]
             self.largest[None] = ti.max(self.largest[None], self.ball[i])
         edge = 2.0 * mean
-        if ti.static(self.brute_force):
-            edge += (high - low).max()
         while _product(ti.floor((high - low) / edge) + 1.0) > 4 * self.tables.body_count[None] + 64:
             edge *= 1.25
         self.edge[None], self.corner[None] = edge, low

@@ -32,21 +32,15 @@ class BroadPhase:
 
     start_pairs: takes in the pairs of a search. limits: ``StabilityLimits`` that are told of pairs,
     None where no step needs them.
-    brute_force: compare all bodies with broken faces, for tests. everywhere: 1 when the next search
-    visits all bodies, as is needed once they have been moved by hand. looked: LOOKED for bodies
-    that the last search visited, EXPOSED for others with spheres; searched: its tick. searches:
-    their number. full: the list without capacity, an index into ``_CAPACITIES``.
+    everywhere: 1 when the next search visits all bodies, as is needed once they have been moved by
+    hand. looked: LOOKED for bodies that the last search visited, EXPOSED for others with spheres;
+    searched: its tick. searches: their number. full: the list without capacity, an index into
+    ``_CAPACITIES``.
     """
 
     scratch_fields = ("exposed", "exposed_count", "looked")
 
-    def __init__(
-        self,
-        contacts: Contacts,
-        start_pairs: Callable[[], Any],
-        limits: Any,
-        brute_force: bool = False,
-    ):
+    def __init__(self, contacts: Contacts, start_pairs: Callable[[], Any], limits: Any):
         n = contacts.tables.capacity.bodies
         self.contacts, self.store = contacts, contacts.store
         self.start_pairs, self.limits = start_pairs, limits
@@ -54,7 +48,7 @@ class BroadPhase:
         self.tables, self.state = contacts.tables, contacts.state
         self.exposed = ti.field(ti.i32, shape=n)
         self.exposed_count = ti.field(ti.i32, shape=())
-        self.neighbours = VerletList(contacts, brute_force)
+        self.neighbours = VerletList(contacts)
         self.listed = self.neighbours.listed
         self.narrow_phase = NarrowPhase(contacts)
         self.searched = ti.field(ti.i64, shape=())

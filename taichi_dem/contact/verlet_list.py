@@ -33,13 +33,13 @@ class VerletList:
     limit: entries that the scene allows. full: 1 when they are exceeded.
     """
 
-    def __init__(self, contacts: Contacts, brute_force: bool = False):
+    def __init__(self, contacts: Contacts):
         n = contacts.tables.capacity.bodies
         self.tables, self.state, self.contacts = contacts.tables, contacts.state, contacts
         self.store, self.capacity = contacts.store, contacts.tables.capacity.neighbour_entries
         self.limit = ti.field(ti.i32, shape=())
         self.reach = Reach(contacts)
-        self.grid = CellGrid(self.tables, self.state, self.reach.ball, brute_force)
+        self.grid = CellGrid(self.tables, self.state, self.reach.ball)
         self.first = ti.field(ti.i32, shape=n + 1)
         self.last = ti.field(ti.i32, shape=n)
         self.listed = ListedPairs(contacts, self.capacity)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Union
+from typing import Union
 
 import numpy as np
 
@@ -141,16 +141,6 @@ class Receivers:
 
     def __getitem__(self, name: str) -> Received:
         return self.received()[name]
-
-
-def receivers_among(observers: Sequence[Any]) -> list[Receivers]:
-    """Receivers among the observers of a run; InputError where two have one name."""
-    found = [one for one in observers if isinstance(one, Receivers)]
-    names = [name for one in found for name in one.points]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise InputError(f"observers must have receivers of different names, got {twice[0]} twice")
-    return found
 
 
 def write_receivers(path: FileName, receivers: Mapping[str, Received]) -> None:

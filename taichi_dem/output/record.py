@@ -12,6 +12,7 @@ from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.files import output_folder, remove_files, write_csv
 from taichi_dem.kit.validation import FileName, file_stem, instance, several
+from taichi_dem.loads.gas_pressure import GasPressure
 from taichi_dem.mesh.files import write_pvd, write_vtu
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.output.hole_monitor import HoleMonitor
@@ -100,6 +101,8 @@ class Recorder:
         self.simulation = simulation
         self.model, self.state = simulation.model, simulation.state
         self.holes = {group: HoleMonitor(self.model, group) for group in groups}
+        loads = enumerate(self.model.loads)
+        self.gas = [place for place, load in loads if isinstance(load, GasPressure)]
         self.rows: list[dict[str, float]] = []
         self.frames: list[Frame] = []
         self.peak_speed = np.zeros(self.model.body_count)
@@ -116,7 +119,7 @@ class Recorder:
         sim: Any = self.simulation
         motion = sim.motion()
         account = sim.energy_balance.account()
-        account["gas_work"] = sim.gas_work()
+        account["gas_work"] = sum(map(sim.energy_balance.load_work, self.gas))
         row = {"time_s": sim.time_s}
         for group, hole in self.holes.items():
             moved = hole.radial_displacement(motion["position"])

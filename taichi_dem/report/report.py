@@ -79,8 +79,6 @@ class Report:
         Volume that bodies shared, where it was measured.
     bond_slip : tuple of BondSlip, default ()
         The bond that slipped farthest; empty where none slipped.
-    measured_speedup : float, optional
-        Ratio of the CPU time of one step for all to that of the run, where it was measured.
     known_error : str, default ""
         What is known of the error, in words.
     certificate : Certificate, optional
@@ -117,7 +115,6 @@ class Report:
     worst_residual: float = 0.0
     interpenetration: Optional[Interpenetration] = None
     bond_slip: tuple = ()
-    measured_speedup: Optional[float] = None
     known_error: str = ""
     certificate: Optional[Certificate] = None
 
@@ -205,8 +202,6 @@ class Report:
             return ()
         ideal, reached = f"{self.ideal_gain:.2f}", f"{self.boundary_gain:.2f}"
         words = f"{ideal} ideal, {reached} with pairs at the finer step"
-        if self.measured_speedup is not None:
-            words += f", {self.measured_speedup:.2f} measured"
         return (("gain over uniform", words),)
 
     def _sweeps_row(self):

@@ -126,7 +126,6 @@ def _scenes():
     yield "Scene", Scene, {"mesh": CUT, "material": CONCRETE, "effects": [], "sleep": 0.0}
     yield "Scene.effect", SCENE.effect, {"role": "softening"}
     yield "Scene.damped", SCENE.damped, {}
-    yield "Scene.has", SCENE.has, {"name": "softening"}
     yield "join", partial(join, PAIR, PAIR.moved(by=(9.0, 0.0, 0.0))), {"names": ["a", "b"]}
     yield "in_space_order", in_space_order, {"mesh": PAIR}
     yield "read_mesh", read_mesh, {"path": PAPER_BLOCK}

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from _closed_forms import _carried
 from taichi_dem import (
     CONCRETE,
     ImplicitDashpots,
@@ -13,7 +14,6 @@ from taichi_dem import (
     Uniform,
     effects,
 )
-from taichi_dem.closed_forms import _carried
 from taichi_dem.elasticity.wave_moduli import wave_moduli
 from taichi_dem.mesh.shapes import bar, single, with_moved_nodes
 

@@ -1,12 +1,14 @@
-"""Costs of effects are those of the same states: a frozen batch goes on as its run would."""
+"""Costs of effects are those of the same states: what is frozen goes on as its run would."""
 
 import numpy as np
 import pytest
 
 import _effects_costs
 from _effects_damper import FrozenBatch
+from _effects_frozen import WARM, FrozenScene, states_of_run
 from ca_damper.lattice import DIRECTIONS, HELD
-from taichi_dem import ImplicitDashpots, simulate
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
+from taichi_dem.mesh.shapes import bar
 
 pytestmark = pytest.mark.experiment
 
@@ -54,3 +56,23 @@ def test_a_known_list_leaves_out_nothing():
     report = simulate(scene, method=ImplicitDashpots(4e-7), until=2.5e-4, samples=25).report
     assert report.needs == () and report.broken_faces == 0
     assert len(report.effects) == 1 + len(best)
+
+
+def test_a_frozen_scene_goes_on_with_the_bits_of_its_run_as_often_as_it_is_asked():
+    """A bar whose end is pulled until it breaks."""
+    drive = effects.PrescribedMotion("right", (2.0, 1.0, 0.0), 900.0)
+    laws = effects.Softening(), effects.ShearSlip(), effects.BondDamping()
+    scene = Scene(bar(0.2, 0.1, (2, 1, 1)), CONCRETE, [*laws, effects.Fixed("left"), drive])
+    method, starts = Uniform(1e-7), (500, 3000)
+    states = states_of_run(scene, method, [n * method.dt0 for n in starts])
+    frozen = FrozenScene(scene, method, states, substeps=5)
+    run = Simulation(scene, method)
+    for k, start in enumerate(starts):
+        run.advance_to(start + WARM + 5)
+        for _ in range(2):
+            assert frozen.seconds(k) > 0.0
+            for name, values in run.state.motion().items():
+                assert np.array_equal(frozen.simulation.state.motion()[name], values), name
+            broken = run.state.broken_tick.to_numpy()
+            assert np.array_equal(frozen.simulation.state.broken_tick.to_numpy(), broken)
+    assert run.report().broken_faces > 0

@@ -7,26 +7,33 @@ import numpy as np
 import pytest
 
 import _trust
+from _accuracy_steps import (
+    SPLIT,
+    Outcome,
+    StepStudy,
+    displacement_error,
+    energy_error,
+    faces_error,
+    outcome_of,
+)
 from _blast_ensemble import HOLE, hole_moves, moved, over_time, stronger
 from _hard_cases._statics import least_friction
 from _hard_cases.blast_piles import CARD, SPAN, TALL, house
 from ca_damper.bouncing import Fall, RecordedFall
 from ca_damper.demo_pictures import Decay
 from ca_damper.measures import first_harmonic
-from taichi_dem import CONCRETE, PAPER_BLOCK, read_mesh
+from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, Uniform, read_mesh
 from taichi_dem.kit.study import Timing
 from taichi_dem.kit.study.work_precision import Point, answers, cheapest
 from taichi_dem.mesh.mesh import group_area, volumes
 from taichi_dem.mesh.shapes import bar, mirrored_copies
 from taichi_dem.mesh.topology import topology_of
-from taichi_dem.outcome import SPLIT, Outcome, displacement_error, energy_error, faces_error
 from taichi_dem.output.attenuation import Attenuation
 from taichi_dem.state.model import Model
-from taichi_dem.step_study import StepStudy
 
 # The package has functions of these names.
 BLAST, BRANCHING = (sys.modules[f"{_trust.__name__}.{name}"] for name in ("blast", "branching"))
-EDGE = 2e-3
+EDGE, BAR = 2e-3, bar(0.2, 0.1, (2, 1, 1))
 
 
 def outcome(moved=((3.0, 0.0, 0.0), (0.0, 4.0, 0.0)), broken=(1, 2), **energy):
@@ -55,6 +62,13 @@ def test_the_floor_of_a_method_is_the_distance_of_its_finest_twin():
     study.runs[2.0] = replace(outcome(), failure="diverged", evaluations=3)
     failed, fine = study.points(outcome())
     assert failed.failure and (fine.error, fine.evaluations) == (0.0, 1)
+
+
+def test_a_disturbed_twin_moves_as_the_scene_does():
+    rows = np.random.default_rng(3).uniform(-1.0, 1.0, (2, BAR.body_count, 3))
+    job = Scene(BAR, CONCRETE, [], velocity=rows[0], spin=rows[1]), Uniform(1e-7), 2e-6
+    alone, disturbed = outcome_of(*job), outcome_of(*job, disturbance=1e-12)
+    np.testing.assert_allclose(disturbed.moved, alone.moved, rtol=1e-4, atol=1e-11)
 
 
 def point(method, step, error, failure=""):

@@ -1,16 +1,13 @@
-"""A run with an effect silenced, or timed from the state of another run, is exactly that run."""
+"""A run with an effect silenced is exactly the run of a scene without it."""
 
-import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, needed_effects, simulate
+from taichi_dem import CONCRETE, Scene, Uniform, effects, needed_effects, simulate
 from taichi_dem.engine import ENGINES
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.paired_cost import WARM, FrozenScene, states_of_run
 
 LAWS = effects.Softening, effects.ShearSlip, effects.BondDamping
 METHOD = Uniform(1e-7)
-STEPS = (500, 3000)
 
 
 def pulled(*listed, speed=2.0):
@@ -26,11 +23,6 @@ def result_of(scene):
 @pytest.fixture(scope="module")
 def scene(taichi_session):
     return pulled(*(law() for law in LAWS))
-
-
-@pytest.fixture(scope="module")
-def states(scene):
-    return states_of_run(scene, METHOD, [n * METHOD.dt0 for n in STEPS])
 
 
 def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(scene):
@@ -54,17 +46,3 @@ def test_advice_tries_what_can_be_silent_on_the_engine_of_the_run():
     advice = needed_effects(result)
     assert len(ENGINES._engines) == before
     assert {"softening", "shear_slip"} <= set(advice.droppable)
-
-
-def test_a_frozen_scene_goes_on_with_the_bits_of_its_run_as_often_as_it_is_asked(scene, states):
-    frozen = FrozenScene(scene, METHOD, states, substeps=5)
-    run = Simulation(scene, METHOD)
-    for k, start in enumerate(STEPS):
-        run.advance_to(start + WARM + 5)
-        for _ in range(2):
-            assert frozen.seconds(k) > 0.0
-            for name, values in run.state.motion().items():
-                assert np.array_equal(frozen.simulation.state.motion()[name], values), name
-            broken = run.state.broken_tick.to_numpy()
-            assert np.array_equal(frozen.simulation.state.broken_tick.to_numpy(), broken)
-    assert run.report().broken_faces > 0

@@ -16,7 +16,6 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem.mesh.shapes import bar, pair, placed_together
-from taichi_dem.outcome import outcome_of
 from taichi_dem.scene import outer_faces_warnings
 from taichi_dem.simulate import run_simulation
 from tests.scenes import beside
@@ -72,13 +71,6 @@ def test_a_checkpoint_belongs_to_the_motion_it_began_with(by_hand, tmp_path):
     assert resumed.frames[-1].position.tobytes() == by_hand.frames[-1].position.tobytes()
     with pytest.raises(InputError, match="is of another initial motion"):
         simulate(scene(velocity=-ROWS[0], spin=ROWS[1]), until=UNTIL, resume=path, **options)
-
-
-def test_a_disturbed_twin_moves_as_the_scene_does():
-    moving = scene(velocity=ROWS[0], spin=ROWS[1])
-    alone = outcome_of(moving, METHOD, UNTIL)
-    disturbed = outcome_of(moving, METHOD, UNTIL, disturbance=1e-12)
-    np.testing.assert_allclose(disturbed.moved, alone.moved, rtol=1e-4, atol=1e-11)
 
 
 def test_one_spin_turns_all_bodies_as_one_rigid_body():

@@ -7,11 +7,11 @@ ROOT = Path(__file__).resolve().parents[2]
 # A module imports from its own layer and those before it; a folder counts as one module.
 LAYERS = {
     "taichi_dem": """
-        kit | meshes mesh shapes | materials | elasticity closed_forms | physics | state
+        kit | meshes mesh shapes | materials | elasticity | physics | state
         | laws | loads | effects initial_motion | scene | step_control | methods | contact
         | stability | step | report | engine engine_view | simulation
-        | output measured_speedup measured_overhead paired_cost observers run_plan | plot | viewer
-        | result scene_pictures | simulate needed_effects outcome | workload step_study goals
+        | output measured_speedup observers run_plan | plot | viewer
+        | result scene_pictures | simulate needed_effects | goals
         | accuracy calibration | solve | demo | __init__ | __main__""",
     "ca_damper": """
         errors random_numbers progress measures report contracts certificate checked_range

@@ -1,4 +1,4 @@
-"""Evaluations of a run, counted body by body and interval by interval.
+"""Evaluations of a run, counted by body and interval (``blast_scaling.py``).
 
 A body is charged with the bonds of which it is the master and the contact pairs of which it is the
 first, as the paper charges its master elements.
@@ -6,17 +6,12 @@ first, as the paper charges its master elements.
 
 from dataclasses import dataclass
 from itertools import chain, combinations
-from typing import Any
 
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.display import by_fields
-from taichi_dem.kit.validation import AUTO
-from taichi_dem.observers import Every
-from taichi_dem.scene import Scene
+from taichi_dem import Every, Simulation
 from taichi_dem.simulate import run_simulation
-from taichi_dem.simulation import Simulation
 from taichi_dem.state.timeline import MAX_LEVEL
 from taichi_dem.step.drivers import Resident, Step
 from taichi_dem.step.multirate.lists import Once
@@ -41,10 +36,7 @@ class Workload:
     seconds: np.ndarray
     searches: np.ndarray
 
-    def __repr__(self) -> str:
-        return by_fields(self)
-
-    def prices(self) -> np.ndarray:
+    def prices(self):
         """Seconds a bond, a pair, a pair of spheres, a tick, and a search, fitted to the intervals.
 
         The price of a bond contains the work of its bodies, as both are due together.
@@ -64,7 +56,7 @@ def _least_squares(table, wanted):
     best, least = np.zeros(table.shape[1]), np.inf
     for chosen in chain.from_iterable(combinations(places, 1 + k) for k in places):
         found = np.linalg.lstsq(table[:, chosen], wanted, rcond=None)[0]
-        error = float(np.linalg.norm(table[:, chosen] @ found - wanted))
+        error = np.linalg.norm(table[:, chosen] @ found - wanted)
         if found.min() >= 0.0 and error < least:
             best, least = np.zeros(table.shape[1]), error
             best[list(chosen)] = found
@@ -78,7 +70,7 @@ class EvaluationCounter:
     counts: (bodies, classes) of KINDS. ticks: how many there were of each class.
     """
 
-    def __init__(self, simulation: Simulation):
+    def __init__(self, simulation):
         engine = simulation.loan.engine
         self.tables, self.schedule = engine.tables, engine.schedule
         self.store = engine.contacts.store
@@ -106,7 +98,7 @@ class EvaluationCounter:
             [0, 1, spheres]
         )
 
-    def read(self) -> tuple[np.ndarray, np.ndarray]:
+    def read(self):
         """Counts (bodies, classes, kinds) and ticks (classes,) since the last time; then zero."""
         found = self.counts.to_numpy(), self.ticks.to_numpy()
         self.counts.fill(0)
@@ -117,7 +109,7 @@ class EvaluationCounter:
 class CountedStep(Step):
     """A step that counts the evaluations that are due; in one serial kernel only."""
 
-    def __init__(self, counter: EvaluationCounter, *parts: Any):
+    def __init__(self, counter, *parts):
         self.counter = counter
         super().__init__(*parts)
 
@@ -143,27 +135,18 @@ class _Intervals:
             self.before = now
 
 
-def record_workload(
-    scene: Scene,
-    method: Any,
-    until: float,
-    every: int,
-    progress: Any = AUTO,
-    title: str = "counting",
-) -> tuple[Workload, Simulation]:
+def record_workload(scene, method, until, every):
     """Run a scene with contact to a time [s] and count its evaluations: workload, simulation.
 
-    method: ``Uniform`` or ``Multirate``. every: largest steps of an interval. progress, title: as
-    of ``simulate``. The run is stopped between two steps only, so its bits are those of an
-    undisturbed one.
+    method: ``Uniform`` or ``Multirate``. every: largest steps of an interval. The run is stopped
+    between two steps only, so its bits are those of an undisturbed one.
     """
     simulation = Simulation(scene, method, "resident")
     counter, engine = EvaluationCounter(simulation), simulation.loan.engine
     step = CountedStep(counter, engine.advance, engine.schedule, engine.broad_phase)
     simulation.driver = Resident(step)
     made = _Intervals(simulation, counter, every)
-    looks = {"progress": progress, "title": title, "observers": [made]}
-    run_simulation(simulation, until=until, samples=1, **looks)
+    run_simulation(simulation, until=until, samples=1, title="blast", observers=[made])
     time_s, counts, ticks, seconds, searches = map(np.array, zip(*made.rows))
     used = 1 + int(np.flatnonzero(ticks.any(axis=0)).max())
     return Workload(time_s, counts[:, :, :used], ticks[:, :used], seconds, searches), simulation

@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE
-from taichi_dem.closed_forms import (
+from _closed_forms import (
     LinearBonds,
     bond_shear,
     bond_tension,
     damped_opening,
     velocity_after_impact,
 )
+from taichi_dem import CONCRETE
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.mesh.topology import body_properties
 

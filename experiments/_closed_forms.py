@@ -1,19 +1,12 @@
-"""Exact solutions for small scenes: the yardsticks of a test of a method or a law."""
-
-from collections.abc import Sequence
+"""Exact solutions for small scenes: the yardsticks of hard cases, laws and methods."""
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from taichi_dem.materials import Material
 from taichi_dem.materials.bond_rules import per_bond
-from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import body_properties, topology_of
 
 
-def damped_opening(
-    mass: float, stiffness: float, damping: float, opening: float, speed: float, time_s: ArrayLike
-) -> np.ndarray:
+def damped_opening(mass, stiffness, damping, opening, speed, time_s):
     """Opening [m] of two bodies tied along a line by a spring and a dashpot, not critical.
 
     mass: reduced [kg]. stiffness [N/m], damping [N s/m]. opening [m], speed [m/s]: at the start.
@@ -26,13 +19,7 @@ def damped_opening(
     return np.real(first * np.exp(slow * time) + (opening - first) * np.exp(fast * time))
 
 
-def velocity_after_impact(
-    meshes: Sequence[Mesh],
-    material: Material,
-    arms: Sequence[np.ndarray],
-    normal: np.ndarray,
-    velocity: np.ndarray,
-) -> np.ndarray:
+def velocity_after_impact(meshes, material, arms, normal, velocity):
     """Velocity (3,) [m/s] of a body after a plastic impact on one at rest.
 
     meshes: both, of a single body each. arms: of the point of contact from either centre [m].
@@ -54,7 +41,7 @@ def velocity_after_impact(
     return velocity + impulse / bodies[0][0][0]
 
 
-def bond_tension(material: Material, opening: ArrayLike) -> np.ndarray:
+def bond_tension(material, opening):
     """Traction [Pa] of a bond that is pulled along a way (Konno et al., Fig. 4).
 
     opening: its openings [m] in their order. It softens beyond its strength, unloads to the origin,
@@ -69,7 +56,7 @@ def bond_tension(material: Material, opening: ArrayLike) -> np.ndarray:
     return np.where(left > 0.0, stiffness * opening, 0.0)
 
 
-def bond_shear(material: Material, sliding: ArrayLike, pressure: float) -> np.ndarray:
+def bond_shear(material, sliding, pressure):
     """Shear traction [Pa] of a bond that is slid along a way (Konno et al., Fig. 3).
 
     sliding: in its order [m]. pressure: on the bond all the time [Pa]. It slips at cohesion +
@@ -77,7 +64,7 @@ def bond_shear(material: Material, sliding: ArrayLike, pressure: float) -> np.nd
     """
     bound = max(0.0, material.cohesion + material.friction * pressure)
     slip, stiffness = 0.0, float(material.shear_stiffness)
-    found: list[float] = []
+    found = []
     for reach in np.asarray(sliding, dtype=float):
         found.append(float(np.clip(stiffness * (reach - slip), -bound, bound)))
         slip = reach - found[-1] / stiffness
@@ -91,7 +78,7 @@ class LinearBonds:
     two are J^T D J summed over the units of all bonds.
     """
 
-    def __init__(self, mesh: Mesh, material: Material):
+    def __init__(self, mesh, material):
         mass, centre, inertia = body_properties(mesh, material.density)
         size = 6 * len(mass)
         self.mass, self.stiffness, self.damping = (np.zeros((size, size)) for _ in range(3))
@@ -122,14 +109,14 @@ class LinearBonds:
             self.stiffness += unit_area * jacobian.T @ elastic @ jacobian
             self.damping += unit_area * jacobian.T @ viscous @ jacobian
 
-    def state_matrix(self) -> np.ndarray:
+    def state_matrix(self):
         """Matrix A (12 n, 12 n) of x' = A x for displacements and turns, then their rates."""
         size = len(self.mass)
         forces = np.hstack([self.stiffness, self.damping])
         rates = -np.linalg.solve(self.mass, forces)
         return np.vstack([np.eye(size, 2 * size, size), rates])
 
-    def static_displacement(self, acceleration: ArrayLike, fixed: np.ndarray) -> np.ndarray:
+    def static_displacement(self, acceleration, fixed):
         """Displacements (n, 3) [m] at which the bonds carry the weight of all bodies.
 
         acceleration: of gravity, (3,) [m/s^2]. fixed: bodies that cannot move, booleans (n,).

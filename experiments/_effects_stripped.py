@@ -1,24 +1,17 @@
-"""Measured overhead of what is absent: a step without effects beside one stripped by hand.
+"""A step without effects beside one stripped by hand: an effect that is absent costs nothing.
 
-An effect that is left out of a scene must cost nothing. The stripped step holds elastic bonds and
-free bodies and nothing that an effect could hook into, so that the promise can be checked on any
-machine.
+The stripped step holds elastic bonds and free bodies and nothing that an effect could hook into, so
+that the promise can be checked on any machine (``cost_of_effects.py``).
 """
-
-from typing import Any, Callable
 
 import numpy as np
 import taichi as ti
 
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform
 from taichi_dem.kit.study.timing import seconds_of
 from taichi_dem.kit.types import vec2, vec3
-from taichi_dem.materials import CONCRETE
-from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.methods import Uniform
 from taichi_dem.physics.bond import unit_arm, unit_opening
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned
-from taichi_dem.scene import Scene
-from taichi_dem.simulation import Simulation
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.drivers import Resident, Step
 
@@ -26,13 +19,13 @@ from taichi_dem.step.drivers import Resident, Step
 STEP = 1e-8
 
 
-def elastic_step_seconds(mesh: Mesh, substeps: int, repeats: int) -> dict[str, list[float]]:
+def elastic_step_seconds(mesh, substeps, repeats):
     """CPU seconds of some substeps of an elastic block in motion, in turns of random order.
 
     Returns "composed", of the step as the package composes it, and "by_hand", of ``ByHand``.
     """
     runs = {"composed": _elastic(mesh, None), "by_hand": _elastic(mesh, ByHand)}
-    seconds: dict[str, list[float]] = {name: [] for name in runs}
+    seconds = {name: [] for name in runs}
     order = np.random.default_rng(2)
     for _ in range(repeats):
         for name in order.permutation([*runs]):
@@ -40,9 +33,9 @@ def elastic_step_seconds(mesh: Mesh, substeps: int, repeats: int) -> dict[str, l
     return seconds
 
 
-def _elastic(mesh: Mesh, stripped: Any) -> Callable[[int], Any]:
+def _elastic(mesh, stripped):
     """A function that takes an elastic block, its bodies shaken, some substeps on."""
-    simulation: Any = Simulation(Scene(mesh, CONCRETE, []), Uniform(STEP), "resident")
+    simulation = Simulation(Scene(mesh, CONCRETE, []), Uniform(STEP), "resident")
     centre = simulation.model.centre
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(centre), 1))
     velocity = np.random.default_rng(1).normal(size=centre.shape)
