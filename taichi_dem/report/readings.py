@@ -214,14 +214,6 @@ class Readings:
             for k in ti.static(range(3)):
                 table[a, 1 + k] = self.contacts.store.heat[p][k]
 
-    @ti.kernel
-    def supported(self, index: ti.i32, marks: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-        """Mark the bodies on which one of the supports acts."""
-        for i in range(self.tables.body_count[None]):
-            for e in ti.static(range(len(self.tables.supports))):
-                if e == index and self.tables.supports[e].acts_on(i):
-                    marks[i] = 1
-
     def momentum(self) -> np.ndarray:
         """Momentum of every body; impulses of loads and supports, their sums and sizes, (n, 14)."""
         state, here = self.state, slice(int(values(self.tables.body_count)))

@@ -4,7 +4,6 @@ Bodies are rigid, so two of them that are not bonded may share volume only where
 apart: no contact, faces without spheres, or contact that is too soft or too sparse.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,11 +11,9 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.types import vec3, vec4
-from taichi_dem.mesh.tetrahedra import components, points_of_parts
+from taichi_dem.mesh.tetrahedra import points_of_parts
+from taichi_dem.report.run import Kept, Run
 from taichi_dem.scene import remedy
-from taichi_dem.state.model import Model
-from taichi_dem.state.state import State
-from taichi_dem.state.timeline import NEVER
 
 #: Share of the smaller body beyond which two bodies count as within each other.
 DEEP = 0.1
@@ -60,52 +57,64 @@ class Interpenetration:
         )
 
 
-class SharedVolume:
+class SharedVolume(Kept):
     """Finds bodies within each other, at recording times after which some body has moved.
 
-    worst: the ``Interpenetration`` so far. Of the last look: pairs (n, 2) and their share (n,),
-    near_pairs (m, 2) all pairs that no plane of a face parts, those that share most first.
+    Of the last look: pairs (n, 2) that share volume and their share of the smaller body (n,).
+    figures: those of ``worst`` so far.
     """
 
-    def __init__(self, model: Model, state: State):
-        self.model, self.state = model, state
+    kept = "place", "turn", "figures"
+
+    def __init__(self, run: Run):
+        self.run, model = run, run.model
         self.arms = model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
         self.points = [points_of_parts(halvings) for halvings in _HALVINGS]
-        self.worst = Interpenetration()
-        self.seen = model.centre, np.tile(np.eye(3), (model.body_count, 1, 1))
+        self.place, self.turn = model.centre, np.tile(np.eye(3), (model.body_count, 1, 1))
+        self.figures = np.array([0.0, -1.0, -1.0, 0.0, 0.0])
         self.pairs, self.share = np.zeros((0, 2), dtype=np.int32), np.zeros(0)
-        self.near_pairs = self.pairs
+
+    @property
+    def worst(self) -> Interpenetration:
+        """The worst pair so far."""
+        share, first, second, time_s, deep = self.figures.tolist()
+        return Interpenetration(share, (int(first), int(second)), time_s, int(deep))
 
     def sample(self, time_s: float, finished: bool = False) -> bool:
         """Compare the bodies where one has moved, or at the end; whether they were compared."""
-        way = self.way()
-        if way <= (0.0 if finished else MOVED):
+        if self._way() <= (0.0 if finished else MOVED):
             return False
-        self.seen = self.now()
-        self._compare(self.corners(*self.seen))
-        self._note(time_s)
+        self.place, self.turn = self._now()
+        self._compare(self.corners())
+        share = self.share.max(initial=0.0)
+        figures = self.figures.copy()
+        if share > figures[0]:
+            figures[:4] = share, *self.pairs[self.share.argmax()], time_s
+        figures[4] = max(figures[4], (self.share > DEEP).sum())
+        self.figures = figures
         return True
 
-    def way(self) -> float:
+    def _way(self):
         """Longest way of a body since the last look, as a share of its radius."""
-        place, turn = self.now()
+        place, turn = self._now()
         # A motion whose square is no number is that of a runaway, which the divergence check names.
         with np.errstate(over="ignore"):
-            way = np.linalg.norm(place - self.seen[0], axis=1) / self.model.body_radius
-            return float((way + np.linalg.norm(turn - self.seen[1], axis=(1, 2))).max())
+            way = np.linalg.norm(place - self.place, axis=1) / self.run.model.body_radius
+            return float((way + np.linalg.norm(turn - self.turn, axis=(1, 2))).max())
 
-    def corners(self, place: np.ndarray, turn: np.ndarray, bodies: Any = slice(None)) -> np.ndarray:
-        """Corners of some bodies [m], (n, 4, 3), from places and rotations of all."""
-        return place[bodies, None] + np.einsum("nij,ncj->nci", turn[bodies], self.arms[bodies])
-
-    def now(self) -> tuple[np.ndarray, np.ndarray]:
+    def _now(self):
         """Positions [m] and rotations of the bodies."""
-        count = self.model.body_count
-        return self.state.position.to_numpy()[:count], self.state.rotation.to_numpy()[:count]
+        state, count = self.run.state, self.run.model.body_count
+        return state.position.to_numpy()[:count], state.rotation.to_numpy()[:count]
+
+    def corners(self, bodies: Any = slice(None)) -> np.ndarray:
+        """Corners of some bodies at present [m], (n, 4, 3)."""
+        place, turn = self._now()
+        return place[bodies, None] + np.einsum("nij,ncj->nci", turn[bodies], self.arms[bodies])
 
     def findings(self) -> tuple[str, ...]:
         """A sentence where bodies are within each other although contact is listed; or none."""
-        contact, worst = self.model.contact, self.worst
+        contact, worst = self.run.model.contact, self.worst
         if contact is None or worst.share <= NOTABLE:
             return ()
         law = type(contact).__name__
@@ -119,69 +128,31 @@ class SharedVolume:
             f"{advice}",
         )
 
-    def fragments(self) -> int:
-        """Number of pieces that intact bonds hold together."""
-        top = self.model.topology
-        intact = self.state.broken_tick.to_numpy()[: self.model.bond_count] == NEVER
-        ends = np.column_stack([top.master, top.slave])[intact]
-        return len(np.unique(components(self.model.body_count, ends)))
-
-    def saved(self) -> dict[str, np.ndarray]:
-        """Data for a checkpoint, arrays by name."""
-        worst = self.worst
-        figures = [worst.share, *worst.bodies, worst.time_s, worst.deep]
-        return {
-            "shared": np.array(figures, dtype=np.float64),
-            "seen": self.seen[0].copy(),
-            "turned": self.seen[1].copy(),
-        }
-
-    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Restore the data that ``saved`` returned."""
-        share, first, second, time_s, deep = saved["shared"].tolist()
-        self.worst = Interpenetration(share, (int(first), int(second)), time_s, int(deep))
-        self.seen = saved["seen"].copy(), saved["turned"].copy()
-
-    def _note(self, time_s):
-        deep = max(self.worst.deep, int((self.share > DEEP).sum()))
-        found = self.worst.share, self.worst.bodies, self.worst.time_s
-        if len(self.share) and self.share.max() > self.worst.share:
-            place = int(self.share.argmax())
-            found = float(self.share[place]), tuple(self.pairs[place].tolist()), time_s
-        self.worst = Interpenetration(*found, deep)
-
     def _compare(self, corners):
         """Find all pairs and their shares; corners (n, 4, 3) [m]."""
-        top = self.model.topology
-        broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
+        top = self.run.model.topology
         # Bond -1 stands for an outer face, which is as free as a broken one.
-        free = np.append(broken, True)[top.body_bond]
+        free = np.append(self.run.broken(), True)[top.body_bond]
         surface = np.flatnonzero(free.any(axis=1))
-        tied = np.full((self.model.body_count, 4), -1, dtype=np.int32)
-        ends = np.column_stack([top.master, top.slave])
-        for body, bonds in ((top.master, top.master_face), (top.slave, top.slave_face)):
-            other = ends.sum(axis=1) - body
-            tied[body, bonds] = np.where(broken, -1, other)
+        other = np.append(top.master + top.slave, 0)[top.body_bond]
+        tied = np.where(free, -1, other - np.arange(len(free))[:, None]).astype(np.int32)
         order, last = _in_rows(corners[surface])
         body = surface[order].astype(np.int32)
         own = np.ascontiguousarray(corners[body])
         box = np.concatenate([own.min(axis=1), own.max(axis=1)], axis=1)
-        args = last, box, own, body, np.ascontiguousarray(tied[body])
+        args = last, box, own, body, tied[body]
         count = np.zeros(len(body) + 1, dtype=np.int32)
         _near_pairs(*args, count, np.zeros((1, 2), dtype=np.int32), False)
         first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32)
         places = np.zeros((max(1, int(count.sum())), 2), dtype=np.int32)
         _near_pairs(*args, first, places, True)
-        near = np.sort(body[places[: int(count.sum())]], axis=1)
-        volume = np.ascontiguousarray(self.model.body_mass[body])
-        share = np.ones(len(near))
+        places, share = places[: int(count.sum())], np.zeros(0)
+        volume = np.ascontiguousarray(self.run.model.body_mass[body])
         for points in self.points:
-            left = np.flatnonzero(share > 0.0)
-            found = np.zeros(len(left))
-            _shares(own, np.ascontiguousarray(places[left]), volume, points, found)
-            share[left] = found
-        self.near_pairs = near[np.argsort(-share, kind="stable")]
-        self.pairs, self.share = near[left], found
+            share = np.zeros(len(places))
+            _shares(own, np.ascontiguousarray(places), volume, points, share)
+            places, share = places[share > 0.0], share[share > 0.0]
+        self.pairs, self.share = np.sort(body[places], axis=1), share
 
 
 def _in_rows(corners):

@@ -38,7 +38,7 @@ def result():
 
 
 def test_times_are_those_of_the_first_body_on_which_an_effect_acts(result):
-    acting = {one.use.effect: one for one in result.certificate.acting}
+    acting = {use.effect: use for use in result.certificate.acting}
     for name, key in (("softening", "softening"), ("shear_slip", "slip")):
         assert acting[name].since_s == np.nanmin(result.acting_since[key])
     assert 0.0 < acting["softening"].since_s < np.nanmin(result.broken_time)

@@ -5,7 +5,7 @@ import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, needed_effects
 from taichi_dem.mesh.shapes import pair
-from taichi_dem.report.bond_slip import MOST_SLIP
+from taichi_dem.report.resolution import MOST_SLIP
 
 EPS = np.finfo(float).eps
 
@@ -34,7 +34,7 @@ def test_share_is_that_of_the_shortest_edge():
     report = slid(0.03).report()
     (found,) = report.bond_slip
     assert found.share == pytest.approx(0.03, abs=16 * EPS)
-    assert found.bond == 0 and not found.excessive
+    assert found.bond == 0 and found.count == 0
 
 
 def test_far_slip_is_warned_of_and_an_effect_that_weakens_is_missed():
@@ -49,4 +49,4 @@ def test_largest_of_all_recordings_is_kept():
     write_slip(simulation, 0.02)
     simulation.sample()
     (found,) = simulation.report().bond_slip
-    assert found.share == pytest.approx(0.1, abs=16 * EPS) and found.most == 1
+    assert found.share == pytest.approx(0.1, abs=16 * EPS) and found.count == 1
