@@ -27,7 +27,7 @@ from taichi_dem.report.energy_balance import EnergyBalance, open_account
 from taichi_dem.report.missing_effects import MissingEffects
 from taichi_dem.report.readings import Readings
 from taichi_dem.report.report import Report, known_error
-from taichi_dem.report.resolution import BondSlips, StepResolution
+from taichi_dem.report.resolution import StepResolution
 from taichi_dem.report.run import Kept, Run
 from taichi_dem.report.shared_volume import SharedVolume
 from taichi_dem.scene import Scene
@@ -255,7 +255,6 @@ class Simulation(Uncopied):
         self.divergence_check = DivergenceCheck(self.run, self.energy_balance)
         self.shared_volume = SharedVolume(self.run)
         self.missing_effects = MissingEffects(self.run, self.shared_volume)
-        self.bond_slips = BondSlips(self.run)
         self.step_resolution = StepResolution(self.run)
 
     @property
@@ -272,7 +271,6 @@ class Simulation(Uncopied):
             "missing effects": self.missing_effects,
             "creep": self.missing_effects.creep,
             "shared volume": self.shared_volume,
-            "bond slips": self.bond_slips,
             "step resolution": self.step_resolution,
         }
 
@@ -294,8 +292,7 @@ class Simulation(Uncopied):
         """Sample missing effects, slip of bonds, and bonds that the step does not resolve."""
         self.missing_effects.sample(self.time_s)
         self.divergence_check.check_shared(self.shared_volume)
-        self.step_resolution.sample()
-        self.bond_slips.sample(self.time_s)
+        self.step_resolution.sample(self.time_s)
 
     def advance_to(self, macro_step: int, on_call: Optional[Callable[[], object]] = None) -> None:
         """Step until a number of largest steps.
@@ -466,7 +463,7 @@ class Simulation(Uncopied):
             ),
             interpenetration=shared_volume.worst,
             bound_by=counted_criteria(self.state.bound.to_numpy()),
-            bond_slip=self.bond_slips.finding(),
+            bond_slip=self.step_resolution.bond_slip(),
             round_off_J=self.divergence_check.round_off(),
         )
         return replace(

@@ -141,27 +141,23 @@ class DivergenceCheck:
 
     def _error(self, body, what, advise: Advise):
         """SimulationDiverged that says what is wrong with a body, and what to change."""
-        schedule, motion, links = self.run.schedule, self.run.state.motion(), self._links(body)
-        level = int(motion["level"][body])
+        schedule, level = self.run.schedule, int(self.run.state.level.to_numpy()[body])
         time_s = self.run.state.tick[None] * schedule.tick_seconds
-        remedy = advise([body, *(other for other, _ in links)])
+        remedy = advise([body, *self._beside(body)])
         error = SimulationDiverged(
-            f"diverged at t = {time_s:.6g} s: body {body} {what}; "
-            f"{_partner(body, motion['velocity'], links)}; its step was "
+            f"diverged at t = {time_s:.6g} s: body {body} {what}; its step was "
             f"{schedule.dt0 / 2.0**level:.3g} s (level {level}), {remedy.words}"
         )
         error.advice = remedy.advice
         return error
 
-    def _links(self, body):
-        """Bodies that a body is tied to or near, and how, as pairs."""
+    def _beside(self, body):
+        """Bodies that a body is tied to or near."""
         top, contacts, broken = self.run.model.topology, self.run.contacts, self.run.broken()
         own = [b for b in top.body_bond[body] if b >= 0 and not broken[b]]
-        links = [(int(top.master[b] + top.slave[b] - body), f"bond {b} to body") for b in own]
         pairs = contacts.store.near_table()[0] if contacts is not None else np.zeros((0, 2), int)
-        for first, second in pairs[(pairs == body).any(axis=1)].tolist():
-            links.append((first + second - body, "contact with body"))
-        return links
+        near = pairs[(pairs == body).any(axis=1)].sum(axis=1) - body
+        return [*(top.master[own] + top.slave[own] - body).tolist(), *near.tolist()]
 
     def _of_speed(self, speed, near):
         """For a body at a speed [m/s] beyond the bound of the scene."""
@@ -229,12 +225,3 @@ class DivergenceCheck:
 def _shorter_step(step, why):
     """To try a step [s]; why: what allows no more, in words."""
     return Remedy(f"{why}: try a step of {step:.2g} s", {"step": float(f"{step:.2g}")})
-
-
-def _partner(body, velocity, links):
-    """The neighbour that moves fastest against a body, and how they are tied."""
-    if not links:
-        return "it touches nothing"
-    apart = [math.hypot(*(velocity[other] - velocity[body])) for other, _ in links]
-    other, tie = links[int(np.nanargmax(np.nan_to_num(apart, nan=np.inf)))]
-    return f"the fastest against it is {tie} {other}"

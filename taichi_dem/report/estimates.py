@@ -30,7 +30,7 @@ _SHARE = "share of the energy put in, at most"
 
 @dataclass(frozen=True)
 class Estimate:
-    """Dimensionless group by which an effect is judged before a run.
+    """Dimensionless group by which an effect is judged.
 
     Parameters
     ----------
@@ -40,18 +40,27 @@ class Estimate:
         Value of the group [-]; NaN where it is not known.
     words : str
         The group in words.
-    verdict : str
-        ``"negligible"``, ``"needed"`` or ``"unclear"``.
     """
 
     effect: str
     group: float
     words: str
-    verdict: str
+
+    @property
+    def verdict(self) -> str:
+        """``"negligible"``, ``"needed"`` or ``"unclear"``."""
+        return NEGLIGIBLE if self.group < _LOW else NEEDED if self.group >= _HIGH else UNCLEAR
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """What it adds to the table of effects."""
+        said = {"advice": self.verdict, "reason": self.words}
+        return {"effect": self.effect, "left_out": self.group, **said}
 
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file; a group that is not known is None."""
-        return {**asdict(self), "group": None if math.isnan(self.group) else self.group}
+        group = None if math.isnan(self.group) else self.group
+        return {**asdict(self), "group": group, "verdict": self.verdict}
 
     def __str__(self):
         value = "not known" if math.isnan(self.group) else f"{self.group:.2g}"
@@ -110,7 +119,7 @@ class PartScales:
         return float(given) if isinstance(given, (int, float)) else math.nan
 
     def of_materials(self, name: str, choose: Any) -> np.ndarray:
-        """A constant of each part: ``np.minimum`` or ``np.maximum`` of those of its bodies."""
+        """A constant of each part: the least or largest of its bodies, as ``choose`` says."""
         materials = self.model.materials
         values = np.array([getattr(one, name) for one in materials.materials], dtype=np.float64)
         found = values[materials.of_body[self.first]]
@@ -139,11 +148,10 @@ class PartScales:
         return total
 
     def bent(self, until: float, borne: np.ndarray) -> np.ndarray:
-        """Largest stress that weight may cause by a time in a bonded part that is borne.
+        """Largest stress of weight in bonded parts that are borne, over the tensile strength.
 
-        As a share of the tensile strength. That of a beam of its length and thickness, as if it
-        were held at one end and its weight set in at once, twice that at rest, 3 density g length^2
-        / thickness; but no more than a speed of g until causes, sqrt(3) density wave g until.
+        That of a beam held at one end whose weight sets in at once, twice 3 density g length^2 /
+        thickness; but no more than a speed of g until causes, sqrt(3) density wave g until.
         """
         long, thin = self._extents()
         bent = 6.0 * WEIGHT * long**2 / thin
@@ -169,12 +177,7 @@ class PartScales:
         if known[k, p] < _HIGH and np.isnan(values).any():
             k, p = np.argwhere(np.isnan(values))[0]
         part = f"part of body {self.first[p]}: " if self.count > 1 else ""
-        return _judged(effect, float(values[k, p]), part + groups[k][1])
-
-
-def _judged(effect, group, words):
-    verdict = NEGLIGIBLE if group < _LOW else NEEDED if group >= _HIGH else UNCLEAR
-    return Estimate(effect, group, words, verdict)
+        return Estimate(effect, float(values[k, p]), part + groups[k][1])
 
 
 def _sums(group, rows):
@@ -197,12 +200,11 @@ def estimates_before(
 ) -> tuple[Estimate, ...]:
     """Estimates of all effects of a scene before a run, by dimensionless groups.
 
-    model: the scene's arrays. until: end of the run [s]. velocity: of the bodies at the start
-    [m/s], (body_count, 3), None at rest. meet: whether parts may meet. The part that needs an
-    effect most decides. The stress is that of the loads and supports on a part (``Effect.stress``)
-    and of the motion at the start, of all parts where they may meet; the speed is that of a wave of
-    this stress, stress / (density wave speed), or the largest at the start, of the part alone. Of
-    several materials in a part the least strengths and the largest friction count.
+    until: end of the run [s]. velocity: of the bodies at the start [m/s], (body_count, 3), None at
+    rest. meet: whether parts may meet. The stress is that of the loads and supports on a part
+    (``Effect.stress``) and of the motion at the start, of all parts where they may meet; the speed
+    is that of a wave of this stress, stress / (density wave speed), or the largest at the start, of
+    the part alone. Of several materials the least strengths and the largest friction count.
     """
     part = parts_of(model.mesh)
     scales = PartScales(model, part)
@@ -224,11 +226,12 @@ def estimates_before(
     contact, worst = scales.worst("contact", (breaks, _OPENS)), scales.worst
     # Parts that meet touch from the start, others where they break.
     if meet and not contact.group >= scales.count:
-        contact = _judged("contact", float(scales.count), "number of parts that may meet")
+        contact = Estimate("contact", float(scales.count), "number of parts that may meet")
     # A part that is borne does not fall; what may hit one at rest is not known.
     borne = scales.under((*model.supports, *model.ground))
     fall = WEIGHT * until / np.maximum(speed, 1e-300)
     fall = np.where(speed == 0.0, np.where(borne, 0.0, np.nan if meet else fall), fall)
+    bends = scales.bent(until, borne | meet), _BENDS
     drag = AIR * speed * until / (scales.density * scales.spacing)
     return (
         worst("softening", (softening, "stress over tensile strength")),
@@ -236,20 +239,15 @@ def estimates_before(
         contact,
         worst("friction", (rubs, "friction times stress over strength")),
         worst("bond damping", (scales.damping, "share of a bond's vibration lost in a cycle")),
-        worst(
-            "gravity",
-            (fall, "speed of a fall over that given"),
-            (scales.bent(until, borne | meet), _BENDS),
-        ),
+        worst("gravity", (fall, "speed of a fall over that given"), bends),
         worst("air drag", (drag, "share of momentum lost to air")),
     )
 
 
 def _speeds(model, velocity, group):
-    """Speeds of groups of bodies at the start: beside a rigid motion of each, of its rim, largest.
+    """Speeds of groups of bodies at the start: beside a rigid motion, of its rim, and largest.
 
-    Three arrays, an entry a group. A front that stops a speed v has the stress density wave v, a
-    rim of speed v density v^2.
+    A front that stops a speed v has the stress density wave v, a rim of speed v density v^2.
     """
     found = np.zeros((3, int(group.max()) + 1))
     if velocity is None:
@@ -278,10 +276,10 @@ def estimates_after(
 ) -> tuple[Estimate, ...]:
     """Estimates of what no law of a scene serves, from where a run has brought the bodies.
 
-    displacement (n, 3) [m] and speed (n,) [m/s]: of the bodies. energy: that each part got [J],
-    (part_count,), 0 where nothing moved it; borne: whether a support, ground or contact bears it.
-    Shares of this energy: work of the weight along the way and its fall, and of the drag of air on
-    balls of the bodies' size at their present speed. Where a part is borne, weight strains it too.
+    displacement (n, 3) [m], speed (n,) [m/s]: of the bodies. energy: that each part got [J], 0
+    where nothing moved it; borne: whether a support, ground or contact bears it. Shares of this
+    energy: work of the weight along the way and its fall, and of the drag of air on balls of the
+    bodies' size at their present speed. Where a part is borne, weight strains it too.
     """
     model, way, found = scales.model, np.linalg.norm(displacement, axis=1), []
     if not any(effect.name == "gravity" for effect in model.loads):

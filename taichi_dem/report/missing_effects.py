@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -53,11 +54,22 @@ class MissingEffect:
     first_s: float = 0.0
     place_m: tuple = ()
 
+    @property
+    def row(self) -> dict[str, Any]:
+        """What it adds to the table of effects."""
+        place = {"since_s": self.first_s, "where": f"{self.unit} {self.where}"}
+        said = {"events": self.count, "advice": "list it", "reason": self.what}
+        return {"effect": self.effect, **said, **place}
+
+    @property
+    def place(self) -> str:
+        """Coordinates [m] in words."""
+        return ", ".join(f"{x:.3g}" for x in self.place_m)
+
     def __str__(self):
-        place = ", ".join(f"{x:.3g}" for x in self.place_m)
         return (
             f"{self.effect} is left out, but {self.what}: {self.count}, first {self.unit} "
-            f"{self.where} at {place} m, t = {self.first_s:.4g} s"
+            f"{self.where} at {self.place} m, t = {self.first_s:.4g} s"
         )
 
 

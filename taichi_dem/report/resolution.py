@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.report.missing_effects import middle_of_bond
+from taichi_dem.report.missing_effects import MissingEffect, middle_of_bond
 from taichi_dem.report.run import Kept, Run
 from taichi_dem.state.timeline import MAX_LEVEL
 
@@ -12,6 +12,7 @@ from taichi_dem.state.timeline import MAX_LEVEL
 #: has slid by a share s of an edge along it, (1 - s)^2 still lies on the other: at 5 % a tenth of
 #: the area that the bond acts on is gone, more than an error that a user would accept.
 MOST_SLIP = 0.05
+_SLIPPED = f"bonds that hold have slipped by more than {100 * MOST_SLIP:g} % of an edge"
 _FULL = "the cohesion is undiminished: SlipWeakening in place of ShearSlip degrades it with slip"
 _WEAKENED = "friction acts on the whole of it: compare with a coarser mesh"
 #: Least share of its coefficient at which a limited dashpot still represents the material.
@@ -25,91 +26,61 @@ MOST_TAKEN = 1.0
 
 
 @dataclass(frozen=True)
-class BondSlip:
+class BondSlip(MissingEffect):
     """Largest residual slip of a bond that held, at the recording times of a run.
 
-    share: of the shortest edge of its face. bond, place_m, time_s: the bond, the middle of its face
-    in the mesh [m], and when. count: largest number of bonds beyond ``MOST_SLIP`` at a time.
-    weakens: whether slip degrades cohesion.
+    share: of the shortest edge of its face. count: largest number of bonds beyond ``MOST_SLIP`` at
+    a time. weakens: whether slip degrades cohesion.
     """
 
-    share: float
-    bond: int
-    place_m: tuple
-    time_s: float
-    count: int
-    weakens: bool
-
-    #: As of a ``MissingEffect``: the effect to list, and the finding in words.
-    effect = "SlipWeakening"
-    what = f"bonds that hold have slipped by more than {100 * MOST_SLIP:g} % of an edge"
+    share: float = 0.0
+    weakens: bool = False
 
     @property
     def figure(self) -> str:
         """The share and the bond in words."""
-        return f"{100 * self.share:.3g} % of the shortest edge of its face (bond {self.bond})"
+        return f"{100 * self.share:.3g} % of the shortest edge of its face (bond {self.where})"
 
     def __str__(self):
-        place = ", ".join(f"{x:.3g}" for x in self.place_m)
         return (
-            f"up to {self.count} {self.what} of their face, bond {self.bond} (at {place} m) by "
-            f"{100 * self.share:.3g} % at t = {self.time_s:.4g} s: less of the face lies on the "
-            f"other, but {_WEAKENED if self.weakens else _FULL}"
+            f"up to {self.count} {self.what} of their face, bond {self.where} (at {self.place} m) "
+            f"by {100 * self.share:.3g} % at t = {self.first_s:.4g} s: less of the face lies on "
+            f"the other, but {_WEAKENED if self.weakens else _FULL}"
         )
 
 
-class BondSlips(Kept):
-    """Measures the residual slip of bonds at recording times."""
-
-    kept = "share", "time_s", "bond", "count"
-
-    def __init__(self, run: Run):
-        self.run, (law,) = run, run.model.by_role["shear"] or (None,)
-        self.present = run.model.bond_count > 0 and getattr(law, "remembers_slip", False)
-        self.weakens = getattr(law, "releases", False)
-        self.share, self.time_s, self.bond, self.count = 0.0, 0.0, -1, 0
-        corners = run.model.mesh.points[run.model.topology.vertices]
-        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
-        self.shortest = edges.min(axis=1)
-
-    def sample(self, time_s: float) -> None:
-        """Update the figures at a recording time [s]."""
-        if not self.present:
-            return
-        share = self.run.readings.residual_slip() / self.shortest
-        self.count = max(self.count, int((share > MOST_SLIP).sum()))
-        if share.max() > self.share:
-            self.share, self.bond, self.time_s = float(share.max()), int(share.argmax()), time_s
-
-    def finding(self) -> tuple[BondSlip, ...]:
-        """The ``BondSlip`` of the run so far, or nothing where no bond slipped."""
-        if self.bond < 0:
-            return ()
-        bond, place = int(self.bond), middle_of_bond(self.run.model, self.bond)
-        figures = float(self.share), bond, tuple(place.tolist()), float(self.time_s)
-        return (BondSlip(*figures, int(self.count), self.weakens),)
-
-
 class StepResolution(Kept):
-    """Checks of the time step: shares of dashpots at recording times, bond failures at the end.
+    """Follows at recording times what mesh and step do not resolve.
 
-    share: least share of its dashpots that each bond kept while it held, (bond_count,). step:
-    shortest step of each body [s]; lightest: mass of the lightest body near it [kg]; pair_share:
-    least recorded share of its contacts; taken: largest part of a speed that they take in a step;
-    all (body_count,).
+    slip: largest residual slip of a bond that held over the shortest edge of its face, the bond,
+    when, and the number of bonds that slipped too far. share: least share of its dashpots that each
+    bond kept while it held, (bond_count,). step: shortest step of each body [s]; lightest: mass of
+    the lightest body near it [kg]; pair_share: least recorded share of its contacts; taken: largest
+    part of a speed that they take in a step; all (body_count,).
     """
 
-    kept = "share", "pair_share", "taken", "step", "lightest"
+    kept = "slip", "share", "pair_share", "taken", "step", "lightest"
 
     def __init__(self, run: Run):
         self.run, bodies = run, run.model.body_count
+        self.slip = np.array([0.0, -1.0, 0.0, 0.0])
         self.share, self.pair_share = np.ones(run.model.bond_count), np.ones(bodies)
         self.taken, self.step = np.zeros(bodies), np.full(bodies, np.inf)
         self.lightest = run.model.body_mass.copy()
+        corners = run.model.mesh.points[run.model.topology.vertices]
+        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
+        self.shortest, (law,) = edges.min(axis=1), run.model.by_role["shear"] or (None,)
+        self.slips = len(edges) > 0 and getattr(law, "remembers_slip", False)
+        self.weakens = getattr(law, "releases", False)
 
-    def sample(self) -> None:
-        """Update the figures at a recording time; not for dashpots that are solved."""
+    def sample(self, time_s: float) -> None:
+        """Update the figures at a recording time [s]; not those of dashpots that are solved."""
         advance, readings, contacts = self.run.advance, self.run.readings, self.run.contacts
+        if self.slips:
+            share = readings.residual_slip() / self.shortest
+            if share.max() > self.slip[0]:
+                self.slip[:3] = share.max(), share.argmax(), time_s
+            self.slip[3] = max(self.slip[3], (share > MOST_SLIP).sum())
         if advance.solves:
             return
         if advance.limited and advance.has_dashpot and self.run.model.bond_count:
@@ -118,6 +89,15 @@ class StepResolution(Kept):
             if advance.limited:
                 self._note_partners(contacts)
             readings.contact_shares(self.pair_share, self.taken)
+
+    def bond_slip(self) -> tuple[BondSlip, ...]:
+        """The ``BondSlip`` of the run so far, or nothing where no bond slipped."""
+        share, bond, time_s, count = self.slip.tolist()
+        if bond < 0:
+            return ()
+        place = tuple(middle_of_bond(self.run.model, int(bond)).tolist())
+        found = "SlipWeakening", _SLIPPED, "bond", int(count), int(bond), time_s, place
+        return (BondSlip(*found, share, self.weakens),)
 
     def _note_partners(self, contacts):
         """Remember steps and light partners: few contacts last until a recording."""

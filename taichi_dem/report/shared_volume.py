@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.types import vec3, vec4
+from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.tetrahedra import points_of_parts
 from taichi_dem.report.run import Kept, Run
 from taichi_dem.scene import remedy
@@ -21,6 +21,8 @@ DEEP = 0.1
 NOTABLE = 0.25
 #: Way of a body, as a share of its radius, after which all are compared again.
 MOVED = 0.25
+#: Pairs that there is room for at first.
+_ROOM = 1024
 #: Halvings of a body's edges, for a first look and for the figure: each part stands for its volume
 #: by a point.
 _HALVINGS = 2, 3
@@ -140,19 +142,15 @@ class SharedVolume(Kept):
         body = surface[order].astype(np.int32)
         own = np.ascontiguousarray(corners[body])
         box = np.concatenate([own.min(axis=1), own.max(axis=1)], axis=1)
-        args = last, box, own, body, tied[body]
-        count = np.zeros(len(body) + 1, dtype=np.int32)
-        _near_pairs(*args, count, np.zeros((1, 2), dtype=np.int32), False)
-        first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32)
-        places = np.zeros((max(1, int(count.sum())), 2), dtype=np.int32)
-        _near_pairs(*args, first, places, True)
-        places, share = places[: int(count.sum())], np.zeros(0)
-        volume = np.ascontiguousarray(self.run.model.body_mass[body])
-        for points in self.points:
-            share = np.zeros(len(places))
-            _shares(own, np.ascontiguousarray(places), volume, points, share)
-            places, share = places[share > 0.0], share[share > 0.0]
-        self.pairs, self.share = np.sort(body[places], axis=1), share
+        mass, count = np.ascontiguousarray(self.run.model.body_mass[body]), np.ones(1, np.int32)
+        found = np.zeros((0, 3))
+        while count[0] > len(found):
+            found, count = np.zeros((max(_ROOM, count[0]), 3)), np.zeros(1, np.int32)
+            _find_pairs(last, box, own, body, tied[body], mass, *self.points, found, count)
+        found = found[: count[0]]
+        found = found[np.lexsort(found[:, [1, 0]].T)]
+        self.pairs = np.sort(body[found[:, :2].astype(np.int32)], axis=1)
+        self.share = found[:, 2]
 
 
 def _in_rows(corners):
@@ -164,36 +162,33 @@ def _in_rows(corners):
 
 
 @ti.kernel
-def _near_pairs(
+def _find_pairs(
     last: ti.types.ndarray(dtype=ti.i32, ndim=1),
     box: ti.types.ndarray(dtype=ti.f64, ndim=2),
     corners: ti.types.ndarray(dtype=ti.f64, ndim=3),
     body: ti.types.ndarray(dtype=ti.i32, ndim=1),
     tied: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    place: ti.types.ndarray(dtype=ti.i32, ndim=1),
-    pairs: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    write: bool,
+    mass: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    few: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    many: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    found: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    count: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Count, or write from their places on, pairs of bodies that no plane of a face parts."""
+    """Count and write pairs of bodies that share volume, as far as there is room, in any order."""
     for i in range(last.shape[0]):
-        count = 0
         for j in range(i + 1, last[i]):
             if _boxes_meet(box, i, j) == 1 and _strangers(tied, body, i, j) == 1:
-                if _outside(corners, i, j) == 0 and _outside(corners, j, i) == 0:
-                    if write:
-                        pairs[place[i] + count, 0], pairs[place[i] + count, 1] = i, j
-                    count += 1
-        if not write:
-            place[i] = count
-
-
-@ti.func
-def _strangers(tied: ti.template(), body: ti.template(), i, j):
-    """1 for bodies that no bond holds together."""
-    strangers = 1
-    for f in ti.static(range(4)):
-        strangers *= ti.cast(tied[i, f] != body[j], ti.i32)
-    return strangers
+                own, other = _planes(corners, i), _planes(corners, j)
+                if _outside(own, corners, j) == 0 and _outside(other, corners, i) == 0:
+                    small, planes = i, other
+                    if mass[i] > mass[j]:
+                        small, planes = j, own
+                    if _share(planes, corners, small, few) > 0.0:
+                        share = _share(planes, corners, small, many)
+                        if share > 0.0:
+                            a = ti.atomic_add(count[0], 1)
+                            if a < found.shape[0]:
+                                found[a, 0], found[a, 1], found[a, 2] = i, j, share
 
 
 @ti.func
@@ -206,60 +201,61 @@ def _boxes_meet(box: ti.template(), i, j):
 
 
 @ti.func
+def _strangers(tied: ti.template(), body: ti.template(), i, j):
+    """1 for bodies that no bond holds together."""
+    strangers = 1
+    for f in ti.static(range(4)):
+        strangers *= ti.cast(tied[i, f] != body[j], ti.i32)
+    return strangers
+
+
+@ti.func
 def _corner(corners: ti.template(), i, c):
     return vec3(corners[i, c, 0], corners[i, c, 1], corners[i, c, 2])
 
 
 @ti.func
-def _plane(corners: ti.template(), i, f):
-    """Plane of the face opposite corner f: inward normal, 1 at that corner, and its offset."""
-    base = _corner(corners, i, (f + 1) % 4)
-    second, third = _corner(corners, i, (f + 2) % 4), _corner(corners, i, (f + 3) % 4)
-    normal = (second - base).cross(third - base)
-    normal /= normal.dot(_corner(corners, i, f) - base)
-    return vec4(normal[0], normal[1], normal[2], -normal.dot(base))
+def _planes(corners: ti.template(), i):
+    """Planes of the faces, each opposite a corner: inward normal, 1 at the corner, and offset."""
+    planes = ti.Matrix.zero(ti.f64, 4, 4)
+    for f in ti.static(range(4)):
+        base = _corner(corners, i, (f + 1) % 4)
+        second, third = _corner(corners, i, (f + 2) % 4), _corner(corners, i, (f + 3) % 4)
+        normal = (second - base).cross(third - base)
+        normal /= normal.dot(_corner(corners, i, f) - base)
+        for k in ti.static(range(3)):
+            planes[f, k] = normal[k]
+        planes[f, 3] = -normal.dot(base)
+    return planes
 
 
 @ti.func
-def _outside(corners: ti.template(), i, j):
-    """1 where all corners of body j lie beyond one face of body i."""
-    outside, f = 0, 0
-    while f < 4 and outside == 0:
-        plane, inside = _plane(corners, i, f), 0
-        for c in range(4):
-            height = plane.xyz.dot(_corner(corners, j, c)) + plane[3]
-            inside |= ti.cast(height > 0.0, ti.i32)
-        outside = 1 - inside
-        f += 1
+def _outside(planes: ti.template(), corners: ti.template(), i):
+    """1 where all corners of body i lie beyond one of the planes."""
+    outside = 0
+    for f in ti.static(range(4)):
+        inside = 0
+        for c in ti.static(range(4)):
+            inside |= _above(planes, f, _corner(corners, i, c))
+        outside |= 1 - inside
     return outside
 
 
-@ti.kernel
-def _shares(
-    corners: ti.types.ndarray(dtype=ti.f64, ndim=3),
-    pairs: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    volume: ti.types.ndarray(dtype=ti.f64, ndim=1),
-    points: ti.types.ndarray(dtype=ti.f64, ndim=2),
-    share: ti.types.ndarray(dtype=ti.f64, ndim=1),
-):
-    """Share of the smaller body of every pair whose parts lie within the other."""
-    for a in range(pairs.shape[0]):
-        small, large = pairs[a, 0], pairs[a, 1]
-        if volume[small] > volume[large]:
-            small, large = large, small
-        count = 0
-        planes = ti.Matrix.zero(ti.f64, 4, 4)
+@ti.func
+def _above(planes: ti.template(), f: ti.template(), point):
+    height = vec3(planes[f, 0], planes[f, 1], planes[f, 2]).dot(point) + planes[f, 3]
+    return ti.cast(height > 0.0, ti.i32)
+
+
+@ti.func
+def _share(planes: ti.template(), corners: ti.template(), i, points: ti.template()):
+    """Share of the points of body i that lie within all planes."""
+    count = 0
+    for m in range(points.shape[0]):
+        point, inside = vec3(0.0), 1
+        for c in ti.static(range(4)):
+            point += points[m, c] * _corner(corners, i, c)
         for f in ti.static(range(4)):
-            plane = _plane(corners, large, f)
-            for k in ti.static(range(4)):
-                planes[f, k] = plane[k]
-        for m in range(points.shape[0]):
-            point = vec3(0.0)
-            for c in ti.static(range(4)):
-                point += points[m, c] * _corner(corners, small, c)
-            inside = 1
-            for f in ti.static(range(4)):
-                height = vec3(planes[f, 0], planes[f, 1], planes[f, 2]).dot(point) + planes[f, 3]
-                inside &= ti.cast(height > 0.0, ti.i32)
-            count += inside
-        share[a] = count / ti.cast(points.shape[0], ti.f64)
+            inside &= _above(planes, f, point)
+        count += inside
+    return count / ti.cast(points.shape[0], ti.f64)

@@ -34,13 +34,17 @@ def test_share_is_that_of_the_shortest_edge():
     report = slid(0.03).report()
     (found,) = report.bond_slip
     assert found.share == pytest.approx(0.03, abs=16 * EPS)
-    assert found.bond == 0 and found.count == 0
+    assert found.where == 0 and found.count == 0
 
 
 def test_far_slip_is_warned_of_and_an_effect_that_weakens_is_missed():
     report = slid(2.0 * MOST_SLIP).report()
     assert any("bond 0 " in need and "by 10 %" in need for need in report.needs)
-    assert [one.effect for one in needed_effects(report).missing] == ["SlipWeakening"]
+    advice = needed_effects(report)
+    assert [one.effect for one in advice.missing] == ["SlipWeakening"]
+    table = advice.table()
+    assert table["effect"].tolist() == ["shear_slip", "SlipWeakening"]
+    assert table["advice"].tolist() == ["keep", "list it"] and table["where"][1] == "bond 0"
 
 
 def test_largest_of_all_recordings_is_kept():
