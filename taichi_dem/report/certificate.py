@@ -27,11 +27,7 @@ class Certificate:
     Parameters
     ----------
     acting : tuple of EffectUse
-        Activity and onset of each effect.
-    law_evaluations : int
-        Evaluations of softening and slip, one for each unit.
-    all_law_evaluations : int
-        Evaluations that effects="all" makes.
+        Activity, onset and evaluations of each effect.
     sleep : float
         Share that was asked for [-], see ``Scene``.
     asleep : float
@@ -50,8 +46,6 @@ class Certificate:
     """
 
     acting: tuple[EffectUse, ...]
-    law_evaluations: int
-    all_law_evaluations: int
     sleep: float
     asleep: float
     impulse: float
@@ -59,6 +53,16 @@ class Certificate:
     audits: tuple[Audit, ...]
     left_out: tuple[Estimate, ...]
     missing: tuple[MissingEffect, ...] = ()
+
+    @property
+    def law_evaluations(self) -> int:
+        """Evaluations of softening and slip, one for each unit."""
+        return sum(use.evaluations for use in self.acting)
+
+    @property
+    def all_law_evaluations(self) -> int:
+        """Evaluations of them that effects="all" makes."""
+        return self.law_evaluations + sum(use.skipped for use in self.acting)
 
     @property
     def law_ratio(self) -> float:
@@ -98,18 +102,14 @@ class Certificate:
         dict
             Figures by name.
         """
+        laws = "law_evaluations", "all_law_evaluations", "law_ratio"
         return {
             "acting_since_s": {use.effect: use.since_s for use in self.acting},
-            "law_evaluations": self.law_evaluations,
-            "all_law_evaluations": self.all_law_evaluations,
-            "law_ratio": self.law_ratio,
-            "sleep": self.sleep,
-            "asleep": self.asleep,
+            **{name: getattr(self, name) for name in (*laws, "sleep", "asleep", "holds")},
             "left_out_impulse": self.impulse,
             "left_out_energy": self.energy,
             "audits": [audit.as_dict() for audit in self.audits],
             "left_out": [estimate.as_dict() for estimate in self.left_out],
-            "holds": self.holds,
         }
 
     def __str__(self):
@@ -162,8 +162,6 @@ def certificate_of(simulation: Any, report: Any) -> Certificate:
     impulse, left_energy = _left_out(run, simulation.energy_balance, scales, energy)
     return Certificate(
         acting=report.effect_activity,
-        law_evaluations=int(demand.evaluated.sum()),
-        all_law_evaluations=int((demand.evaluated + demand.skipped).sum()),
         sleep=float(schedule.sleeping.share[None]),
         asleep=float(awake.mean() / now) if now > 0.0 else 0.0,
         impulse=impulse,

@@ -124,7 +124,7 @@ class _Uses:
             steers=effect.role in _STEERING,
             kept=kept,
             rounding=effect.role == "dashpot" and energy > 0.0 and not events,
-            **(self._demanded(effect.role) if events else {}),
+            **self._demanded(effect.role, events),
         )
 
     def _sum(self, terms):
@@ -159,15 +159,14 @@ class _Uses:
         kept += _WITHOUT_WORK if rounds else ""
         return f"bodies {'driven' if is_driven else 'held'}", marks, done, kept
 
-    def _demanded(self, role):
+    def _demanded(self, role, events):
         """When and where an effect that acted on demand began, and its evaluations."""
-        times = self.demand.since.get(_TIMES.get(role, ""), np.zeros(0))
-        if not np.isfinite(times).any():
-            return {}
-        first = int(np.nanargmin(times))
-        found = {"since_s": float(times[first]), "where": f"body {first}"}
+        found, times = {}, self.demand.since.get(_TIMES.get(role, ""), np.zeros(0))
+        if events and np.isfinite(times).any():
+            first = int(np.nanargmin(times))
+            found = {"since_s": float(times[first]), "where": f"body {first}"}
         if role in ("tension", "shear"):
             law = SLIP if role == "shear" else SOFTENING
-            found["evaluations"] = int(self.demand.evaluated[law])
-            found["skipped"] = int(self.demand.skipped[law])
+            made, skipped = self.demand.evaluated[law], self.demand.skipped[law]
+            found.update(evaluations=int(made), skipped=int(skipped))
         return found

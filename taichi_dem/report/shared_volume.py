@@ -178,17 +178,16 @@ def _find_pairs(
     for i in range(last.shape[0]):
         for j in range(i + 1, last[i]):
             if _boxes_meet(box, i, j) == 1 and _strangers(tied, body, i, j) == 1:
-                own, other = _planes(corners, i), _planes(corners, j)
-                if _outside(own, corners, j) == 0 and _outside(other, corners, i) == 0:
-                    small, planes = i, other
-                    if mass[i] > mass[j]:
-                        small, planes = j, own
-                    if _share(planes, corners, small, few) > 0.0:
-                        share = _share(planes, corners, small, many)
-                        if share > 0.0:
-                            a = ti.atomic_add(count[0], 1)
-                            if a < found.shape[0]:
-                                found[a, 0], found[a, 1], found[a, 2] = i, j, share
+                small, large = i, j
+                if mass[i] > mass[j]:
+                    small, large = j, i
+                planes = _planes(corners, large)
+                if _share(planes, corners, small, few) > 0.0:
+                    share = _share(planes, corners, small, many)
+                    if share > 0.0:
+                        a = ti.atomic_add(count[0], 1)
+                        if a < found.shape[0]:
+                            found[a, 0], found[a, 1], found[a, 2] = i, j, share
 
 
 @ti.func
@@ -230,24 +229,6 @@ def _planes(corners: ti.template(), i):
 
 
 @ti.func
-def _outside(planes: ti.template(), corners: ti.template(), i):
-    """1 where all corners of body i lie beyond one of the planes."""
-    outside = 0
-    for f in ti.static(range(4)):
-        inside = 0
-        for c in ti.static(range(4)):
-            inside |= _above(planes, f, _corner(corners, i, c))
-        outside |= 1 - inside
-    return outside
-
-
-@ti.func
-def _above(planes: ti.template(), f: ti.template(), point):
-    height = vec3(planes[f, 0], planes[f, 1], planes[f, 2]).dot(point) + planes[f, 3]
-    return ti.cast(height > 0.0, ti.i32)
-
-
-@ti.func
 def _share(planes: ti.template(), corners: ti.template(), i, points: ti.template()):
     """Share of the points of body i that lie within all planes."""
     count = 0
@@ -256,6 +237,7 @@ def _share(planes: ti.template(), corners: ti.template(), i, points: ti.template
         for c in ti.static(range(4)):
             point += points[m, c] * _corner(corners, i, c)
         for f in ti.static(range(4)):
-            inside &= _above(planes, f, point)
+            height = vec3(planes[f, 0], planes[f, 1], planes[f, 2]).dot(point) + planes[f, 3]
+            inside &= ti.cast(height > 0.0, ti.i32)
         count += inside
     return count / ti.cast(points.shape[0], ti.f64)
