@@ -251,14 +251,14 @@ class Simulation(Uncopied):
 
     def _open_balance(self):
         """Begin the energy balance and the other diagnostics."""
-        self.energy_balance = EnergyBalance(self.run)
-        self.divergence_check = DivergenceCheck(self.run, self.energy_balance)
-        self.shared_volume = SharedVolume(self.run)
-        self.missing_effects = MissingEffects(self.run, self.shared_volume)
-        self.step_resolution = StepResolution(self.run)
+        self.energy_balance = EnergyBalance(self.parts)
+        self.divergence_check = DivergenceCheck(self.parts, self.energy_balance)
+        self.shared_volume = SharedVolume(self.parts)
+        self.missing_effects = MissingEffects(self.parts, self.shared_volume)
+        self.step_resolution = StepResolution(self.parts)
 
     @property
-    def run(self) -> Run:
+    def parts(self) -> Run:
         """Parts that reports read."""
         parts = self.model, self.state, self.schedule, self.advance, self.readings, self.contacts
         return Run(*parts)
@@ -454,7 +454,7 @@ class Simulation(Uncopied):
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
-            effect_activity=effect_uses(self.run, self.energy_balance, tables, account),
+            effect_activity=effect_uses(self.parts, self.energy_balance, tables, account),
             missing_effects=() if brief else self.missing_effects.findings(shared_volume),
             unresolved=(
                 *self.step_resolution.findings(),
@@ -480,7 +480,7 @@ class Simulation(Uncopied):
         dict of ndarray
             Times [s], shape (body_count,), by name; NaN for never.
         """
-        return on_demand(self.run).since
+        return on_demand(self.parts).since
 
 
 def macro_steps(until: float, dt0: float) -> int:

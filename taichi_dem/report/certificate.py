@@ -150,7 +150,7 @@ def certificate_of(simulation: Any, report: Any) -> Certificate:
 
     simulation: the ``Simulation``, started. report: its ``Report`` without a certificate.
     """
-    run, now = simulation.run, simulation.time_s
+    run, now = simulation.parts, simulation.time_s
     demand, schedule = on_demand(run), run.schedule
     awake = np.nan_to_num(demand.since["awake"], nan=now)
     links = np.stack([run.model.topology.master, run.model.topology.slave])

@@ -15,21 +15,15 @@ from taichi_dem.report.run import Kept, Run
 #: Tables of bodies, bonds and pairs that the terms are summed from.
 EnergyTables = tuple[np.ndarray, np.ndarray, np.ndarray]
 #: Terms of the account in the order of tables and files, all in J.
-TERMS = (
-    "kinetic",
-    "bond_strain",
-    "sphere_strain",
-    "bond_dashpot",
-    "softening",
-    "release",
-    "slip",
-    "sphere_dashpot",
-    "friction",
-    "ground_dashpot",
-    "injected",
-    "load_work",
-    "support_work",
-    "residual",
+TERMS = tuple(
+    "kinetic bond_strain sphere_strain bond_dashpot softening release slip sphere_dashpot friction "
+    "ground_dashpot injected load_work support_work residual".split()
+)
+#: Terms that the columns of the three tables add to.
+_COLUMNS = (
+    "kinetic load_work support_work sphere_dashpot friction injected ground_dashpot".split(),
+    "bond_strain bond_dashpot slip release softening".split(),
+    "sphere_strain sphere_dashpot friction injected".split(),
 )
 #: Terms that the bodies hold; all others are booked as they are given or taken.
 _HELD = ("kinetic", "bond_strain", "sphere_strain")
@@ -105,24 +99,12 @@ class EnergyBalance(Kept):
 
         tables: those of ``tables``, if they have been read already.
         """
-        body, bond, pair = self.tables() if tables is None else tables
-        terms = {
-            "kinetic": body[:, 0].sum(),
-            "bond_strain": bond[:, 0].sum(),
-            "sphere_strain": pair[:, 0].sum(),
-            "bond_dashpot": bond[:, 1].sum(),
-            "softening": bond[:, 4].sum(),
-            "release": bond[:, 3].sum(),
-            "slip": bond[:, 2].sum(),
-            "sphere_dashpot": body[:, 3].sum() + pair[:, 1].sum(),
-            "friction": body[:, 4].sum() + pair[:, 2].sum(),
-            "injected": body[:, 5].sum() + pair[:, 3].sum(),
-            "ground_dashpot": body[:, 6].sum(),
-            "load_work": body[:, 1].sum(),
-            "support_work": body[:, 2].sum(),
-        }
-        start = dict(zip(TERMS, self.start))
-        terms = {name: value - start[name] for name, value in terms.items()}
+        terms = {name: 0.0 for name in TERMS if name != "residual"}
+        for names, table in zip(_COLUMNS, self.tables() if tables is None else tables):
+            for name, column in zip(names, table.T):
+                terms[name] += column.sum()
+        for name, start in zip(terms, self.start):
+            terms[name] -= start
         given = terms["load_work"] + terms["support_work"] + terms["injected"] + self.start_energy
         terms["residual"] = given - sum(terms[name] for name in terms if name not in _GIVEN)
         return {name: float(value) for name, value in terms.items()}

@@ -20,7 +20,7 @@ class Looked:
     def __init__(self, mesh, *listed):
         self.simulation = Simulation(Scene(mesh, CONCRETE, listed), Uniform())
         self.model, self.state = self.simulation.model, self.simulation.state
-        self.volume = SharedVolume(self.simulation.run)
+        self.volume = SharedVolume(self.simulation.parts)
 
     def shares(self, position, orientation=None, time_s=0.0):
         """Shares by pair of bodies, of bodies at a position [m], (n, 3)."""
@@ -116,6 +116,6 @@ def test_the_worst_pair_is_kept_and_survives_a_checkpoint():
     worst = looked.volume.worst
     assert (worst.bodies, worst.time_s, worst.deep) == ((0, 1), 2.0, 2)
     assert worst.share == seen[1][0, 1] > NOTABLE
-    again = SharedVolume(looked.simulation.run)
+    again = SharedVolume(looked.simulation.parts)
     again.resume(looked.volume.saved())
     assert again.worst == worst and np.array_equal(again.place, looked.volume.place)
