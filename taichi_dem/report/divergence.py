@@ -2,7 +2,6 @@
 
 import math
 import time
-from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple, Optional
 
@@ -41,10 +40,6 @@ class Remedy(NamedTuple):
 
     words: str
     advice: dict[str, float]
-
-
-#: What to change, of a body and those that it is tied to or near.
-Advise = Callable[[list[int]], Remedy]
 
 
 class DivergenceCheck:
@@ -139,8 +134,11 @@ class DivergenceCheck:
         """Bound of the energy [J] that rounding of positions has put into the bonds so far."""
         return max(1, int(self.run.schedule.evaluations[0])) * self.rounded_once
 
-    def _error(self, body, what, advise: Advise):
-        """SimulationDiverged that says what is wrong with a body, and what to change."""
+    def _error(self, body, what, advise):
+        """SimulationDiverged that says what is wrong with a body, and what to change.
+
+        advise: gives the Remedy for the body and those that it is tied to or near, by number.
+        """
         schedule, level = self.run.schedule, int(self.run.state.level.to_numpy()[body])
         time_s = self.run.state.tick[None] * schedule.tick_seconds
         remedy = advise([body, *self._beside(body)])

@@ -138,8 +138,8 @@ class _Uses:
             # A shear law may release bonds where no law of tension is listed.
             terms = *terms, "release"
         # Counts show all that laws of the package do; derived classes may act differently.
-        own = type(effect).__module__.startswith(("taichi_dem.laws.", "taichi_dem.loads."))
-        kept = "" if own or effect.role in ("contact", "friction") else _OWN
+        ours = type(effect).__module__.startswith(("taichi_dem.laws.", "taichi_dem.loads."))
+        kept = "" if ours or effect.role in ("contact", "friction") else _OWN
         return what, self.marks[effect.role], self._sum(terms), kept
 
     def _drive(self, effect):
