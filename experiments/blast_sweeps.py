@@ -21,10 +21,10 @@ from functools import partial
 import numpy as np
 
 from _blast import blast_parser, paper_scene
+from _dashpot_system import DashpotSystem
 from taichi_dem import At, ImplicitDashpots, Simulation
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BROWN, GREY, STYLES, VIOLET, picture
-from taichi_dem.report.dashpot_system import DashpotSystem
 from taichi_dem.simulate import run_simulation
 
 NAME = "blast_sweeps"

@@ -3,9 +3,8 @@
 An effect is said to be droppable only where a run without it has been made and is equal.
 """
 
-from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any, Optional, Union
+from typing import Any
 
 import numpy as np
 
@@ -62,11 +61,9 @@ def needed_effects(result: object, tolerance: float = ROUNDING) -> Advice:
         raise InputError(f"result must be a Result of simulate or its report, got {kind}")
     uses, tolerance = report.effect_activity, fraction("tolerance", tolerance)
     tried = [use.effect for use in uses if use.idle or use.negligible(tolerance)]
-    shown: dict[str, float] = {}
-    if isinstance(result, Result) and not result.diverged:
-        shown = differences(result, tried, tolerance)
-    slipped = (slip for slip in report.bond_slip if slip.excessive and not slip.weakens)
-    return Advice(uses, (*report.missing_effects, *slipped), tolerance, shown)
+    if isinstance(result, Result) and tried and not result.diverged:
+        return report.advice(tolerance, _differences(result, tried, tolerance))
+    return report.advice(tolerance)
 
 
 def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
@@ -96,30 +93,24 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
     return estimates_before(model, until, velocity, may_meet(scene, parts_of(scene.mesh)))
 
 
-def differences(result: Result, names: Iterable[str], tolerance: float) -> dict[str, float]:
+def _differences(result, names, tolerance):
     """Difference that each effect makes to a run, by name, as a share of what was recorded.
 
     names: of the effects, all left out together first; where this differs by more than the
     tolerance, one after the other. Friction goes with the contact it acts in.
     """
-    names = tuple(names)
-    if not names:
-        return {}
     together = _difference(result, names)
     if together <= tolerance or len(names) == 1:
         return dict.fromkeys(names, together)
+    roles = {effect.name: effect.role for effect in result.scene.effects}
     found: dict[str, float] = {}
-    left_out: tuple[str, ...] = ()
+    left_out: list[str] = []
     # Friction first: contact can be left out only with it.
-    for name in sorted(names, key=lambda name: _role(result, name) != "friction"):
-        found[name] = _difference(result, (*left_out, name))
+    for name in sorted(names, key=lambda name: roles[name] != "friction"):
+        found[name] = _difference(result, [*left_out, name])
         if found[name] <= tolerance:
-            left_out = (*left_out, name)
+            left_out.append(name)
     return found
-
-
-def _role(result, name):
-    return next(effect.role for effect in result.scene.effects if effect.name == name)
 
 
 def _difference(result, names):
@@ -142,22 +133,18 @@ def _difference(result, names):
 def _without(effects, names, may_be_silent):
     """Effects of a list without those of some names; silent friction goes with its contact.
 
-    Of these, those that can stay as silent copies: the same bits, and nothing is compiled anew.
+    Of these, those whose class itself says how can stay as silent copies: the same bits, and
+    nothing is compiled anew.
     """
     kept = []
     for effect in effects:
         if effect.name not in names:
             kept.append(effect)
-        elif may_be_silent and _can_be_silent(effect):
+        elif may_be_silent and "harmless" in vars(type(effect)):
             kept.append(effect.silent())
     if any(effect.role == "contact" for effect in kept):
         return kept
     return [effect for effect in kept if effect.name or effect.role != "friction"]
-
-
-def _can_be_silent(effect):
-    """Whether its class itself says how: one that it derives from may not know its law."""
-    return "harmless" in vars(type(effect))
 
 
 def recorded_difference(first: Result, second: Result) -> float:
@@ -165,55 +152,33 @@ def recorded_difference(first: Result, second: Result) -> float:
 
     A share of the largest value of each; of energies, of the largest of all of them; of speeds, of
     the largest in the connected part to which a body belongs; zero where rounding explains it.
-    Infinite where columns have other lengths.
+    Infinite where columns have other lengths, or other bonds broke.
     """
-    joules = [name for name in first.history if name.endswith("_J") and name != "residual_J"]
-    energy = max((np.abs(first.history[name]).max(initial=0.0) for name in joules), default=0.0)
-    rounding = _rounding(first)
+    history, broken, part = first.history, first.broken_time, parts_of(first.model.mesh)
+    joules = [name for name in history if name.endswith("_J") and name != "residual_J"]
+    energy = max((np.abs(history[name]).max(initial=0.0) for name in joules), default=0.0)
+    # The energy that rounding may have put into the bonds moves the lightest body at most so fast,
+    # and over the run so far.
+    heat = first.report.round_off_J
+    speed = float(np.sqrt(2.0 * heat / first.model.body_mass.min()))
+    rounding = {"_J": heat, "_m_s": speed, "_mm": 1e3 * speed * first.report.until_s}
+    fastest = np.zeros(part.max() + 1)
+    np.maximum.at(fastest, part, first.peak_speed)
     found = [
-        _apart(first.peak_speed, second.peak_speed, rounding["_m_s"], _fastest_beside(first)),
-        _broken_apart(first.broken_time, second.broken_time),
+        _apart(first.peak_speed, second.peak_speed, speed, fastest[part]),
+        _apart(np.nan_to_num(broken), np.nan_to_num(second.broken_time)),
     ]
-    for name in first.history:
+    if not np.array_equal(np.isnan(broken), np.isnan(second.broken_time)):
+        return np.inf
+    for name in history:
         if name != "residual_J":
             unexplained = next((rounding[unit] for unit in rounding if name.endswith(unit)), 0.0)
-            columns = first.history[name], second.history.get(name)
-            found.append(_apart(*columns, unexplained, energy if name in joules else None))
+            scale = energy if name in joules else None
+            found.append(_apart(history[name], second.history.get(name), unexplained, scale))
     return float(max(found, default=0.0))
 
 
-def _fastest_beside(result):
-    """Largest speed in the part of each body [m/s]."""
-    part = parts_of(result.model.mesh)
-    fastest = np.zeros(part.max() + 1)
-    np.maximum.at(fastest, part, result.peak_speed)
-    return fastest[part]
-
-
-def _rounding(result):
-    """Differences that rounding alone explains, by the unit at the end of a column's name.
-
-    The energy that rounding may have put into the bonds moves the lightest body at most so fast,
-    and over the run so far.
-    """
-    energy = result.report.round_off_J
-    speed = float(np.sqrt(2.0 * energy / result.model.body_mass.min()))
-    return {"_J": energy, "_m_s": speed, "_mm": 1e3 * speed * result.report.until_s}
-
-
-def _broken_apart(one: np.ndarray, other: np.ndarray) -> float:
-    """Largest difference of times of fracture [s], over the latest; NaN for bonds that hold."""
-    if not np.array_equal(np.isnan(one), np.isnan(other)):
-        return np.inf
-    return _apart(np.nan_to_num(one), np.nan_to_num(other))
-
-
-def _apart(
-    one: np.ndarray,
-    other: Optional[np.ndarray],
-    rounding: float = 0.0,
-    scale: Union[float, np.ndarray, None] = None,
-) -> float:
+def _apart(one, other, rounding=0.0, scale=None):
     """Largest difference of two arrays, over the largest value of the first or given scales.
 
     Zero up to the difference that rounding explains.

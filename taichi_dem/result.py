@@ -26,7 +26,6 @@ from taichi_dem.output.record import (
     write_paraview,
 )
 from taichi_dem.report.certificate import Certificate
-from taichi_dem.report.energy_balance import injected_words
 from taichi_dem.report.report import Report
 from taichi_dem.scene import Scene
 from taichi_dem.state.model import Model
@@ -111,6 +110,11 @@ class Result(RunExports):
         """What acted and what was left out, with effects="auto"; else None."""
         return self.report.certificate
 
+    @property
+    def effects(self) -> Table:
+        """One row for each effect: what it did, since when, what was left out, and advice."""
+        return self.report.advice().table()
+
     def mean_displacement(self, bodies: np.ndarray) -> np.ndarray:
         """Mean displacement of some bodies.
 
@@ -154,8 +158,6 @@ class Result(RunExports):
         """The main figures of the run, (name, text) each."""
         report, model, history = self.report, self.model, self.history
         parts = counted(model.body_count, "body"), counted(model.bond_count, "bond")
-        work = report.energy_balance["load_work"] + report.energy_balance["support_work"]
-        injected = injected_words(report.energy_balance, report.round_off_J)
         rows = [
             ("simulated", f"{report.until_s:.4g} s"),
             ("method", f"{report.method}, {report.driver} driver"),
@@ -164,9 +166,9 @@ class Result(RunExports):
             ("effects", ", ".join(report.effects) or "none"),
             ("broken bonds", f"{report.broken_faces:,}"),
             ("largest speed", f"{np.fmax.reduce(self.peak_speed, initial=np.nan):.4g} m/s"),
-            ("work put in", f"{work:.4g} J"),
+            ("work put in", f"{report.work_put_in:.4g} J"),
             ("energy not explained", report.unexplained),
-            *((("energy injected", injected),) if injected else ()),
+            *((("energy injected", report.injected),) if report.injected else ()),
             ("time", f"{report.compile_seconds:.1f} s compiling, {report.run_seconds:.1f} s run"),
         ]
         for hole, moved in outward_columns(history).items():

@@ -201,15 +201,8 @@ def _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays):
 
 def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
     """All that a checkpoint holds of a started simulation, a ``restart.RunSnapshot``."""
-    parts: dict[str, Owner] = {
-        "simulation": simulation,
-        "energy balance": simulation.energy_balance,
-        "missing effects": simulation.missing_effects,
-        "shared volume": simulation.shared_volume,
-        "bond slips": simulation.bond_slips,
-        "step resolution": simulation.step_resolution,
-        "recorder": recorder,
-    }
+    parts: dict[str, Owner] = {"simulation": simulation, **simulation.followed}
+    parts["recorder"] = recorder
     return RunSnapshot(
         run_identity(simulation.scene, simulation.method), LoanMemory(simulation.loan), parts
     )

@@ -18,17 +18,16 @@ from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, instance, shown, whole
 from taichi_dem.methods import Method, check_method
-from taichi_dem.report.bond_slip import BondSlips
-from taichi_dem.report.certificate import acting_since, certificate_of
+from taichi_dem.report.certificate import certificate_of
 from taichi_dem.report.divergence import DivergenceCheck
-from taichi_dem.report.effect_activity import effect_activity
+from taichi_dem.report.effects import effect_uses, on_demand
 from taichi_dem.report.energy_balance import EnergyBalance, open_account
-from taichi_dem.report.known_error import known_error
 from taichi_dem.report.missing_effects import MissingEffects
 from taichi_dem.report.readings import Readings
-from taichi_dem.report.report import Report
+from taichi_dem.report.report import Report, known_error
+from taichi_dem.report.resolution import StepResolution
+from taichi_dem.report.run import Kept, Run
 from taichi_dem.report.shared_volume import SharedVolume
-from taichi_dem.report.step_resolution import StepResolution
 from taichi_dem.scene import Scene
 from taichi_dem.state.capacity import capacity_of
 from taichi_dem.state.model import Model
@@ -244,17 +243,28 @@ class Simulation(Uncopied):
 
     def _open_balance(self):
         """Begin the energy balance and the other diagnostics."""
-        read = self.model, self.state, self.readings, self.contacts
-        self.energy_balance = EnergyBalance(*read)
-        self.divergence_check = DivergenceCheck(
-            self.model, self.state, self.schedule, self.contacts, self.energy_balance, self.solves
-        )
-        self.shared_volume = SharedVolume(self.model, self.state)
-        self.missing_effects = MissingEffects(
-            self.model, self.state, self.readings, self.shared_volume, self.schedule
-        )
-        self.bond_slips = BondSlips(self.model, self.readings)
-        self.step_resolution = StepResolution(*read, self.schedule, self.advance)
+        self.energy_balance = EnergyBalance(self.parts)
+        self.divergence_check = DivergenceCheck(self.parts, self.energy_balance)
+        self.shared_volume = SharedVolume(self.parts)
+        self.missing_effects = MissingEffects(self.parts, self.shared_volume)
+        self.step_resolution = StepResolution(self.parts)
+
+    @property
+    def parts(self) -> Run:
+        """Parts that reports read."""
+        parts = self.model, self.state, self.schedule, self.advance, self.readings, self.contacts
+        return Run(*parts)
+
+    @property
+    def followed(self) -> dict[str, Kept]:
+        """What is kept over a run beside the fields, by name."""
+        return {
+            "energy balance": self.energy_balance,
+            "missing effects": self.missing_effects,
+            "creep": self.missing_effects.creep,
+            "shared volume": self.shared_volume,
+            "step resolution": self.step_resolution,
+        }
 
     def motion(self) -> dict[str, np.ndarray]:
         """Motion of the bodies, with velocities and spins at the time of the positions.
@@ -274,8 +284,7 @@ class Simulation(Uncopied):
         """Sample missing effects, slip of bonds, and bonds that the step does not resolve."""
         self.missing_effects.sample(self.time_s)
         self.divergence_check.check_shared(self.shared_volume)
-        self.step_resolution.sample()
-        self.bond_slips.sample(self.time_s)
+        self.step_resolution.sample(self.time_s)
 
     def advance_to(self, macro_step: int, on_call: Optional[Callable[[], object]] = None) -> None:
         """Step until a number of largest steps.
@@ -426,19 +435,16 @@ class Simulation(Uncopied):
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
-            effect_activity=effect_activity(
-                self.model, self.energy_balance, self.readings, tables, account, counts[0]
-            ),
+            effect_activity=effect_uses(self.parts, self.energy_balance, tables, account),
             missing_effects=() if brief else self.missing_effects.findings(shared_volume),
             unresolved=(
                 *self.step_resolution.findings(),
-                *self.missing_effects.unseen(),
                 *shared_volume.findings(),
                 *open_account(account, self.divergence_check.round_off()),
             ),
             interpenetration=shared_volume.worst,
             bound_by=counted_criteria(self.state.bound.to_numpy()),
-            bond_slip=self.bond_slips.finding(),
+            bond_slip=self.step_resolution.bond_slip(),
             round_off_J=self.divergence_check.round_off(),
         )
         return replace(
@@ -455,4 +461,4 @@ class Simulation(Uncopied):
         dict of ndarray
             Times [s], shape (body_count,), by name; NaN for never.
         """
-        return acting_since(self.model, self.state, self.schedule)
+        return on_demand(self.parts).since

@@ -2,10 +2,19 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf
-from typing import Optional
+from math import inf, nan
+from typing import Any, Optional
 
+from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import in_brief
+
+#: Columns of ``Advice.table`` with what stands in a row that has nothing to say there.
+_COLUMNS = {
+    **{"effect": "", "listed": False, "events": 0, "since_s": nan, "where": ""},
+    **{"energy_J": nan, "energy_share": nan, "evaluations": 0, "skipped": 0},
+    **{"left_out": nan, "advice": "", "reason": ""},
+}
+_PURE = ("events", "energy_share", "evaluations", "skipped", "left_out")
 
 
 @dataclass(frozen=True)
@@ -35,6 +44,14 @@ class EffectUse:
         Reason to keep it in any case, in words, or ``""``.
     rounding : bool, default False
         Whether the booked energy is within rounding errors; then no event is counted.
+    since_s : float, optional
+        Time of the first event [s]; None where it is not known.
+    where : str, default ""
+        Place of the first event, such as ``"body 3"``; ``""`` where it is not known.
+    evaluations : int, default 0
+        Evaluations made, where they are counted.
+    skipped : int, default 0
+        Evaluations that were not needed.
     """
 
     effect: str
@@ -47,6 +64,10 @@ class EffectUse:
     steers: bool = False
     kept: str = ""
     rounding: bool = False
+    since_s: Optional[float] = None
+    where: str = ""
+    evaluations: int = 0
+    skipped: int = 0
 
     @property
     def is_active(self) -> bool:
@@ -83,10 +104,15 @@ class EffectUse:
             return f"never acted (0 {self.what})"
         if self.rounding:
             return f"never acted beyond round-off (0 {self.what}, {self.energy_J:.3g} J)"
-        most = f" of {self.of:,}" if self.of else ""
         energy = f", {self.energy_J:.3g} J" if self.energy_J is not None else ""
         share = f", {100 * self.share:.3g} % of {self.whole}" if self.share is not None else ""
-        return f"{self.events:,}{most} {self.what}{energy}{share}"
+        return f"{self.acted}{energy}{share}"
+
+    @property
+    def acted(self) -> str:
+        """Its events in words, without the name and the energy."""
+        most = f" of {self.of:,}" if self.of else ""
+        return f"{self.events:,}{most} {self.what}"
 
 
 @dataclass(frozen=True)
@@ -105,12 +131,15 @@ class Advice:
         Difference that a run without an effect made, by name, as a share of what was recorded. Then
         only effects whose difference is within the tolerance are droppable. None where counts
         decide.
+    left_out : tuple, default ()
+        Estimates of effects that nothing serves; like the findings, each with a ``row``.
     """
 
     uses: tuple[EffectUse, ...]
     missing: tuple
     tolerance: float
     shown: Optional[Mapping[str, float]] = None
+    left_out: tuple = ()
 
     @property
     def inactive(self) -> tuple[str, ...]:
@@ -164,6 +193,36 @@ class Advice:
                 return f"{finding.what}: {finding.count}", "list it"
         return "left out", "not missed"
 
+    def table(self) -> Table:
+        """Give all that is known of the effects, a row for each.
+
+        Returns
+        -------
+        Table
+            Name, whether listed, number and first time and place of its events, energy [J] and its
+            share, evaluations made and skipped, estimated size of what was left out, as a share of
+            what it acts beside; advice and its reason.
+        """
+        rows = [self._row(use) for use in self.uses]
+        rows += [finding.row for finding in (*self.missing, *self.left_out)]
+        columns = {n: [row.get(n, empty) for row in rows] for n, empty in _COLUMNS.items()}
+        return Table(columns, dict.fromkeys(_PURE, "1"), index="effect")
+
+    def _row(self, use) -> dict[str, Any]:
+        known = {"since_s": use.since_s, "energy_J": use.energy_J, "energy_share": use.share}
+        return {
+            **{"effect": use.effect, "listed": True, "events": use.events, "where": use.where},
+            **{name: value for name, value in known.items() if value is not None},
+            **{"evaluations": use.evaluations, "skipped": use.skipped},
+            **{"advice": self._advice(use), "reason": f"{use}{self._reason(use)}"},
+        }
+
+    def _advice(self, use):
+        return "drop" if use.effect in self.droppable else "keep"
+
+    def _reason(self, use):
+        return f"; {use.kept}" if use.kept else self._shown(use)
+
     def __repr__(self):
         lists = {
             "keep": [use.effect for use in self.uses if use.effect not in self.droppable],
@@ -178,6 +237,4 @@ class Advice:
         return "\n".join([*lines, *(f"missed     {finding}" for finding in self.missing)])
 
     def _line(self, use):
-        verdict = "drop" if use.effect in self.droppable else "keep"
-        reason = f"; {use.kept}" if use.kept else self._shown(use)
-        return f"{verdict:10s} {use.effect:16s} {use}{reason}"
+        return f"{self._advice(use):10s} {use.effect:16s} {use}{self._reason(use)}"

@@ -10,46 +10,10 @@ from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.mesh.parts import parts_of
 from taichi_dem.physics.sphere_pair import CONTACT
-from taichi_dem.report.estimates import Estimate, estimates_after
-from taichi_dem.report.missing_effects import bond_rounding
-from taichi_dem.report.part_scales import PartScales
-from taichi_dem.state.activity import LATER
-from taichi_dem.state.model import Model
-from taichi_dem.state.state import State
-from taichi_dem.state.timeline import MACRO_TICKS, NEVER
-from taichi_dem.step.multirate.schedule import Schedule
-
-#: Times at which effects began on bodies, by the role that they have in a report.
-_TIMES = {
-    "bond": "damage",
-    "tension": "softening",
-    "shear": "slip",
-    "contact": "contact",
-    "friction": "friction",
-}
-
-
-@dataclass(frozen=True)
-class Acting:
-    """One effect of a run and the time from which it acted.
-
-    Parameters
-    ----------
-    use : EffectUse
-        Activity of the effect.
-    since_s : float
-        Time at which its limit was first reached [s]; NaN where it never was, or is not known.
-    """
-
-    use: EffectUse
-    since_s: float
-
-    def __str__(self):
-        if self.use.idle:
-            return f"{self.use.effect}: never"
-        of = f" of {self.use.of:,}" if self.use.of else ""
-        begun = f" from {1e3 * self.since_s:.3g} ms" if np.isfinite(self.since_s) else ""
-        return f"{self.use.effect}: {self.use.events:,}{of} {self.use.what}{begun}"
+from taichi_dem.report.effects import on_demand
+from taichi_dem.report.estimates import Estimate, PartScales, estimates_after
+from taichi_dem.report.missing_effects import MissingEffect, bond_rounding
+from taichi_dem.state.timeline import MACRO_TICKS
 
 
 @dataclass(frozen=True)
@@ -58,12 +22,8 @@ class Certificate:
 
     Parameters
     ----------
-    acting : tuple of Acting
-        Activity and onset of each effect.
-    law_evaluations : int
-        Evaluations of softening and slip, one for each unit.
-    all_law_evaluations : int
-        Evaluations that effects="all" makes.
+    acting : tuple of EffectUse
+        Activity, onset and evaluations of each effect.
     sleep : float
         Share that was asked for [-], see ``Scene``.
     asleep : float
@@ -74,23 +34,31 @@ class Certificate:
     energy : float
         Bound of the energy that they left out, as a share of the energy of that part, likewise.
     audits : tuple of Audit
-        Audit of each kind of skipped evaluation.
+        Audit of what sleeps.
     left_out : tuple of Estimate
         Estimate of each effect that no law of the scene serves.
     missing : tuple of MissingEffect, default ()
-        Effects that were left out, not by choice of the user, and would have acted.
+        Effects that were left out and would have acted.
     """
 
-    acting: tuple[Acting, ...]
-    law_evaluations: int
-    all_law_evaluations: int
+    acting: tuple[EffectUse, ...]
     sleep: float
     asleep: float
     impulse: float
     energy: float
     audits: tuple[Audit, ...]
     left_out: tuple[Estimate, ...]
-    missing: tuple[Any, ...] = ()
+    missing: tuple[MissingEffect, ...] = ()
+
+    @property
+    def law_evaluations(self) -> int:
+        """Evaluations of the law of bonds, one for each unit; effects that share it share them."""
+        return max((use.evaluations for use in self.acting), default=0)
+
+    @property
+    def all_law_evaluations(self) -> int:
+        """Evaluations of them that effects="all" makes."""
+        return self.law_evaluations + max((use.skipped for use in self.acting), default=0)
 
     @property
     def law_ratio(self) -> float:
@@ -120,7 +88,7 @@ class Certificate:
         return f"list {', '.join(one.effect for one in self.missing)}"
 
     def __repr__(self):
-        return in_brief(self, *map(str, self.acting), "" if self.holds else "does not hold")
+        return in_brief(self, *self._acted(), "" if self.holds else "does not hold")
 
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file.
@@ -130,26 +98,24 @@ class Certificate:
         dict
             Figures by name.
         """
-        since = {one.use.effect: one.since_s for one in self.acting}
+        laws = "law_evaluations", "all_law_evaluations", "law_ratio"
         return {
-            "acting_since_s": {k: None if np.isnan(v) else v for k, v in since.items()},
-            "law_evaluations": self.law_evaluations,
-            "all_law_evaluations": self.all_law_evaluations,
-            "law_ratio": self.law_ratio,
-            "sleep": self.sleep,
-            "asleep": self.asleep,
+            "acting_since_s": {use.effect: use.since_s for use in self.acting},
+            **{name: getattr(self, name) for name in (*laws, "sleep", "asleep", "holds")},
             "left_out_impulse": self.impulse,
             "left_out_energy": self.energy,
             "audits": [audit.as_dict() for audit in self.audits],
             "left_out": [estimate.as_dict() for estimate in self.left_out],
-            "holds": self.holds,
         }
 
     def __str__(self):
         """A line for every kind of thing."""
+        return "\n".join([*self._acted(), *self.left_out_lines()])
+
+    def left_out_lines(self) -> list[str]:
+        """What was left out, in lines."""
         skipped = 100.0 * (1.0 - self.law_evaluations / max(1, self.all_law_evaluations))
         lines = [
-            *map(str, self.acting),
             f"law of bonds: {skipped:.3g} % of its evaluations skipped",
             self._sleep_line(),
             *(f"left out: {estimate}" for estimate in self.left_out),
@@ -157,7 +123,13 @@ class Certificate:
         ]
         if not self.holds:
             lines.append(f"this certificate does not hold, as {self.failure}: {self.remedy}")
-        return "\n".join(lines)
+        return lines
+
+    def _acted(self):
+        """A line for each effect: what it did, and since when."""
+        for use in self.acting:
+            begun = f" from {1e3 * use.since_s:.3g} ms" if use.since_s is not None else ""
+            yield f"{use.effect}: {'never' if use.idle else use.acted + begun}"
 
     def _sleep_line(self):
         if not self.sleep:
@@ -169,112 +141,64 @@ class Certificate:
         )
 
 
-def acting_since(model: Model, state: State, schedule: Schedule) -> dict[str, np.ndarray]:
-    """Time [s] from which each effect acted on each body, (body_count,), NaN where never, by name.
-
-    Softening and slip: on one of the body's bonds, as soon as it came near a limit. awake: since
-    the body was evaluated. Empty unless effects act on demand.
-    """
-    if state.activity is None:
-        return {}
-    n, seconds = model.body_count, schedule.tick_seconds
-    bonds = _times(state.activity.since.to_numpy()[: model.bond_count], NEVER, seconds)
-    bodies = _times(state.activity.touched.to_numpy()[:n], LATER, seconds)
-    own = np.append(bonds, [[np.nan, np.nan]], axis=0)[model.topology.body_bond]
-    first = np.fmin.reduce(own, axis=1, initial=np.nan)
-    awake = _times(schedule.sleeping.since.to_numpy()[:n], NEVER, seconds)
-    laws = ("damage",) if model.by_role["bond"] else ("softening", "slip")
-    times = zip(("contact", "friction"), bodies.T)
-    return {**dict(zip(laws, first.T)), **dict(times), "awake": awake}
-
-
-def _times(ticks, never, tick_seconds):
-    return np.where(ticks == never, np.nan, ticks * tick_seconds)
-
-
-def certificate_of(run: Any, report: Any) -> Certificate:
+def certificate_of(simulation: Any, report: Any) -> Certificate:
     """Certificate of a run so far.
 
-    run: the ``Simulation``, started. report: its ``Report`` without a certificate.
+    simulation: the ``Simulation``, started. report: its ``Report`` without a certificate.
     """
-    model, state, schedule, now = run.model, run.state, run.schedule, run.time_s
-    since = acting_since(model, state, schedule)
-    evaluated, laws = _law_evaluations(model, state, schedule)
-    skipped = _bond_steps_asleep(model, since["awake"], now, schedule)
-    awake = np.nan_to_num(since["awake"], nan=now)
-    scales = PartScales(model, parts_of(model.mesh))
-    energy = _energy(run, scales)
-    impulse, left_energy = _left_out(run, scales, energy)
+    run, now = simulation.parts, simulation.time_s
+    demand, schedule = on_demand(run), run.schedule
+    awake = np.nan_to_num(demand.since["awake"], nan=now)
+    links = np.stack([run.model.topology.master, run.model.topology.slave])
+    # Evaluations of bonds that sleep has spared, at the largest step.
+    until = awake[links].max(axis=0, initial=0.0)
+    asleep = int(until.sum() / (schedule.tick_seconds * MACRO_TICKS))
+    scales = PartScales(run.model, parts_of(run.model.mesh))
+    energy = _energy(run, simulation.energy_balance, scales)
+    impulse, left_energy = _left_out(run, simulation.energy_balance, scales, energy)
     return Certificate(
-        acting=tuple(_acting(model, use, since) for use in report.effect_activity),
-        law_evaluations=evaluated,
-        all_law_evaluations=laws,
+        acting=report.effect_activity,
         sleep=float(schedule.sleeping.share[None]),
         asleep=float(awake.mean() / now) if now > 0.0 else 0.0,
         impulse=impulse,
         energy=left_energy,
-        audits=_audits(run.step.audit, skipped),
-        left_out=_not_served(run, scales, energy),
-        # What the user chose to leave out is no gap of what was left out for them.
-        missing=tuple(one for one in report.missing_effects if not one.is_chosen),
+        audits=_audits(simulation.step.audit, asleep),
+        left_out=_not_served(simulation, scales, energy),
+        missing=report.missing_effects,
     )
 
 
-def _law_evaluations(model, state, schedule):
-    """Evaluations of the law of bonds, a unit each: those made, and those of effects="all"."""
-    if not any(model.by_role[role] for role in ("bond", "tension", "shear")):
-        return 0, 0
-    evaluated = state.activity.evaluated.to_numpy()[: model.bond_count].sum()
-    return int(evaluated), 3 * (int(schedule.evaluations[5]) + model.bond_count)
-
-
-def _energy(run, scales):
+def _energy(run, balance, scales):
     """Energy that each part got [J]: from loads and supports, or what it has and took if more.
 
     Zero where it is no more than rounding leaves.
     """
-    body, bond, _ = run.energy_balance.tables()
+    body, bond, _ = balance.tables()
     given = sum(np.abs(scales.sum(column)) for column in body[:, 1:3].T)
     taken = scales.sum(body[:, 0]) + scales.sum_of_bonds(bond.sum(axis=1))
-    substeps = int(run.schedule.evaluations[0])
-    rounding = scales.sum_of_bonds(bond_rounding(run.model, run.state, substeps))
     energy = np.maximum(given, taken)
-    return np.where(energy > rounding, energy, 0.0)
+    return np.where(energy > scales.sum_of_bonds(bond_rounding(run)), energy, 0.0)
 
 
-def _left_out(run, scales, energy):
+def _left_out(run, balance, scales, energy):
     """Largest shares of impulse and energy of a part that sleep left out there."""
     table = np.zeros((max(1, run.model.bond_count), 2))
     run.readings.left_out(table)
     left = [scales.sum_of_bonds(column) for column in table[: run.model.bond_count].T]
-    wholes = run.energy_balance.momentum_exchanged(scales.sum), energy
+    wholes = balance.momentum_exchanged(scales.sum), energy
     return [float((part / np.maximum(whole, 1e-300)).max()) for part, whole in zip(left, wholes)]
 
 
-def _not_served(run, scales, energy):
+def _not_served(simulation, scales, energy):
     """Estimates of what no law of the scene serves."""
-    motion, model = run.motion(), run.model
-    moved = motion["position"] - run.first_motion["position"]
+    motion, model = simulation.motion(), simulation.model
+    moved = motion["position"] - simulation.first_motion["position"]
     speed = np.linalg.norm(motion["velocity"], axis=1)
-    touched = run.state.active_effects.to_numpy()[: model.body_count] & np.int64(CONTACT)
+    touched = simulation.state.active_effects.to_numpy()[: model.body_count] & np.int64(CONTACT)
     borne = scales.under((*model.supports, *model.ground)) | (scales.sum(touched) > 0)
-    return estimates_after(scales, moved, speed, run.time_s, energy, borne)
-
-
-def _acting(model, use, since):
-    role = next((e.role for e in model.effects if e.name == use.effect), "")
-    times = since.get(_TIMES.get(role, ""), np.zeros(0))
-    first = np.fmin.reduce(times, initial=np.nan) if use.events else np.nan
-    return Acting(use, float(first))
+    return estimates_after(scales, moved, speed, simulation.time_s, energy, borne)
 
 
 def _audits(audit, skipped):
     audited, missed = int(audit.audited[None]), int(audit.misses[None])
     return (Audit(max(skipped, audited), audited, missed, "bonds asleep"),)
-
-
-def _bond_steps_asleep(model, awake, now, schedule):
-    """Evaluations of bonds that sleep has spared, at the largest step."""
-    links = np.stack([model.topology.master, model.topology.slave])
-    until = np.nan_to_num(awake, nan=now)[links].max(axis=0, initial=0.0)
-    return int(until.sum() / (schedule.tick_seconds * MACRO_TICKS))

@@ -7,15 +7,9 @@ over stiffness, and two pieces stop once the drag gave the momentum that they sl
 that slide on as fast after many times as much are pushed by a load.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from taichi_dem.mesh.tetrahedra import components
-from taichi_dem.report.readings import Readings
-from taichi_dem.state.model import Model
-from taichi_dem.state.state import State
-from taichi_dem.state.timeline import NEVER
+from taichi_dem.report.run import Kept, Run
 
 #: Share of its limit below which friction would hold; a contact near it may slide next.
 _HELD = 0.98
@@ -29,38 +23,37 @@ _ALIKE = 2.0
 _FORCE, _SPEED, _IMPULSE, _WAY, _FASTEST, _SINCE, _OFFSET = range(7)
 
 
-class Creep:
+class Creep(Kept):
     """Follows pairs of bodies that slide below the limit of friction, at recording times.
 
     speed: largest of a creep so far [m/s]. share: of its limit that friction took then.
     """
 
-    def __init__(self, model: Model, state: State, readings: Readings):
-        self.model, self.state, self.readings = model, state, readings
-        self.time_s, self.speed, self.share = 0.0, 0.0, 0.0
+    kept = "time_s", "speed", "share", "code", "table"
+
+    def __init__(self, run: Run):
+        self.run, self.time_s, self.speed, self.share = run, 0.0, 0.0, 0.0
         self.code, self.table = np.zeros(0, dtype=np.int64), np.zeros((0, 9))
-        self._pieces: tuple[int, np.ndarray] = (-1, np.zeros(0, dtype=np.int64))
-        stiffness, damping = (
-            model.materials.of_contacts(f"contact_{name}") for name in ("stiffness", "damping")
-        )
-        self.softest = float(np.min(stiffness))
-        self.parting_s = float(np.max(damping)) / self.softest
+        of_contacts = run.model.materials.of_contacts
+        self.softest = float(np.min(of_contacts("contact_stiffness")))
+        self.parting_s = float(np.max(of_contacts("contact_damping"))) / self.softest
 
     def sample(self, time_s: float) -> np.ndarray:
         """Bodies that creep at a recording time [s]."""
-        bodies, (force, bound, power) = self.readings.rubbing()
+        count = self.run.model.body_count
+        bodies, (force, bound, power) = self.run.readings.rubbing()
         slides = (force > 0.0) & (force < _HELD * bound)
         bodies, force, bound = bodies[slides], force[slides], bound[slides]
-        place = self.state.position.to_numpy()[: self.model.body_count]
+        place = self.run.state.position.to_numpy()[:count]
         offset, speed = place[bodies[:, 1]] - place[bodies[:, 0]], power[slides] / force
-        code = bodies[:, 0].astype(np.int64) * self.model.body_count + bodies[:, 1]
-        rest = np.zeros_like(force)
+        code, rest = bodies[:, 0].astype(np.int64) * count + bodies[:, 1], np.zeros_like(force)
         table = np.column_stack([force, speed, rest, rest, speed, rest + time_s, offset])
         self._go_on(code, table, time_s - self.time_s)
         self.code, self.table, self.time_s = code, table, time_s
         lasts = time_s - table[:, _SINCE] > _PUSHED * self.parting_s
         places = np.flatnonzero(lasts & _goes_far(table, offset, bound / self.softest))
-        places = places[self._is_pushed(bodies[places], table[places])]
+        if len(places):
+            places = places[self._is_pushed(bodies[places], table[places])]
         if len(places):
             self.speed = max(self.speed, float(speed[places].max()))
             self.share = float(force[places].sum() / bound[places].sum())
@@ -80,10 +73,8 @@ class Creep:
 
     def _is_pushed(self, bodies, table):
         """Whether the drag between two pieces would have stopped them many times over."""
-        if not len(bodies):
-            return np.zeros(0, dtype=bool)
-        piece = self._piece_of_body()
-        mass = np.bincount(piece, self.model.body_mass, minlength=self.model.body_count)
+        model, piece = self.run.model, self.run.pieces()
+        mass = np.bincount(piece, model.body_mass, minlength=model.body_count)
         ends = np.sort(piece[bodies], axis=1)
         _, group = np.unique(ends, axis=0, return_inverse=True)
         group = group.reshape(-1)  # NumPy 2.0 returns a column
@@ -93,34 +84,12 @@ class Creep:
         lighter = mass[ends].min(axis=1)
         return (ends[:, 0] != ends[:, 1]) & (impulse > _PUSHED * lighter * fastest[group])
 
-    def _piece_of_body(self):
-        """Piece of each body, which intact bonds hold together, (body_count,)."""
-        top = self.model.topology
-        intact = self.state.broken_tick.to_numpy()[: self.model.bond_count] == NEVER
-        if self._pieces[0] != intact.sum():
-            ends = np.column_stack([top.master, top.slave])[intact]
-            self._pieces = int(intact.sum()), components(self.model.body_count, ends)
-        return self._pieces[1]
-
     def words(self) -> str:
         """The finding in words."""
         return (
             f"bodies in contact creep under a steady load, at up to {1e3 * self.speed:.2g} mm/s, "
             f"though it takes {100.0 * self.share:.2g} % of the friction that would hold them"
         )
-
-    def saved(self) -> dict[str, np.ndarray]:
-        """Data for a checkpoint, arrays by name."""
-        return {
-            "creep": np.array([self.time_s, self.speed, self.share]),
-            "creep_pairs": np.column_stack([self.code, self.table]),
-        }
-
-    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Restore the data that ``saved`` returned."""
-        self.time_s, self.speed, self.share = saved["creep"].tolist()
-        self.code = saved["creep_pairs"][:, 0].astype(np.int64)
-        self.table = saved["creep_pairs"][:, 1:].copy()
 
 
 def _goes_far(table, offset, least):

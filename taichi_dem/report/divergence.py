@@ -1,20 +1,21 @@
-"""Detect diverged runs, and describe where and why."""
+"""Detect diverged runs: describe where and why, and advise a shorter step or other constants."""
 
 import math
 import time
-from typing import Optional
+from functools import partial
+from typing import NamedTuple, Optional
 
 import numpy as np
 
-from taichi_dem.contact.contacts import FARTHEST, Contacts
+from taichi_dem.contact.contacts import FARTHEST
 from taichi_dem.kit.errors import SimulationDiverged
-from taichi_dem.report.energy_balance import EnergyBalance
-from taichi_dem.report.remedy import Remedies, Remedy, shorter_step
+from taichi_dem.report.energy_balance import EnergyBalance, unexplained_share
+from taichi_dem.report.run import Run
 from taichi_dem.report.shared_volume import SharedVolume
-from taichi_dem.state.model import Model
-from taichi_dem.state.state import State
+from taichi_dem.stability.contact_limits import contact_rates
+from taichi_dem.stability.quality import quality_report
+from taichi_dem.stability.stable_step import dashpot_step, spring_step
 from taichi_dem.step.drivers import CALL_SECONDS
-from taichi_dem.step.multirate.schedule import Schedule
 
 #: Unexplained energy beyond which a run counts as diverged, as a share of the energy present.
 ENERGY_FROM_NOWHERE = 0.5
@@ -27,27 +28,30 @@ DEEPEST_OVERLAP = 0.95
 #: Share of the time that a hurried check may take: it reads every bond, a tenth of a call of the
 #: driver at 100,000 bodies.
 SHARE = 0.02
+#: Share of all energy that an account may leave unexplained while the step is not to blame. Steps
+#: at half of their limits, those that are advised, leave some per cent.
+CLOSED = 0.1
+#: Factor by which a bound or a stiffness that is not the step's is raised at a time.
+RAISED = 10.0
+
+
+class Remedy(NamedTuple):
+    """The end of a sentence, and the same as numbers: see ``SimulationDiverged.advice``."""
+
+    words: str
+    advice: dict[str, float]
 
 
 class DivergenceCheck:
-    """Checks a run after every call of the driver; raises SimulationDiverged with the place.
+    """Checks a run after every call of the driver; raises SimulationDiverged with the place."""
 
-    solves: whether the method solves dashpots implicitly, so that only springs limit the step.
-    """
-
-    def __init__(
-        self,
-        model: Model,
-        state: State,
-        schedule: Schedule,
-        contacts: Optional[Contacts],
-        energy_balance: EnergyBalance,
-        solves: bool = False,
-    ):
-        self.model, self.state, self.schedule = model, state, schedule
-        self.remedies = Remedies(model, state, schedule, contacts, energy_balance, solves)
-        self.contacts, self.energy_balance = contacts, energy_balance
-        self.rounded_once = self._rounded_once()
+    def __init__(self, run: Run, energy_balance: EnergyBalance):
+        self.run, self.energy_balance = run, energy_balance
+        # Energy [J] of springs whose ends are known to a few units in the last place.
+        model, area = run.model, 3.0 * run.model.bonds["area"]
+        place = 4.0 * np.finfo(float).eps * np.abs(model.mesh.points).max()
+        stiffness = model.bond_stiffness.max(axis=1, initial=0.0)
+        self.rounded_once = max(0.5 * float(np.sum(area * stiffness)) * place**2, 1e-300)
         self.rest_until = self.last_spent = 0.0
 
     def check(self, hurried: bool = False) -> None:
@@ -72,122 +76,150 @@ class DivergenceCheck:
             self.last_spent = spent
 
     def _check_speed(self):
-        body = self.state.bad_body[None]
-        if body < self.model.body_count:
-            motion = self.state.motion()
-            speed = math.hypot(*motion["velocity"][body])
-            words = f"moves at {speed:.3g} m/s"
-            links = self._links(body)
-            if speed < self.state.max_speed2[None] ** 0.5 and self.contacts is not None:
-                extent = float(self.model.spheres.extent[body])
-                whole = speed + math.hypot(*motion["spin"][body]) * extent
-                words += ", too far in a step for its contacts to be followed"
-                allowed = FARTHEST * extent / whole
-                remedy = shorter_step(0.5 * allowed, f"contacts allow {allowed:.3g} s")
-                raise self._exception(body, motion, words, links, remedy)
-            remedy = self.remedies.of_speed(body, _partners(links), speed)
-            raise self._exception(body, motion, words, links, remedy)
+        run, body = self.run, self.run.state.bad_body[None]
+        if body >= run.model.body_count:
+            return
+        motion = run.state.motion()
+        speed = math.hypot(*motion["velocity"][body])
+        what = f"moves at {speed:.3g} m/s"
+        # A speed that is no number is beyond every bound.
+        if run.contacts is None or not speed < run.state.max_speed2[None] ** 0.5:
+            raise self._error(body, what, partial(self._of_speed, speed))
+        extent = float(run.model.spheres.extent[body])
+        allowed = FARTHEST * extent / (speed + math.hypot(*motion["spin"][body]) * extent)
+        remedy = _shorter_step(0.5 * allowed, f"contacts allow {allowed:.3g} s")
+        what += ", too far in a step for its contacts to be followed"
+        raise self._error(body, what, lambda near: remedy)
 
     def _check_overlap(self):
-        if self.contacts is None or not self.contacts.store.near_count[None]:
+        contacts = self.run.contacts
+        if contacts is None or not contacts.store.near_count[None]:
             return
-        bodies, _, deepest = self.contacts.store.near_table()
+        bodies, _, deepest = contacts.store.near_table()
         pair = int(deepest.argmax())
         if deepest[pair] > DEEPEST_OVERLAP:
             body, other = bodies[pair].tolist()
             inside, size = f"one of body {other}", "their radii"
-            if self.contacts.law.meets_faces:
+            if contacts.law.meets_faces:
                 inside, size = f"body {other}", "its radius"
             share = f"{100 * deepest[pair]:.0f} % of {size}"
-            self._raise_overlap(body, f"has a contact sphere inside {inside} ({share})")
+            what = f"has a contact sphere inside {inside} ({share})"
+            raise self._error(body, what, self._of_overlap)
 
     def check_shared(self, volume: SharedVolume) -> None:
         """Raise SimulationDiverged where contact of all faces has not kept two bodies apart."""
-        contact = self.model.contact
+        contact = self.run.model.contact
         if contact is None or not contact.outer_faces or not len(volume.share):
             return
         place = int(volume.share.argmax())
         if volume.share[place] > DEEPEST_SHARE:
             body, other = volume.pairs[place].tolist()
             share = f"{100 * volume.share[place]:.0f} %"
-            self._raise_overlap(body, f"shares {share} of its volume with body {other}")
-
-    def _raise_overlap(self, body, what):
-        links = self._links(body)
-        remedy = self.remedies.of_overlap(body, _partners(links))
-        raise self._exception(body, self.state.motion(), what, links, remedy)
+            what = f"shares {share} of its volume with body {other}"
+            raise self._error(body, what, self._of_overlap)
 
     def _check_energy(self):
         account = self.energy_balance.account()
         present = account["kinetic"] + account["bond_strain"] + account["sphere_strain"]
-        given = (
-            self.energy_balance.start_energy
-            + abs(account["load_work"])
-            + abs(account["support_work"])
-        )
+        given = self.energy_balance.start_energy + abs(account["load_work"])
+        given += abs(account["support_work"])
         bound = ENERGY_FROM_NOWHERE * max(given, self.round_off())
         if -account["residual"] > bound and present > given:
-            motion = self.state.motion()
-            body = int(np.linalg.norm(motion["velocity"], axis=1).argmax())
+            velocity = self.run.state.motion()["velocity"]
+            body = int(np.linalg.norm(velocity, axis=1).argmax())
             what = f"is the fastest while {-account['residual']:.3g} J came from nowhere"
-            links = self._links(body)
-            remedy = self.remedies.of_energy(body, _partners(links))
-            raise self._exception(body, motion, what, links, remedy)
+            raise self._error(body, what, self._of_energy)
 
     def round_off(self) -> float:
         """Bound of the energy [J] that rounding of positions has put into the bonds so far."""
-        return max(1, int(self.schedule.evaluations[0])) * self.rounded_once
+        return max(1, int(self.run.schedule.evaluations[0])) * self.rounded_once
 
-    def _rounded_once(self):
-        """Energy [J] of springs whose ends are known to a few units in the last place."""
-        area = 3.0 * self.model.bonds["area"]
-        stiffness = self.model.bond_stiffness.max(axis=1, initial=0.0)
-        place = 4.0 * np.finfo(float).eps * np.abs(self.model.mesh.points).max()
-        return max(0.5 * float(np.sum(area * stiffness)) * place**2, 1e-300)
+    def _error(self, body, what, advise):
+        """SimulationDiverged that says what is wrong with a body, and what to change.
 
-    def _exception(self, body, motion, what, links, remedy: Remedy):
-        """SimulationDiverged that says what is wrong with a body, and what to change."""
-        level = int(motion["level"][body])
-        time_s = self.state.tick[None] * self.schedule.tick_seconds
-        step = self.schedule.dt0 / 2.0**level
+        advise: gives the Remedy for the body and those that it is tied to or near, by number.
+        """
+        schedule, level = self.run.schedule, int(self.run.state.level.to_numpy()[body])
+        time_s = self.run.state.tick[None] * schedule.tick_seconds
+        remedy = advise([body, *self._beside(body)])
         error = SimulationDiverged(
-            f"diverged at t = {time_s:.6g} s: body {body} {what}; "
-            f"{_partner(body, motion, links)}; its step was {step:.3g} s (level {level}), "
-            f"{remedy.words}"
+            f"diverged at t = {time_s:.6g} s: body {body} {what}; its step was "
+            f"{schedule.dt0 / 2.0**level:.3g} s (level {level}), {remedy.words}"
         )
         error.advice = remedy.advice
         return error
 
-    def _links(self, body):
-        """Bodies that a body is tied to or near, and how, as pairs."""
-        top = self.model.topology
-        intact = self.state.broken_tick.to_numpy() < 0
-        links = [
-            (int(top.master[b] + top.slave[b] - body), f"bond {b} to body")
-            for b in top.body_bond[body]
-            if b >= 0 and intact[b]
-        ]
-        for first, second in self._pairs():
-            if body in (first, second):
-                links.append((int(first + second - body), "contact with body"))
-        return links
+    def _beside(self, body):
+        """Bodies that a body is tied to or near."""
+        top, contacts, broken = self.run.model.topology, self.run.contacts, self.run.broken()
+        own = [b for b in top.body_bond[body] if b >= 0 and not broken[b]]
+        pairs = contacts.store.near_table()[0] if contacts is not None else np.zeros((0, 2), int)
+        near = pairs[(pairs == body).any(axis=1)].sum(axis=1) - body
+        return [*(top.master[own] + top.slave[own] - body).tolist(), *near.tolist()]
 
-    def _pairs(self):
-        if self.contacts is None:
-            return np.zeros((0, 2), dtype=int)
-        return self.contacts.store.near_table()[0]
+    def _of_speed(self, speed, near):
+        """For a body at a speed [m/s] beyond the bound of the scene."""
+        bound = RAISED * speed
+        words = f"the energy that it has was given to it: try a max_speed of {bound:.2g} m/s"
+        return self._of_step(near) or Remedy(words, {"max_speed": float(f"{bound:.2g}")})
+
+    def _of_overlap(self, near):
+        """For a body that has sunk too deep into one of those near it."""
+        if not self.run.state.tick[None]:
+            return Remedy("and the scene begins like this: move the bodies apart", {})
+        model = self.run.model
+        stiffness = model.materials.of_contacts("contact_stiffness")
+        firm = RAISED * float(np.broadcast_to(stiffness, model.body_count)[near[0]])
+        words = f"its contacts are too soft: try a contact_stiffness of {firm:.2g} N/m"
+        return self._of_step(near) or Remedy(words, {"contact_stiffness": float(f"{firm:.2g}")})
+
+    def _of_energy(self, near):
+        """For the fastest body of a run in which energy came from nowhere."""
+        return self._of_step(near, to_blame=True) or Remedy("which nothing limits", {})
+
+    def _of_step(self, near, to_blame=False) -> Optional[Remedy]:
+        """A shorter step, or None where the step is not to blame.
+
+        Runaways are often thrown by a neighbour of a shorter step, so the tightest limit counts.
+        Control keeps bodies below their limits: there, and below half of them, a shorter step helps
+        where the account of energy does not close.
+        """
+        schedule, limits = self.run.schedule, self._limits()
+        level = self.run.state.level.to_numpy()[near].max()
+        taken = schedule.dt0 / 2.0 ** (int(level) if schedule.has_limits else 0)
+        limit, cause, tight = min((limits[name][k], name, k) for name in limits for k in near)
+        whose = f"its {cause}" if tight == near[0] else f"the {cause} of body {tight} beside it"
+        bounded = np.isfinite(limit)
+        words = f"{whose} allow {limit:.3g} s" if bounded else "which nothing near it limits"
+        if bounded and taken > 0.5 * limit:
+            return _shorter_step(0.5 * limit, words)
+        if to_blame or unexplained_share(self.energy_balance.account()) > CLOSED:
+            words += ", but the account does not close"
+            return _shorter_step(0.5 * min(taken, limit), words)
+        return None
+
+    def _limits(self):
+        """Largest stable explicit steps [s] by criterion, arrays (body_count,).
+
+        Dashpots that are solved or limited set none.
+        """
+        model, run = self.run.model, self.run
+        steps = quality_report(model.mesh, model.materials)
+        limits = {"bond springs": steps.spring_step_s}
+        limited = run.schedule.has_limits and run.schedule.limits.limited
+        stiff = not (run.advance.solves or limited)
+        if model.by_role["dashpot"] and stiff:
+            limits["bond dashpots"] = steps.dashpot_step_s
+        if run.contacts is not None:
+            of_contacts = model.materials.of_contacts
+            pairs, counts, _ = run.contacts.store.near_table()
+            rates = contact_rates(pairs, counts, model.body_mass)
+            limits["contact springs"] = spring_step(of_contacts("contact_stiffness") * rates)
+            if stiff:
+                limits["sphere dashpots"] = dashpot_step(of_contacts("contact_damping") * rates)
+        return limits
 
 
-def _partners(links):
-    """Bodies of the links."""
-    return [other for other, _ in links]
-
-
-def _partner(body, motion, links):
-    """The neighbour that moves fastest against a body, and how they are tied."""
-    if not links:
-        return "it touches nothing"
-    velocity = motion["velocity"]
-    apart = [math.hypot(*(velocity[other] - velocity[body])) for other, _ in links]
-    other, tie = links[int(np.nanargmax(np.nan_to_num(apart, nan=np.inf)))]
-    return f"the fastest against it is {tie} {other}"
+def _shorter_step(step, why):
+    """To try a step [s]; why: what allows no more, in words."""
+    return Remedy(f"{why}: try a step of {step:.2g} s", {"step": float(f"{step:.2g}")})

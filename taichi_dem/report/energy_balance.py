@@ -10,37 +10,25 @@ from typing import Optional
 
 import numpy as np
 
-from taichi_dem.contact.contacts import Contacts
-from taichi_dem.report.readings import Readings
-from taichi_dem.state.model import Model
-from taichi_dem.state.state import State
+from taichi_dem.report.run import Kept, Run
 
 #: Tables of bodies, bonds and pairs that the terms are summed from.
 EnergyTables = tuple[np.ndarray, np.ndarray, np.ndarray]
 #: Terms of the account in the order of tables and files, all in J.
-TERMS = (
-    "kinetic",
-    "bond_strain",
-    "sphere_strain",
-    "bond_dashpot",
-    "softening",
-    "release",
-    "slip",
-    "sphere_dashpot",
-    "friction",
-    "ground_dashpot",
-    "injected",
-    "load_work",
-    "support_work",
-    "residual",
+TERMS = tuple(
+    "kinetic bond_strain sphere_strain bond_dashpot softening release slip sphere_dashpot friction "
+    "ground_dashpot injected load_work support_work residual".split()
 )
-
+#: Terms that the columns of the three tables add to.
+_COLUMNS = (
+    "kinetic load_work support_work sphere_dashpot friction injected ground_dashpot".split(),
+    "bond_strain bond_dashpot slip release softening".split(),
+    "sphere_strain sphere_dashpot friction injected".split(),
+)
 #: Terms that the bodies hold; all others are booked as they are given or taken.
-_HELD = ("kinetic", "bond_strain", "sphere_strain", "residual")
-
-
-#: Terms that the energy put in and injected goes into.
-_SPENT = tuple(name for name in TERMS if name not in ("injected", "load_work", "support_work"))
+_HELD = ("kinetic", "bond_strain", "sphere_strain")
+#: Terms of the energy put in and injected; all others are what it goes into.
+_GIVEN = ("load_work", "support_work", "injected")
 #: Share of the energy beyond which an account counts as open.
 OPEN = 0.5
 #: Share of the energy put in from which on injected energy is told.
@@ -64,7 +52,7 @@ def injected_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
     Put in: work of loads and supports, and the energy at the start, which the residual leaves.
     round_off: energy [J] up to which all may be rounding.
     """
-    start = sum(value if name in _SPENT else -value for name, value in account.items())
+    start = sum(-value if name in _GIVEN else value for name, value in account.items())
     put_in = abs(account["load_work"]) + abs(account["support_work"]) + abs(start)
     if account["injected"] < NOTED * put_in or account["injected"] <= round_off:
         return ""
@@ -87,59 +75,38 @@ def open_account(account: Mapping[str, float], round_off: float) -> tuple[str, .
     )
 
 
-class EnergyBalance:
+class EnergyBalance(Kept):
     """Energy balance: sums of booked terms, and stored energies computed by the laws of the step.
 
-    readings: the ``Readings`` of a run. contacts: its ``Contacts``, None without.
+    start_energy: energy at the start [J].
     """
 
-    def __init__(
-        self, model: Model, state: State, readings: Readings, contacts: Optional[Contacts]
-    ):
-        self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
-        self.start_energy, self.start = 0.0, np.zeros(len(TERMS))
-        accounts = len(model.loads) + 1 + len(model.ground)
-        self.start_works = np.zeros((model.body_count, accounts))
+    kept = "start_energy", "start_momentum", "start", "start_works"
+
+    def __init__(self, run: Run):
+        self.run, self.start_energy, self.start = run, 0.0, np.zeros(len(TERMS))
+        self.start_works = np.zeros(1)
         first = self.account()
-        self.start_energy = first["kinetic"] + first["bond_strain"] + first["sphere_strain"]
+        self.start_energy = sum(first[name] for name in _HELD)
         # Half a step of what acts from the start is booked at time zero.
-        self.start = np.array([0.0 if name in _HELD else first[name] for name in TERMS])
-        self.start_works = self._works()
+        held = *_HELD, "residual"
+        self.start = np.array([0.0 if name in held else first[name] for name in TERMS])
+        self.start_works = self.works()
         self.start_momentum = self.momentum()
-
-    def saved(self) -> dict[str, np.ndarray]:
-        """Data for a checkpoint, arrays by name."""
-        start = np.array([self.start_energy, *self.start_momentum, *self.start])
-        return {"start": start, "works": self.start_works.copy()}
-
-    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Restore the data that ``saved`` returned."""
-        self.start_energy, self.start_momentum = float(saved["start"][0]), saved["start"][1:7]
-        self.start, self.start_works = saved["start"][7:], saved["works"].copy()
 
     def account(self, tables: Optional[EnergyTables] = None) -> dict[str, float]:
         """All terms in J by name; residual is the unexplained remainder.
 
         tables: those of ``tables``, if they have been read already.
         """
-        body, bond, pair = self.tables() if tables is None else tables
-        terms = {
-            "kinetic": body[:, 0].sum(),
-            "bond_strain": bond[:, 0].sum(),
-            "sphere_strain": pair[:, 0].sum(),
-            "bond_dashpot": bond[:, 1].sum(),
-            "softening": bond[:, 4].sum(),
-            "release": bond[:, 3].sum(),
-            "slip": bond[:, 2].sum(),
-            "sphere_dashpot": body[:, 3].sum() + pair[:, 1].sum(),
-            "friction": body[:, 4].sum() + pair[:, 2].sum(),
-            "injected": body[:, 5].sum() + pair[:, 3].sum(),
-            "ground_dashpot": body[:, 6].sum(),
-            "load_work": body[:, 1].sum(),
-            "support_work": body[:, 2].sum(),
-        }
-        terms = {name: terms[name] - self.start[TERMS.index(name)] for name in terms}
-        terms["residual"] = self._residual(terms)
+        terms = {name: 0.0 for name in TERMS if name != "residual"}
+        for names, table in zip(_COLUMNS, self.tables() if tables is None else tables):
+            for name, column in zip(names, table.T):
+                terms[name] += column.sum()
+        for name, start in zip(terms, self.start):
+            terms[name] -= start
+        given = terms["load_work"] + terms["support_work"] + terms["injected"] + self.start_energy
+        terms["residual"] = given - sum(terms[name] for name in terms if name not in _GIVEN)
         return {name: float(value) for name, value in terms.items()}
 
     def tables(self) -> EnergyTables:
@@ -149,41 +116,28 @@ class EnergyBalance:
         bond: strain, dashpot, slip, release, softening. A row a pair: strain, dashpots, friction,
         injected, so far as its first body has not taken them.
         """
-        with self.readings.held():
-            return self.readings.bodies(), self.readings.bonds(), self.readings.pairs()
+        readings = self.run.readings
+        with readings.held():
+            return readings.bodies(), readings.bonds(), readings.pairs()
 
-    def _residual(self, terms):
-        given = terms["load_work"] + terms["support_work"] + terms["injected"] + self.start_energy
-        return given - sum(terms[name] for name in _SPENT if name != "residual")
+    def works(self) -> np.ndarray:
+        """Work of each load, of all supports and of each ground on every body, since the start [J].
+
+        Columns in this order, (body_count, accounts).
+        """
+        return self.run.readings.works() - self.start_works
 
     def load_work(self, index: int) -> float:
         """Work of one load [J], by its place in the scene's list of loads."""
-        return float(self.load_works(index).sum())
-
-    def load_works(self, index: int) -> np.ndarray:
-        """Work of one load on every body [J], (body_count,)."""
-        return self._works()[:, index]
-
-    def _works(self):
-        """Work of each load, of all supports and of each ground on every body, since the start."""
-        return self.readings.works() - self.start_works
+        return float(self.works()[:, index].sum())
 
     def ground_heats(self, index: int) -> np.ndarray:
         """Heat [J] in the dashpots of one ground at every body, (body_count,), by its place."""
-        return 0.0 - self._works()[:, len(self.model.loads) + 1 + index]
-
-    def support_works(self, index: int) -> np.ndarray:
-        """Work [J] of all supports on the bodies that one of them holds, (body_count,).
-
-        NaN for a body that it does not hold.
-        """
-        marks = np.zeros(self.model.body_count, dtype=np.int32)
-        self.readings.supported(index, marks)
-        return np.where(marks == 1, self._works()[:, len(self.model.loads)], np.nan)
+        return 0.0 - self.works()[:, len(self.run.model.loads) + 1 + index]
 
     def momentum(self) -> np.ndarray:
         """Linear [N s] and angular momentum about the origin [N m s], less external impulses."""
-        return _own(self.readings.momentum())
+        return _own(self.run.readings.momentum())
 
     def momentum_errors(self) -> tuple[float, float]:
         """Errors of linear and angular momentum, relative to the momentum exchanged.
@@ -192,7 +146,7 @@ class EnergyBalance:
         larger; at least a millionth of the impulses of loads and supports added by their sizes, of
         which nothing is left where a support takes what a load gives.
         """
-        rows = self.readings.momentum()
+        rows = self.run.readings.momentum()
         # The squares of a run that has diverged may be beyond all numbers.
         with np.errstate(over="ignore", invalid="ignore"):
             lost = _own(rows) - self.start_momentum
@@ -204,7 +158,7 @@ class EnergyBalance:
 
         total: sum of a number of each body over every part.
         """
-        rows = self.readings.momentum()
+        rows = self.run.readings.momentum()
         sizes = (np.linalg.norm(rows[:, k : k + 3], axis=1) for k in (0, 6))
         return np.max([total(one) for one in (*sizes, _LEAST_SHARE * rows[:, 12])], axis=0)
 

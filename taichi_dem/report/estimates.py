@@ -2,24 +2,26 @@
 
 A dimensionless group compares the effect with what it acts beside. Far below one it is negligible,
 far above it is needed, and between it is unclear: stresses concentrate at holes and notches by a
-factor of a few, which no such estimate knows.
+factor of a few, which no such estimate knows. Each connected part is judged by its own size,
+stiffness, strength, loads and speed: beside a large or fast part, a mean or a largest value of all
+would hide what moves or breaks a small or slow one.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem.mesh.parts import parts_of
-from taichi_dem.report.part_scales import WEIGHT, PartScales
+from taichi_dem.mesh.parts import part_boxes, parts_of, parts_under
 from taichi_dem.state.model import Model
 
 NEGLIGIBLE, NEEDED, UNCLEAR = "negligible", "needed", "unclear"
 #: Groups below which an effect is negligible, and from which on it is needed.
 _LOW, _HIGH = 0.05, 2.0
-#: Density of air [kg/m^3].
-AIR = 1.2
+#: Density of air [kg/m^3], and standard weight [m/s^2].
+AIR, WEIGHT = 1.2, 9.80665
 #: Groups in words.
 _OPENS = "stress over strength, as contact needs free faces"
 _BENDS = "stress of the weight over tensile strength, at most"
@@ -28,7 +30,7 @@ _SHARE = "share of the energy put in, at most"
 
 @dataclass(frozen=True)
 class Estimate:
-    """Dimensionless group by which an effect is judged before a run.
+    """Dimensionless group by which an effect is judged.
 
     Parameters
     ----------
@@ -38,28 +40,156 @@ class Estimate:
         Value of the group [-]; NaN where it is not known.
     words : str
         The group in words.
-    verdict : str
-        ``"negligible"``, ``"needed"`` or ``"unclear"``.
     """
 
     effect: str
     group: float
     words: str
-    verdict: str
+
+    @property
+    def verdict(self) -> str:
+        """``"negligible"``, ``"needed"`` or ``"unclear"``."""
+        return NEGLIGIBLE if self.group < _LOW else NEEDED if self.group >= _HIGH else UNCLEAR
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """What it adds to the table of effects."""
+        said = {"advice": self.verdict, "reason": self.words}
+        return {"effect": self.effect, "left_out": self.group, **said}
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file; a group that is not known is None.
-
-        Returns
-        -------
-        dict
-            Figures by name; a group that is not known is None.
-        """
-        return {**asdict(self), "group": None if math.isnan(self.group) else self.group}
+        """All figures, for a JSON file; a group that is not known is None."""
+        group = None if math.isnan(self.group) else self.group
+        return {**asdict(self), "group": group, "verdict": self.verdict}
 
     def __str__(self):
         value = "not known" if math.isnan(self.group) else f"{self.group:.2g}"
         return f"{self.effect}: {self.verdict} ({self.words} {value})"
+
+
+class PartScales:
+    """Numbers of connected parts, arrays (count,).
+
+    part, of_bonds: of each body and bond. first: lowest body. size: longest side of a part's box,
+    spacing: of its bodies [m]; wave: speed of sound [m/s]; damping: share of its energy that a bond
+    between bodies of mean size loses in a cycle.
+    """
+
+    def __init__(self, model: Model, part: np.ndarray):
+        self.model, self.part = model, part
+        self.first = np.unique(part, return_index=True)[1]
+        self.count, self.of_bonds = len(self.first), part[model.topology.master]
+        self.bodies, self.mass = np.bincount(part), self.sum(model.body_mass)
+        corners = model.mesh.points[model.mesh.tetrahedra]
+        low, high = part_boxes(corners, part)
+        edges = corners[:, 1:] - corners[:, :1]
+        self.density = self.mass / self.sum(np.abs(np.linalg.det(edges)) / 6.0)
+        self.size = (high - low).max(axis=1)
+        self.spacing = 2.0 * self.sum(model.body_radius) / self.bodies
+        self._join()
+
+    def sum(self, values: np.ndarray) -> np.ndarray:
+        """Sum of a number of each body over every part."""
+        return np.bincount(self.part, values, minlength=self.count)
+
+    def sum_of_bonds(self, values: np.ndarray) -> np.ndarray:
+        """Sum of a number of each bond over every part."""
+        return np.bincount(self.of_bonds, values, minlength=self.count)
+
+    def _join(self):
+        """Stiffness and damping of the bonds of each part: medians, where bonds differ."""
+        model = self.model
+        self.is_bonded = np.bincount(self.of_bonds, minlength=self.count) > 0
+        stiffness, damping = model.bond_stiffness[:, 0], model.bond_damping[:, 0]
+        normal, self.damping = np.full(self.count, self._stiffness_of_all()), np.zeros(self.count)
+        area, pair = 3.0 * model.bonds["area"], 0.5 * self.mass / self.bodies
+        order = np.argsort(self.of_bonds, kind="stable")
+        parts, begin = np.unique(self.of_bonds[order], return_index=True)
+        for p, own in zip(parts, np.split(order, begin[1:])):
+            normal[p] = np.median(stiffness[own])
+            rate = float(area[own].mean()) / (normal[p] * pair[p])
+            self.damping[p] = 2.0 * math.pi * np.median(damping[own]) * math.sqrt(rate)
+        self.wave = np.sqrt(normal * self.spacing / self.density)
+
+    def _stiffness_of_all(self):
+        """Normal stiffness per area [Pa/m] where a part has no bond; NaN where only bonds have."""
+        if self.model.bond_count:
+            return float(np.median(self.model.bond_stiffness[:, 0]))
+        given = self.model.material.normal_stiffness
+        return float(given) if isinstance(given, (int, float)) else math.nan
+
+    def of_materials(self, name: str, choose: Any) -> np.ndarray:
+        """A constant of each part: the least or largest of its bodies, as ``choose`` says."""
+        materials = self.model.materials
+        values = np.array([getattr(one, name) for one in materials.materials], dtype=np.float64)
+        found = values[materials.of_body[self.first]]
+        choose.at(found, self.part, values[materials.of_body])
+        return found
+
+    def under(self, effects: Iterable[Any]) -> np.ndarray:
+        """Whether any of some effects acts on each part."""
+        marks = [parts_under(self.model.mesh, effect, self.part) for effect in effects]
+        return np.any([np.zeros(self.count, dtype=bool), *marks], axis=0)
+
+    def stress(self, size: np.ndarray, everywhere: bool) -> np.ndarray:
+        """Sum of the stresses of loads and supports [Pa]; NaN where it is not known.
+
+        size: of each part, or of what it rests on [m]. everywhere: whether each reaches all parts.
+        """
+        of_body, materials = self.model.materials.of_body, self.model.materials.materials
+        present = np.zeros((self.count, len(materials)), dtype=bool)
+        present[self.part, of_body] = True
+        total = np.zeros(self.count)
+        for effect in (*self.model.loads, *self.model.supports):
+            acts = parts_under(self.model.mesh, effect, self.part) | everywhere
+            for p in np.flatnonzero(acts):
+                own = [one for one, here in zip(materials, present[p]) if here]
+                total[p] += max(effect.stress(one, float(size[p])) for one in own)
+        return total
+
+    def bent(self, until: float, borne: np.ndarray) -> np.ndarray:
+        """Largest stress of weight in bonded parts that are borne, over the tensile strength.
+
+        That of a beam held at one end whose weight sets in at once, twice 3 density g length^2 /
+        thickness; but no more than a speed of g until causes, sqrt(3) density wave g until.
+        """
+        long, thin = self._extents()
+        bent = 6.0 * WEIGHT * long**2 / thin
+        most = self.density * np.minimum(bent, math.sqrt(3.0) * self.wave * WEIGHT * until)
+        stress = np.where(borne & self.is_bonded, most, 0.0)
+        return stress / self.of_materials("tensile_strength", np.minimum)
+
+    def _extents(self):
+        """Longest and shortest side [m] of the box with the second moments of each part."""
+        mass, inertia = self.model.body_mass, self.model.body_inertia
+        arm = _arms(self.model, self.part)
+        own = 0.5 * np.trace(inertia, axis1=1, axis2=2)[:, None, None] * np.eye(3) - inertia
+        second = _sums(self.part, own + mass[:, None, None] * arm[:, :, None] * arm[:, None])
+        squares = np.linalg.eigvalsh(second / self.mass[:, None, None])
+        sides = np.sqrt(12.0 * np.maximum(squares, 0.0))
+        return sides[:, 2], sides[:, 0]
+
+    def worst(self, effect: str, *groups: tuple[np.ndarray, str]) -> Estimate:
+        """Estimate of the part that needs an effect most; groups: of each part, and in words."""
+        values = np.stack([value for value, _ in groups])
+        known = np.where(np.isnan(values), -1.0, values)
+        k, p = np.unravel_index(int(np.argmax(known)), known.shape)
+        if known[k, p] < _HIGH and np.isnan(values).any():
+            k, p = np.argwhere(np.isnan(values))[0]
+        part = f"part of body {self.first[p]}: " if self.count > 1 else ""
+        return Estimate(effect, float(values[k, p]), part + groups[k][1])
+
+
+def _sums(group, rows):
+    """Sums over groups of bodies of an array of each, (count, ...)."""
+    columns = [np.bincount(group, column) for column in rows.reshape(len(rows), -1).T]
+    return np.stack(columns, axis=1).reshape(-1, *rows.shape[1:])
+
+
+def _arms(model, group):
+    """Places of the bodies from the centre of mass of their group [m], (n, 3)."""
+    mass = model.body_mass[:, None]
+    return model.centre - (_sums(group, mass * model.centre) / _sums(group, mass))[group]
 
 
 def estimates_before(
@@ -70,25 +200,22 @@ def estimates_before(
 ) -> tuple[Estimate, ...]:
     """Estimates of all effects of a scene before a run, by dimensionless groups.
 
-    model: the scene's arrays. until: end of the run [s]. velocity: of the bodies at the start
-    [m/s], (body_count, 3), None at rest. meet: whether parts may meet. Each connected part is
-    judged by its own numbers, and the one that needs an effect most decides. The stress is that of
-    the loads and supports on a part (``Effect.stress``) and of the motion at the start, of all
-    parts where they may meet; the speed is that of a wave of this stress, stress / (density wave
-    speed), or the largest at the start, of the part alone. Of several materials in a part the least
-    strengths and the largest friction count.
+    until: end of the run [s]. velocity: of the bodies at the start [m/s], (body_count, 3), None at
+    rest. meet: whether parts may meet. The stress is that of the loads and supports on a part
+    (``Effect.stress``) and of the motion at the start, of all parts where they may meet; the speed
+    is that of a wave of this stress, stress / (density wave speed), or the largest at the start, of
+    the part alone. Of several materials the least strengths and the largest friction count.
     """
     part = parts_of(model.mesh)
-    scales, drives = PartScales(model, part), (*model.loads, *model.supports)
+    scales = PartScales(model, part)
     beside, rim, fastest = _speeds(model, velocity, part)
     # An unknown load is NaN, and with it all that follows.
-    own = scales.stress(drives, scales.size, False)
-    speed = np.maximum(
-        own / (scales.density * scales.wave) + beside + rim**2 / scales.wave, fastest
-    )
+    own = scales.stress(scales.size, False)
+    speed = own / (scales.density * scales.wave) + beside + rim**2 / scales.wave
+    speed = np.maximum(speed, fastest)
     if meet:
         whole = np.full(scales.count, float(np.ptp(model.mesh.points, axis=0).max()))
-        own = scales.stress(drives, whole, True)
+        own = scales.stress(whole, True)
         shared = _speeds(model, velocity, np.zeros_like(part))
         beside, rim = (np.maximum(one, other).max() for one, other in zip((beside, rim), shared))
     stress = own + scales.density * (scales.wave * beside + rim**2)
@@ -96,104 +223,47 @@ def estimates_before(
     shear = stress / np.maximum(scales.of_materials("cohesion", np.minimum), 1e-300)
     breaks = np.maximum(softening, shear)
     rubs = scales.of_materials("friction", np.maximum) * breaks
-    worst = _Worst(scales)
-    drag = _drag(scales.density, speed, until, scales.spacing)
+    contact, worst = scales.worst("contact", (breaks, _OPENS)), scales.worst
+    # Parts that meet touch from the start, others where they break.
+    if meet and not contact.group >= scales.count:
+        contact = Estimate("contact", float(scales.count), "number of parts that may meet")
+    # A part that is borne does not fall; what may hit one at rest is not known.
+    borne = scales.under((*model.supports, *model.ground))
+    fall = WEIGHT * until / np.maximum(speed, 1e-300)
+    fall = np.where(speed == 0.0, np.where(borne, 0.0, np.nan if meet else fall), fall)
+    bends = scales.bent(until, borne | meet), _BENDS
+    drag = AIR * speed * until / (scales.density * scales.spacing)
     return (
         worst("softening", (softening, "stress over tensile strength")),
         worst("slip", (shear, "stress over cohesion")),
-        _contact(worst("contact", (breaks, _OPENS)), scales.count if meet else 0),
+        contact,
         worst("friction", (rubs, "friction times stress over strength")),
         worst("bond damping", (scales.damping, "share of a bond's vibration lost in a cycle")),
-        worst("gravity", *_weight_before(scales, speed, until, meet)),
+        worst("gravity", (fall, "speed of a fall over that given"), bends),
         worst("air drag", (drag, "share of momentum lost to air")),
     )
 
 
-class _Worst:
-    """Estimate of the part that needs an effect most."""
-
-    def __init__(self, scales: PartScales):
-        self.scales = scales
-
-    def __call__(self, effect, *groups):
-        """groups: pairs of a group of each part, and what it is in words."""
-        values = np.stack([value for value, _ in groups])
-        known = np.where(np.isnan(values), -1.0, values)
-        k, p = np.unravel_index(int(np.argmax(known)), known.shape)
-        if known[k, p] < _HIGH and np.isnan(values).any():
-            k, p = np.argwhere(np.isnan(values))[0]
-        words = groups[k][1]
-        if self.scales.count > 1:
-            words = f"part of body {self.scales.first[p]}: {words}"
-        return _judged(effect, float(values[k, p]), words)
-
-
-def _weight_before(scales, speed, until, meet):
-    """Groups of weight: its fall beside what else moves a part, its stress where a part is borne.
-
-    A part that is borne does not fall; one that others may reach may be moved by these, unknown.
-    """
-    borne = scales.under((*scales.model.supports, *scales.model.ground))
-    fall = WEIGHT * until / np.maximum(speed, 1e-300)
-    still = speed == 0.0
-    fall = np.where(still & borne, 0.0, np.where(still & meet, np.nan, fall))
-    return (fall, "speed of a fall over that given"), _bent(scales, until, borne | meet)
-
-
-def _bent(scales, until, borne):
-    """Group of the stress of weight in bonded parts that something bears."""
-    stress = np.where(borne & scales.is_bonded, scales.weight_stress(until), 0.0)
-    return stress / scales.of_materials("tensile_strength", np.minimum), _BENDS
-
-
-def _contact(breaks, meeting):
-    """Estimate of contact: parts that meet touch from the start, others where they break."""
-    if meeting and not breaks.group >= meeting:
-        return _judged("contact", float(meeting), "number of parts that may meet")
-    return breaks
-
-
 def _speeds(model, velocity, group):
-    """Speeds of groups of bodies at the start: beside a rigid motion of each, of its rim, largest.
+    """Speeds of groups of bodies at the start: beside a rigid motion, of its rim, and largest.
 
-    Three arrays, an entry a group. A front that stops a speed v has the stress density wave v, a
-    rim of speed v density v^2.
+    A front that stops a speed v has the stress density wave v, a rim of speed v density v^2.
     """
-    count = int(group.max()) + 1
+    found = np.zeros((3, int(group.max()) + 1))
     if velocity is None:
-        return np.zeros((3, count))
-
-    def total(rows):
-        flat = rows.reshape(len(rows), -1)
-        sums = [np.bincount(group, column, minlength=count) for column in flat.T]
-        return np.stack(sums, axis=1).reshape(count, *rows.shape[1:])
-
-    mass = model.body_mass[:, None]
-    arm = model.centre - (total(mass * model.centre) / total(mass))[group]
-    mean = (total(mass * velocity) / total(mass))[group]
-    momentum = total(mass * np.cross(arm, velocity))
-    squares = mass[:, :, None] * arm[:, :, None] * arm[:, None]
-    second = total(squares)
+        return found
+    mass, arm = model.body_mass[:, None], _arms(model, group)
+    mean = (_sums(group, mass * velocity) / _sums(group, mass))[group]
+    momentum = _sums(group, mass * np.cross(arm, velocity))
+    second = _sums(group, mass[:, :, None] * arm[:, :, None] * arm[:, None])
     inertia = np.eye(3) * np.trace(second, axis1=1, axis2=2)[:, None, None] - second
     rate = np.einsum("pij,pj->pi", np.linalg.pinv(inertia, hermitian=True), momentum)
     rim = np.cross(rate[group], arm)
-    found = np.zeros((3, count))
     for row, one in zip(found, (velocity - mean - rim, rim, velocity)):
         np.maximum.at(row, group, np.linalg.norm(one, axis=1))
     # Rounding of a rigid motion strains nothing.
     found[0][found[0] <= 1e-9 * found[2]] = 0.0
     return found
-
-
-def _drag(density, speed, until, spacing):
-    return AIR * speed * until / (density * spacing)
-
-
-def _judged(effect, group, words):
-    if math.isnan(group):
-        return Estimate(effect, group, words, UNCLEAR)
-    verdict = NEGLIGIBLE if group < _LOW else NEEDED if group >= _HIGH else UNCLEAR
-    return Estimate(effect, float(group), words, verdict)
 
 
 def estimates_after(
@@ -206,23 +276,22 @@ def estimates_after(
 ) -> tuple[Estimate, ...]:
     """Estimates of what no law of a scene serves, from where a run has brought the bodies.
 
-    displacement (n, 3) [m] and speed (n,) [m/s]: of the bodies. energy: that each part got [J],
-    (part_count,), 0 where nothing moved it; borne: whether a support, ground or contact bears it.
-    Shares of this energy: work of the weight along the way and its fall, and of the drag of air on
-    balls of the bodies' size at their present speed. Where a part is borne, weight strains it too.
+    displacement (n, 3) [m], speed (n,) [m/s]: of the bodies. energy: that each part got [J], 0
+    where nothing moved it; borne: whether a support, ground or contact bears it. Shares of this
+    energy: work of the weight along the way and its fall, and of the drag of air on balls of the
+    bodies' size at their present speed. Where a part is borne, weight strains it too.
     """
-    way, worst, found = np.linalg.norm(displacement, axis=1), _Worst(scales), []
-    model = scales.model
+    model, way, found = scales.model, np.linalg.norm(displacement, axis=1), []
     if not any(effect.name == "gravity" for effect in model.loads):
         fall = WEIGHT * until
         work = model.body_mass * (WEIGHT * way + fall * speed + 0.5 * fall**2)
         share = _share(scales.sum(work), energy)
         # What is borne and not moved at all does not fall.
         share = np.where(borne & (energy == 0.0), 0.0, share)
-        found.append(worst("gravity", (share, _SHARE), _bent(scales, until, borne)))
+        groups = (share, _SHARE), (scales.bent(until, borne), _BENDS)
+        found.append(scales.worst("gravity", *groups))
     drag = 0.5 * AIR * math.pi * model.body_radius**2 * speed**2
-    found.append(worst("air drag", (_share(scales.sum(drag * way), energy), _SHARE)))
-    return tuple(found)
+    return (*found, scales.worst("air drag", (_share(scales.sum(drag * way), energy), _SHARE)))
 
 
 def _share(work, energy):

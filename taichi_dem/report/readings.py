@@ -54,21 +54,21 @@ class Readings:
         """
         _, table = self.pushes()
         bodies = self.contacts.store.near_bodies() if len(table) else np.zeros((0, 2), np.int32)
-        return bodies, table[:, 2:].T
+        return bodies, table[:, 2:5].T
 
     def pushes(self) -> tuple[np.ndarray, np.ndarray]:
         """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
 
         Summed in the order of the pairs, so that no thread changes a bit. Also the heat of each
-        pair's dashpots and friction by which the booked one is behind [J], and the sums of
-        ``rubbing``, (pairs, 5).
+        pair's dashpots and friction by which the booked one is behind [J], the sums of
+        ``rubbing``, and the pair's strain and booked heats [J], (pairs, 9).
         """
         return self._once("pushes", self._pushes)
 
     def _pushes(self):
         pushed = np.zeros((int(values(self.tables.body_count)), 6))
         count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
-        table = np.zeros((count, 17))
+        table = np.zeros((count, 21))
         if count:
             bodies = self.contacts.store.near_bodies()
             self._push(table)
@@ -87,6 +87,9 @@ class Readings:
                 table[a, 6 + k], table[a, 9 + k] = half * found.force[k], half * found.moment_j[k]
             table[a, 12], table[a, 13] = half * found.dragged, half * found.rubbed
             table[a, 14], table[a, 15], table[a, 16] = found.rub, found.bound, found.rubbed
+            table[a, 17] = self.contacts.pair_energy(p)
+            for k in ti.static(range(3)):
+                table[a, 18 + k] = self.contacts.store.heat[p][k]
 
     def bodies(self) -> np.ndarray:
         """Kinetic energy, work of loads, supports, contact heats, ground's heat [J], (n, 7)."""
@@ -201,28 +204,9 @@ class Readings:
 
     def pairs(self) -> np.ndarray:
         """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""
-        _, heats = self.pushes()
-        table = np.zeros((len(heats), 4))
-        if len(heats):
-            self._pairs(table)
-            table[:, 1:3] += heats[:, :2]
+        table = self.pushes()[1][:, 5:].copy()
+        table[:, 1:3] += self.pushes()[1][:, :2]
         return table
-
-    @ti.kernel
-    def _pairs(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        for a in range(self.contacts.store.near_count[None]):
-            p = self.contacts.store.near_slot[a]
-            table[a, 0] = self.contacts.pair_energy(p)
-            for k in ti.static(range(3)):
-                table[a, 1 + k] = self.contacts.store.heat[p][k]
-
-    @ti.kernel
-    def supported(self, index: ti.i32, marks: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-        """Mark the bodies on which one of the supports acts."""
-        for i in range(self.tables.body_count[None]):
-            for e in ti.static(range(len(self.tables.supports))):
-                if e == index and self.tables.supports[e].acts_on(i):
-                    marks[i] = 1
 
     def momentum(self) -> np.ndarray:
         """Momentum of every body; impulses of loads and supports, their sums and sizes, (n, 14)."""

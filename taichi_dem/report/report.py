@@ -1,15 +1,17 @@
 """The short report at the end of a run."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Optional
 
+from taichi_dem.kit.accuracy import plans
 from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.effect_usage import Advice
+from taichi_dem.methods import order_of
 from taichi_dem.report.certificate import Certificate
 from taichi_dem.report.energy_balance import injected_words
 from taichi_dem.report.shared_volume import Interpenetration
-
-#: Keys of the JSON file that differ from the attribute's name.
-_JSON_KEYS = {"effect_activity": "acted", "missing_effects": "missed"}
+from taichi_dem.scene import Scene, kind_of
 
 
 @dataclass(frozen=True)
@@ -131,9 +133,8 @@ class Report:
     @property
     def needs(self) -> tuple[str, ...]:
         """Sentences about effects that were missed, slip of bonds, and a step that was too long."""
-        slipped = (str(slip) for slip in self.bond_slip if slip.excessive)
-        missing = (str(missing) for missing in self.missing_effects)
-        return (*missing, *slipped, *self.unresolved)
+        slipped = (slip for slip in self.bond_slip if slip.count)
+        return (*map(str, (*self.missing_effects, *slipped)), *self.unresolved)
 
     @property
     def contact_evaluations(self) -> int:
@@ -149,6 +150,11 @@ class Report:
     def boundary_gain(self) -> float:
         """Ratio of the evaluations of one step for all to those that were made."""
         return self.uniform_evaluations / max(1, self.contact_evaluations)
+
+    @property
+    def work_put_in(self) -> float:
+        """Work of loads and supports [J]."""
+        return self.energy_balance["load_work"] + self.energy_balance["support_work"]
 
     @property
     def energy_residual_fraction(self) -> float:
@@ -169,6 +175,31 @@ class Report:
         whole = "the energy held" if held > given else "it"
         return f"{100.0 * self.energy_residual_fraction:.3g} % of {whole}"
 
+    @property
+    def injected(self) -> str:
+        """Energy that breaking faces injected, in words, where it counts; else ``""``."""
+        return injected_words(self.energy_balance, self.round_off_J)
+
+    def advice(self, tolerance: float = 0.0, shown: Optional[Mapping[str, float]] = None) -> Advice:
+        """Advice on the effects, of which runs without some have shown a difference, by name.
+
+        Parameters
+        ----------
+        tolerance : float, default 0.0
+            Largest difference that counts as equal, as a share of what was recorded.
+        shown : mapping, optional
+            Differences that were shown, see ``needed_effects``; none by default.
+
+        Returns
+        -------
+        Advice
+            Print it, or read its ``table()``.
+        """
+        slipped = (slip for slip in self.bond_slip if slip.count and not slip.weakens)
+        missing = *self.missing_effects, *slipped
+        left_out = self.certificate.left_out if self.certificate else ()
+        return Advice(self.effect_activity, missing, tolerance, shown or {}, left_out)
+
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file.
 
@@ -177,97 +208,84 @@ class Report:
         dict
             Figures by name.
         """
+        figures = asdict(replace(self, certificate=None))
+        figures["acted"] = figures.pop("effect_activity")
+        figures["missed"] = figures.pop("missing_effects")
+        figures["certificate"] = self.certificate and self.certificate.as_dict()
         gains = "ideal_gain", "boundary_gain"
         derived = ("contact_evaluations", *gains, "energy_residual_fraction", "needs")
-        plain = replace(self, certificate=None)
-        figures = {_JSON_KEYS.get(name, name): value for name, value in asdict(plain).items()}
-        figures["certificate"] = self.certificate and self.certificate.as_dict()
         return {**figures, **{name: getattr(self, name) for name in derived}}
 
-    def _effect_rows(self):
-        """Rows with the activity of each effect."""
-        if not self.effect_activity:
-            return (("effects", "none"),)
-        rows = [f"{use.effect}: {use}" for use in self.effect_activity]
-        return (("effects", rows[0]), *(("", row) for row in rows[1:]))
-
-    def _bound_words(self):
-        """Criteria that bound the steps, with the number of bodies."""
-        words = ((name.replace("_", " "), n) for name, n in self.bound_by.items())
-        return ", ".join(f"{name} ({n} bodies)" for name, n in words)
-
-    def _gain_row(self):
-        """Row with the gain from steps of different length, where there are any."""
+    def _gain(self):
+        """Gain from steps of different length, where there are any."""
         if self.body_updates == self.body_count * self.substeps:
-            return ()
+            return
         ideal, reached = f"{self.ideal_gain:.2f}", f"{self.boundary_gain:.2f}"
-        words = f"{ideal} ideal, {reached} with pairs at the finer step"
-        return (("gain over uniform", words),)
+        yield f"{ideal} ideal, {reached} with pairs at the finer step"
 
-    def _sweeps_row(self):
-        """Row with the sweeps over all dashpots, for methods that solve them."""
-        if not self.sweeps:
-            return ()
-        words = f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"
-        return (("sweeps", f"{words}, {self.unconverged_steps:,} substeps unconverged"),)
+    def _sweeps(self):
+        """Sweeps over all dashpots, for methods that solve them."""
+        if self.sweeps:
+            words = f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"
+            yield f"{words}, {self.unconverged_steps:,} substeps unconverged"
 
-    def _injected_row(self):
-        """Row with the energy that breaking faces injected, where it counts."""
-        words = injected_words(self.energy_balance, self.round_off_J)
-        return (("injected", words),) if words else ()
-
-    def _certificate_rows(self):
-        """Rows with what was left out; what acted stands among the effects."""
-        if self.certificate is None:
-            return ()
-        parts = str(self.certificate).splitlines()[len(self.certificate.acting) :]
-        return tuple(("certificate" if not k else "", part) for k, part in enumerate(parts))
-
-    def _error_rows(self):
-        """Rows with what is known of the error."""
-        parts = self.known_error.split("; ") if self.known_error else ()
-        return tuple((name, part) for name, part in zip(("known of the error", "", ""), parts))
+    def _rows(self):
+        """Names, and the lines of each."""
+        bound = ((name.replace("_", " "), n) for name, n in self.bound_by.items())
+        broken = f"{self.broken_faces} of {self.bond_count} bonds broken"
+        counted = f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs"
+        momentum = f"{self.linear_momentum_error:.1e} linear, {self.angular_momentum_error:.1e}"
+        run = f"{self.run_seconds:.1f} s run ({self.run_cpu_seconds:.1f} s of CPU)"
+        return {
+            "method": [f"{self.method}, {self.driver} driver"],
+            "effects": [f"{use.effect}: {use}" for use in self.effect_activity] or ["none"],
+            "simulated": [f"{self.until_s:.4g} s, {broken}"],
+            "smallest step": [f"{self.smallest_step_s:.3g} s"],
+            "steps bound by": [", ".join(f"{name} ({n} bodies)" for name, n in bound)],
+            "substeps": [f"{self.substeps:,}"],
+            "evaluations": [f"{counted}, {self.body_updates:,} bodies"],
+            "largest bond slip": [slip.figure for slip in self.bond_slip],
+            "gain over uniform": self._gain(),
+            "sweeps": self._sweeps(),
+            "contact searches": [f"{self.searches:,}"],
+            "interpenetration": [str(self.interpenetration or "not looked for")],
+            "work put in": [f"{self.work_put_in:.6g} J"],
+            "energy residual": [self.unexplained],
+            "injected": [self.injected] if self.injected else (),
+            "known of the error": self.known_error.split("; ") if self.known_error else (),
+            "certificate": self.certificate.left_out_lines() if self.certificate else (),
+            "momentum error": [f"{momentum} angular"],
+            "time": [f"{self.compile_seconds:.1f} s before the first step, {run}"],
+        }
 
     def __str__(self):
         """A table of some twenty lines, then one line for every effect that was missed."""
-        rows = [
-            ("method", f"{self.method}, {self.driver} driver"),
-            *self._effect_rows(),
-            (
-                "simulated",
-                f"{self.until_s:.4g} s, {self.broken_faces} of {self.bond_count} bonds broken",
-            ),
-            ("smallest step", f"{self.smallest_step_s:.3g} s"),
-            ("steps bound by", self._bound_words()),
-            ("substeps", f"{self.substeps:,}"),
-            (
-                "evaluations",
-                f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs, "
-                f"{self.body_updates:,} bodies",
-            ),
-            *(("largest bond slip", slip.figure) for slip in self.bond_slip),
-            *self._gain_row(),
-            *self._sweeps_row(),
-            ("contact searches", f"{self.searches:,}"),
-            ("interpenetration", str(self.interpenetration or "not looked for")),
-            (
-                "work put in",
-                f"{self.energy_balance['load_work'] + self.energy_balance['support_work']:.6g} J",
-            ),
-            ("energy residual", self.unexplained),
-            *self._injected_row(),
-            *self._error_rows(),
-            *self._certificate_rows(),
-            (
-                "momentum error",
-                f"{self.linear_momentum_error:.1e} linear, "
-                f"{self.angular_momentum_error:.1e} angular",
-            ),
-            (
-                "time",
-                f"{self.compile_seconds:.1f} s before the first step, "
-                f"{self.run_seconds:.1f} s run ({self.run_cpu_seconds:.1f} s of CPU)",
-            ),
+        lines = [
+            f"{'' if k else name:18s} {text}"
+            for name, texts in self._rows().items()
+            for k, text in enumerate(texts)
         ]
-        lines = [f"{name:18s} {text}" for name, text in rows]
         return "\n".join([*lines, *(f"warning: {need}" for need in self.needs)])
+
+
+def known_error(report: Report, scene: Scene, method: Any) -> str:
+    """What is known of the error of a run that was not asked for an accuracy: for nothing extra.
+
+    Step and order of the method, how the energy balance closes, and what a plan says, in words. A
+    plan is at hand where the session has answered a question of a scene of this kind.
+    """
+    if not report.substeps:
+        return ""
+    varying = report.substeps > round(report.until_s / method.dt0)
+    order = order_of(method, scene.damped(touching=report.pair_evaluations > 0), varying)
+    # Events each fall within a step, whatever the order between them.
+    events = {"breaks": report.broken_faces, "contacts": report.pair_evaluations}
+    between = " and ".join(name for name, count in events.items() if count)
+    words = "order unknown" if order is None else f"order {order}"
+    words += f" between {between}" if between and order is not None else ""
+    closes = f"energy balance: {report.unexplained.replace('; ', ', ')}"
+    if "%" in closes:
+        closes = f"energy balance closes to {report.unexplained.replace(' of it', '')}"
+    plan = plans.recall(kind_of(scene))
+    parts = f"{'steps up to' if varying else 'step'} {method.dt0:.3g} s, {words}", closes
+    return "; ".join([*parts, f"in such scenes {plan}"] if plan else parts)

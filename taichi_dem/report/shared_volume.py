@@ -4,19 +4,16 @@ Bodies are rigid, so two of them that are not bonded may share volume only where
 apart: no contact, faces without spheres, or contact that is too soft or too sparse.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.types import vec3, vec4
-from taichi_dem.mesh.tetrahedra import components, points_of_parts
+from taichi_dem.kit.types import vec3
+from taichi_dem.mesh.tetrahedra import points_of_parts
+from taichi_dem.report.run import Kept, Run
 from taichi_dem.scene import remedy
-from taichi_dem.state.model import Model
-from taichi_dem.state.state import State
-from taichi_dem.state.timeline import NEVER
 
 #: Share of the smaller body beyond which two bodies count as within each other.
 DEEP = 0.1
@@ -24,6 +21,8 @@ DEEP = 0.1
 NOTABLE = 0.25
 #: Way of a body, as a share of its radius, after which all are compared again.
 MOVED = 0.25
+#: Pairs that there is room for at first.
+_ROOM = 1024
 #: Halvings of a body's edges, for a first look and for the figure: each part stands for its volume
 #: by a point.
 _HALVINGS = 2, 3
@@ -60,52 +59,64 @@ class Interpenetration:
         )
 
 
-class SharedVolume:
+class SharedVolume(Kept):
     """Finds bodies within each other, at recording times after which some body has moved.
 
-    worst: the ``Interpenetration`` so far. Of the last look: pairs (n, 2) and their share (n,),
-    near_pairs (m, 2) all pairs that no plane of a face parts, those that share most first.
+    Of the last look: pairs (n, 2) that share volume and their share of the smaller body (n,).
+    figures: those of ``worst`` so far.
     """
 
-    def __init__(self, model: Model, state: State):
-        self.model, self.state = model, state
+    kept = "place", "turn", "figures"
+
+    def __init__(self, run: Run):
+        self.run, model = run, run.model
         self.arms = model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
         self.points = [points_of_parts(halvings) for halvings in _HALVINGS]
-        self.worst = Interpenetration()
-        self.seen = model.centre, np.tile(np.eye(3), (model.body_count, 1, 1))
+        self.place, self.turn = model.centre, np.tile(np.eye(3), (model.body_count, 1, 1))
+        self.figures = np.array([0.0, -1.0, -1.0, 0.0, 0.0])
         self.pairs, self.share = np.zeros((0, 2), dtype=np.int32), np.zeros(0)
-        self.near_pairs = self.pairs
+
+    @property
+    def worst(self) -> Interpenetration:
+        """The worst pair so far."""
+        share, first, second, time_s, deep = self.figures.tolist()
+        return Interpenetration(share, (int(first), int(second)), time_s, int(deep))
 
     def sample(self, time_s: float, finished: bool = False) -> bool:
         """Compare the bodies where one has moved, or at the end; whether they were compared."""
-        way = self.way()
-        if way <= (0.0 if finished else MOVED):
+        if self._way() <= (0.0 if finished else MOVED):
             return False
-        self.seen = self.now()
-        self._compare(self.corners(*self.seen))
-        self._note(time_s)
+        self.place, self.turn = self._now()
+        self._compare(self.corners())
+        share = self.share.max(initial=0.0)
+        figures = self.figures.copy()
+        if share > figures[0]:
+            figures[:4] = share, *self.pairs[self.share.argmax()], time_s
+        figures[4] = max(figures[4], (self.share > DEEP).sum())
+        self.figures = figures
         return True
 
-    def way(self) -> float:
+    def _way(self):
         """Longest way of a body since the last look, as a share of its radius."""
-        place, turn = self.now()
+        place, turn = self._now()
         # A motion whose square is no number is that of a runaway, which the divergence check names.
         with np.errstate(over="ignore"):
-            way = np.linalg.norm(place - self.seen[0], axis=1) / self.model.body_radius
-            return float((way + np.linalg.norm(turn - self.seen[1], axis=(1, 2))).max())
+            way = np.linalg.norm(place - self.place, axis=1) / self.run.model.body_radius
+            return float((way + np.linalg.norm(turn - self.turn, axis=(1, 2))).max())
 
-    def corners(self, place: np.ndarray, turn: np.ndarray, bodies: Any = slice(None)) -> np.ndarray:
-        """Corners of some bodies [m], (n, 4, 3), from places and rotations of all."""
-        return place[bodies, None] + np.einsum("nij,ncj->nci", turn[bodies], self.arms[bodies])
-
-    def now(self) -> tuple[np.ndarray, np.ndarray]:
+    def _now(self):
         """Positions [m] and rotations of the bodies."""
-        count = self.model.body_count
-        return self.state.position.to_numpy()[:count], self.state.rotation.to_numpy()[:count]
+        state, count = self.run.state, self.run.model.body_count
+        return state.position.to_numpy()[:count], state.rotation.to_numpy()[:count]
+
+    def corners(self, bodies: Any = slice(None)) -> np.ndarray:
+        """Corners of some bodies at present [m], (n, 4, 3)."""
+        place, turn = self._now()
+        return place[bodies, None] + np.einsum("nij,ncj->nci", turn[bodies], self.arms[bodies])
 
     def findings(self) -> tuple[str, ...]:
         """A sentence where bodies are within each other although contact is listed; or none."""
-        contact, worst = self.model.contact, self.worst
+        contact, worst = self.run.model.contact, self.worst
         if contact is None or worst.share <= NOTABLE:
             return ()
         law = type(contact).__name__
@@ -119,69 +130,27 @@ class SharedVolume:
             f"{advice}",
         )
 
-    def fragments(self) -> int:
-        """Number of pieces that intact bonds hold together."""
-        top = self.model.topology
-        intact = self.state.broken_tick.to_numpy()[: self.model.bond_count] == NEVER
-        ends = np.column_stack([top.master, top.slave])[intact]
-        return len(np.unique(components(self.model.body_count, ends)))
-
-    def saved(self) -> dict[str, np.ndarray]:
-        """Data for a checkpoint, arrays by name."""
-        worst = self.worst
-        figures = [worst.share, *worst.bodies, worst.time_s, worst.deep]
-        return {
-            "shared": np.array(figures, dtype=np.float64),
-            "seen": self.seen[0].copy(),
-            "turned": self.seen[1].copy(),
-        }
-
-    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Restore the data that ``saved`` returned."""
-        share, first, second, time_s, deep = saved["shared"].tolist()
-        self.worst = Interpenetration(share, (int(first), int(second)), time_s, int(deep))
-        self.seen = saved["seen"].copy(), saved["turned"].copy()
-
-    def _note(self, time_s):
-        deep = max(self.worst.deep, int((self.share > DEEP).sum()))
-        found = self.worst.share, self.worst.bodies, self.worst.time_s
-        if len(self.share) and self.share.max() > self.worst.share:
-            place = int(self.share.argmax())
-            found = float(self.share[place]), tuple(self.pairs[place].tolist()), time_s
-        self.worst = Interpenetration(*found, deep)
-
     def _compare(self, corners):
         """Find all pairs and their shares; corners (n, 4, 3) [m]."""
-        top = self.model.topology
-        broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
+        top = self.run.model.topology
         # Bond -1 stands for an outer face, which is as free as a broken one.
-        free = np.append(broken, True)[top.body_bond]
+        free = np.append(self.run.broken(), True)[top.body_bond]
         surface = np.flatnonzero(free.any(axis=1))
-        tied = np.full((self.model.body_count, 4), -1, dtype=np.int32)
-        ends = np.column_stack([top.master, top.slave])
-        for body, bonds in ((top.master, top.master_face), (top.slave, top.slave_face)):
-            other = ends.sum(axis=1) - body
-            tied[body, bonds] = np.where(broken, -1, other)
+        other = np.append(top.master + top.slave, 0)[top.body_bond]
+        tied = np.where(free, -1, other - np.arange(len(free))[:, None]).astype(np.int32)
         order, last = _in_rows(corners[surface])
         body = surface[order].astype(np.int32)
         own = np.ascontiguousarray(corners[body])
         box = np.concatenate([own.min(axis=1), own.max(axis=1)], axis=1)
-        args = last, box, own, body, np.ascontiguousarray(tied[body])
-        count = np.zeros(len(body) + 1, dtype=np.int32)
-        _near_pairs(*args, count, np.zeros((1, 2), dtype=np.int32), False)
-        first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32)
-        places = np.zeros((max(1, int(count.sum())), 2), dtype=np.int32)
-        _near_pairs(*args, first, places, True)
-        near = np.sort(body[places[: int(count.sum())]], axis=1)
-        volume = np.ascontiguousarray(self.model.body_mass[body])
-        share = np.ones(len(near))
-        for points in self.points:
-            left = np.flatnonzero(share > 0.0)
-            found = np.zeros(len(left))
-            _shares(own, np.ascontiguousarray(places[left]), volume, points, found)
-            share[left] = found
-        self.near_pairs = near[np.argsort(-share, kind="stable")]
-        self.pairs, self.share = near[left], found
+        mass, count = np.ascontiguousarray(self.run.model.body_mass[body]), np.ones(1, np.int32)
+        found = np.zeros((0, 3))
+        while count[0] > len(found):
+            found, count = np.zeros((max(_ROOM, count[0]), 3)), np.zeros(1, np.int32)
+            _find_pairs(last, box, own, body, tied[body], mass, *self.points, found, count)
+        found = found[: count[0]]
+        found = found[np.lexsort(found[:, [1, 0]].T)]
+        self.pairs = np.sort(body[found[:, :2].astype(np.int32)], axis=1)
+        self.share = found[:, 2]
 
 
 def _in_rows(corners):
@@ -193,36 +162,32 @@ def _in_rows(corners):
 
 
 @ti.kernel
-def _near_pairs(
+def _find_pairs(
     last: ti.types.ndarray(dtype=ti.i32, ndim=1),
     box: ti.types.ndarray(dtype=ti.f64, ndim=2),
     corners: ti.types.ndarray(dtype=ti.f64, ndim=3),
     body: ti.types.ndarray(dtype=ti.i32, ndim=1),
     tied: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    place: ti.types.ndarray(dtype=ti.i32, ndim=1),
-    pairs: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    write: bool,
+    mass: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    few: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    many: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    found: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    count: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Count, or write from their places on, pairs of bodies that no plane of a face parts."""
+    """Count and write pairs of bodies that share volume, as far as there is room, in any order."""
     for i in range(last.shape[0]):
-        count = 0
         for j in range(i + 1, last[i]):
             if _boxes_meet(box, i, j) == 1 and _strangers(tied, body, i, j) == 1:
-                if _outside(corners, i, j) == 0 and _outside(corners, j, i) == 0:
-                    if write:
-                        pairs[place[i] + count, 0], pairs[place[i] + count, 1] = i, j
-                    count += 1
-        if not write:
-            place[i] = count
-
-
-@ti.func
-def _strangers(tied: ti.template(), body: ti.template(), i, j):
-    """1 for bodies that no bond holds together."""
-    strangers = 1
-    for f in ti.static(range(4)):
-        strangers *= ti.cast(tied[i, f] != body[j], ti.i32)
-    return strangers
+                small, large = i, j
+                if mass[i] > mass[j]:
+                    small, large = j, i
+                planes = _planes(corners, large)
+                if _share(planes, corners, small, few) > 0.0:
+                    share = _share(planes, corners, small, many)
+                    if share > 0.0:
+                        a = ti.atomic_add(count[0], 1)
+                        if a < found.shape[0]:
+                            found[a, 0], found[a, 1], found[a, 2] = i, j, share
 
 
 @ti.func
@@ -235,60 +200,44 @@ def _boxes_meet(box: ti.template(), i, j):
 
 
 @ti.func
+def _strangers(tied: ti.template(), body: ti.template(), i, j):
+    """1 for bodies that no bond holds together."""
+    strangers = 1
+    for f in ti.static(range(4)):
+        strangers *= ti.cast(tied[i, f] != body[j], ti.i32)
+    return strangers
+
+
+@ti.func
 def _corner(corners: ti.template(), i, c):
     return vec3(corners[i, c, 0], corners[i, c, 1], corners[i, c, 2])
 
 
 @ti.func
-def _plane(corners: ti.template(), i, f):
-    """Plane of the face opposite corner f: inward normal, 1 at that corner, and its offset."""
-    base = _corner(corners, i, (f + 1) % 4)
-    second, third = _corner(corners, i, (f + 2) % 4), _corner(corners, i, (f + 3) % 4)
-    normal = (second - base).cross(third - base)
-    normal /= normal.dot(_corner(corners, i, f) - base)
-    return vec4(normal[0], normal[1], normal[2], -normal.dot(base))
+def _planes(corners: ti.template(), i):
+    """Planes of the faces, each opposite a corner: inward normal, 1 at the corner, and offset."""
+    planes = ti.Matrix.zero(ti.f64, 4, 4)
+    for f in ti.static(range(4)):
+        base = _corner(corners, i, (f + 1) % 4)
+        second, third = _corner(corners, i, (f + 2) % 4), _corner(corners, i, (f + 3) % 4)
+        normal = (second - base).cross(third - base)
+        normal /= normal.dot(_corner(corners, i, f) - base)
+        for k in ti.static(range(3)):
+            planes[f, k] = normal[k]
+        planes[f, 3] = -normal.dot(base)
+    return planes
 
 
 @ti.func
-def _outside(corners: ti.template(), i, j):
-    """1 where all corners of body j lie beyond one face of body i."""
-    outside, f = 0, 0
-    while f < 4 and outside == 0:
-        plane, inside = _plane(corners, i, f), 0
-        for c in range(4):
-            height = plane.xyz.dot(_corner(corners, j, c)) + plane[3]
-            inside |= ti.cast(height > 0.0, ti.i32)
-        outside = 1 - inside
-        f += 1
-    return outside
-
-
-@ti.kernel
-def _shares(
-    corners: ti.types.ndarray(dtype=ti.f64, ndim=3),
-    pairs: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    volume: ti.types.ndarray(dtype=ti.f64, ndim=1),
-    points: ti.types.ndarray(dtype=ti.f64, ndim=2),
-    share: ti.types.ndarray(dtype=ti.f64, ndim=1),
-):
-    """Share of the smaller body of every pair whose parts lie within the other."""
-    for a in range(pairs.shape[0]):
-        small, large = pairs[a, 0], pairs[a, 1]
-        if volume[small] > volume[large]:
-            small, large = large, small
-        count = 0
-        planes = ti.Matrix.zero(ti.f64, 4, 4)
+def _share(planes: ti.template(), corners: ti.template(), i, points: ti.template()):
+    """Share of the points of body i that lie within all planes."""
+    count = 0
+    for m in range(points.shape[0]):
+        point, inside = vec3(0.0), 1
+        for c in ti.static(range(4)):
+            point += points[m, c] * _corner(corners, i, c)
         for f in ti.static(range(4)):
-            plane = _plane(corners, large, f)
-            for k in ti.static(range(4)):
-                planes[f, k] = plane[k]
-        for m in range(points.shape[0]):
-            point = vec3(0.0)
-            for c in ti.static(range(4)):
-                point += points[m, c] * _corner(corners, small, c)
-            inside = 1
-            for f in ti.static(range(4)):
-                height = vec3(planes[f, 0], planes[f, 1], planes[f, 2]).dot(point) + planes[f, 3]
-                inside &= ti.cast(height > 0.0, ti.i32)
-            count += inside
-        share[a] = count / ti.cast(points.shape[0], ti.f64)
+            height = vec3(planes[f, 0], planes[f, 1], planes[f, 2]).dot(point) + planes[f, 3]
+            inside &= ti.cast(height > 0.0, ti.i32)
+        count += inside
+    return count / ti.cast(points.shape[0], ti.f64)

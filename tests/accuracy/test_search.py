@@ -61,7 +61,7 @@ def test_twins_that_scatter_get_no_single_number(monkeypatch):
 def certified(impulse=0.0, misses=0):
     """Certificate of a run of which half of all bodies slept."""
     audit = Audit(1000, 10, misses, "bonds asleep")
-    return Certificate((), 1, 1, 1e-6, 0.5, impulse, 0.0, (audit,), ())
+    return Certificate((), 1e-6, 0.5, impulse, 0.0, (audit,), ())
 
 
 @pytest.mark.parametrize(

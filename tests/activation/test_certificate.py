@@ -38,10 +38,23 @@ def result():
 
 
 def test_times_are_those_of_the_first_body_on_which_an_effect_acts(result):
-    acting = {one.use.effect: one for one in result.certificate.acting}
+    acting = {use.effect: use for use in result.certificate.acting}
     for name, key in (("softening", "softening"), ("shear_slip", "slip")):
         assert acting[name].since_s == np.nanmin(result.acting_since[key])
     assert 0.0 < acting["softening"].since_s < np.nanmin(result.broken_time)
+
+
+def test_the_table_of_effects_has_the_figures_of_the_certificate(result):
+    found, certificate = result.effects, result.certificate
+    row = {name: k for k, name in enumerate(found["effect"])}
+    assert found["listed"].tolist() == [True] * len(certificate.acting) + [False] * 2
+    assert found["since_s"][row["softening"]] == np.nanmin(result.acting_since["softening"])
+    # Softening and slip are one law of bonds, asked once.
+    assert found["evaluations"].max() == certificate.law_evaluations
+    every = found["evaluations"] + found["skipped"]
+    assert every.max() == certificate.all_law_evaluations
+    assert found["left_out"][row["gravity"]] == certificate.left_out[0].group
+    assert found["advice"][row["gravity"]] == certificate.left_out[0].verdict
 
 
 def test_bodies_of_a_broken_bond_have_softened_before_it_broke(result):

@@ -5,7 +5,7 @@ import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, needed_effects
 from taichi_dem.mesh.shapes import pair
-from taichi_dem.report.bond_slip import MOST_SLIP
+from taichi_dem.report.resolution import MOST_SLIP
 
 EPS = np.finfo(float).eps
 
@@ -34,13 +34,17 @@ def test_share_is_that_of_the_shortest_edge():
     report = slid(0.03).report()
     (found,) = report.bond_slip
     assert found.share == pytest.approx(0.03, abs=16 * EPS)
-    assert found.bond == 0 and not found.excessive
+    assert found.where == 0 and found.count == 0
 
 
 def test_far_slip_is_warned_of_and_an_effect_that_weakens_is_missed():
     report = slid(2.0 * MOST_SLIP).report()
     assert any("bond 0 " in need and "by 10 %" in need for need in report.needs)
-    assert [one.effect for one in needed_effects(report).missing] == ["SlipWeakening"]
+    advice = needed_effects(report)
+    assert [one.effect for one in advice.missing] == ["SlipWeakening"]
+    table = advice.table()
+    assert table["effect"].tolist() == ["shear_slip", "SlipWeakening"]
+    assert table["advice"].tolist() == ["keep", "list it"] and table["where"][1] == "bond 0"
 
 
 def test_largest_of_all_recordings_is_kept():
@@ -49,4 +53,4 @@ def test_largest_of_all_recordings_is_kept():
     write_slip(simulation, 0.02)
     simulation.sample()
     (found,) = simulation.report().bond_slip
-    assert found.share == pytest.approx(0.1, abs=16 * EPS) and found.most == 1
+    assert found.share == pytest.approx(0.1, abs=16 * EPS) and found.count == 1

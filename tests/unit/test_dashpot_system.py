@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
+from _dashpot_system import DashpotSystem
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.report.dashpot_system import DashpotSystem
 
 STEP = 4e-7
 

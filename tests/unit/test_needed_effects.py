@@ -8,8 +8,9 @@ import pytest
 from taichi_dem import CONCRETE, Scene, Uniform, checked_mesh, effects, needed_effects, simulate
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
-from taichi_dem.report.effect_activity import effect_activity
+from taichi_dem.report.effects import effect_uses
 from taichi_dem.report.energy_balance import TERMS
+from taichi_dem.report.run import Run
 from taichi_dem.state.model import Model
 
 #: Far below the strength of concrete: a block of some 1 kg that falls from rest for 1e-5 s.
@@ -63,13 +64,14 @@ def used(listed, bits=0, marked=0, heat=0.0, **account):
     heat: in each bond [J].
     """
     model = Model(pair(), CONCRETE, listed)
-    state = SimpleNamespace(active_effects=column([bits, 0]), position=column(model.centre))
+    fields = {"active_effects": column([bits, 0]), "position": column(model.centre)}
+    state, schedule = SimpleNamespace(**fields, activity=None), SimpleNamespace(evaluations=[100])
     tables = np.zeros((2, 6)), np.full((1, 5), heat), None
-    balance = SimpleNamespace(state=state, start_energy=0.0)
-    balance.support_works = balance.load_works = lambda index: np.zeros(2)
+    balance = SimpleNamespace(start_energy=0.0, works=lambda: np.zeros((2, 4)))
     readings = SimpleNamespace(active_bonds=lambda: np.full((1, 2), marked > 0))
     filled = {**dict.fromkeys(TERMS, 0.0), **account}
-    return {u.effect: u for u in effect_activity(model, balance, readings, tables, filled, 100)}
+    run = Run(model, state, schedule, None, readings, None)
+    return {use.effect: use for use in effect_uses(run, balance, tables, filled)}
 
 
 @pytest.mark.parametrize(

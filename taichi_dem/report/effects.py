@@ -1,0 +1,178 @@
+"""Effects of a run: what acted, since when, and with what share of the energy."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
+from taichi_dem.report.energy_balance import EnergyBalance, EnergyTables
+from taichi_dem.report.missing_effects import bond_rounding
+from taichi_dem.report.run import Run
+from taichi_dem.state.activity import LATER
+from taichi_dem.state.timeline import NEVER
+
+_EPSILON = np.finfo(np.float64).eps
+#: Terms of the account that pass through bonds; dashpots are compared with their sum.
+_THROUGH_BONDS = ("bond_strain", "bond_dashpot", "softening", "release", "slip")
+#: Events of each law in words, and the terms of the account that it books, by role.
+_LAWS = {
+    "bond": ("bonds damaged", ("softening", "release", "slip")),
+    "tension": ("bonds softened", ("softening", "release")),
+    "shear": ("bonds slipped", ("slip",)),
+    "dashpot": ("bonds damped", ("bond_dashpot",)),
+    "contact": ("bodies touched", ("sphere_dashpot", "sphere_strain")),
+    "friction": ("bodies rubbed", ("friction",)),
+}
+#: Names of the times at which laws began on bodies, by role.
+_TIMES = {
+    "bond": "damage",
+    "tension": "softening",
+    "shear": "slip",
+    "contact": "contact",
+    "friction": "friction",
+}
+#: Roles judged by whether they acted: a crack, slip, wall or sticking contact can decide the
+#: outcome at little energy.
+_STEERING = ("bond", "tension", "shear", "contact", "friction", "support", "ground")
+#: Roles that define the problem, so that they are kept whatever work they did.
+_POSED = {
+    "load": "a load is part of the question",
+    "support": "a support is part of the question",
+    "ground": "the ground is part of the question",
+}
+_WITHOUT_WORK = ", and holds without doing work"
+_OWN = "the account need not show what an effect of your own does"
+
+
+class OnDemand(NamedTuple):
+    """Where and when laws acted on demand; empty and zero where all are evaluated.
+
+    since: by name, time from which an effect acted on each body [s], NaN where never; awake: since
+    it was evaluated. Laws of bonds: on one of its bonds, as soon as it came near a limit.
+    evaluated, skipped: evaluations of the law of bonds, a unit each.
+    """
+
+    since: dict[str, np.ndarray]
+    evaluated: int
+    skipped: int
+
+
+def on_demand(run: Run) -> OnDemand:
+    """What acted on demand in a run so far."""
+    activity, schedule, model = run.state.activity, run.schedule, run.model
+    if activity is None:
+        return OnDemand({}, 0, 0)
+    n, bonds, seconds = model.body_count, model.bond_count, schedule.tick_seconds
+    begun = _times(activity.since.to_numpy()[:bonds], NEVER, seconds)
+    own = np.append(begun, [[np.nan, np.nan]], axis=0)[model.topology.body_bond]
+    first = np.fmin.reduce(own, axis=1, initial=np.nan)
+    touched = _times(activity.touched.to_numpy()[:n], LATER, seconds)
+    awake = _times(schedule.sleeping.since.to_numpy()[:n], NEVER, seconds)
+    laws = ("damage",) if model.by_role["bond"] else ("softening", "slip")
+    times = dict(zip((*laws, "contact", "friction"), (*first.T[: len(laws)], *touched.T)))
+    evaluated = int(activity.evaluated.to_numpy()[:bonds].sum())
+    units = 3 * (int(schedule.evaluations[5]) + bonds)
+    return OnDemand({**times, "awake": awake}, evaluated, units - evaluated)
+
+
+def _times(ticks, never, tick_seconds):
+    return np.where(ticks == never, np.nan, ticks * tick_seconds)
+
+
+def effect_uses(
+    run: Run, balance: EnergyBalance, tables: EnergyTables, account: Mapping[str, float]
+) -> tuple[EffectUse, ...]:
+    """An EffectUse for every listed effect, in the model's order.
+
+    Events are counted where effects act: one is idle only if not a bit of the run depends on it.
+    tables, account: from the methods of that name of the energy balance. Effects are judged by
+    role, so that user-defined ones are judged like those of the package; they are never called idle
+    where only their own code could tell.
+    """
+    uses = _Uses(run, balance, tables[1][:, 1], account)
+    return tuple(uses.of(effect) for effect in run.model.effects if effect.name)
+
+
+class _Uses:
+    """Makes the EffectUse of an effect; heat: of the dashpots of each bond [J]."""
+
+    def __init__(self, run, balance, heat, account):
+        self.run, self.account, self.works = run, account, balance.works()
+        self.given = abs(account["load_work"]) + abs(account["support_work"]) + balance.start_energy
+        self.bits = run.state.active_effects.to_numpy()[: run.model.body_count]
+        self.demand, marks = on_demand(run), run.readings.active_bonds()
+        self.marks = {
+            "bond": marks.any(axis=1),
+            "tension": marks[:, 0],
+            "shear": marks[:, 1],
+            "dashpot": heat > bond_rounding(run),
+            "contact": self.bits & np.int64(CONTACT),
+            "friction": self.bits & np.int64(RUBBED),
+        }
+
+    def of(self, effect):
+        """The use of one effect."""
+        find = self._drive if effect.role in _POSED else self._law
+        what, marks, energy, kept = find(effect)
+        whole, total, events = "the energy put in", self.given, int(np.count_nonzero(marks))
+        if effect.role == "dashpot":
+            # Of all the energy put in, a fall takes most: its vibration may be damped all the same.
+            whole, total = "what bonds took and hold", self._sum(_THROUGH_BONDS)
+        of = {"bonds": self.run.model.bond_count, "bodies": self.run.model.body_count}
+        return EffectUse(
+            effect=effect.name,
+            what=what,
+            events=events,
+            of=of[what.split()[0]],
+            energy_J=float(energy),
+            share=float(energy / total) if total > 0.0 else 0.0,
+            whole=whole,
+            steers=effect.role in _STEERING,
+            kept=kept,
+            rounding=effect.role == "dashpot" and energy > 0.0 and not events,
+            **self._demanded(effect.role, events),
+        )
+
+    def _sum(self, terms):
+        return sum(self.account[term] for term in terms)
+
+    def _law(self, effect):
+        """Events in words, where they were, the energy booked, and why it is kept in any case."""
+        what, terms = _LAWS[effect.role]
+        roles = {one.role for one in self.run.model.effects if one.name}
+        if effect.role == "shear" and "tension" not in roles:
+            # A shear law may release bonds where no law of tension is listed.
+            terms = *terms, "release"
+        # Counts show all that laws of the package do; derived classes may act differently.
+        ours = type(effect).__module__.startswith(("taichi_dem.laws.", "taichi_dem.loads."))
+        kept = "" if ours or effect.role in ("contact", "friction") else _OWN
+        return what, self.marks[effect.role], self._sum(terms), kept
+
+    def _drive(self, effect):
+        """The same of a load, support or ground."""
+        model, kept = self.run.model, _POSED[effect.role]
+        drives = *model.loads, *model.supports, *model.ground
+        place = drives.index(effect)
+        marks = self.bits & np.int64(1 << place)
+        if effect.role == "load":
+            return "bodies loaded", marks, np.abs(self.works[:, place]).sum(), kept
+        if effect.role == "ground":
+            column = place + 1 - len(model.supports)
+            return "bodies braked", marks, np.abs(self.works[:, column]).sum(), kept
+        done = np.where(marks != 0, np.abs(self.works[:, len(model.loads)]), 0.0).sum()
+        rounds = done <= int(self.run.schedule.evaluations[0]) * _EPSILON * self.given
+        is_driven = not rounds and np.any(effect.travel())
+        kept += _WITHOUT_WORK if rounds else ""
+        return f"bodies {'driven' if is_driven else 'held'}", marks, done, kept
+
+    def _demanded(self, role, events):
+        """When and where an effect that acted on demand began, and its evaluations."""
+        found, times = {}, self.demand.since.get(_TIMES.get(role, ""), np.zeros(0))
+        if events and np.isfinite(times).any():
+            first = int(np.nanargmin(times))
+            found = {"since_s": float(times[first]), "where": f"body {first}"}
+        if role in ("bond", "tension", "shear"):
+            found.update(evaluations=self.demand.evaluated, skipped=self.demand.skipped)
+        return found

@@ -1,0 +1,205 @@
+"""What mesh and step of a run do not resolve: slip of bonds that hold, dashpots, late failures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_dem.report.missing_effects import MissingEffect, middle_of_bond
+from taichi_dem.report.run import Kept, Run
+from taichi_dem.state.timeline import MAX_LEVEL
+
+#: Largest slip over the shortest edge at which a bond still represents its face. Of a triangle that
+#: has slid by a share s of an edge along it, (1 - s)^2 still lies on the other: at 5 % a tenth of
+#: the area that the bond acts on is gone, more than an error that a user would accept.
+MOST_SLIP = 0.05
+_SLIPPED = f"bonds that hold have slipped by more than {100 * MOST_SLIP:g} % of an edge"
+_FULL = "the cohesion is undiminished: SlipWeakening in place of ShearSlip degrades it with slip"
+_WEAKENED = "friction acts on the whole of it: compare with a coarser mesh"
+#: Least share of its coefficient at which a limited dashpot still represents the material.
+LEAST_SHARE = 0.5
+#: A bond open by this many failure openings when it fails has failed too late: its dashpots,
+#: far stronger than its springs, have acted too long.
+MOST_OPENING = 1.25
+#: Sphere dashpots of a pair take c n dt / m of the speed at which the bodies part or meet; above 1
+#: they reverse it, and throw apart bodies that the springs should part gently.
+MOST_TAKEN = 1.0
+
+
+@dataclass(frozen=True)
+class BondSlip(MissingEffect):
+    """Largest residual slip of a bond that held, at the recording times of a run.
+
+    share: of the shortest edge of its face. count: largest number of bonds beyond ``MOST_SLIP`` at
+    a time. weakens: whether slip degrades cohesion.
+    """
+
+    share: float = 0.0
+    weakens: bool = False
+
+    @property
+    def figure(self) -> str:
+        """The share and the bond in words."""
+        return f"{100 * self.share:.3g} % of the shortest edge of its face (bond {self.where})"
+
+    def __str__(self):
+        return (
+            f"up to {self.count} {self.what} of their face, bond {self.where} (at {self.place} m) "
+            f"by {100 * self.share:.3g} % at t = {self.first_s:.4g} s: less of the face lies on "
+            f"the other, but {_WEAKENED if self.weakens else _FULL}"
+        )
+
+
+class StepResolution(Kept):
+    """Follows at recording times what mesh and step do not resolve.
+
+    slip: largest residual slip of a bond that held over the shortest edge of its face, the bond,
+    when, and the number of bonds that slipped too far. share: least share of its dashpots that each
+    bond kept while it held, (bond_count,). step: shortest step of each body [s]; lightest: mass of
+    the lightest body near it [kg]; pair_share: least recorded share of its contacts; taken: largest
+    part of a speed that they take in a step; all (body_count,).
+    """
+
+    kept = "slip", "share", "pair_share", "taken", "step", "lightest"
+
+    def __init__(self, run: Run):
+        self.run, bodies = run, run.model.body_count
+        self.slip = np.array([0.0, -1.0, 0.0, 0.0])
+        self.share, self.pair_share = np.ones(run.model.bond_count), np.ones(bodies)
+        self.taken, self.step = np.zeros(bodies), np.full(bodies, np.inf)
+        self.lightest = run.model.body_mass.copy()
+        corners = run.model.mesh.points[run.model.topology.vertices]
+        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
+        by_role = run.model.by_role
+        self.shortest, (law,) = edges.min(axis=1), by_role["bond"] or by_role["shear"] or (None,)
+        self.slips = len(edges) > 0 and getattr(law, "remembers_slip", False)
+        self.weakens = getattr(law, "releases", False)
+
+    def sample(self, time_s: float) -> None:
+        """Update the figures at a recording time [s]; not those of dashpots that are solved."""
+        advance, readings, contacts = self.run.advance, self.run.readings, self.run.contacts
+        if self.slips:
+            share = readings.residual_slip() / self.shortest
+            if share.max() > self.slip[0]:
+                self.slip[:3] = share.max(), share.argmax(), time_s
+            self.slip[3] = max(self.slip[3], (share > MOST_SLIP).sum())
+        if advance.solves:
+            return
+        if advance.limited and advance.has_dashpot and self.run.model.bond_count:
+            readings.bond_shares(self.share)
+        if contacts is not None and contacts.store.near_count[None]:
+            if advance.limited:
+                self._note_partners(contacts)
+            readings.contact_shares(self.pair_share, self.taken)
+
+    def bond_slip(self) -> tuple[BondSlip, ...]:
+        """The ``BondSlip`` of the run so far, or nothing where no bond slipped."""
+        share, bond, time_s, count = self.slip.tolist()
+        if bond < 0:
+            return ()
+        place = tuple(middle_of_bond(self.run.model, int(bond)).tolist())
+        found = "SlipWeakening", _SLIPPED, "bond", int(count), int(bond), time_s, place
+        return (BondSlip(*found, share, self.weakens),)
+
+    def _note_partners(self, contacts):
+        """Remember steps and light partners: few contacts last until a recording."""
+        step = self.run.schedule.dt0 / 2.0 ** self.run.state.level.to_numpy()
+        self.step, mass = np.minimum(self.step, step), self.run.model.body_mass
+        pairs, _, _ = contacts.store.near_table()
+        for one, other in (pairs.T, pairs.T[::-1]):
+            np.minimum.at(self.lightest, one, mass[other])
+
+    def findings(self) -> tuple[str, ...]:
+        """Sentences about dashpots and failures that the step did not resolve; may be empty."""
+        share, late, pair_share = self.share, self._openings_at_failure(), self._contact_shares()
+        return (
+            *_too_long(
+                share < LEAST_SHARE,
+                -share,
+                "the dashpots of {count} bonds, and limits them to less than half, bond {worst} to "
+                "{percent:.2g} %: these bonds give way too fast",
+            ),
+            *_too_long(
+                late > MOST_OPENING,
+                late,
+                "{count} bonds that failed late, bond {worst} at {value:.2g} times its failure "
+                "opening: their dashpots took energy for too long",
+            ),
+            *_too_long(
+                pair_share < LEAST_SHARE,
+                -pair_share,
+                "the sphere dashpots of {count} bodies, and limits them to less than half, those "
+                "of body {worst} to {percent:.2g} %: what is pressed together parts too fast",
+            ),
+            *_too_long(
+                self.taken > MOST_TAKEN,
+                self.taken,
+                "the sphere dashpots of {count} bodies: those of body {worst} take {value:.2g} of "
+                "a speed in one step, and throw bodies apart that they should stop",
+            ),
+            *self._sweeps(),
+            *self._levels(),
+        )
+
+    def _levels(self):
+        if not self.run.schedule.undivided[None]:
+            return ()
+        least = self.run.schedule.dt0 / 2.0**MAX_LEVEL
+        return (
+            f"the shortest step of all, {least:.3g} s or 2^-{MAX_LEVEL} of the largest, was "
+            "reached: steps are not divided further; take a shorter largest step",
+        )
+
+    @property
+    def unconverged(self) -> tuple[int, float]:
+        """Steps whose sweeps ended before impulses agreed, and the worst residual.
+
+        The residual is a share of the fastest body's speed.
+        """
+        solver = self.run.advance.solver
+        if solver is None:
+            return 0, 0.0
+        return int(solver.unconverged[None]), float(solver.worst[None])
+
+    def _sweeps(self):
+        (steps, worst), solver = self.unconverged, self.run.advance.solver
+        if not steps:
+            return ()
+        allowed = float(solver.tolerance[None])
+        return (
+            f"the dashpots of {steps} steps were not solved: sweeps ended with changes of up to "
+            f"{100 * worst:.2g} % of the largest speed, where {100 * allowed:.2g} % is asked; "
+            f"allow more sweeps than {int(solver.bounds[1])}, or take a shorter step",
+        )
+
+    def _contact_shares(self):
+        """Largest share that limited sphere dashpots can have had where they acted, (body_count,).
+
+        The recorded share, or that of a single contact, 1 / X with X = 2 c dt / m; see
+        ``stability/body_limits.py``. Contacts that took energy have acted; it is booked to the
+        first body of a pair.
+        """
+        damping = self.run.model.materials.of_contacts("contact_damping")
+        if self.run.contacts is None or not self.run.advance.limited or not np.any(damping):
+            return self.pair_share
+        acted = self.run.state.contact_heat.to_numpy()[:, :2].sum(axis=1) > 0.0
+        x = 2.0 * damping * self.step / self.lightest
+        return np.minimum(self.pair_share, np.where(acted, 1.0 / np.maximum(1.0, x), 1.0))
+
+    def _openings_at_failure(self):
+        """Largest opening of the units of every bond that failed over the failure opening, (b,)."""
+        model, units = self.run.model, self.run.state.fields().get("softening_unit")
+        if units is None:
+            return np.zeros(model.bond_count)
+        widest = units.to_numpy()[: 3 * model.bond_count, 0].reshape(-1, 3).max(axis=1)
+        opening = model.of_bonds(lambda material: material.failure_opening)
+        return np.where(self.run.broken(), widest / opening, 0.0)
+
+
+def _too_long(wrong, values, words):
+    """Sentence about the places where a step is too long, with the worst; or none."""
+    if not wrong.any():
+        return ()
+    worst = int(np.argmax(values))
+    figures = {"value": abs(values[worst]), "percent": 100 * abs(values[worst])}
+    told = words.format(count=wrong.sum(), worst=worst, **figures)
+    return (f"the step is too long for {told}",)

@@ -1,0 +1,51 @@
+"""What reports read of a simulation, and what they keep of it over a run."""
+
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple, Optional
+
+import numpy as np
+
+from taichi_dem.contact.contacts import Contacts
+from taichi_dem.mesh.tetrahedra import components
+from taichi_dem.report.readings import Readings
+from taichi_dem.state.model import Model
+from taichi_dem.state.state import State
+from taichi_dem.state.timeline import NEVER
+from taichi_dem.step.advance import Advance
+from taichi_dem.step.multirate.schedule import Schedule
+
+
+class Run(NamedTuple):
+    """What a report reads of a simulation; contacts is None without contact."""
+
+    model: Model
+    state: State
+    schedule: Schedule
+    advance: Advance
+    readings: Readings
+    contacts: Optional[Contacts]
+
+    def broken(self) -> np.ndarray:
+        """Whether each bond has been released, (bond_count,)."""
+        return self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
+
+    def pieces(self) -> np.ndarray:
+        """Piece of each body, which bonds that hold keep together, (body_count,)."""
+        top = self.model.topology
+        ends = np.column_stack([top.master, top.slave])[~self.broken()]
+        return components(self.model.body_count, ends)
+
+
+class Kept:
+    """What is followed over a run: a checkpoint holds its attributes of the names ``kept``."""
+
+    kept: ClassVar[tuple[str, ...]] = ()
+
+    def saved(self) -> dict[str, np.ndarray]:
+        """Data for a checkpoint, arrays by name."""
+        return {name: np.array(getattr(self, name)) for name in self.kept}
+
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Restore the data that ``saved`` returned."""
+        for name in self.kept:
+            setattr(self, name, saved[name].copy()[()])
