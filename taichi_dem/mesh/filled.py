@@ -137,12 +137,9 @@ def _smooth_parts(points, tetrahedra):
     outer = faces[geometry.outer_rows(faces)]
     normal = geometry.area_vectors(points, outer)
     normal /= length(normal)[:, None]
-    edges = np.sort(outer[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
-    order = np.lexsort(edges.T)
-    same = (edges[order[1:]] == edges[order[:-1]]).all(axis=1)
-    pairs = np.stack([order[:-1][same], order[1:][same]], axis=1) // 3
-    smooth = dot(normal[pairs[:, 0]], normal[pairs[:, 1]]) > np.cos(np.radians(_EDGE_DEG))
-    label = geometry.components(len(outer), pairs[smooth])
+    first, second = geometry.pairs_at_edges(outer)
+    smooth = dot(normal[first], normal[second]) > np.cos(np.radians(_EDGE_DEG))
+    label = geometry.components(len(outer), np.stack([first[smooth], second[smooth]], axis=1))
     parts = (outer[label == first] for first in np.unique(label))
     return {f"surface_{k}": part for k, part in enumerate(parts, 1)}
 
