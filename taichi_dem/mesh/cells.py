@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.mesh.check import FLAT
+from taichi_dem.mesh.check import FLAT, refuse_outside
 from taichi_dem.mesh.tetrahedra import LOCAL_EDGES, edge_lengths, signed_volumes
 
 #: Corners of a cell by its shape; further nodes, on edges and faces, follow them.
@@ -80,12 +80,7 @@ def bodies_in(raw: Any, points: np.ndarray) -> Bodies:
 def corners_of(block: Any, point_count: int) -> np.ndarray:
     """Corners of the cells of a block; InputError where they are no points."""
     corners = np.asarray(block.data)[:, : _CORNERS[shape_of(block.type)]]
-    bad = np.flatnonzero(((corners < 0) | (corners >= point_count)).any(axis=1))
-    if len(bad):
-        raise InputError(
-            f"points of {block.type} {bad[0]} must be numbers from 0 to {point_count - 1}, got "
-            f"{corners[bad[0]].tolist()}"
-        )
+    refuse_outside(block.type, "point", corners, point_count)
     return corners
 
 

@@ -122,12 +122,18 @@ def _checked_bodies(name, bodies, body_count):
         raise InputError(
             f"body group {name!r} must be a list of at least one body number, got {shown(bodies)}"
         )
-    bad = found[(found < 0) | (found >= body_count)]
+    refuse_outside(f"body group {name!r}", "body", found[:, None], body_count)
+    return np.unique(found).astype(np.int32)
+
+
+def refuse_outside(what: str, of: str, rows: np.ndarray, count: int) -> None:
+    """Refuse numbers (n, k) of points or bodies that are not there."""
+    bad = np.flatnonzero(((rows < 0) | (rows >= count)).any(axis=1))
     if len(bad):
         raise InputError(
-            f"body group {name!r} must hold body numbers from 0 to {body_count - 1}, got {bad[0]}"
+            f"{what}: {of} numbers must lie in [0, {count - 1}], but row {bad[0]} is "
+            f"{rows[bad[0]].tolist()}"
         )
-    return np.unique(found).astype(np.int32)
 
 
 def _checked_groups(groups, point_count):
@@ -151,12 +157,7 @@ def _checked_indices(what, indices, width, point_count):
         raise InputError(f"{what} must have shape (n, {width}), got {indices.shape}")
     if indices.dtype.kind not in "iu":
         raise InputError(f"{what} must hold integer point numbers, got {indices.dtype}")
-    bad = np.flatnonzero(((indices < 0) | (indices >= point_count)).any(axis=1))
-    if len(bad):
-        raise InputError(
-            f"{what}: point numbers must lie in [0, {point_count - 1}], but row {bad[0]} is "
-            f"{indices[bad[0]].tolist()}"
-        )
+    refuse_outside(what, "point", indices, point_count)
     return indices.astype(np.int32)
 
 

@@ -1,21 +1,17 @@
-"""Groups of faces and of bodies that a file of meshio's names, and what else it holds."""
+"""Groups of faces and of bodies that a file of meshio's names."""
 
-import re
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.mesh.cells import Bodies, blocks_of, corners_of, shape_of, triangles_in
+from taichi_dem.mesh.cells import Bodies, blocks_of, corners_of, triangles_in
 from taichi_dem.mesh.gmsh_files import made_name, physical_names
 from taichi_dem.mesh.mesh import Mesh
 
 #: Between the names of groups in that of a physical volume whose cells are in all of them.
 _BOTH = "|"
-#: Kinds of Gmsh's groups that are not read, by their dimension.
-_UNREAD = {0: "points", 1: "lines"}
-_ABAQUS_SURFACE = re.compile(r"\*surface\s*,.*?name\s*=\s*\"?([^,\"\n]+)", re.IGNORECASE)
 
 
 def face_groups_in(raw: Any) -> dict[str, np.ndarray]:
@@ -68,34 +64,13 @@ def volumes_of(mesh: Mesh, first: int) -> tuple[list[str], np.ndarray]:
     return [name for name in names if name], np.where(tags, tags + first - 1, 0)[kind.reshape(-1)]
 
 
-def unread_groups(raw: Any, path: str) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
-    """Groups that are neither of faces nor of bodies, as pairs of name and kind of member.
-
-    Those that seldom matter, and those that may have been meant for loads, supports or materials.
-    """
-    idle: list[tuple[str, str]] = []
-    meant: list[tuple[str, str]] = []
-    for block, tags in zip(raw.cells, raw.cell_data.get("gmsh:physical", ())):
-        if block.dim in _UNREAD:
-            names = physical_names(raw, block.dim)
-            for tag in np.unique(tags[tags > 0]).tolist():
-                idle.append((names.get(tag, f"physical_{tag}"), _UNREAD[block.dim]))
-    for name in raw.cell_sets:
-        known = name in raw.field_data or name == "gmsh:bounding_entities"
-        if not known and not any(True for _ in _of_set(raw, name, 3)):
-            idle.append((name, "elements"))
-    for name, members in raw.point_sets.items():
-        (meant if len(members) < len(raw.points) else idle).append((name, "points"))
-    meant += [(name, "element sides") for name in _surfaces_of_abaqus(path)]
-    return list(dict.fromkeys(idle)), list(dict.fromkeys(meant))
-
-
-def _surfaces_of_abaqus(path):
-    """Names of surfaces in an Abaqus file, which meshio passes over."""
-    if not path.lower().endswith(".inp"):
-        return []
-    with open(path, encoding="utf-8", errors="replace") as file:
-        return [name[1].strip() for name in map(_ABAQUS_SURFACE.match, file) if name]
+def unread_groups(raw: Any, mesh: Mesh) -> tuple[str, ...]:
+    """Names of the groups of a file that are neither of faces nor of bodies."""
+    named = [key.name for key in raw.field_data]
+    named += [key for key in raw.cell_sets if key not in raw.field_data]
+    known = {*mesh.groups, *mesh.body_groups, "gmsh:bounding_entities"}
+    unread = (one for one in (*named, *raw.point_sets) if known.isdisjoint(one.split(_BOTH)))
+    return tuple(dict.fromkeys(unread))
 
 
 def _groups_in(raw, dimension):
@@ -157,13 +132,3 @@ def _tells_parts(raw, name):
     chosen = list(_values(raw, name, 3))
     cells = sum(int(members.sum()) for _, _, members in chosen)
     return 1 < len({value for value, _, _ in chosen}) < max(cells, 3)
-
-
-def held_cells(raw: Any, solid_only: bool = False) -> str:
-    """Types of the cells that a file holds, or of the solid ones that cannot be read."""
-    wanted = (
-        block.type
-        for block in raw.cells
-        if len(block.data) and not (solid_only and (block.dim != 3 or shape_of(block.type)))
-    )
-    return ", ".join(sorted(set(wanted)))

@@ -13,6 +13,7 @@ from xml.sax.saxutils import quoteattr
 import meshio
 import numpy as np
 
+from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done, write_text
 from taichi_dem.kit.likely_units import EDGE, in_unit
@@ -20,13 +21,7 @@ from taichi_dem.kit.timeout import run_with_timeout
 from taichi_dem.kit.validation import FileName, path_name, positive
 from taichi_dem.mesh.cells import blocks_of, bodies_in, corners_of, fault_of_cells, shape_of
 from taichi_dem.mesh.check import checked_points, unbonded_places, weld_labels
-from taichi_dem.mesh.file_groups import (
-    body_groups_in,
-    face_groups_in,
-    held_cells,
-    unread_groups,
-    volumes_of,
-)
+from taichi_dem.mesh.file_groups import body_groups_in, face_groups_in, unread_groups, volumes_of
 from taichi_dem.mesh.gmsh_files import keyed_by_dimension, refuse_bad_gmsh, with_own_keys
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
 from taichi_dem.mesh.tetrahedra import edge_lengths
@@ -45,7 +40,6 @@ _IN_A_GROUP = (
     "mesh in three dimensions (gmsh -3), and make a physical group of the volume too, as Gmsh "
     "saves only what is in a group"
 )
-_PLURALS = {"hexahedron": "hexahedra", "wedge": "wedges", "pyramid": "pyramids"}
 
 
 def read_mesh(
@@ -87,8 +81,8 @@ def read_mesh(
     physical volumes; in other formats from sets of solid cells and integer data on them. Elements
     of higher order are read as linear ones. Hexahedra, prisms and pyramids are cut into tetrahedra
     after welding. Groups of points and lines are not read. A UserWarning tells of what may change
-    results: Abaqus sets and surfaces that are not read, cells of types that meshio does not know,
-    and cells that meet but share no face.
+    results: sets of some points, which are not read, cells of types that meshio does not know, and
+    cells that meet but share no face.
 
     Examples
     --------
@@ -104,18 +98,16 @@ def read_mesh(
         raise InputError(f"mesh file {path}: {error}") from None
     edge = np.median(edge_lengths(mesh.points, mesh.tetrahedra))
     in_unit(f"median edge of mesh file {path} at scale={scale:g}", float(edge), EDGE)
-    idle, meant = unread_groups(raw, path)
-    told = [
-        _of_dropped_cells(printed),
-        f"the sets {_listed(meant)} are not read: {_NEEDED}" if meant else "",
-        unbonded_places(mesh.points, mesh.tetrahedra),
-    ]
+    unread = unread_groups(raw, mesh)
+    notes = [f"the groups {', '.join(unread)} are not read: {_NEEDED}"] if unread else []
+    told = [_of_dropped_cells(printed), unbonded_places(mesh.points, mesh.tetrahedra)]
+    # A set of all points is a program's own, one of some was meant for something.
+    told += notes if any(len(some) < len(raw.points) for some in raw.point_sets.values()) else []
     told = [sentence for sentence in told if sentence]
     for sentence in told:
         warnings.warn(f"mesh file {path}: {sentence}", stacklevel=2)
-    if idle:
-        told.insert(0, f"only groups of faces and of solid cells are read, not {_listed(idle)}")
-    return replace(mesh, notes=(*told, *mesh.notes), source=path, unread=(*idle, *meant))
+    notes = [*dict.fromkeys((*notes, *told)), *mesh.notes]
+    return replace(mesh, notes=tuple(notes), source=path, unread=unread)
 
 
 def write_mesh(path: FileName, mesh: Mesh) -> None:
@@ -162,8 +154,6 @@ def write_pvd(path: FileName, times_s: Sequence[float], file_names: Sequence[str
 
     times_s: time of each file [s].  file_names: relative to the folder of ``path``.
     """
-    if len(times_s) != len(file_names):
-        raise InputError(f"{path}: {len(times_s)} times, but {len(file_names)} file names")
     sets = [
         f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(str(name))}/>'
         for time, name in zip(map(float, times_s), file_names)
@@ -221,19 +211,17 @@ def _of_dropped_cells(printed):
 
 def _refuse_unreadable(raw, path, printed):
     """Refuse solid cells that cannot be cut, which would leave holes, and files without any."""
-    others = held_cells(raw, solid_only=True)
+    held = {block.type: block.dim for block in raw.cells if len(block.data)}
+    others = sorted(kind for kind in held if held[kind] == 3 and not shape_of(kind))
     if others:
-        raise InputError(f"mesh file {path} holds {others} cells, which cannot be read: {_SPLIT}")
-    if blocks_of(raw, 3):
-        return
-    if _of_dropped_cells(printed):
-        raise InputError(f"mesh file {path} {_UNKNOWN}, which cannot be read: {_SPLIT}")
-    remedy = "mesh the volume with tetrahedra"
-    if blocks_of(raw, 2):
-        remedy = "fill it, saved as STL, by taichi_dem.shapes.from_surface, if it is closed"
-        remedy = _IN_A_GROUP if "gmsh:physical" in raw.cell_data else remedy
-    held = held_cells(raw) or "no cells"
-    raise InputError(f"mesh file {path} holds no tetrahedra (it holds: {held}): {remedy}")
+        raise InputError(
+            f"mesh file {path} holds {', '.join(others)} cells, which cannot be read: {_SPLIT}"
+        )
+    if not blocks_of(raw, 3):
+        remedy = f"{_IN_A_GROUP}, or fill a closed surface by taichi_dem.shapes.from_surface"
+        remedy = _of_dropped_cells(printed) or remedy
+        kinds = ", ".join(sorted(held)) or "no cells"
+        raise InputError(f"mesh file {path} holds no tetrahedra (it holds: {kinds}): {remedy}")
 
 
 def _mesh(raw, scale, weld_tolerance, keep_coincident):
@@ -264,15 +252,8 @@ def _mesh(raw, scale, weld_tolerance, keep_coincident):
 def _cuts(raw, bodies):
     """Notes on cells that are read as linear tetrahedra."""
     for k, block in blocks_of(raw, 3):
-        count, kind = len(block), block.type
-        if shape_of(kind) != "tetra":
-            made = int((bodies.block == k).sum())
-            named = f"{kind} cells" if kind not in _PLURALS else _PLURALS[kind]
-            yield f"cut {count} {kind if count == 1 else named} into {made} tetrahedra"
+        made = int((bodies.block == k).sum())
+        if shape_of(block.type) != "tetra":
+            yield f"cut {counted(len(block), f'{block.type} cell')} into {made} tetrahedra"
         elif block.data.shape[1] > 4:
-            order = "second" if block.data.shape[1] == 10 else "higher"
-            yield f"read {count} {order}-order elements as linear {kind}"
-
-
-def _listed(groups):
-    return ", ".join(f"{name} (of {kind})" for name, kind in groups)
+            yield f"read {made} {block.type} elements of higher order as linear ones"

@@ -43,8 +43,8 @@ class Mesh(MeshMethods):
         Sentences about what the checks repaired or found remarkable.
     source : str, default ""
         Name of the file; ``""`` for a mesh built in memory.
-    unread : tuple of tuple of (str, str), default ()
-        Groups of the file that are neither of faces nor of bodies: pairs of name and kind.
+    unread : tuple of str, default ()
+        Names of the groups of the file that are neither of faces nor of bodies.
     keep_coincident : bool, default False
         Whether points that coincide stay apart, and with them the faces on them, as at a joint or a
         crack.
@@ -76,7 +76,7 @@ class Mesh(MeshMethods):
     groups: Mapping[str, np.ndarray]
     notes: tuple[str, ...] = ()
     source: str = ""
-    unread: tuple[tuple[str, str], ...] = ()
+    unread: tuple[str, ...] = ()
     keep_coincident: bool = False
     body_groups: Mapping[str, np.ndarray] = field(default_factory=dict)
 
@@ -151,13 +151,7 @@ class Mesh(MeshMethods):
         InputError
             There is no such group.
         """
-        if not isinstance(name, str) or name not in self.groups:
-            kinds = ["bodies"] * (isinstance(name, str) and name in self.body_groups)
-            kinds += [kind for other, kind in self.unread if other == name]
-            why = f" ({name} is a group of {kinds[0]}: make one of faces)" if kinds else ""
-            known = ", ".join(sorted(self.groups)) or "none"
-            raise InputError(f"mesh has no face group {shown(name)}{why}; its groups are: {known}")
-        return self.groups[name]
+        return self._members("face", self.groups, name, (*self.body_groups, *self.unread))
 
     def group_bodies(self, name: str) -> np.ndarray:
         """Bodies of a group.
@@ -177,14 +171,18 @@ class Mesh(MeshMethods):
         InputError
             There is no such group.
         """
-        if not isinstance(name, str) or name not in self.body_groups:
-            known = ", ".join(sorted(self.body_groups)) or "none"
-            of_faces = isinstance(name, str) and name in self.groups
-            why = f" ({name} is a group of faces: make one of bodies)" if of_faces else ""
-            raise InputError(
-                f"mesh has no body group {shown(name)}{why}; its body groups are: {known}"
-            )
-        return self.body_groups[name]
+        return self._members("body", self.body_groups, name, self.groups)
+
+    def _members(self, kind, groups, name, others):
+        if isinstance(name, str) and name in groups:
+            return groups[name]
+        known = ", ".join(sorted(groups)) or "none"
+        why = (
+            f" ({name} is one of another kind)" if isinstance(name, str) and name in others else ""
+        )
+        raise InputError(
+            f"mesh has no {kind} group {shown(name)}{why}; its {kind} groups are: {known}"
+        )
 
     def bonded_by(self, shares: Mapping[str, float]) -> "Mesh":
         """Return the mesh with only a share of the area of some inner faces bonded.
