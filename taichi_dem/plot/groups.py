@@ -78,16 +78,11 @@ def _members(mesh, outer, bodies):
     names = [name for name in sizes if name not in mesh.inner_groups]
     member = np.full(len(outer), -1)
     if names:
-        stacked = [mesh.groups[name] for name in names]
-        number = geometry.face_numbers(np.vstack([outer, *stacked]))
-        chosen, start = np.full(number.max() + 1, -1), {}
-        place = len(outer)
-        for name in names:
-            start[name] = place
-            place += sizes[name]
-        for name in sorted(names, key=lambda name: -sizes[name]):
-            chosen[number[start[name] : start[name] + sizes[name]]] = names.index(name)
-        member = chosen[number[: len(outer)]]
+        number, *members = geometry.numbers_in(outer, *(mesh.groups[name] for name in names))
+        chosen = np.full(max(map(np.max, (number, *members))) + 1, -1)
+        for k in sorted(range(len(names)), key=lambda k: -sizes[names[k]]):
+            chosen[members[k]] = k
+        member = chosen[number]
     else:
         names = list(mesh.body_groups)
         for k, name in enumerate(names):

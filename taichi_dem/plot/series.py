@@ -1,15 +1,16 @@
 """Curves over time: pressure (Konno et al., Fig 11), motion, energy, levels."""
 
 from collections.abc import Mapping
-from typing import Optional
+from typing import Any, Optional
 
 import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
-from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, styles_of
+from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, seconds, styles_of
 from taichi_dem.kit.validation import FileName
 from taichi_dem.output.record import outward_columns
-from taichi_dem.plot.levels import draw_level_shares
+from taichi_dem.plot.bodies import shades
 
 #: Energy terms from the bottom of the stack up, with colours and dashes: blue is held, orange lost
 #: in bonds, purple in contacts; within a group they differ in lightness.
@@ -161,6 +162,42 @@ def _momentary(axes, time, history):
     )
     axes.plot(time, share, color=RED)
     axes.set(ylabel="unexplained\n[% of work so far]", ylim=(0.0, None))
+
+
+def level_shades(count: int) -> Any:
+    """Colours of so many levels, the coarsest first and lightest."""
+    return shades("magma_r", 0.02, 0.92, max(2, count)).colors
+
+
+def level_look(count: int) -> Any:
+    """Arguments cmap and norm of a collection whose values are levels."""
+    norm = BoundaryNorm(np.arange(count + 1) - 0.5, count)
+    return {"cmap": ListedColormap(level_shades(count)[:count]), "norm": norm}
+
+
+def level_names(dt0: float, count: int) -> Any:
+    """Step of each level in words; dt0: of level 0 [s]."""
+    return [seconds(dt0 / 2.0**level) for level in range(count)]
+
+
+def draw_level_shares(
+    owner: Any,
+    axes: Any,
+    time: np.ndarray,
+    shares: np.ndarray,
+    dt0: float,
+    loc: str = "outside right center",
+) -> None:
+    """Share of bodies on each level over time, the coarsest at the bottom, with its legend.
+
+    owner: figure or axes that get the legend, at a place loc. time: in the unit of the axis.
+    shares: (sample_count, level_count), rows summing to 1. dt0: step of level 0 [s].
+    """
+    count = shares.shape[1]
+    areas = axes.stackplot(time, 100.0 * shares.T, colors=level_shades(count))
+    axes.set(ylabel="share of bodies [%]", ylim=(0.0, 100.0))
+    names = level_names(dt0, count)
+    owner.legend(areas[::-1], names[::-1], title="step", loc=loc)
 
 
 def plot_levels(path: FileName, time_s: np.ndarray, shares: np.ndarray, dt0: float) -> None:

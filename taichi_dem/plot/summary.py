@@ -9,8 +9,8 @@ from matplotlib.ticker import MaxNLocator
 
 from taichi_dem.kit.plot_style import BLACK, BLUE, png_of, styled
 from taichi_dem.output.record import Frame, outward_columns
-from taichi_dem.plot.block import draw_breaks, frame_block
-from taichi_dem.plot.bodies import draw_bodies
+from taichi_dem.plot.block import draw_breaks
+from taichi_dem.plot.bodies import draw_bodies, frame_block
 from taichi_dem.plot.view import View
 from taichi_dem.state.model import Model
 
