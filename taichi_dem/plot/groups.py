@@ -1,7 +1,7 @@
 """Picture of a mesh before a run: its outer faces, coloured by group, seen from two sides."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Optional
+from typing import Optional
 
 import numpy as np
 from matplotlib.collections import PolyCollection
@@ -62,7 +62,7 @@ def _keys(mesh, names, member, acting):
     """Lines of the legend."""
     counts = [(member == k).sum() for k in range(len(names))]
     keys = [
-        area_key(_label(name, counts[k], acting), facecolor=_colour(k))
+        area_key(_label(name, counts[k], acting), facecolor=_COLOURS[k % len(_COLOURS)])
         for k, name in enumerate(names[:_MOST])
     ]
     if len(names) > _MOST:
@@ -107,7 +107,7 @@ def _draw(axes, mesh, outer, member, view):
     """Faces that are seen, from back to front, the darker the more they lean away."""
     triangles = mesh.points[outer]
     seen = view.facing(triangles)
-    palette = np.array([to_rgb(_colour(k)) for k in range(len(_COLOURS))] + [to_rgb(_NONE)])
+    palette = np.array([to_rgb(colour) for colour in (*_COLOURS, _NONE)])
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     light = normal @ (view.toward + view.up) / np.linalg.norm(normal, axis=1)
     shade = _DARKEST + (1.0 - _DARKEST) * np.clip(light[seen] / _SQUARE, 0.0, 1.0)
@@ -130,10 +130,6 @@ def _draw_axes(axes, view):
         tip = OffsetFrom(axes, (1.0, 1.0))
         axes.annotate("", end, middle, xycoords=tip, textcoords=tip, arrowprops=line)
         axes.annotate(name, (1.0, 1.0), letter, ha="center", va="center", fontsize=8, **fixed)
-
-
-def _colour(place: int) -> Any:
-    return _COLOURS[place % len(_COLOURS)]
 
 
 def _label(name, count, acting):
