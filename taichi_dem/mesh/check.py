@@ -54,22 +54,31 @@ def checked_arrays(
 
 def checked_points(points: Any) -> np.ndarray:
     """Copy as (n, 3) float64, or InputError."""
-    try:
-        points = np.array(points)
-        points = points.astype(np.float64) if points.dtype.kind in "iuf" else None
-    except (TypeError, ValueError, OverflowError):
-        points = None
-    if points is None:
-        raise InputError("points must be an array of numbers, shape (n, 3)")
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"points must have shape (n, 3), got {points.shape}")
-    bad = np.flatnonzero(~(np.abs(points) <= _MOST_EXTENT).all(axis=1))
+    found = _rows("points", points, 3, "iuf", "numbers")
+    with np.errstate(over="ignore"):
+        found = found.astype(np.float64)
+    bad = np.flatnonzero(~(np.abs(found) <= _MOST_EXTENT).all(axis=1))
     if len(bad):
         raise InputError(
             f"points must be finite, within {_MOST_EXTENT:g} m, but {len(bad)} are not, the first "
-            f"is number {bad[0]}: {points[bad[0]].tolist()}"
+            f"is number {bad[0]}: {found[bad[0]].tolist()}"
         )
-    return points
+    return found
+
+
+def _rows(what, values, width, kinds, words):
+    """An array of rows of numbers; kinds: of NumPy's types, words: what they are called."""
+    try:
+        found = np.asarray(values)
+    except ValueError:
+        raise InputError(f"{what} must be rows of {width} {words} each") from None
+    if found.size == 0:
+        raise InputError(f"{what} must not be empty")
+    if found.dtype.kind not in kinds:
+        raise InputError(f"{what} must hold {words}, got {found.dtype}")
+    if found.ndim != 2 or found.shape[1] != width:
+        raise InputError(f"{what} must have shape (n, {width}), got {found.shape}")
+    return found
 
 
 def weld_labels(
@@ -119,9 +128,7 @@ def _checked_bodies(name, bodies, body_count):
     except ValueError:
         found = np.zeros(0)
     if found.ndim != 1 or not found.size or found.dtype.kind not in "iu":
-        raise InputError(
-            f"body group {name!r} must be a list of at least one body number, got {shown(bodies)}"
-        )
+        raise InputError(f"body group {name!r} must be a list of body numbers, got {shown(bodies)}")
     refuse_outside(f"body group {name!r}", "body", found[:, None], body_count)
     return np.unique(found).astype(np.int32)
 
@@ -147,18 +154,9 @@ def _checked_groups(groups, point_count):
 
 def _checked_indices(what, indices, width, point_count):
     """Copy as (n, width) int32 with all values in range, or InputError."""
-    try:
-        indices = np.asarray(indices)
-    except ValueError:
-        raise InputError(f"{what} must be rows of {width} point numbers each") from None
-    if indices.size == 0:
-        raise InputError(f"{what} must not be empty")
-    if indices.ndim != 2 or indices.shape[1] != width:
-        raise InputError(f"{what} must have shape (n, {width}), got {indices.shape}")
-    if indices.dtype.kind not in "iu":
-        raise InputError(f"{what} must hold integer point numbers, got {indices.dtype}")
-    refuse_outside(what, "point", indices, point_count)
-    return indices.astype(np.int32)
+    found = _rows(what, indices, width, "iu", "integer point numbers")
+    refuse_outside(what, "point", found, point_count)
+    return found.astype(np.int32)
 
 
 def _without_loose_points(points, tetrahedra, groups, notes):

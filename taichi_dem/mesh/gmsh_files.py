@@ -47,26 +47,17 @@ def refuse_bad_gmsh(path: str) -> None:
     if [mark[1] for mark in marks] != _WHOLE:
         raise InputError("it must have one whole section $Nodes, then one $Elements")
     version, kind = content[:200].split()[1:3]
-    rows_of = {b"2": _rows_2, b"2.2": _rows_2, b"4": _rows_4, b"4.1": _rows_4}.get(version)
-    if kind == b"0" and rows_of:
-        nodes, elements = (
-            content[start.end() : end.start()].splitlines()[1:]
-            for start, end in zip(marks[::2], marks[1::2])
-        )
-        _refuse_numbers(rows_of, nodes, elements)
-
-
-def _refuse_numbers(rows_of, nodes, elements):
-    """Check numbers of points, and that elements have points that are there."""
+    if kind == b"1" or version not in (b"2", b"2.2", b"4", b"4.1"):
+        return
+    nodes, elements = (
+        [line.split() for line in content[start.end() : end.start()].splitlines()[1:]]
+        for start, end in zip(marks[::2], marks[1::2])
+    )
     try:
-        points = np.array([int(row[0]) for row in rows_of(nodes, True)], dtype=np.int64)
-        corners = np.array(
-            [int(one) for row in rows_of(elements, False) for one in row], dtype=np.int64
-        )
+        numbers = _numbers_2 if version.startswith(b"2") else _numbers_4
+        points, corners = (np.array(found, dtype=np.int64) for found in numbers(nodes, elements))
     except (ValueError, IndexError, OverflowError):
-        raise InputError(
-            "its sections must hold the rows of whole numbers that they announce"
-        ) from None
+        raise InputError("its sections must hold the whole numbers that they announce") from None
     number, count = np.unique(points, return_counts=True)
     wrong = number[(number < 1) | (count > 1)]
     if len(wrong):
@@ -76,51 +67,47 @@ def _refuse_numbers(rows_of, nodes, elements):
         raise InputError(f"its elements have the point {missing[0]}, which is not there")
 
 
-def _rows_2(lines, of_points):
-    """Rows of version 2.2: number and places of each point, or corners of each element."""
-    rows = [line.split() for line in lines]
-    if len(rows) != int(rows[0][0]) + 1:
-        raise ValueError
-    if of_points:
-        return _alike(rows[1:], 4)
-    corners: dict[bytes, list] = {}
-    for _, kind, tags, *rest in rows[1:]:
-        corners.setdefault(kind, []).append(rest[_positive(tags) :])
-    return [row for group in corners.values() for row in _alike(group, len(group[0]))]
+def _numbers_2(nodes, elements):
+    """Numbers of points and of corners in version 2.2, where each row says how many tags it has."""
+    sizes: dict[bytes, int] = {}
+    corners: list[int] = []
+    for _, kind, tags, *rest in elements[1:]:
+        own = rest[int(tags) :]
+        _require(int(tags) >= 0 and len(own) == sizes.setdefault(kind, len(own)) > 0)
+        corners += map(int, own)
+    for rows in (nodes, elements):
+        _require(int(rows[0][0]) == len(rows) - 1)
+    _require(all(len(row) == 4 for row in nodes[1:]))
+    return [int(row[0]) for row in nodes[1:]], corners
 
 
-def _rows_4(lines, of_points):
-    """Rows of version 4.1: the number of each point, or corners of each element."""
-    rows, found, at = [line.split() for line in lines], [], 1
-    for _ in range(_positive(rows[0][0])):
-        _, _, _, size = map(_positive, rows[at])
-        block = rows[at + 1 : at + 1 + size]
-        at += 1 + size
-        if len(block) < size:
-            raise ValueError
-        if of_points:
-            found += _alike(block, 1)
-            _alike(rows[at : at + size], 3)
-            at += size
-        elif size:
-            found += [row[1:] for row in _alike(block, len(block[0]))]
-    if at != len(rows):
-        raise ValueError
+def _numbers_4(nodes, elements):
+    """The same in version 4.1, where a row of four numbers, the last its size, heads a block."""
+    points, corners = (
+        [[int(one) for one in row] for row in _rows_4(rows, each)]
+        for rows, each in ((nodes, 2), (elements, 1))
+    )
+    return [one for (one,) in points], [one for row in corners for one in row[1:]]
+
+
+def _rows_4(rows, each):
+    """Rows of all blocks; each: how many an entry has, the places of a point are not among them."""
+    at, found = 1, []
+    for _ in range(int(rows[0][0])):
+        _, _, _, size = map(int, rows[at])
+        block = rows[at + 1 : at + 1 + each * size]
+        _require(len(block) == each * size >= 0)
+        _require(all(len(row) == len(block[0]) for row in block[:size]))
+        _require(all(len(row) == 3 for row in block[size:]))
+        found += block[:size]
+        at += 1 + len(block)
+    _require(at == len(rows))
     return found
 
 
-def _alike(rows, width):
-    """Rows that are all as long."""
-    if not width or any(len(row) != width for row in rows):
+def _require(right):
+    if not right:
         raise ValueError
-    return rows
-
-
-def _positive(word):
-    number = int(word)
-    if number < 0:
-        raise ValueError
-    return number
 
 
 @contextmanager
