@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from _bar_pictures import draw_breaks, draw_space_time, film_bar, picture_wave
 from taichi_dem import CONCRETE, Every
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, GREY, RED, picture
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.study import write_rows
 from taichi_dem.output.profile import Profile, travel_time
+from taichi_dem.plot.bars import draw_breaks, draw_space_time, film_bar, picture_wave
 from taichi_dem.simulate import run_simulation
 
 #: Length of a bar [m], its bodies a cell; time step [s], steps between looks.

@@ -12,6 +12,11 @@ from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.mesh_methods import Choice, choose, with_faces
 
 
+def with_outer_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
+    """The mesh with one more group of outer faces: ``Mesh.group``."""
+    return instance("mesh", mesh, Mesh).group(name, chosen)
+
+
 def with_body_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
     """Return the mesh with one more group of bodies, chosen by their centres.
 

@@ -2,7 +2,7 @@
 
 from taichi_dem.plot.block import plot_acting, plot_cracks, plot_steps
 from taichi_dem.plot.deep import plot_crack_probability, plot_deep_cracks
-from taichi_dem.plot.film import save_animation
+from taichi_dem.plot.film import film_runs, save_animation
 from taichi_dem.plot.result.pictures import plot_attenuation
 from taichi_dem.plot.series import (
     plot_energy,
@@ -13,6 +13,7 @@ from taichi_dem.plot.series import (
 )
 
 __all__ = [
+    "film_runs",
     "plot_acting",
     "plot_attenuation",
     "plot_crack_probability",
