@@ -45,7 +45,7 @@ def refuse_bad_gmsh(path: str) -> None:
         return
     marks = list(_ENDS.finditer(content))
     if [mark[1] for mark in marks] != _WHOLE:
-        raise InputError("it must have one whole section $Nodes, then one $Elements")
+        raise InputError("it must have one whole section $Nodes, then $Elements; it may be cut off")
     version, kind = content[:200].split()[1:3]
     if kind == b"1" or version not in (b"2", b"2.2", b"4", b"4.1"):
         return
@@ -57,7 +57,7 @@ def refuse_bad_gmsh(path: str) -> None:
         numbers = _numbers_2 if version.startswith(b"2") else _numbers_4
         points, corners = (np.array(found, dtype=np.int64) for found in numbers(nodes, elements))
     except (ValueError, IndexError, OverflowError):
-        raise InputError("its sections must hold the whole numbers that they announce") from None
+        raise InputError("its sections must hold as many whole numbers as they announce") from None
     number, count = np.unique(points, return_counts=True)
     wrong = number[(number < 1) | (count > 1)]
     if len(wrong):
