@@ -7,8 +7,8 @@ from taichi_dem.kit.plot_style import GREY, line_key, picture, styles_of
 from taichi_dem.kit.study import Table
 from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.output.run_costs import level_columns, level_shares
-from taichi_dem.plot.film_runs import FilmedRun, film_runs
-from taichi_dem.plot.levels import draw_level_shares, level_look, level_names
+from taichi_dem.plot.film import FilmedRun, film_runs
+from taichi_dem.plot.series import draw_level_shares, level_look, level_names
 
 TABLE = Table(
     method=("name", "method"),

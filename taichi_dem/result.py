@@ -15,7 +15,6 @@ from taichi_dem.kit.files import output_folder, remove_files, write_csv, write_t
 from taichi_dem.kit.validation import FileName, shown
 from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
-from taichi_dem.output.export.run_exports import RunExports
 from taichi_dem.output.receivers import Received, write_receivers
 from taichi_dem.output.record import (
     Frame,
@@ -25,6 +24,7 @@ from taichi_dem.output.record import (
     write_bonds,
     write_paraview,
 )
+from taichi_dem.output.run_tables import RunTables
 from taichi_dem.report.certificate import Certificate
 from taichi_dem.report.report import Report
 from taichi_dem.scene import Scene
@@ -32,7 +32,7 @@ from taichi_dem.state.model import Model
 
 
 @dataclass(frozen=True, eq=False)
-class Result(RunExports):
+class Result(RunTables):
     """Result of a run.
 
     As the last line of a notebook's cell it shows a picture and a table.

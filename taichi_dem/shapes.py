@@ -18,13 +18,10 @@ import numpy as np
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import EDGE, in_unit
 from taichi_dem.kit.validation import FileName, direction, finite, positive, shown, told_apart
-from taichi_dem.mesh.drawn_out import drawn_out
-from taichi_dem.mesh.filled import MOST_BODIES, filled_surface
+from taichi_dem.mesh.drawn_out import circle, divided, drawn_out
+from taichi_dem.mesh.filled import filled_surface, refuse_too_many
 from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.triangles import circle, divided
 
-#: Tetrahedra in a cube of an element: 2.3 triangles in a square, three in a layer of 0.8.
-_PER_CUBE = 8.7
 #: Distance from a line within which a point lies on it, in elements.
 _ON = 1e-6
 
@@ -235,12 +232,7 @@ def _element(element, smallest, volume):
         raise InputError(
             f"element must be at most the smallest length of the shape, {most} m, got {got}"
         )
-    if _PER_CUBE * volume / element**3 > MOST_BODIES:
-        least = (_PER_CUBE * volume / MOST_BODIES) ** (1.0 / 3.0)
-        got, bound = told_apart(element, least)
-        raise InputError(
-            f"element must be at least {bound} m, for {MOST_BODIES} tetrahedra at most, got {got}"
-        )
+    refuse_too_many(element, volume)
     return in_unit("element", element, EDGE)
 
 
@@ -269,14 +261,14 @@ def _on_circle(middle, diameter, element):
 
 
 def _on_slot(slot, element):
-    (left, _), (_, depth), (right, _) = slot[0], slot[1], slot[2]
+    (left, _), (_, depth), (right, _) = slot[:3]
     near = _ON * element
 
     def on(points):
         x, y = points[..., 0], points[..., 1]
-        walls = (np.abs(x - left) < near) | (np.abs(x - right) < near)
-        end = np.abs(y - depth) < near
-        return (x > left - near) & (x < right + near) & (y < depth + near) & (walls | end)
+        on_wall = np.minimum(np.abs(x - left), np.abs(x - right)) < near
+        inside = (x > left - near) & (x < right + near) & (y < depth + near)
+        return inside & (on_wall | (np.abs(y - depth) < near))
 
     return on
 
@@ -310,7 +302,7 @@ def _checked_notch(notch, x, y, element):
 
 def _check_apart(slot, loops, element):
     """Raise InputError for a notch that comes nearer than an element to a hole."""
-    (left, _), (_, depth), (right, _) = slot[0], slot[1], slot[2]
+    (left, _), (_, depth), (right, _) = slot[:3]
     for loop in loops:
         aside = np.maximum(np.maximum(left - loop[:, 0], loop[:, 0] - right), 0.0)
         above = np.maximum(loop[:, 1] - depth, 0.0)

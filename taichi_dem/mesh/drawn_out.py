@@ -1,18 +1,37 @@
-"""Solids whose front view is drawn out along z: layers of prisms of three tetrahedra each."""
+"""Solids whose front view is drawn out along z: layers of prisms of three tetrahedra each.
+
+The front view is a plane region with holes in triangles of even size. Points lie on the outline
+and, in a regular triangular lattice, inside; they are joined by Delaunay's rule and moved to the
+middle of their neighbours, a few times over.
+"""
 
 from collections.abc import Mapping, Sequence
-from typing import Callable
+from typing import Any, Callable
 
 import numpy as np
 
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.fixed_order import dot
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
-from taichi_dem.mesh.triangles import triangulated
 
 #: Height of a layer over the edge of its triangles.
 _LAYER = 0.8
 #: Given coordinates of points (..., 2) [m], whether each lies on a part of the outline.
 OnOutline = Callable[[np.ndarray], np.ndarray]
+#: Least distance of an inner point from the outline, and shift that decides between triangulations
+#: of points on one circle, in elements.
+_FROM_OUTLINE, _SHIFT = 0.55, 1e-4
+#: Largest circumscribed radius of an inner triangle, in elements, and where that fails.
+_RADII = 0.95, 1.6
+#: Rounds of smoothing, and moves of a round.
+_ROUNDS, _MOVES = 3, 4
+#: Points whose triangles are found at a time.
+_CHUNK = 128
+#: Place of what stands for no point, and of centres of circles through points on a line [m].
+_FAR = 1e30
+#: Share of the area that may be missing.
+_AREA = 1e-9
 
 
 def drawn_out(
@@ -60,3 +79,181 @@ def _groups(points, outer, depth, sides):
     for name, on in sides.items():
         ends[name] = between & on(points[outer, :2]).all(axis=1)
     return {name: outer[chosen] for name, chosen in ends.items()}
+
+
+def triangulated(
+    loops: Sequence[np.ndarray], element: float, seed: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 2) and triangles (m, 3), anticlockwise; the points of the loops come first.
+
+    Parameters
+    ----------
+    loops : arrays (k, 2) [m]
+        Corners of the outline, anticlockwise, and of holes in it, clockwise, about an element
+        apart.
+    element : float [m]
+        Length of an edge.
+
+    Raises
+    ------
+    InputError
+        Where the outline is too narrow, or too finely divided, for elements of this size.
+    """
+    starts = np.vstack(loops)
+    ends = np.vstack([np.roll(loop, -1, axis=0) for loop in loops])
+    draw = np.random.default_rng(seed)
+    points = np.vstack([starts, _inner_points(starts, ends, element)])
+    for _ in range(_ROUNDS):
+        found = _inner_triangles(points, starts, ends, element, draw)
+        _smooth(points, found, len(starts))
+    return points, found
+
+
+def _inner_triangles(points, starts, ends, element, draw):
+    """Triangles that fill the region; InputError where they do not."""
+    wanted = 0.5 * float((starts[:, 0] * ends[:, 1] - ends[:, 0] * starts[:, 1]).sum())
+    for radius in _RADII:
+        found = _delaunay(points, radius * element, _SHIFT * element, draw)
+        found = found[_is_inside(points[found].mean(axis=1), starts, ends)]
+        if abs(float(_areas(points, found).sum()) - wanted) <= _AREA * wanted:
+            return found
+    raise InputError(
+        "element must be smaller for this shape, whose narrowest place it has to fit into, got "
+        f"{element:g} m"
+    )
+
+
+def _inner_points(starts, ends, element):
+    """Lattice of triangles inside the outline, away from it."""
+    low, high = starts.min(axis=0), starts.max(axis=0)
+    count = np.ceil((high - low) / (element * np.array([1.0, np.sqrt(0.75)]))).astype(int) + 1
+    column, row = np.meshgrid(np.arange(count[0]), np.arange(count[1]), indexing="ij")
+    x = (column + 0.5 * (row % 2)).ravel() * element
+    lattice = np.stack([x, row.ravel() * element * np.sqrt(0.75)], axis=1)
+    lattice += 0.5 * (low + high - lattice.min(axis=0) - lattice.max(axis=0))
+    lattice = lattice[_is_inside(lattice, starts, ends)]
+    near = _by_chunks(lattice, lambda some: _distance(some, starts, ends))
+    return lattice[near > _FROM_OUTLINE * element]
+
+
+def _by_chunks(points, function):
+    """A function of points applied to some of them at a time, (n,)."""
+    parts = [function(points[k : k + _CHUNK]) for k in range(0, len(points), _CHUNK)]
+    return np.concatenate([np.zeros(0), *parts])
+
+
+def _distance(points, starts, ends):
+    """Distance of points from the nearest of some sides [m], (n,)."""
+    side, arm = ends - starts, points[:, None] - starts
+    share = np.clip(dot(arm, side) / dot(side, side), 0.0, 1.0)
+    away = arm - share[..., None] * side
+    return np.sqrt(dot(away, away)).min(axis=1)
+
+
+def _is_inside(points, starts, ends):
+    """Whether points lie inside the outline and outside its holes, (n,): rays to the right."""
+
+    def crossed(some):
+        x, y = some[:, :1], some[:, 1:]
+        between = (starts[:, 1] > y) != (ends[:, 1] > y)
+        rise = np.where(ends[:, 1] == starts[:, 1], 1.0, ends[:, 1] - starts[:, 1])
+        at = starts[:, 0] + (y - starts[:, 1]) * (ends[:, 0] - starts[:, 0]) / rise
+        return (between & (at > x)).sum(axis=1) % 2
+
+    return _by_chunks(points, crossed) == 1
+
+
+def _delaunay(points, radius, shift, draw):
+    """Triangles of points whose circles hold no other point, each once, anticlockwise."""
+    # Of points on one circle any triangulation is right, and all triangles must choose the same.
+    moved = points + shift * draw.uniform(-1.0, 1.0, points.shape)
+    near = _neighbours(moved, 2.0 * radius)
+    far = np.vstack([moved, np.full(2, _FAR)])
+    width = near.shape[1]
+    one, other = np.triu_indices(width, 1)
+    found = []
+    for first in range(0, len(points), _CHUNK):
+        rows = near[first : first + _CHUNK]
+        centre, radius2 = _circles(moved[first : first + _CHUNK], far[rows], one, other)
+        away = centre[:, :, None] - far[rows][:, None]
+        inside = (away**2).sum(axis=3) < radius2[:, :, None] * (1.0 - 1e-12)
+        inside[:, np.arange(len(one)), one] = inside[:, np.arange(len(one)), other] = False
+        valid = ~inside.any(axis=2) & (radius2 < radius**2)
+        point, pair = np.nonzero(valid & (rows[:, one] >= 0) & (rows[:, other] >= 0))
+        found.append(np.stack([first + point, rows[point, one[pair]], rows[point, other[pair]]]).T)
+    triangles = np.unique(np.sort(np.vstack(found), axis=1), axis=0)
+    return np.where((_areas(points, triangles) < 0.0)[:, None], triangles[:, ::-1], triangles)
+
+
+def _neighbours(points, radius):
+    """Points within a radius of each, (n, most), filled up with -1, which is far from all."""
+    cell = np.floor((points - points.min(axis=0)) / radius).astype(np.int64)
+    width = int(cell[:, 1].max()) + 3
+    key = (cell[:, 0] + 1) * width + cell[:, 1] + 1
+    order = np.argsort(key, kind="stable")
+    pairs = []
+    for dx in (-1, 0, 1):
+        for dy in (-1, 0, 1):
+            wanted = key + dx * width + dy
+            low = np.searchsorted(key[order], wanted)
+            count = np.searchsorted(key[order], wanted, side="right") - low
+            start = np.repeat(low - np.append(0, np.cumsum(count)[:-1]), count)
+            place = order[start + np.arange(count.sum())]
+            pairs.append(np.stack([np.repeat(np.arange(len(points)), count), place], axis=1))
+    pair = np.vstack(pairs)
+    away = points[pair[:, 0]] - points[pair[:, 1]]
+    pair = pair[(dot(away, away) < radius**2) & (pair[:, 0] != pair[:, 1])]
+    pair = pair[np.lexsort((pair[:, 1], pair[:, 0]))]
+    count = np.bincount(pair[:, 0], minlength=len(points))
+    near = np.full((len(points), max(2, count.max())), -1)
+    near[pair[:, 0], np.arange(len(pair)) - np.repeat(np.cumsum(count) - count, count)] = pair[:, 1]
+    return near
+
+
+def _circles(points, neighbours, one, other):
+    """Centres (c, pairs, 2) and squared radii of the circles through points and two neighbours."""
+    arms = neighbours - points[:, None]
+    a, b = arms[:, one], arms[:, other]
+    twice = 2.0 * (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+    size = np.stack([dot(a, a), dot(b, b)], axis=-1)
+    x = b[..., 1] * size[..., 0] - a[..., 1] * size[..., 1]
+    y = a[..., 0] * size[..., 1] - b[..., 0] * size[..., 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        centre = np.stack([x, y], axis=-1) / twice[..., None]
+    centre = np.where(np.isfinite(centre), centre, _FAR)
+    return points[:, None] + centre, dot(centre, centre)
+
+
+def _areas(points, triangles):
+    """Areas of triangles [m2], negative where they are clockwise, (m,)."""
+    corner = points[triangles]
+    a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    return 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def _smooth(points, triangles, fixed):
+    """Move the points behind the fixed ones to the middle of the triangles around them."""
+    for _ in range(_MOVES):
+        area = np.abs(_areas(points, triangles))
+        middle = points[triangles].mean(axis=1) * area[:, None]
+        corner, weight = triangles.ravel(), np.repeat(area, 3)
+        sums = [np.bincount(corner, np.repeat(part, 3), len(points)) for part in middle.T]
+        around = np.bincount(corner, weight, len(points))
+        mean = np.stack(sums, axis=1) / np.where(around > 0.0, around, 1.0)[:, None]
+        points[fixed:] = mean[fixed:]
+
+
+def circle(centre: Any, diameter: float, element: float) -> np.ndarray:
+    """Corners of a regular polygon on a circle, about an element apart, (k, 2), anticlockwise."""
+    count = max(8, round(np.pi * diameter / element))
+    angle = 2.0 * np.pi * np.arange(count) / count
+    return np.asarray(centre) + 0.5 * diameter * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def divided(corners: Any, element: float) -> np.ndarray:
+    """Corners of a polygon with points between them, about an element apart, (k, 2)."""
+    corners, parts = np.asarray(corners, dtype=float), []
+    for start, end in zip(corners, np.roll(corners, -1, axis=0)):
+        count = max(1, round(float(np.sqrt(((end - start) ** 2).sum())) / element))
+        parts.append(start + (end - start) * (np.arange(count) / count)[:, None])
+    return np.vstack(parts)

@@ -13,11 +13,7 @@ from taichi_dem.mesh.mesh_methods import Choice, choose, with_faces
 
 
 def with_outer_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
-    """The mesh with one more group: outer faces chosen by their centres.
-
-    chosen: a function of the centres [m], (n, 3), that returns n truth values, as ``lambda x: x[:,
-    1] > 0.5``. Raises InputError for a name that is taken, a choice of no face, or other values.
-    """
+    """The mesh with one more group of outer faces: ``Mesh.group``."""
     return instance("mesh", mesh, Mesh).group(name, chosen)
 
 
@@ -57,7 +53,7 @@ def with_inner_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
     """The mesh with one more group: faces between two bodies chosen by their centres.
 
     ``Scene(unbonded=[name])`` makes a notch or an open joint of it. chosen, errors: as for
-    ``with_outer_group``.
+    ``Mesh.group``.
     """
     inner = _inner_faces(mesh)[0]
     return with_faces(mesh, name, inner[choose(mesh, inner, chosen)])
@@ -75,7 +71,7 @@ def with_cut(
     Those between a body whose centre lies behind the plane and one that lies before it, so that no
     bond is left across: as rough as the mesh is, and flat where faces lie in the plane. point [m]
     and normal: of the plane. chosen: which of them, by the centres of the faces, as for
-    ``with_outer_group``; None for all. Raises InputError as that, and for a normal of zero.
+    ``Mesh.group``; None for all. Raises InputError as that, and for a normal of zero.
     """
     origin, along = np.array(direction("point", point)), unit_vector("normal", normal)
     inner, bodies = _inner_faces(mesh)

@@ -3,8 +3,8 @@
 import contextlib
 import io
 import os
+import re
 import warnings
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Optional
@@ -13,38 +13,33 @@ from xml.sax.saxutils import quoteattr
 import meshio
 import numpy as np
 
+from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done, write_text
 from taichi_dem.kit.likely_units import EDGE, in_unit
 from taichi_dem.kit.timeout import run_with_timeout
 from taichi_dem.kit.validation import FileName, path_name, positive
-from taichi_dem.mesh.cell_groups import body_groups_of, volumes_of
-from taichi_dem.mesh.content import (
-    cells_counted,
-    cells_dropped,
-    is_quadrangle,
-    is_solid,
-    is_tetrahedron,
-    is_triangle,
-    others_dropped,
-    parts_dropped,
-    reason_of,
-    refuse_uncut,
-    refuse_without_tetrahedra,
-    surfaces_of_abaqus,
-    unread_groups,
-)
-from taichi_dem.mesh.gmsh_check import refuse_bad_gmsh
-from taichi_dem.mesh.gmsh_names import keyed_by_dimension, made_name, physical_names, with_own_keys
-from taichi_dem.mesh.mesh import Mesh, checked_mesh, welded_numbers
-from taichi_dem.mesh.parts_in_files import unbonded_places
-from taichi_dem.mesh.split import folded_or_flat, shape_of, tetrahedra_in, triangles_in
+from taichi_dem.mesh.cells import blocks_of, bodies_in, corners_of, fault_of_cells, shape_of
+from taichi_dem.mesh.check import checked_points, unbonded_places, weld_labels
+from taichi_dem.mesh.file_groups import body_groups_in, face_groups_in, unread_groups, volumes_of
+from taichi_dem.mesh.gmsh_files import keyed_by_dimension, refuse_bad_gmsh, with_own_keys
+from taichi_dem.mesh.mesh import Mesh, checked_mesh
 from taichi_dem.mesh.tetrahedra import edge_lengths
 
 #: Time that a reader may take [s], and what it reads at the slowest [byte/s]: some of meshio's wait
 #: for ever for the rest of a file that was cut off.
 _PATIENCE_S = 20.0
 _SLOWEST_BYTES_PER_S = 1e5
+_SPLIT = "split them into tetrahedra, for example by ParaView's filter Tetrahedralize"
+_UNKNOWN = "holds cells of a type that meshio does not know, such as voxels"
+_NEEDED = (
+    "loads and supports need groups of faces (physical surfaces in Gmsh), materials groups of "
+    "solid cells"
+)
+_IN_A_GROUP = (
+    "mesh in three dimensions (gmsh -3), and make a physical group of the volume too, as Gmsh "
+    "saves only what is in a group"
+)
 
 
 def read_mesh(
@@ -86,8 +81,8 @@ def read_mesh(
     physical volumes; in other formats from sets of solid cells and integer data on them. Elements
     of higher order are read as linear ones. Hexahedra, prisms and pyramids are cut into tetrahedra
     after welding. Groups of points and lines are not read. A UserWarning tells of what may change
-    results: Abaqus sets and surfaces that are not read, cells of types that meshio does not know,
-    and cells that meet but share no face.
+    results: sets of some points, which are not read, cells of types that meshio does not know, and
+    cells that meet but share no face.
 
     Examples
     --------
@@ -96,24 +91,23 @@ def read_mesh(
     """
     scale, path = positive("scale", scale), path_name("path", path)
     raw, printed = _read_raw(path)
-    refuse_uncut(raw, path)
-    if not any(is_solid(block.type) and len(block.data) for block in raw.cells):
-        refuse_without_tetrahedra(raw, path, printed)
-    unread = (*unread_groups(raw), *surfaces_of_abaqus(path))
+    _refuse_unreadable(raw, path, printed)
     try:
         mesh = _mesh(raw, scale, weld_tolerance, keep_coincident)
     except InputError as error:
-        cells = _cell_at_fault(raw) if "tetrahedra " in str(error) else ""
-        raise InputError(f"mesh file {path}: {error}{cells}") from None
+        raise InputError(f"mesh file {path}: {error}") from None
     edge = np.median(edge_lengths(mesh.points, mesh.tetrahedra))
     in_unit(f"median edge of mesh file {path} at scale={scale:g}", float(edge), EDGE)
-    told = [cells_dropped(printed), *parts_dropped(raw, unread)]
-    told.append(unbonded_places(mesh.points, mesh.tetrahedra))
+    unread = unread_groups(raw, mesh)
+    notes = [f"the groups {', '.join(unread)} are not read: {_NEEDED}"] if unread else []
+    told = [_of_dropped_cells(printed), unbonded_places(mesh.points, mesh.tetrahedra)]
+    # A set of all points is a program's own, one of some was meant for something.
+    told += notes if any(len(some) < len(raw.points) for some in raw.point_sets.values()) else []
     told = [sentence for sentence in told if sentence]
     for sentence in told:
         warnings.warn(f"mesh file {path}: {sentence}", stacklevel=2)
-    notes = (*others_dropped(raw, unread), *told, *mesh.notes)
-    return replace(mesh, notes=notes, source=path, unread=unread)
+    notes = [*dict.fromkeys((*notes, *told)), *mesh.notes]
+    return replace(mesh, notes=tuple(notes), source=path, unread=unread)
 
 
 def write_mesh(path: FileName, mesh: Mesh) -> None:
@@ -160,8 +154,6 @@ def write_pvd(path: FileName, times_s: Sequence[float], file_names: Sequence[str
 
     times_s: time of each file [s].  file_names: relative to the folder of ``path``.
     """
-    if len(times_s) != len(file_names):
-        raise InputError(f"{path}: {len(times_s)} times, but {len(file_names)} file names")
     sets = [
         f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(str(name))}/>'
         for time, name in zip(map(float, times_s), file_names)
@@ -180,26 +172,17 @@ def _read_raw(path):
         problem = "is no file" if os.path.lexists(path) else "does not exist"
         problem = "is a folder" if os.path.isdir(path) else problem
         raise InputError(f"mesh file {path} {problem}")
-    _refuse_if_gmsh(path)
     said = io.StringIO()
     seconds = _PATIENCE_S + os.path.getsize(path) / _SLOWEST_BYTES_PER_S
     sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
     try:
+        if path.lower().endswith(".msh"):
+            refuse_bad_gmsh(path)
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             return run_with_timeout(seconds, lambda: _meshio_read(path), sentence), said.getvalue()
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
-        reason = reason_of(error, said.getvalue())
+        reason = _reason_of(error, said.getvalue())
         raise InputError(f"mesh file {path} cannot be read: {reason}") from None
-
-
-def _refuse_if_gmsh(path):
-    """Check a Gmsh file before it is read."""
-    if path.lower().endswith(".msh"):
-        try:
-            refuse_bad_gmsh(path)
-        except OSError as error:
-            reason = error.strerror or error
-            raise InputError(f"mesh file {path} cannot be read: {reason}") from None
 
 
 def _meshio_read(path):
@@ -210,109 +193,67 @@ def _meshio_read(path):
             return keyed_by_dimension(meshio.read(copy), names)
 
 
+def _reason_of(error, printed):
+    """Why a reader failed, in words: an exception may hold a number only."""
+    text = " ".join(str(error).split())
+    if isinstance(error, SystemExit):
+        text = " ".join(printed.replace("Error: ", "").split())
+    named = text if re.search(r"[^\W\d]", text) else f"{type(error).__name__} {text}"
+    return _of_dropped_cells(text) or named.strip()
+
+
+def _of_dropped_cells(printed):
+    """A sentence about cells that meshio ignores, or ""; printed: its message."""
+    if "cells that meshio cannot handle" not in " ".join(printed.split()):
+        return ""
+    return f"it {_UNKNOWN}, and these are not read: {_SPLIT}"
+
+
+def _refuse_unreadable(raw, path, printed):
+    """Refuse solid cells that cannot be cut, which would leave holes, and files without any."""
+    held = {block.type: block.dim for block in raw.cells if len(block.data)}
+    others = sorted(kind for kind in held if held[kind] == 3 and not shape_of(kind))
+    if others:
+        raise InputError(
+            f"mesh file {path} holds {', '.join(others)} cells, which cannot be read: {_SPLIT}"
+        )
+    if not blocks_of(raw, 3):
+        remedy = f"{_IN_A_GROUP}, or fill a closed surface by taichi_dem.shapes.from_surface"
+        remedy = _of_dropped_cells(printed) or remedy
+        kinds = ", ".join(sorted(held)) or "no cells"
+        raise InputError(f"mesh file {path} holds no tetrahedra (it holds: {kinds}): {remedy}")
+
+
 def _mesh(raw, scale, weld_tolerance, keep_coincident):
     """The mesh of a file's cells, cut once their points are welded; raw gets the welded numbers."""
-    notes: list[str] = []
+    with np.errstate(over="ignore"):  # numbers that are not finite are refused
+        points = checked_points(scale * np.asarray(raw.points, dtype=np.float64))
     welding: list[str] = []
-    with np.errstate(over="ignore"):  # checked_mesh refuses numbers that are not finite
-        points = scale * np.asarray(raw.points, dtype=np.float64)
-    tetrahedra = _tetrahedra(raw, notes)
-    label = welded_numbers(points, tetrahedra, weld_tolerance, welding)
+    bodies = bodies_in(raw, points)
+    label = weld_labels(points, bodies.tetrahedra, weld_tolerance, welding)
     if welding:
-        _renumber(raw, label)
-        notes.clear()
-        tetrahedra = _tetrahedra(raw, notes)
+        for _, block in (*blocks_of(raw, 2), *blocks_of(raw, 3)):
+            corners = corners_of(block, len(points))
+            block.data = np.hstack([label[corners], block.data[:, corners.shape[1] :]])
+        bodies = bodies_in(raw, points)
     kept = {"keep_coincident": keep_coincident}
-    mesh = checked_mesh(points, tetrahedra, _groups(raw), **kept)
-    bodies = body_groups_of(raw)
-    if len(bodies) > 1:
-        notes.append(f"bodies are in the groups {', '.join(bodies)}, for materials of their own")
-    return replace(mesh, body_groups=bodies, notes=(*notes, *welding, *mesh.notes))
+    try:
+        mesh = checked_mesh(points, bodies.tetrahedra, face_groups_in(raw), **kept)
+    except InputError as error:
+        fault = fault_of_cells(raw, points) if "tetrahedra " in str(error) else ""
+        raise InputError(f"{error}; {fault}" if fault else str(error)) from None
+    groups = body_groups_in(raw, bodies)
+    notes = list(_cuts(raw, bodies))
+    if len(groups) > 1:
+        notes.append(f"bodies are in the groups {', '.join(groups)}, for materials of their own")
+    return replace(mesh, body_groups=groups, notes=(*notes, *welding, *mesh.notes))
 
 
-def _renumber(raw, label):
-    """Renumber the points of solid cells and faces, label (n,) by the old numbers.
-
-    Numbers of no point stay, to be refused later.
-    """
-    for block in raw.cells:
-        if len(block.data) and (is_solid(block.type) or _is_face(block.type)):
-            data = np.asarray(block.data)
-            known = (data >= 0) & (data < len(label))
-            block.data = np.where(known, label[np.where(known, data, 0)], data)
-
-
-def _cell_at_fault(raw):
-    """Meaning of an error for the file's cells, where some have been cut; else ""."""
-    cut = [block for block in raw.cells if len(block.data) and shape_of(block.type)]
-    finite = np.isfinite(raw.points).all() and np.shape(raw.points)[1:] == (3,)
-    for block in cut if finite else ():
-        if (block.data >= 0).all() and (block.data < len(raw.points)).all():
-            sentence = folded_or_flat(raw.points, block.type, block.data)
-            if sentence:
-                return f"; these are tetrahedra that cells were cut into: {sentence}"
-    return "; tetrahedra are numbered after cells have been cut" if cut else ""
-
-
-def _tetrahedra(raw, notes):
-    """Corner points of all tetrahedra, (n, 4), those that other cells are cut into last."""
-    found, cut = [np.empty((0, 4), dtype=np.int64)], []
-    for block in (block for block in raw.cells if len(block.data)):
-        if is_tetrahedron(block.type):
-            found.append(block.data[:, :4])
-            if block.data.shape[1] > 4:
-                order = "second" if block.data.shape[1] == 10 else "higher"
-                notes.append(
-                    f"read {len(block.data)} {order}-order elements as linear {block.type}"
-                )
-        elif shape_of(block.type):
-            cut.append(tetrahedra_in(raw.points, block.type, block.data))
-            cells = cells_counted(len(block.data), block.type)
-            notes.append(f"cut {cells} into {len(cut[-1])} tetrahedra")
-    return np.vstack([*found, *cut])
-
-
-def _groups(raw):
-    """Named groups of triangles, name -> (n, 3)."""
-    found = defaultdict(list)
-    if "gmsh:physical" in raw.cell_data:
-        names = physical_names(raw, 2)
-        for faces, value in _labelled(raw, raw.cell_data["gmsh:physical"]):
-            if value > 0:  # 0: in no physical group
-                name = names.get(value) or made_name("physical", value, names.values())
-                found[name].append(faces)
-        # A surface in two groups: Gmsh 4.1 keeps one number a face, but the sets know of both.
-        found.update(_sets(raw))
-    else:
-        for key in raw.cell_data:
-            if not key.startswith("gmsh:"):  # numbers of drawn entities, no choice of the user
-                for faces, value in _labelled(raw, raw.cell_data[key]):
-                    found[f"{key}_{value}"].append(faces)
-    return {name: np.vstack(faces) for name, faces in found.items()}
-
-
-def _labelled(raw, data):
-    """Triangles that carry one integer value, as (faces (n, 3), value), for every value."""
-    for block, values in zip(raw.cells, map(np.asarray, data)):
-        if _is_face(block.type) and values.ndim == 1 and values.dtype.kind in "iu":
-            for value in np.unique(values):
-                yield _corners(block, values == value), value
-
-
-def _sets(raw):
-    """Triangles of the sets of physical surfaces, name -> list of (n, 3)."""
-    found = defaultdict(list)
-    for key in raw.field_data:
-        for block, members in zip(raw.cells, raw.cell_sets.get(key, ())):
-            if _is_face(block.type) and members is not None and len(members):
-                found[key.name].append(_corners(block, members))
-    return found
-
-
-def _is_face(kind):
-    return is_triangle(kind) or is_quadrangle(kind)
-
-
-def _corners(block, members):
-    """Triangles of some faces of a block, (n, 3); quadrangles as ``tetrahedra_in`` cuts them."""
-    return triangles_in(block.data[members, : 3 if is_triangle(block.type) else 4])
+def _cuts(raw, bodies):
+    """Notes on cells that are read as linear tetrahedra."""
+    for k, block in blocks_of(raw, 3):
+        made = int((bodies.block == k).sum())
+        if shape_of(block.type) != "tetra":
+            yield f"cut {counted(len(block), f'{block.type} cell')} into {made} tetrahedra"
+        elif block.data.shape[1] > 4:
+            yield f"read {made} {block.type} elements of higher order as linear ones"

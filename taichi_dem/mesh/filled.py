@@ -15,9 +15,9 @@ from taichi_dem.mesh.mesh import Mesh, checked_mesh
 #: Angle between triangles of an STL from which on an edge parts two surfaces [degrees].
 _EDGE_DEG = 40.0
 #: Most elements of a mesh: ten million tetrahedra take some ten GiB to check.
-MOST_BODIES = 10_000_000
-#: Tetrahedra that Gmsh makes in a cube of an element.
-_PER_CUBE = 8.5
+_MOST_BODIES = 10_000_000
+#: Tetrahedra in a cube of an element; Gmsh makes 8.5.
+_PER_CUBE = 8.7
 #: Endings of files, by how they are read.
 _DRAWN, _TRIANGLES = (".step", ".stp"), (".stl",)
 
@@ -33,24 +33,19 @@ def filled_surface(path: FileName, element: float, scale: float = 1.0) -> Mesh:
     with session("filled") as gmsh:
         drawn = name.lower().endswith(_DRAWN)
         if drawn:
-            _draw_solid(gmsh, name)
+            gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+            gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
+            gmsh.model.occ.importShapes(name)
+            gmsh.model.occ.synchronize()
+            if not gmsh.model.getEntities(3):
+                raise InputError(f"surface file {name} must hold a closed surface, got none")
         else:
             _draw_triangles(gmsh, name)
-        _refuse_too_many(name, element, scale, _drawn_volume(gmsh, drawn))
+        refuse_too_many(element, _drawn_volume(gmsh, drawn) * scale**3)
         gmsh.option.setNumber("Mesh.MeshSizeMin", element / scale)
         gmsh.option.setNumber("Mesh.MeshSizeMax", element / scale)
         gmsh.model.mesh.generate(3)
         return _mesh_of(gmsh, scale, name, drawn)
-
-
-def _draw_solid(gmsh: Any, name: str) -> None:
-    """Read a CAD file with its lengths in m."""
-    gmsh.option.setString("Geometry.OCCTargetUnit", "M")
-    gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
-    gmsh.model.occ.importShapes(name)
-    gmsh.model.occ.synchronize()
-    if not gmsh.model.getEntities(3):
-        raise InputError(f"surface file {name} must hold a solid, a closed surface, got none")
 
 
 def _drawn_volume(gmsh, drawn):
@@ -64,15 +59,14 @@ def _drawn_volume(gmsh, drawn):
     return abs(float(np.linalg.det(corners - corners[:1, :1]).sum())) / 6.0
 
 
-def _refuse_too_many(name, element, scale, volume):
-    """Raise InputError for more tetrahedra than there is memory for, before Gmsh makes them."""
-    volume = volume * scale**3
-    least = (_PER_CUBE * volume / MOST_BODIES) ** (1.0 / 3.0)
+def refuse_too_many(element: float, volume: float) -> None:
+    """Raise InputError for more tetrahedra in a volume [m3] than there is memory for."""
+    least = (_PER_CUBE * volume / _MOST_BODIES) ** (1.0 / 3.0)
     if element < least:
         got, bound = told_apart(element, least)
         raise InputError(
-            f"element must be at least {bound} m, for {MOST_BODIES} tetrahedra at most in the "
-            f"{volume:.3g} m^3 of {name}, got {got}"
+            f"element must be at least {bound} m, for {_MOST_BODIES} tetrahedra at most in "
+            f"{volume:.3g} m3, got {got}"
         )
 
 
@@ -94,9 +88,8 @@ def _refuse_open(gmsh, name):
     _, nodes = gmsh.model.mesh.getElementsByType(2)
     if not len(nodes):
         raise InputError(f"surface file {name} must hold triangles, got none")
-    corners = np.sort(nodes.reshape(-1, 3).astype(np.int64), axis=1)
-    edges = corners[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
-    count = np.unique(edges, axis=0, return_counts=True)[1]
+    corners = nodes.reshape(-1, 3)[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
+    count = np.unique(np.sort(corners, axis=1), axis=0, return_counts=True)[1]
     wrong = int((count != 2).sum())
     if wrong:
         raise InputError(
@@ -120,15 +113,15 @@ def _mesh_of(gmsh, scale, name, drawn):
 
 
 def _drawn_groups(gmsh, number):
-    """Faces of each surface of a CAD file, by its name."""
+    """Faces of each surface of a CAD file, by the last part of its name there, else its number."""
     groups: dict[str, np.ndarray] = {}
     for _, tag in gmsh.model.getEntities(2):
+        given = gmsh.model.getEntityName(2, tag).rsplit("/", 1)[-1].replace('"', "").strip()
+        key = given if given.isprintable() and given else f"surface_{tag}"
         _, corners = gmsh.model.mesh.getElementsByType(2, tag)
-        if len(corners):
-            faces = number[corners.astype(np.int64)].reshape(-1, 3)
-            key = _name_of(gmsh, tag)
-            groups[key] = np.vstack([groups[key], faces]) if key in groups else faces
-    return groups
+        faces = number[corners.astype(np.int64)].reshape(-1, 3)
+        groups[key] = np.vstack([groups.get(key, faces[:0]), faces])
+    return {name: faces for name, faces in groups.items() if len(faces)}
 
 
 def _smooth_parts(points, tetrahedra):
@@ -137,17 +130,8 @@ def _smooth_parts(points, tetrahedra):
     outer = faces[geometry.outer_rows(faces)]
     normal = geometry.area_vectors(points, outer)
     normal /= length(normal)[:, None]
-    edges = np.sort(outer[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
-    order = np.lexsort(edges.T)
-    same = (edges[order[1:]] == edges[order[:-1]]).all(axis=1)
-    pairs = np.stack([order[:-1][same], order[1:][same]], axis=1) // 3
-    smooth = dot(normal[pairs[:, 0]], normal[pairs[:, 1]]) > np.cos(np.radians(_EDGE_DEG))
-    label = geometry.components(len(outer), pairs[smooth])
+    first, second = geometry.pairs_at_edges(outer)
+    smooth = dot(normal[first], normal[second]) > np.cos(np.radians(_EDGE_DEG))
+    label = geometry.components(len(outer), np.stack([first[smooth], second[smooth]], axis=1))
     parts = (outer[label == first] for first in np.unique(label))
     return {f"surface_{k}": part for k, part in enumerate(parts, 1)}
-
-
-def _name_of(gmsh, tag):
-    """Last part of the name that a CAD program gave a surface, else its number."""
-    given = gmsh.model.getEntityName(2, tag).rsplit("/", 1)[-1].replace('"', "").strip()
-    return given if given.isprintable() and given else f"surface_{tag}"

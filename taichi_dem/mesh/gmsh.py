@@ -6,13 +6,12 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done
-from taichi_dem.kit.validation import FileName, finite, path_name, plain_fields, positive, shown
+from taichi_dem.kit.validation import FileName, finite, path_name, positive, shown, whole
 
 #: Options that could make two runs of the same Gmsh differ, or change the elements.
 _OPTIONS = {
@@ -38,55 +37,13 @@ _OPTIONS = {
 _MOST_SEGMENTS = 10000
 
 
-@dataclass(frozen=True)
-class _Block:
-    """Shape and element sizes of a block with a hole [m]; checked."""
-
-    width: float
-    height: float
-    depth: float
-    hole: tuple
-    hole_diameter: float
-    hole_segments: int
-    size_hole: float
-    size_far: float
-    distance_far: float
-
-    def __post_init__(self):
-        plain_fields(self)
-        sizes = ("size_hole", "size_far", "distance_far")
-        for name in ("width", "height", "depth", "hole_diameter", *sizes):
-            object.__setattr__(self, name, positive(name, getattr(self, name)))
-        segments = self.hole_segments
-        if type(segments) is not int or not 4 <= segments <= _MOST_SEGMENTS or segments % 4:
-            raise InputError(
-                f"hole_segments must be 4, 8, 12, ... up to {_MOST_SEGMENTS} (four equal arcs), "
-                f"got {shown(segments)}"
-            )
-        self._check_hole()
-
-    def _check_hole(self):
-        """Raise InputError unless the hole's axis leaves a wall on all four sides."""
-        margin = 0.5 * self.hole_diameter
-        right, top = self.width - margin, self.height - margin
-        two = isinstance(self.hole, (tuple, list)) and len(self.hole) == 2
-        numeric = two and all(finite(c) for c in self.hole)
-        if not (numeric and margin < self.hole[0] < right and margin < self.hole[1] < top):
-            raise InputError(
-                f"hole must be (x, y) with x in ({margin:g}, {right:g}) m and "
-                f"y in ({margin:g}, {top:g}) m, got {shown(self.hole)}"
-            )
-        # Gmsh ends the process on a number that it cannot read, such as np.float64(0.5).
-        object.__setattr__(self, "hole", tuple(float(c) for c in self.hole))
-
-
 def block_with_hole(
     path: FileName,
     *,
     width: float = 2.0,
     height: float = 2.0,
     depth: float = 0.2,
-    hole: tuple[float, float] = (1.6, 1.0),
+    hole: Sequence[float] = (1.6, 1.0),
     hole_diameter: float = 0.05,
     hole_segments: int = 8,
     size_hole: float = 0.055,
@@ -109,23 +66,35 @@ def block_with_hole(
     path = path_name("path", path)
     if not path.endswith(".msh"):
         raise InputError(f"the name of the mesh file must end in .msh, got {path}")
-    block = _Block(
-        width,
-        height,
-        depth,
-        hole,
-        hole_diameter,
-        hole_segments,
-        size_hole,
-        size_far,
-        distance_far,
-    )
+    sizes = {"width": width, "height": height, "depth": depth, "hole_diameter": hole_diameter}
+    grading = {"size_hole": size_hole, "size_far": size_far, "distance_far": distance_far}
+    box = [positive(name, value) for name, value in sizes.items()]
+    near, far, distance = (positive(name, value) for name, value in grading.items())
+    centre = _checked_hole(hole, *box)
+    chords, rest = divmod(whole("hole_segments", hole_segments, 4, _MOST_SEGMENTS), 4)
+    if rest:
+        raise InputError(f"hole_segments must be 4, 8, 12, ..., got {hole_segments}")
     with session("block_with_hole") as gmsh:
-        _add_geometry(gmsh.model, block)
-        _add_sizes(gmsh.model.mesh.field, block)
+        walls = _add_geometry(gmsh.model, centre, *box)
+        _divide_walls(gmsh.model, walls, chords, max(1, round(box[2] / near)))
+        _add_sizes(gmsh.model.mesh.field, centre, 0.5 * box[3], near, far, distance)
         gmsh.model.mesh.generate(3)
         with renamed_when_done(path) as temporary:
             gmsh.write(temporary)
+
+
+def _checked_hole(hole, width, height, depth, diameter):
+    """Place of the hole's axis, which leaves a wall on all four sides."""
+    margin = 0.5 * diameter
+    right, top = width - margin, height - margin
+    two = isinstance(hole, (tuple, list)) and len(hole) == 2 and all(map(finite, hole))
+    if not (two and margin < hole[0] < right and margin < hole[1] < top):
+        raise InputError(
+            f"hole must be (x, y) with x in ({margin:g}, {right:g}) m and "
+            f"y in ({margin:g}, {top:g}) m, got {shown(hole)}"
+        )
+    # Gmsh ends the process on a number that it cannot read, such as np.float64(0.5).
+    return float(hole[0]), float(hole[1])
 
 
 @contextlib.contextmanager
@@ -155,43 +124,30 @@ def session(name: str) -> Iterator[Any]:
             gmsh.finalize()
 
 
-def _add_geometry(model, block):
-    """Front view with its hole, drawn at z = 0 and drawn out along z; physical groups."""
-    geo = model.geo
-    outline = _outline(geo, block)
-    circle = _circle(geo, block)
+def _add_geometry(model, hole, width, height, depth, diameter):
+    """Front view with its hole, drawn at z = 0 and drawn out along z; groups. The hole's walls."""
+    geo, (x, y), r = model.geo, hole, 0.5 * diameter
+    corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
+    quarters = [(x + r, y), (x, y + r), (x - r, y), (x, y - r)]
+    corners = [geo.addPoint(*place, 0.0) for place in corners]
+    middle = geo.addPoint(x, y, 0.0)
+    ends = [geo.addPoint(*place, 0.0) for place in quarters]
+    # Anticlockwise from the lower left corner: bottom, right, top, left.
+    outline = [geo.addLine(corners[k], corners[(k + 1) % 4]) for k in range(4)]
+    circle = [geo.addCircleArc(ends[k], middle, ends[(k + 1) % 4]) for k in range(4)]
     back = geo.addPlaneSurface([geo.addCurveLoop(outline), geo.addCurveLoop(circle)])
-    drawn = geo.extrude([(2, back)], 0.0, 0.0, block.depth)
-    front, volume, *sides = [tag for _, tag in drawn]
+    front, volume, *sides = [tag for _, tag in geo.extrude([(2, back)], 0.0, 0.0, depth)]
     geo.synchronize()
-    _divide_walls(model, sides[4:], block)
     faces = dict(zip(("bottom", "right", "top", "left"), ([tag] for tag in sides[:4])))
     faces.update(hole=sides[4:], back=[back], front=[front])
     model.addPhysicalGroup(3, [volume], name="block")
     for name, tags in faces.items():
         model.addPhysicalGroup(2, tags, name=name)
+    return sides[4:]
 
 
-def _outline(geo, block):
-    """Four lines anticlockwise, from the lower left corner: bottom, right, top, left."""
-    w, h = block.width, block.height
-    corners = [geo.addPoint(x, y, 0.0) for x, y in ((0, 0), (w, 0), (w, h), (0, h))]
-    return [geo.addLine(corners[k], corners[(k + 1) % 4]) for k in range(4)]
-
-
-def _circle(geo, block):
-    """Four quarter arcs."""
-    x, y = block.hole
-    r = 0.5 * block.hole_diameter
-    centre = geo.addPoint(x, y, 0.0)
-    ends = [geo.addPoint(x + a * r, y + b * r, 0.0) for a, b in ((1, 0), (0, 1), (-1, 0), (0, -1))]
-    return [geo.addCircleArc(ends[k], centre, ends[(k + 1) % 4]) for k in range(4)]
-
-
-def _divide_walls(model, walls, block):
-    """Regular triangles on the hole's walls: chords around it, layers of size_hole along it."""
-    chords = block.hole_segments // 4
-    layers = max(1, round(block.depth / block.size_hole))
+def _divide_walls(model, walls, chords, layers):
+    """Regular triangles on the hole's walls: chords of each around it, layers along it."""
     for wall in walls:
         for _, curve in model.getBoundary([(2, wall)], combined=False):
             arc = model.getType(1, abs(curve)) == "Circle"
@@ -200,14 +156,11 @@ def _divide_walls(model, walls, block):
         model.mesh.setTransfiniteSurface(wall, "AlternateRight")
 
 
-def _add_sizes(field, block):
+def _add_sizes(field, hole, radius, near, far, distance):
     """Element size: linear in the distance from the hole's wall."""
-    x, y = block.hole
-    radius = 0.5 * block.hole_diameter
-    growth = (block.size_far - block.size_hole) / block.distance_far
-    distance = f"Max(Sqrt((x-{x!r})^2+(y-{y!r})^2)-{radius!r}, 0)"
-    low, high = sorted((block.size_hole, block.size_far))
-    size = f"Min(Max({block.size_hole!r}+{growth!r}*{distance}, {low!r}), {high!r})"
+    (x, y), growth = hole, (far - near) / distance
+    away = f"Max(Sqrt((x-{x!r})^2+(y-{y!r})^2)-{radius!r}, 0)"
+    low, high = sorted((near, far))
     tag = field.add("MathEval")
-    field.setString(tag, "F", size)
+    field.setString(tag, "F", f"Min(Max({near!r}+{growth!r}*{away}, {low!r}), {high!r})")
     field.setAsBackgroundMesh(tag)

@@ -8,10 +8,9 @@ import numpy as np
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import flag, instance, shown, word
 from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.check import COINCIDENT, joined_bodies, weld_labels
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
-from taichi_dem.mesh.parts import parts_of
 from taichi_dem.mesh.shapes import placed_together
-from taichi_dem.mesh.weld import COINCIDENT, weld_labels
 
 #: Names of meshes that get none.
 _NAMES = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
@@ -92,20 +91,17 @@ def _refuse_clashes(parts):
 def _bonded(mesh):
     """The mesh with points at one place made one, so that faces on them are shared."""
     shortest = geometry.edge_lengths(mesh.points, mesh.tetrahedra).min()
-    label = weld_labels(mesh.points, mesh.tetrahedra, _WELD * shortest)
+    label = weld_labels(mesh.points, mesh.tetrahedra, _WELD * shortest, [])
     tetrahedra = label[mesh.tetrahedra]
     groups = {name: label[faces] for name, faces in mesh.groups.items()}
-    faces = geometry.all_faces(tetrahedra)
-    number = geometry.face_numbers(np.vstack([faces, *groups.values()]))
-    shared = np.bincount(number[: len(faces)], minlength=number.max() + 1) == 2
-    start = len(faces)
-    for name, own in groups.items():
-        inner = shared[number[start : start + len(own)]]
-        start += len(own)
+    number, *members = geometry.numbers_in(geometry.all_faces(tetrahedra), *groups.values())
+    shared = np.flatnonzero(np.bincount(number) == 2)
+    for (name, own), mine in zip(mesh.groups.items(), members):
+        inner = np.isin(mine, shared)
         if not inner.all():
-            groups[name] = own[~inner]
+            groups[name] = label[own[~inner]]
     made = checked_mesh(mesh.points, tetrahedra, groups, body_groups=mesh.body_groups)
-    before, after = (len(np.unique(parts_of(one))) for one in (mesh, made))
+    before, after = (len(np.unique(joined_bodies(one.tetrahedra))) for one in (mesh, made))
     if after == before:
         raise InputError(
             "bonded must be False for meshes that share no face: their points must lie on each "

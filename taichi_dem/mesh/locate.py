@@ -24,7 +24,7 @@ def body_at(mesh: Mesh, name: str, point: np.ndarray) -> int:
     Raises
     ------
     InputError
-        For a point in no body, with the nearest body and its distance.
+        For a point in no body, with the nearest body and the distance of its centre.
     """
     corners = mesh.points[geometry.all_faces(mesh.tetrahedra)]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -33,21 +33,8 @@ def body_at(mesh: Mesh, name: str, point: np.ndarray) -> int:
     holding = np.flatnonzero(outside <= _ROUNDING * np.ptp(mesh.points, axis=0).max())
     if len(holding):
         return int(holding[0])
-    away = _distances(point, corners)
-    nearest = int(away.argmin())
+    away = length(mesh.points[mesh.tetrahedra].mean(axis=1) - point)
     raise InputError(
-        f"{name} must lie in a body, got ({point[0]:g}, {point[1]:g}, {point[2]:g}) m, which is "
-        f"{away[nearest]:.3g} m from the nearest, body {nearest // 4}"
+        f"{name} must lie in a body, got ({point[0]:g}, {point[1]:g}, {point[2]:g}) m; the centre "
+        f"of the nearest, body {away.argmin()}, is {away.min():.3g} m away"
     )
-
-
-def _distances(point, corners):
-    """Distances of a point from triangles (n, 3, 3) [m], (n,)."""
-    sides = corners[:, [1, 2, 0]] - corners
-    normal = np.cross(sides[:, 0], sides[:, 1])
-    normal /= length(normal)[:, None]
-    arms = point - corners
-    above = np.all(dot(np.cross(sides, arms), normal[:, None]) >= 0.0, axis=1)
-    share = np.clip(dot(arms, sides) / dot(sides, sides), 0.0, 1.0)
-    to_sides = length(arms - share[..., None] * sides).min(axis=1)
-    return np.where(above, np.abs(dot(arms[:, 0], normal)), to_sides)

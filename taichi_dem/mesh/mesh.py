@@ -14,32 +14,13 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import (
-    FileName,
-    flag,
-    fraction,
-    instance,
-    path_name,
-    shown,
-    told_apart,
-    word,
-)
+from taichi_dem.kit.validation import FileName, flag, fraction, instance, path_name, shown
 from taichi_dem.mesh import tetrahedra as geometry
-from taichi_dem.mesh.body_groups import checked_body_groups
-from taichi_dem.mesh.checked_groups import checked_groups
+from taichi_dem.mesh.check import checked_arrays, checked_body_groups, joined_bodies
 from taichi_dem.mesh.mesh_methods import MeshMethods
-from taichi_dem.mesh.parts_in_files import parts_of
-from taichi_dem.mesh.sharing import refuse_bad_sharing
-from taichi_dem.mesh.weld import COINCIDENT, weld_labels
-
-#: Share of (longest edge)^3 below which a volume counts as zero, as it may be round-off.
-FLAT = 1e-12
 
 #: First words of the notes on what has been mended.
 _MENDING = ("welded", "dropped", "turned")
-
-#: The extent of a mesh lies between these [m]: a moment of inertia is its fifth power.
-_LEAST_EXTENT, _MOST_EXTENT = 1e-30, 1e30
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +43,8 @@ class Mesh(MeshMethods):
         Sentences about what the checks repaired or found remarkable.
     source : str, default ""
         Name of the file; ``""`` for a mesh built in memory.
-    unread : tuple of tuple of (str, str), default ()
-        Groups of the file that are neither of faces nor of bodies: pairs of name and kind.
+    unread : tuple of str, default ()
+        Names of the groups of the file that are neither of faces nor of bodies.
     keep_coincident : bool, default False
         Whether points that coincide stay apart, and with them the faces on them, as at a joint or a
         crack.
@@ -95,7 +76,7 @@ class Mesh(MeshMethods):
     groups: Mapping[str, np.ndarray]
     notes: tuple[str, ...] = ()
     source: str = ""
-    unread: tuple[tuple[str, str], ...] = ()
+    unread: tuple[str, ...] = ()
     keep_coincident: bool = False
     body_groups: Mapping[str, np.ndarray] = field(default_factory=dict)
 
@@ -105,9 +86,7 @@ class Mesh(MeshMethods):
         for name in ("notes", "unread"):
             instance(name, getattr(self, name), tuple)
         instance("source", self.source, (str, os.PathLike))
-        given = self.points, self.tetrahedra, self.groups, 0.0
-        parts = _checked(*given, self.keep_coincident, notes)
-        self._hold(parts, checked_body_groups(self.body_groups, len(parts[1])))
+        self._hold(self.points, self.tetrahedra, self.groups, self.body_groups, 0.0, notes)
         mended = [note for note in notes if note.split()[0] in _MENDING]
         if mended:
             raise InputError(f"a Mesh takes what checked_mesh gives, which here {mended[0]}")
@@ -116,25 +95,26 @@ class Mesh(MeshMethods):
     bonded_shares: ClassVar[tuple[tuple[str, float], ...]] = ()
     inner_groups: ClassVar[tuple[str, ...]] = ()
 
-    def _hold(self, parts, body_groups):
-        """Keep arrays that cannot be written to; parts: what ``_checked`` gives."""
-        points, tetrahedra, groups, inner_groups = parts
-        object.__setattr__(self, "inner_groups", inner_groups)
-        for array in (points, tetrahedra, *groups.values(), *body_groups.values()):
-            array.setflags(write=False)
-        for name, value in zip(("points", "tetrahedra"), (points, tetrahedra)):
-            object.__setattr__(self, name, value)
-        object.__setattr__(self, "groups", MappingProxyType(dict(groups)))
-        object.__setattr__(self, "body_groups", MappingProxyType(dict(body_groups)))
+    def _hold(self, points, tetrahedra, groups, body_groups, tolerance, notes):
+        """Keep checked arrays; notes: a list to which sentences on repairs are added."""
+        arrays = checked_arrays(points, tetrahedra, groups, tolerance, self.keep_coincident, notes)
+        names = "points", "tetrahedra", "groups", "inner_groups", "body_groups"
+        bodies = checked_body_groups(body_groups, len(arrays[1]))
+        self.__setstate__({**vars(self), **dict(zip(names, (*arrays, bodies)))})
 
     def __getstate__(self) -> dict[str, Any]:
-        named = {"groups": dict(self.groups), "body_groups": dict(self.body_groups)}
-        return {**vars(self), **named}
+        return {**vars(self), "groups": dict(self.groups), "body_groups": dict(self.body_groups)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        parts = self.points, self.tetrahedra, self.groups, self.inner_groups
-        self._hold(parts, self.body_groups)
+        groups, body_groups = state["groups"], state["body_groups"]
+        held = state["points"], state["tetrahedra"], *groups.values(), *body_groups.values()
+        for array in held:
+            array.setflags(write=False)
+        read_only = {
+            "groups": MappingProxyType(groups),
+            "body_groups": MappingProxyType(body_groups),
+        }
+        self.__dict__.update({**state, **read_only})
 
     def __repr__(self):
         groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
@@ -171,13 +151,7 @@ class Mesh(MeshMethods):
         InputError
             There is no such group.
         """
-        if not isinstance(name, str) or name not in self.groups:
-            known = ", ".join(sorted(self.groups)) or "none"
-            kinds = ["bodies"] * (isinstance(name, str) and name in self.body_groups)
-            kinds += [kind for other, kind in self.unread if other == name]
-            why = f" ({name} is a group of {kinds[0]}: make one of faces)" if kinds else ""
-            raise InputError(f"mesh has no face group {shown(name)}{why}; its groups are: {known}")
-        return self.groups[name]
+        return self._members("face", self.groups, name, (*self.body_groups, *self.unread))
 
     def group_bodies(self, name: str) -> np.ndarray:
         """Bodies of a group.
@@ -197,14 +171,18 @@ class Mesh(MeshMethods):
         InputError
             There is no such group.
         """
-        if not isinstance(name, str) or name not in self.body_groups:
-            known = ", ".join(sorted(self.body_groups)) or "none"
-            of_faces = isinstance(name, str) and name in self.groups
-            why = f" ({name} is a group of faces: make one of bodies)" if of_faces else ""
-            raise InputError(
-                f"mesh has no body group {shown(name)}{why}; its body groups are: {known}"
-            )
-        return self.body_groups[name]
+        return self._members("body", self.body_groups, name, self.groups)
+
+    def _members(self, kind, groups, name, others):
+        if isinstance(name, str) and name in groups:
+            return groups[name]
+        known = ", ".join(sorted(groups)) or "none"
+        why = (
+            f" ({name} is one of another kind)" if isinstance(name, str) and name in others else ""
+        )
+        raise InputError(
+            f"mesh has no {kind} group {shown(name)}{why}; its {kind} groups are: {known}"
+        )
 
     def bonded_by(self, shares: Mapping[str, float]) -> "Mesh":
         """Return the mesh with only a share of the area of some inner faces bonded.
@@ -312,176 +290,12 @@ def checked_mesh(
     flag("keep_coincident", keep_coincident)
     if source != "":
         path_name("source", source)
-    parts = _checked(points, tetrahedra, groups, weld_tolerance, keep_coincident, notes)
-    _note_parts(parts[1], notes)
     made = object.__new__(Mesh)
-    made.__dict__.update(notes=tuple(notes), source=str(source), unread=())
-    made.__dict__.update(keep_coincident=keep_coincident)
-    made._hold(
-        parts, checked_body_groups({} if body_groups is None else body_groups, len(parts[1]))
-    )
-    return made
-
-
-def _checked(points, tetrahedra, groups, weld_tolerance, keep_coincident, notes):
-    """Points, tetrahedra and groups as ``checked_mesh`` wants them; notes: of what was mended."""
-    places = _checked_points(points)
-    corners = _checked_indices("tetrahedra", tetrahedra, 4, len(places))
-    faces = _checked_groups(groups, len(places))
-    label = welded_numbers(places, corners, weld_tolerance, notes)
-    corners, faces = label[corners], {name: label[faces[name]] for name in faces}
-    places, corners, faces = _without_loose_points(places, corners, faces, notes)
-    _refuse_extent(places)
-    if not keep_coincident:
-        _refuse_coincident(places)
-    corners = _positive(places, corners, notes)
-    refuse_bad_sharing(corners)
-    if keep_coincident:
-        _check_coincident(places, corners, weld_tolerance, notes)
-    return places, corners, *checked_groups(corners, faces, notes)
-
-
-def welded_numbers(
-    points: ArrayLike, tetrahedra: ArrayLike, tolerance: float, notes: list[str]
-) -> np.ndarray:
-    """For every point the first of those that become one with it, (n,) int32.
-
-    points, tetrahedra, tolerance: as for ``checked_mesh``, with the same errors. notes: a list to
-    which a sentence is added where points become one.
-    """
-    points = _checked_points(points)
-    tetrahedra = _checked_indices("tetrahedra", tetrahedra, 4, len(points))
-    label = weld_labels(points, tetrahedra, tolerance)
-    count = int(np.sum(label != np.arange(len(points))))
-    if count:
-        notes.append(f"welded {count} points closer than {tolerance:g} m to another")
-    return label.astype(np.int32)
-
-
-def _checked_points(points: Any) -> np.ndarray:
-    """Copy as (n, 3) float64, or InputError."""
-    try:
-        points = np.array(points)
-        points = points.astype(np.float64) if points.dtype.kind in "iuf" else None
-    except (TypeError, ValueError, OverflowError):
-        points = None
-    if points is None:
-        raise InputError("points must be an array of numbers, shape (n, 3)")
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"points must have shape (n, 3), got {points.shape}")
-    bad = np.flatnonzero(~(np.abs(points) <= _MOST_EXTENT).all(axis=1))
-    if len(bad):
-        raise InputError(
-            f"points must be finite, within {_MOST_EXTENT:g} m, but {len(bad)} are not, the first "
-            f"is number {bad[0]}: {points[bad[0]].tolist()}"
-        )
-    return points
-
-
-def _checked_groups(groups: Any, point_count: int) -> dict[str, np.ndarray]:
-    """Groups as a dict of name to (n, 3) int32, or InputError."""
-    if not isinstance(groups, Mapping):
-        raise InputError(f"groups must be a dict of name to faces, got {shown(groups)}")
-    return {
-        word("name of a group", name): _checked_indices(f"group {name!r}", faces, 3, point_count)
-        for name, faces in groups.items()
-    }
-
-
-def _checked_indices(what: str, indices: Any, width: int, point_count: int) -> np.ndarray:
-    """Copy as (n, width) int32 with all values in range, or InputError."""
-    try:
-        indices = np.asarray(indices)
-    except ValueError:
-        raise InputError(f"{what} must be rows of {width} point numbers each") from None
-    if indices.size == 0:
-        raise InputError(f"{what} must not be empty")
-    if indices.ndim != 2 or indices.shape[1] != width:
-        raise InputError(f"{what} must have shape (n, {width}), got {indices.shape}")
-    if indices.dtype.kind not in "iu":
-        raise InputError(f"{what} must hold integer point numbers, got {indices.dtype}")
-    bad = np.flatnonzero(((indices < 0) | (indices >= point_count)).any(axis=1))
-    if len(bad):
-        raise InputError(
-            f"{what}: point numbers must lie in [0, {point_count - 1}], but row {bad[0]} is "
-            f"{indices[bad[0]].tolist()}"
-        )
-    return indices.astype(np.int32)
-
-
-def _without_loose_points(points, tetrahedra, groups, notes):
-    """Drop the points that no tetrahedron uses; a group's face that uses one gets -1 there."""
-    used = np.unique(tetrahedra)
-    if len(used) < len(points):
-        notes.append(f"dropped {len(points) - len(used)} points that belong to no tetrahedron")
-    new = np.full(len(points), -1, dtype=np.int32)
-    new[used] = np.arange(len(used), dtype=np.int32)
-    return points[used], new[tetrahedra], {name: new[faces] for name, faces in groups.items()}
-
-
-def _refuse_extent(points):
-    """Refuse a mesh so small that its inertia falls to zero."""
-    extent = np.ptp(points, axis=0).max()
-    if extent < _LEAST_EXTENT:
-        got, least = told_apart(extent, _LEAST_EXTENT)
-        raise InputError(f"points must span at least {least} m, got {got} m")
-
-
-def _refuse_coincident(points):
-    """Refuse coincident points: bodies that seem joined there would not be bonded."""
-    pairs, distance = _coincident(points)
-    if len(pairs):
-        first = points[pairs[0, 0]]
-        raise InputError(
-            f"{len(np.unique(pairs[:, 1]))} points coincide with another, the first at "
-            f"({first[0]:g}, {first[1]:g}, {first[2]:g}) m; pass "
-            f"weld_tolerance={2.0 * distance:.1e} to join them, or keep_coincident=True to keep "
-            "the faces on them apart"
-        )
-
-
-def _coincident(points):
-    """Pairs of points at one place, (n, 2), and the distance that counts as none [m]."""
-    distance = COINCIDENT * np.ptp(points, axis=0).max()
-    none = np.empty((0, 2), dtype=np.int64)
-    return geometry.close_pairs(points, distance) if distance > 0.0 else none, distance
-
-
-def _check_coincident(points, tetrahedra, weld_tolerance, notes):
-    """Say how many points are kept apart; refuse a wish to weld, and bodies in one place.
-
-    Joined where they coincide, the bodies must make a mesh that has no bodies in each other.
-    """
-    if weld_tolerance:
-        raise InputError(
-            f"weld_tolerance must be 0 with keep_coincident=True, got {shown(weld_tolerance)}"
-        )
-    pairs, _ = _coincident(points)
-    if len(pairs):
-        refuse_bad_sharing(geometry.components(len(points), pairs)[tetrahedra])
-        count = len(np.unique(pairs))
-        notes.append(f"kept {count} points apart that coincide with another: no bond joins them")
-
-
-def _positive(points, tetrahedra, notes):
-    """Turn negative volumes, refuse flat ones."""
-    volume = geometry.signed_volumes(points, tetrahedra)
-    longest = geometry.edge_lengths(points, tetrahedra).max(axis=1)
-    flat = np.flatnonzero(np.abs(volume) <= FLAT * longest**3)
-    if len(flat):
-        raise InputError(
-            f"{len(flat)} tetrahedra have no volume, the first is number {flat[0]} with "
-            f"{volume[flat[0]]:.3g} m3 (at least {FLAT:g} of its longest edge cubed is needed)"
-        )
-    negative = volume < 0.0
-    if negative.any():
-        notes.append(f"turned {int(negative.sum())} tetrahedra of negative volume")
-        tetrahedra = np.where(negative[:, None], tetrahedra[:, [0, 1, 3, 2]], tetrahedra)
-    return np.ascontiguousarray(tetrahedra, dtype=np.int32)
-
-
-def _note_parts(tetrahedra, notes):
-    """Say when the bodies are not all joined through shared faces."""
-    parts = len(np.unique(parts_of(tetrahedra)))
+    made.__dict__.update(source=str(source), unread=(), keep_coincident=keep_coincident)
+    bodies = {} if body_groups is None else body_groups
+    made._hold(points, tetrahedra, groups, bodies, weld_tolerance, notes)
+    parts = len(np.unique(joined_bodies(made.tetrahedra)))
     if parts > 1:
         notes.append(f"the mesh has {parts} parts that share no face with each other")
+    made.__dict__.update(notes=tuple(notes))
+    return made

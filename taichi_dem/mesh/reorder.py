@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 
 from taichi_dem.kit.validation import instance
-from taichi_dem.mesh.body_groups import renumbered
 from taichi_dem.mesh.mesh import Mesh
 
 #: Cells of the curve along the longest side of a mesh, as a power of two.
@@ -46,7 +45,8 @@ def in_space_order(mesh: Mesh) -> Mesh:
     """
     instance("mesh", mesh, Mesh)
     order = np.argsort(_morton(mesh.points[mesh.tetrahedra].mean(axis=1)), kind="stable")
-    groups = renumbered(mesh.body_groups, order)
+    place = np.argsort(order)
+    groups = {name: place[bodies] for name, bodies in mesh.body_groups.items()}
     return replace(mesh, tetrahedra=mesh.tetrahedra[order], body_groups=groups)
 
 

@@ -60,6 +60,12 @@ def face_numbers(faces: np.ndarray) -> np.ndarray:
     return number.reshape(-1)  # NumPy 2.0 returns a column
 
 
+def numbers_in(*faces: np.ndarray) -> list[np.ndarray]:
+    """``face_numbers`` of several arrays of faces, counted together, one array for each."""
+    ends = np.cumsum([len(rows) for rows in faces])[:-1]
+    return np.split(face_numbers(np.vstack(faces)), ends)
+
+
 def outer_rows(faces: np.ndarray) -> np.ndarray:
     """Rows of ``all_faces`` that are the face of one body only, in order, shape (n,)."""
     number = face_numbers(faces)
@@ -128,28 +134,31 @@ def close_pairs(points: np.ndarray, distance: float) -> np.ndarray:
     Two such points lie in one cell of at least one of eight cubic grids of cell size 4 distance,
     shifted by half a cell along each axis; so sorting by cell finds them without all pairs.
     """
-    found = [np.empty((0, 2), dtype=np.int64)]
+    found = []
     cell = 4.0 * distance
     low = points.min(axis=0)
     for shift in np.ndindex(2, 2, 2):
-        index = np.floor((points - low) / cell + 0.5 * np.array(shift))
-        found.append(_pairs_in_cells(points, index, distance))
+        first, second = _equal_rows(np.floor((points - low) / cell + 0.5 * np.array(shift)))
+        near = length(points[first] - points[second]) <= distance
+        found.append(np.sort(np.column_stack([first[near], second[near]]), axis=1))
     return np.unique(np.vstack(found), axis=0)
 
 
-def _pairs_in_cells(points, cell_index, distance):
-    """Close pairs among points of equal cell index (n, 3)."""
-    order = np.lexsort(cell_index.T)
-    in_order = cell_index[order]
-    found = [np.empty((0, 2), dtype=np.int64)]
-    for step in range(1, len(points)):
-        same = np.flatnonzero(np.all(in_order[step:] == in_order[:-step], axis=1))
+def pairs_at_edges(faces: np.ndarray) -> np.ndarray:
+    """Numbers of each two faces (n, 3) that have an edge in common, (2, pairs)."""
+    return _equal_rows(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)) // 3
+
+
+def _equal_rows(rows):
+    """Numbers of each two equal rows (n, ...), (2, pairs)."""
+    order = np.lexsort(rows.T)
+    rows, found = rows[order], [np.empty((2, 0), dtype=np.int64)]
+    for step in range(1, len(rows)):
+        same = np.flatnonzero((rows[step:] == rows[:-step]).all(axis=1))
         if len(same) == 0:
             break
-        pair = np.sort(np.column_stack([order[same], order[same + step]]), axis=1)
-        gap = length(points[pair[:, 0]] - points[pair[:, 1]])
-        found.append(pair[gap <= distance])
-    return np.vstack(found)
+        found.append(np.stack([order[same], order[same + step]]))
+    return np.hstack(found)
 
 
 @functools.cache

@@ -100,13 +100,11 @@ def _bonded_faces(mesh):
     if mesh.bonded_shares:
         faces = geometry.all_faces(mesh.tetrahedra)[rows[:, 0]]
         groups = [mesh.group_faces(name) for name, _ in mesh.bonded_shares]
-        number = geometry.face_numbers(np.vstack([faces, *groups]))
-        of_face, start = np.ones(number.max() + 1), len(faces)
-        for (_, least), group in zip(mesh.bonded_shares, groups):
-            mine = number[start : start + len(group)]
+        number, *members = geometry.numbers_in(faces, *groups)
+        of_face = np.ones(1 + max(map(np.max, (number, *members))))
+        for (_, least), mine in zip(mesh.bonded_shares, members):
             of_face[mine] = np.minimum(of_face[mine], least)
-            start += len(group)
-        share = of_face[number[: len(faces)]]
+        share = of_face[number]
     return rows[share > 0.0], share[share > 0.0]
 
 
@@ -135,16 +133,14 @@ def faces_of_group(mesh: Mesh, topology: Topology, name: str) -> tuple[np.ndarra
     Of inner faces without bonds both sides, one after the other. Raises InputError when the mesh
     has no such group, or bonds join its faces.
     """
-    wanted = mesh.group_faces(name)
     check_free(mesh, name)
-    if name in mesh.inner_groups:
-        return _sides_of(mesh, topology, wanted)
     outer = face_vertices(mesh, topology.outer_body, topology.outer_face)
-    number = geometry.face_numbers(np.vstack([outer, wanted]))
-    index_of = np.full(number.max() + 1, -1)
-    index_of[number[: len(outer)]] = np.arange(len(outer))
-    index = index_of[number[len(outer) :]]
-    return topology.outer_body[index], topology.outer_face[index]
+    number, wanted = geometry.numbers_in(outer, mesh.group_faces(name))
+    place = np.full(max(number.max(), wanted.max()) + 1, -1)
+    place[wanted] = np.arange(len(wanted))
+    found = np.flatnonzero(place[number] >= 0)
+    found = found[np.argsort(place[number[found]], kind="stable")]
+    return topology.outer_body[found], topology.outer_face[found]
 
 
 def check_free(mesh: Mesh, name: str) -> None:
@@ -154,17 +150,6 @@ def check_free(mesh: Mesh, name: str) -> None:
             f"group {name} must be of outer faces, or unbonded (Scene(unbonded=[{name!r}])), "
             "got inner faces that are bonded"
         )
-
-
-def _sides_of(mesh, topology, wanted):
-    """Free faces on both sides of inner faces, body and local face."""
-    outer = face_vertices(mesh, topology.outer_body, topology.outer_face)
-    number = geometry.face_numbers(np.vstack([outer, wanted]))
-    place = np.full(number.max() + 1, -1)
-    place[number[len(outer) :]] = np.arange(len(wanted))
-    found = np.flatnonzero(place[number[: len(outer)]] >= 0)
-    found = found[np.argsort(place[number[found]], kind="stable")]
-    return topology.outer_body[found], topology.outer_face[found]
 
 
 def mean_density(mesh: Mesh, density: Density) -> float:

@@ -145,14 +145,10 @@ class Receivers:
 
 def write_receivers(path: FileName, receivers: Mapping[str, Received]) -> None:
     """Write a CSV row for each receiver and time; InputError when it cannot be written."""
-    parts = receivers.values()
     names = [np.full(len(one.time_s), name) for name, one in receivers.items()]
-    columns: dict[str, np.ndarray] = {
-        "receiver": np.concatenate(names),
-        "time_s": np.concatenate([one.time_s for one in parts]),
-    }
-    for letter, unit in (("u", "m"), ("v", "m_s")):
-        rows = [one.displacement if letter == "u" else one.velocity for one in parts]
-        for axis, column in zip("xyz", np.vstack(rows).T):
-            columns[f"{letter}{axis}_{unit}"] = column
+    times = [one.time_s for one in receivers.values()]
+    columns = {"receiver": np.concatenate(names), "time_s": np.concatenate(times)}
+    for letter, unit, kind in (("u", "m", "displacement"), ("v", "m_s", "velocity")):
+        rows = np.vstack([getattr(one, kind) for one in receivers.values()])
+        columns.update({f"{letter}{axis}_{unit}": rows[:, k] for k, axis in enumerate("xyz")})
     write_csv(path, columns)

@@ -1,4 +1,4 @@
-"""Tables of a finished run: fragments, cracks, energy, attenuation."""
+"""What a finished run gives: tables, and files for other programs."""
 
 from typing import Any, Optional
 
@@ -6,11 +6,14 @@ import numpy as np
 
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import whole
+from taichi_dem.kit.validation import FileName, whole
 from taichi_dem.output.attenuation import Attenuation
-from taichi_dem.output.body_values import Bodies
+from taichi_dem.output.body_values import Bodies, shares_of_scale
 from taichi_dem.output.cracks import Rose, crack_area_at, cracks_of, rose_of
 from taichi_dem.output.energy_shares import energy_shares
+from taichi_dem.output.export.gltf import write_gltf
+from taichi_dem.output.export.particles import write_particles
+from taichi_dem.output.export.vtkhdf import write_vtkhdf
 from taichi_dem.output.fragments import Fragments, fragments_of
 from taichi_dem.output.hole_monitor import watched_group
 from taichi_dem.output.record import Frame
@@ -27,6 +30,7 @@ class RunTables:
     frames: tuple[Frame, ...]
     broken_time: np.ndarray
     peak_speed: np.ndarray
+    acting_since: dict[str, np.ndarray]
 
     def frame(self, number: int = -1) -> Frame:
         """Choose a frame.
@@ -171,3 +175,58 @@ class RunTables:
             Where there is no such frame.
         """
         return Bodies(self.model, self.frame(frame), self.broken_time, self.peak_speed)
+
+    def write_vtkhdf(self, path: FileName) -> None:
+        """Write all frames as one VTKHDF file for ParaView, with the data of the PVD series.
+
+        Parameters
+        ----------
+        path : str or path
+            Such as ``"run.vtkhdf"``.
+
+        Raises
+        ------
+        InputError
+            Where there are no frames, h5py is not installed, or the file cannot be written.
+        """
+        self.frame()
+        write_vtkhdf(path, self.model, self.frames, self.acting_since)
+
+    def write_xyz(self, path: FileName, of: str = "bodies") -> None:
+        """Write all frames as an extended XYZ file for OVITO.
+
+        Parameters
+        ----------
+        path : str or path
+            Such as ``"run.xyz"``.
+        of : {"bodies", "fragments"}
+            What a particle is (``taichi_dem.output.export.particles``).
+
+        Raises
+        ------
+        InputError
+            Where there are no frames, or the file cannot be written.
+        """
+        self.frame()
+        write_particles(path, self.model, self.frames, self.broken_time, of)
+
+    def write_gltf(self, path: FileName, colour: str = "peak_speed", seconds: float = 10.0) -> None:
+        """Write an animation for browsers and Blender; every fragment moves as a rigid piece.
+
+        Parameters
+        ----------
+        path : str or path
+            Such as ``"run.glb"``.
+        colour : str
+            One of ``taichi_dem.output.body_values.COLOURS``, in the last frame: violet is 0, yellow
+            the value that 2 % of the bodies exceed.
+        seconds : float
+            How long the animation lasts [s].
+
+        Raises
+        ------
+        InputError
+            Where there are no frames, or the file cannot be written.
+        """
+        shares = shares_of_scale(self.bodies(-1), colour)
+        write_gltf(path, self.model, self.frames, self.broken_time, shares, seconds)

@@ -1,56 +1,43 @@
-"""Pictures of the block: cracks (Konno et al., Fig 12) and steps (Fig 13)."""
+"""Pictures of the block: cracks (Konno et al., Fig 12), steps (Fig 13), where effects act."""
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Optional
 
-import matplotlib
 import numpy as np
-from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import ListedColormap
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from taichi_dem.kit.plot_style import area_key, picture
 from taichi_dem.kit.validation import FileName
-from taichi_dem.output.record import Frame, body_corners
-from taichi_dem.plot.levels import level_look, level_names
+from taichi_dem.output.record import Frame
+from taichi_dem.plot.bodies import (
+    ALONG_Z,
+    JOINT,
+    STONE,
+    break_times,
+    displaced,
+    draw_bodies,
+    draw_lines,
+    draw_stone,
+    frame_block,
+    shades,
+)
+from taichi_dem.plot.series import level_look, level_names
 from taichi_dem.plot.view import View, surface, traces
 from taichi_dem.state.model import Model
 
-STONE, JOINT, _INSIDE = "#E4E0D6", "#C9C3B5", "#B5AD9C"
-
-
-def displaced(model: Model, frame: Frame, magnify: float) -> np.ndarray:
-    """Corners of all bodies (body_count, 4, 3) [m], their displacement magnified."""
-    rest = model.mesh.points[model.mesh.tetrahedra]
-    return rest + magnify * (body_corners(model, frame) - rest)
-
-
-def break_times(model: Model, broken_time: Optional[np.ndarray]) -> np.ndarray:
-    """The times of breaking [s], (bond_count,); all NaN, unbroken, where none are given."""
-    return np.full(model.bond_count, np.nan) if broken_time is None else broken_time
-
-
-def frame_block(axes: Any, view: View, model: Model, margin: float = 0.05) -> None:
-    """Limits, equal scales and labels of a view of the whole block; margin: share of its size."""
-    flat = view.project(model.mesh.points)
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    pad = margin * (high - low).max()
-    axes.set(xlim=(low[0] - pad, high[0] + pad), ylim=(low[1] - pad, high[1] + pad))
-    axes.set_aspect("equal")
-    axes.locator_params(nbins=5)
-    axes.grid(False)
-
-
-def name_outer_axes(panels: np.ndarray, count: int, view: View) -> None:
-    """Labels and numbers of x below each column and of y on the left; hide all but count panels."""
-    columns = panels.shape[1]
-    for axes in panels.flat[count:]:
-        axes.set_axis_off()
-    for axes in panels.flat[max(0, count - columns) : count]:
-        axes.set_xlabel(view.labels()[0])
-        axes.tick_params(labelbottom=True)
-    for axes in panels[:, 0]:
-        axes.set_ylabel(view.labels()[1])
+_INSIDE = "#B5AD9C"
+_EDGE = "#00000030"
+#: Titles by name, as ``Simulation.acting_since`` names them.
+TITLES = {
+    "softening": "softening of a bond",
+    "slip": "slip of a bond",
+    "damage": "damage of a bond",
+    "contact": "contact",
+    "friction": "friction",
+    "awake": "body evaluated",
+}
 
 
 def plot_cracks(
@@ -59,7 +46,7 @@ def plot_cracks(
     frame: Frame,
     broken_time: np.ndarray,
     magnify: float = 5.0,
-    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    axis: Sequence[float] = ALONG_Z,
 ) -> Figure:
     """Broken faces by time of breaking, in the block at rest and as it is (Konno et al., Fig 12).
 
@@ -92,14 +79,12 @@ def plot_cracks(
 
 def draw_breaks(axes: Any, view: View, model: Model, broken_time: np.ndarray) -> Any:
     """Every broken face of the block at rest, also inside it; the earliest on top."""
-    rest = model.mesh.points[model.mesh.tetrahedra]
-    polygons, _, _ = surface(model.topology, view, rest, np.zeros(model.bond_count, dtype=bool))
-    axes.add_collection(PolyCollection(polygons, facecolor=STONE, edgecolor=JOINT, linewidth=0.4))
+    draw_stone(axes, view, model)
     broken = np.flatnonzero(~np.isnan(broken_time))
     broken = broken[np.argsort(-broken_time[broken], kind="stable")]
     triangles = view.project(model.mesh.points[model.topology.vertices[broken]])
-    lines = LineCollection(np.concatenate([triangles, triangles[:, :1]], axis=1), linewidth=0.9)
-    return _by_time(axes, lines, broken_time[broken])
+    outlines = np.concatenate([triangles, triangles[:, :1]], axis=1)
+    return draw_lines(axes, outlines, 1e3 * broken_time[broken], linewidth=0.9)
 
 
 def _deformed(axes, view, model, corners, broken_time):
@@ -110,17 +95,7 @@ def _deformed(axes, view, model, corners, broken_time):
     body, ends, time_s = traces(model.mesh, model.topology, view, broken_time)
     order = np.argsort(-time_s, kind="stable")
     segments = view.project(corners[body[:, None], ends])[order]
-    return _by_time(axes, LineCollection(segments, linewidth=1.1), time_s[order])
-
-
-def _by_time(axes, lines, time_s):
-    """Colour lines by time [ms], dark first; light yellow would vanish on the stone."""
-    shades = matplotlib.colormaps["plasma"](np.linspace(0.0, 0.88, 256))
-    lines.set_cmap(ListedColormap(shades))
-    lines.set_array(1e3 * time_s)
-    lines.set_capstyle("round")
-    axes.add_collection(lines)
-    return lines
+    return draw_lines(axes, segments, 1e3 * time_s[order], linewidth=1.1)
 
 
 def _close_up(axes, view, model, frame, broken_time):
@@ -135,13 +110,37 @@ def _close_up(axes, view, model, frame, broken_time):
     axes.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
 
 
+@contextlib.contextmanager
+def _panels(path, view, model, columns, rows, extra, names) -> Iterator[Any]:
+    """A panel of the whole block for each name, which is its title; labels at the outer ones.
+
+    extra: room around them [inch].
+    """
+    extent = np.ptp(view.project(model.mesh.points), axis=0)
+    height = 2.6 * float(np.clip(extent[1] / extent[0], 0.15, 2.0)) + extra[0]
+    size = 2.6 * columns + extra[1], height * rows + extra[2]
+    options = {"squeeze": False, "sharex": True, "sharey": True}
+    with picture(path, rows, columns, size=size, **options) as (figure, panels):
+        yield figure, panels
+        for axes, name in zip(panels.flat, names):
+            axes.set_title(name)
+            frame_block(axes, view, model, 0.03)
+        for axes in panels.flat[len(names) :]:
+            axes.set_axis_off()
+        for axes in panels.flat[max(0, len(names) - columns) : len(names)]:
+            axes.set_xlabel(view.labels()[0])
+            axes.tick_params(labelbottom=True)
+        for axes in panels[:, 0]:
+            axes.set_ylabel(view.labels()[1])
+
+
 def plot_steps(
     path: FileName,
     model: Model,
     frames: Sequence[Frame],
     dt0: float,
     broken_time: Optional[np.ndarray] = None,
-    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    axis: Sequence[float] = ALONG_Z,
 ) -> None:
     """Step of every body at several times (Konno et al., Fig 13).
 
@@ -154,20 +153,18 @@ def plot_steps(
         picked = np.linspace(0, len(frames), 7).round().astype(int)[1:] - 1
         frames = [frames[k] for k in picked]
     rows = 1 if len(frames) <= 3 else 2
-    columns = -(-len(frames) // rows)
     top = max(1, *(int(frame.level.max()) for frame in frames))
-    look = level_look(top + 1)
-    extent = np.ptp(view.project(model.mesh.points), axis=0)
-    height = 2.6 * np.clip(extent[1] / extent[0], 0.15, 2.0)
-    size = (2.6 * columns + 1.2, (height + 0.1) * rows + 0.6)
-    with picture(path, rows, columns, size=size, squeeze=False, sharex=True, sharey=True) as (
-        figure,
-        panels,
-    ):
+    look = {"edgecolor": _EDGE, "axis": axis, **level_look(top + 1)}
+    names = [
+        f"t = {1e3 * frame.time_s:.3g} ms, finest level {int(frame.level.max())}"
+        for frame in frames
+    ]
+    shape = -(-len(frames) // rows), rows, (0.1, 1.2, 0.6)
+    with _panels(path, view, model, *shape, names) as (figure, panels):
         figure.get_layout_engine().set(h_pad=0.08)
         for axes, frame in zip(panels.flat, frames):
-            drawn = _levels(axes, view, model, frame, broken_time, look)
-        name_outer_axes(panels, len(frames), view)
+            seen = broken_time <= frame.time_s
+            drawn = draw_bodies(axes, model, frame, frame.level, broken=seen, **look)
         bar = figure.colorbar(drawn, ax=panels, ticks=range(top + 1), pad=0.02, aspect=30)
         bar.ax.set_yticklabels(level_names(dt0, top + 1))
         bar.ax.tick_params(length=0)
@@ -175,13 +172,33 @@ def plot_steps(
         bar.set_label("step of a body")
 
 
-def _levels(axes, view, model, frame, broken_time, look):
-    corners = body_corners(model, frame)
-    polygons, body, _ = surface(model.topology, view, corners, broken_time <= frame.time_s)
-    drawn = PolyCollection(polygons, edgecolor="#00000030", linewidth=0.3, **look)
-    drawn.set_array(frame.level[body])
-    axes.add_collection(drawn)
-    smallest = int(frame.level.max())
-    axes.set_title(f"t = {1e3 * frame.time_s:.3g} ms, finest level {smallest}")
-    frame_block(axes, view, model, 0.03)
-    return drawn
+def plot_acting(
+    path: FileName,
+    model: Model,
+    acting_since: Mapping[str, np.ndarray],
+    until: float,
+    axis: Sequence[float] = ALONG_Z,
+) -> None:
+    """Bodies of the block at rest, coloured by the time from which an effect acts; a panel each.
+
+    acting_since: times [s] by name, (body_count,), NaN where an effect never acts
+    (``Result.acting_since``). until: end of the run [s]. axis: towards the viewer.
+    """
+    view, names = View(axis), [name for name in TITLES if name in acting_since]
+    extent = np.ptp(view.project(model.mesh.points), axis=0)
+    columns = min(3, len(names)) if extent[1] > 0.3 * extent[0] else 1
+    shape = columns, -(-len(names) // columns), (0.5, 1.4, 0.7)
+    titles = [
+        f"{TITLES[name]}\n{np.isfinite(acting_since[name]).sum():,} of {model.body_count:,} bodies"
+        for name in names
+    ]
+    colours = shades("plasma", 0.0, 0.92)
+    colours.set_bad(STONE)
+    look = {"cmap": colours, "clim": (0.0, 1e3 * until), "edgecolor": _EDGE, "axis": axis}
+    with _panels(path, view, model, *shape, titles) as (figure, panels):
+        for axes, name in zip(panels.flat, names):
+            times = np.ma.masked_invalid(1e3 * acting_since[name])
+            drawn = draw_bodies(axes, model, None, times, **look)
+        figure.colorbar(drawn, ax=panels, label="acts from [ms]", pad=0.02, aspect=30)
+        never = area_key("never", fc=STONE, ec=_EDGE)
+        figure.legend(handles=[never], loc="outside lower left")

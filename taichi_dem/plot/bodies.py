@@ -1,15 +1,66 @@
-"""Bodies coloured by a value, in a panel that may have other things to show too."""
+"""Bodies coloured by a value, lines by another: what all pictures of a block are made of."""
 
 from collections.abc import Sequence
 from typing import Any, Optional
 
+import matplotlib
 import numpy as np
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import ListedColormap
 
-from taichi_dem.output.record import Frame
-from taichi_dem.plot.block import displaced
+from taichi_dem.output.record import Frame, body_corners
 from taichi_dem.plot.view import View, surface
 from taichi_dem.state.model import Model
+
+STONE, JOINT = "#E4E0D6", "#C9C3B5"
+#: A view along the z axis.
+ALONG_Z = (0.0, 0.0, 1.0)
+
+
+def shades(name: str, low: float, high: float, count: int = 256) -> ListedColormap:
+    """A part of a map of colours of matplotlib; low, high: shares of it."""
+    return ListedColormap(matplotlib.colormaps[name](np.linspace(low, high, count)))
+
+
+def displaced(model: Model, frame: Frame, magnify: float) -> np.ndarray:
+    """Corners of all bodies (body_count, 4, 3) [m], their displacement magnified."""
+    rest = model.mesh.points[model.mesh.tetrahedra]
+    return rest + magnify * (body_corners(model, frame) - rest)
+
+
+def break_times(model: Model, broken_time: Optional[np.ndarray]) -> np.ndarray:
+    """The times of breaking [s], (bond_count,); all NaN, unbroken, where none are given."""
+    return np.full(model.bond_count, np.nan) if broken_time is None else broken_time
+
+
+def frame_block(axes: Any, view: View, model: Model, margin: float = 0.05) -> None:
+    """Limits, equal scales and labels of a view of the whole block; margin: share of its size."""
+    flat = view.project(model.mesh.points)
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    pad = margin * (high - low).max()
+    axes.set(xlim=(low[0] - pad, high[0] + pad), ylim=(low[1] - pad, high[1] + pad))
+    axes.set_aspect("equal")
+    axes.locator_params(nbins=5)
+    axes.grid(False)
+
+
+def draw_stone(axes: Any, view: View, model: Model) -> None:
+    """Draw the outer faces of the block at rest, all in one colour."""
+    rest = model.mesh.points[model.mesh.tetrahedra]
+    polygons, _, _ = surface(model.topology, view, rest, np.zeros(model.bond_count, dtype=bool))
+    axes.add_collection(PolyCollection(polygons, facecolor=STONE, edgecolor=JOINT, linewidth=0.4))
+
+
+def draw_lines(axes: Any, segments: np.ndarray, values: np.ndarray, **look: Any) -> Any:
+    """Draw lines (n, points, 2) coloured by a value each; look: of the ``LineCollection``.
+
+    By default colours run from dark to orange: light yellow would vanish on the stone.
+    """
+    lines = LineCollection(segments, **{"cmap": shades("plasma", 0.0, 0.88), **look})
+    lines.set_array(values)
+    lines.set_capstyle("round")
+    axes.add_collection(lines)
+    return lines
 
 
 def draw_bodies(
@@ -20,7 +71,7 @@ def draw_bodies(
     *,
     magnify: float = 1.0,
     broken: Any = None,
-    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    axis: Sequence[float] = ALONG_Z,
     **look: Any,
 ) -> Any:
     """Draw the bodies where they are, coloured by a value each; returns the collection.
@@ -45,7 +96,7 @@ def move_bodies(
     *,
     magnify: float = 1.0,
     broken: Any = None,
-    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    axis: Sequence[float] = ALONG_Z,
 ) -> None:
     """Change what ``draw_bodies`` has drawn to another frame: arguments as there."""
     corners = model.mesh.points[model.mesh.tetrahedra]

@@ -1,18 +1,20 @@
-"""Cracks of a block that is as deep as it is wide: in space, and in two sections."""
+"""Cracks of a deep block in space and in sections, and how probable each face is to break."""
 
 import itertools
 from typing import Any
 
-import matplotlib
 import numpy as np
-from matplotlib.collections import LineCollection
-from matplotlib.colors import ListedColormap
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import Normalize
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from taichi_dem.kit.plot_style import GREY, picture
 from taichi_dem.kit.validation import FileName
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import Topology
+from taichi_dem.plot.bodies import JOINT, STONE, draw_lines, draw_stone, frame_block, shades
+from taichi_dem.plot.view import View, traces
+from taichi_dem.state.model import Model
 
 _AXES = "xyz"
 
@@ -35,7 +37,7 @@ def plot_deep_cracks(
     broken = broken[np.argsort(-broken_time[broken], kind="stable")]
     triangles, time_ms = mesh.points[topology.vertices[broken]], 1e3 * broken_time[broken]
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    look = _colours_by_time(1e3 * time_s)
+    look = {"cmap": shades("plasma", 0.0, 0.88), "norm": Normalize(0.0, 1e3 * time_s)}
     with picture(path, 0, size=(9.2, 3.9)) as (figure, _):
         grid = figure.add_gridspec(1, 3, width_ratios=(1.25, 1.0, 0.8), wspace=0.14)
         whole = figure.add_subplot(grid[0], projection="3d")
@@ -46,12 +48,6 @@ def plot_deep_cracks(
         lines = _section(panels[0], triangles, time_ms, 2, middle, (low, high), look)
         _section(panels[1], triangles, time_ms, 1, hole[1], (low, high), look)
         figure.colorbar(lines, ax=panels, label="time of breaking [ms]", shrink=0.8, aspect=25)
-
-
-def _colours_by_time(end_ms):
-    """Colours by time, dark first; as in the pictures of flat blocks."""
-    shades = matplotlib.colormaps["plasma"](np.linspace(0.0, 0.88, 256))
-    return {"cmap": ListedColormap(shades), "norm": matplotlib.colors.Normalize(0.0, end_ms)}
 
 
 def _in_space(axes, triangles, time_ms, low, high, look):
@@ -81,10 +77,7 @@ def _section(axes, triangles, time_ms, normal, place, bounds, look):
     """Where broken faces cross the plane at a place on an axis."""
     across, up = (0, 1) if normal == 2 else (0, 2)
     segments, which = crossings(triangles, normal, place)
-    lines = LineCollection(segments[..., [across, up]], linewidth=1.3, **look)
-    lines.set_array(time_ms[which])
-    lines.set_capstyle("round")
-    axes.add_collection(lines)
+    lines = draw_lines(axes, segments[..., [across, up]], time_ms[which], linewidth=1.3, **look)
     low, high = bounds
     axes.set(xlim=(low[across], high[across]), ylim=(low[up], high[up]))
     axes.set(xlabel=f"{_AXES[across]} [m]", ylabel=f"{_AXES[up]} [m]")
@@ -116,3 +109,58 @@ def crossings(triangles: np.ndarray, normal: int, place: float) -> Any:
         share = (place - first[:, normal]) / (end[:, normal] - first[:, normal])
         lines.append(first + share[:, None] * (end - first))
     return np.stack(lines, axis=1), which
+
+
+def plot_crack_probability(path: FileName, model: Model, probability: np.ndarray) -> None:
+    """Faces of the block at rest by their probability to break: on its front, and half-way through.
+
+    Parameters
+    ----------
+    path : path
+        Name of the PNG file.
+    model : Model
+        Of a scene with the mesh of all runs.
+    probability : ndarray, shape (bond_count,)
+        Of each bond to be broken [1]; faces at 0 are not drawn.
+    """
+    view = View()
+    with picture(path, 1, 2, size=(9.0, 4.1), sharey=True) as (figure, panels):
+        drawn = _on_front(panels[0], view, model, probability)
+        panels[0].set_title("On the front face")
+        _half_way(panels[1], view, model, probability)
+        for axes in panels:
+            frame_block(axes, view, model)
+            axes.set_xlabel(view.labels()[0])
+        panels[0].set_ylabel(view.labels()[1])
+        label = "probability of a face to break [1]"
+        figure.colorbar(drawn, ax=panels, label=label, shrink=0.85, aspect=25)
+
+
+def _on_front(axes, view, model, probability):
+    """Edges of the front face by the most probable face that ends there."""
+    corners = model.mesh.points[model.mesh.tetrahedra]
+    draw_stone(axes, view, model)
+    # Traces are of the least value that ends at an edge.
+    falling = np.where(probability > 0.0, -probability, np.nan)
+    body, ends, least = traces(model.mesh, model.topology, view, falling)
+    return _lines(axes, view.project(corners[body[:, None], ends]), -least)
+
+
+def _half_way(axes, view, model, probability):
+    """Where faces cross the plane half-way through the block."""
+    low, high = model.mesh.points.min(axis=0), model.mesh.points.max(axis=0)
+    middle = 0.5 * float(low[2] + high[2])
+    segments, which = crossings(model.mesh.points[model.topology.vertices], 2, middle)
+    segments, found = view.project(segments), probability[which]
+    whole = np.array([low, (high[0], low[1], 0.0), high, (low[0], high[1], 0.0)])[:, :2]
+    axes.add_collection(PolyCollection([whole], facecolor=STONE, edgecolor=JOINT))
+    axes.add_collection(LineCollection(segments, colors=JOINT, linewidth=0.4))
+    axes.set_title(f"In the section at z = {middle:.3g} m")
+    return _lines(axes, segments[found > 0.0], found[found > 0.0])
+
+
+def _lines(axes, segments, probability):
+    """Lines by probability, dark where it is high and on top."""
+    order = np.argsort(probability, kind="stable")
+    look = {"cmap": shades("viridis_r", 0.1, 1.0), "norm": Normalize(0.0, 1.0), "linewidth": 1.6}
+    return draw_lines(axes, segments[order], probability[order], **look)

@@ -1,7 +1,7 @@
 """Picture of a mesh before a run: its outer faces, coloured by group, seen from two sides."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Optional
+from typing import Optional
 
 import numpy as np
 from matplotlib.collections import PolyCollection
@@ -62,7 +62,7 @@ def _keys(mesh, names, member, acting):
     """Lines of the legend."""
     counts = [(member == k).sum() for k in range(len(names))]
     keys = [
-        area_key(_label(name, counts[k], acting), facecolor=_colour(k))
+        area_key(_label(name, counts[k], acting), facecolor=_COLOURS[k % len(_COLOURS)])
         for k, name in enumerate(names[:_MOST])
     ]
     if len(names) > _MOST:
@@ -78,16 +78,11 @@ def _members(mesh, outer, bodies):
     names = [name for name in sizes if name not in mesh.inner_groups]
     member = np.full(len(outer), -1)
     if names:
-        stacked = [mesh.groups[name] for name in names]
-        number = geometry.face_numbers(np.vstack([outer, *stacked]))
-        chosen, start = np.full(number.max() + 1, -1), {}
-        place = len(outer)
-        for name in names:
-            start[name] = place
-            place += sizes[name]
-        for name in sorted(names, key=lambda name: -sizes[name]):
-            chosen[number[start[name] : start[name] + sizes[name]]] = names.index(name)
-        member = chosen[number[: len(outer)]]
+        number, *members = geometry.numbers_in(outer, *(mesh.groups[name] for name in names))
+        chosen = np.full(max(map(np.max, (number, *members))) + 1, -1)
+        for k in sorted(range(len(names)), key=lambda k: -sizes[names[k]]):
+            chosen[members[k]] = k
+        member = chosen[number]
     else:
         names = list(mesh.body_groups)
         for k, name in enumerate(names):
@@ -112,7 +107,7 @@ def _draw(axes, mesh, outer, member, view):
     """Faces that are seen, from back to front, the darker the more they lean away."""
     triangles = mesh.points[outer]
     seen = view.facing(triangles)
-    palette = np.array([to_rgb(_colour(k)) for k in range(len(_COLOURS))] + [to_rgb(_NONE)])
+    palette = np.array([to_rgb(colour) for colour in (*_COLOURS, _NONE)])
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     light = normal @ (view.toward + view.up) / np.linalg.norm(normal, axis=1)
     shade = _DARKEST + (1.0 - _DARKEST) * np.clip(light[seen] / _SQUARE, 0.0, 1.0)
@@ -135,10 +130,6 @@ def _draw_axes(axes, view):
         tip = OffsetFrom(axes, (1.0, 1.0))
         axes.annotate("", end, middle, xycoords=tip, textcoords=tip, arrowprops=line)
         axes.annotate(name, (1.0, 1.0), letter, ha="center", va="center", fontsize=8, **fixed)
-
-
-def _colour(place: int) -> Any:
-    return _COLOURS[place % len(_COLOURS)]
 
 
 def _label(name, count, acting):

@@ -1,15 +1,16 @@
 """Curves over time: pressure (Konno et al., Fig 11), motion, energy, levels."""
 
 from collections.abc import Mapping
-from typing import Optional
+from typing import Any, Optional
 
 import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
-from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, styles_of
+from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, seconds, styles_of
 from taichi_dem.kit.validation import FileName
 from taichi_dem.output.record import outward_columns
-from taichi_dem.plot.levels import draw_level_shares
+from taichi_dem.plot.bodies import shades
 
 #: Energy terms from the bottom of the stack up, with colours and dashes: blue is held, orange lost
 #: in bonds, purple in contacts; within a group they differ in lightness.
@@ -31,6 +32,12 @@ _GIVEN = {
 }
 
 
+_AT_HOLE = {
+    "monitor_displacement_mm": "body of the hole nearest to the free face",
+    "hole_radial_displacement_mm": "outward, mean over the hole's bodies",
+}
+
+
 def _span(axes, time):
     """Limit an axis to the times there are; a run that ended at its start has but one."""
     axes.set_xlim(0.0, time[-1] if time[-1] > 0.0 else 1.0)
@@ -40,19 +47,14 @@ def plot_pressure(
     path: FileName, time_s: np.ndarray, pressure_pa: np.ndarray, until_s: Optional[float] = None
 ) -> None:
     """Pressure of the blast gas over time (Konno et al., Fig 11); until_s: end of the run."""
+    time_ms, pressure = 1e3 * np.asarray(time_s), 1e-6 * np.asarray(pressure_pa)
+    peak = int(pressure.argmax())
+    place, words = (time_ms[peak], pressure[peak]), "{1:.4g} MPa at {0:.3g} ms"
     with picture(path, size=(5.6, 3.2)) as (_, axes):
-        time_ms, pressure = 1e3 * np.asarray(time_s), 1e-6 * np.asarray(pressure_pa)
         axes.plot(time_ms, pressure, color=RED)
-        peak = int(pressure.argmax())
-        axes.annotate(
-            f"{pressure[peak]:.4g} MPa at {time_ms[peak]:.3g} ms",
-            (time_ms[peak], pressure[peak]),
-            xytext=(6, 6),
-            textcoords="offset points",
-        )
+        axes.annotate(words.format(*place), place, (6, 6), textcoords="offset points")
         if until_s is not None:
-            look = {"color": "black", "linewidth": 0.8, "linestyle": ":", "label": "end of the run"}
-            axes.axvline(1e3 * until_s, **look)
+            axes.axvline(1e3 * until_s, color="black", lw=0.8, ls=":", label="end of the run")
             axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
         axes.set(xlabel="time [ms]", ylabel="pressure on the hole [MPa]")
         axes.set(xlim=(0.0, time_ms[-1]), ylim=(0.0, 1.12 * pressure[peak]))
@@ -62,24 +64,14 @@ def plot_history(path: Optional[FileName], history: Mapping[str, np.ndarray]) ->
     """Displacement at the hole, broken faces and the smallest step over time."""
     time = 1e3 * history["time_s"]
     with picture(path, 3, 1, size=(6.2, 6.6), sharex=True) as (figure, (top, middle, bottom)):
+        lines = {f"{hole}, outward": moved for hole, moved in outward_columns(history).items()}
+        looks: Any = ({},) * len(lines)
         if "hole_radial_displacement_mm" in history:
-            top.plot(
-                time,
-                history["monitor_displacement_mm"],
-                color=RED,
-                label="body of the hole nearest to the free face",
-            )
-            top.plot(
-                time,
-                history["hole_radial_displacement_mm"],
-                color=BLUE,
-                linestyle="--",
-                label="outward, mean over the hole's bodies",
-            )
-            top.legend(loc="upper left")
-        elif outward_columns(history):
-            for hole, moved in outward_columns(history).items():
-                top.plot(time, moved, label=f"{hole}, outward")
+            lines = {words: history[name] for name, words in _AT_HOLE.items()}
+            looks = {"color": RED}, {"color": BLUE, "linestyle": "--"}
+        for (label, moved), look in zip(lines.items(), looks):
+            top.plot(time, moved, label=label, **look)
+        if lines:
             top.legend(loc="upper left")
         top.set(ylabel="displacement [mm]", ylim=(0.0, None))
         middle.step(time, history["broken_faces"], where="post", color=BLUE)
@@ -104,13 +96,11 @@ def plot_energy(path: Optional[FileName], history: Mapping[str, np.ndarray]) -> 
     time = 1e3 * history["time_s"]
     present = {key: look for key, look in ENERGY_TERMS.items() if key in history}
     terms = {key: look for key, look in present.items() if np.abs(history[key]).max() > 0.0}
-    with picture(
-        path, 2, 2, size=(9.2, 5.6), sharex=True, gridspec_kw={"height_ratios": [3.2, 1]}
-    ) as (figure, panels):
+    options = {"sharex": True, "height_ratios": (3.2, 1)}
+    with picture(path, 2, 2, size=(9.2, 5.6), **options) as (figure, panels):
         _stack(panels[0, 0], time, history, terms)
         _lines(panels[0, 1], time, history, terms)
-        _residual(panels[1, 0], time, history)
-        _momentary(panels[1, 1], time, history)
+        _unexplained(panels[1, 0], panels[1, 1], time, history)
         for axes in panels[1]:
             axes.set(xlabel="time [ms]")
             _span(axes, time)
@@ -146,21 +136,51 @@ def positive(values: np.ndarray) -> np.ndarray:
     return np.where(values > 0.0, values, np.nan)
 
 
-def _residual(axes, time, history):
+def _unexplained(axes, share_axes, time, history):
+    """The residual, and its share of the work done so far, once there is some."""
     axes.plot(time, 1e-3 * history["residual_J"], color=RED)
     axes.axhline(0.0, color="black", linewidth=0.6)
     axes.set(ylabel="unexplained\nenergy [kJ]")
-
-
-def _momentary(axes, time, history):
-    """Residual as a share of the work done so far."""
     work = np.abs(history["load_work_J"]) + np.abs(history["support_work_J"])
-    late = work > 1e-3 * work.max()
-    share = np.where(
-        late, 100.0 * np.abs(history["residual_J"]) / np.where(late, work, 1.0), np.nan
-    )
-    axes.plot(time, share, color=RED)
-    axes.set(ylabel="unexplained\n[% of work so far]", ylim=(0.0, None))
+    work = np.where(work > 1e-3 * work.max(), work, np.nan)
+    share_axes.plot(time, 100.0 * np.abs(history["residual_J"]) / work, color=RED)
+    share_axes.set(ylabel="unexplained\n[% of work so far]", ylim=(0.0, None))
+
+
+def level_shades(count: int) -> Any:
+    """Colours of so many levels, the coarsest first and lightest."""
+    return shades("magma_r", 0.02, 0.92, max(2, count)).colors
+
+
+def level_look(count: int) -> Any:
+    """Arguments cmap and norm of a collection whose values are levels."""
+    norm = BoundaryNorm(np.arange(count + 1) - 0.5, count)
+    return {"cmap": ListedColormap(level_shades(count)[:count]), "norm": norm}
+
+
+def level_names(dt0: float, count: int) -> Any:
+    """Step of each level in words; dt0: of level 0 [s]."""
+    return [seconds(dt0 / 2.0**level) for level in range(count)]
+
+
+def draw_level_shares(
+    owner: Any,
+    axes: Any,
+    time: np.ndarray,
+    shares: np.ndarray,
+    dt0: float,
+    loc: str = "outside right center",
+) -> None:
+    """Share of bodies on each level over time, the coarsest at the bottom, with its legend.
+
+    owner: figure or axes that get the legend, at a place loc. time: in the unit of the axis.
+    shares: (sample_count, level_count), rows summing to 1. dt0: step of level 0 [s].
+    """
+    count = shares.shape[1]
+    areas = axes.stackplot(time, 100.0 * shares.T, colors=level_shades(count))
+    axes.set(ylabel="share of bodies [%]", ylim=(0.0, 100.0))
+    names = level_names(dt0, count)
+    owner.legend(areas[::-1], names[::-1], title="step", loc=loc)
 
 
 def plot_levels(path: FileName, time_s: np.ndarray, shares: np.ndarray, dt0: float) -> None:
@@ -199,24 +219,18 @@ def plot_methods(
             here = np.asarray(made[column])
             # Largest steps differ, and with them the times of the samples.
             there = np.interp(time, 1e3 * first["time_s"], first[column])
-            share = np.where(
-                there > 1e-3 * there.max(), here / np.where(there > 0, there, 1), np.nan
-            )
-            moved.plot(time, 100.0 * (share - 1.0), **look)
+            there = np.where(there > 1e-3 * there.max(), there, np.nan)
+            moved.plot(time, 100.0 * (here / there - 1.0), **look)
         cost.set(ylabel="CPU time of stepping [s]")
         work.set(ylabel="evaluations of bonds\nand contact pairs [10⁶]")
         for axes, name, unit in ((cost, "cpu_s", 1.0), (work, "evaluations", 1e6)):
             last = [made[name][-1] / unit for made in series.values()]
-            if max(last) > 20.0 * min(last):
-                axes.set_yscale("log")
-                # A run begins with nothing done, where a logarithm has no end.
-                axes.set_ylim(0.01 * min(last), None)
-            else:
-                axes.set_ylim(0.0, None)
-        moved.set(
-            ylabel=f"displacement of the {_COMPARED[column]},\n"
-            f"difference from\n{next(iter(styles.values())).label} [%]"
-        )
+            # A run begins with nothing done, where a logarithm has no end.
+            log = max(last) > 20.0 * min(last)
+            axes.set_yscale("log" if log else "linear")
+            axes.set_ylim(0.01 * min(last) if log else 0.0, None)
+        words_of = f"displacement of the {_COMPARED[column]},\ndifference from\n{{}} [%]"
+        moved.set(ylabel=words_of.format(next(iter(styles.values())).label))
         for axes in (cost, work, moved):
             axes.set(xlabel="time [ms]")
             _span(axes, time)

@@ -9,8 +9,8 @@ from matplotlib.ticker import MaxNLocator
 
 from taichi_dem.kit.plot_style import BLACK, BLUE, png_of, styled
 from taichi_dem.output.record import Frame, outward_columns
-from taichi_dem.plot.block import draw_breaks, frame_block
-from taichi_dem.plot.bodies import draw_bodies
+from taichi_dem.plot.block import draw_breaks
+from taichi_dem.plot.bodies import draw_bodies, frame_block
 from taichi_dem.plot.view import View
 from taichi_dem.state.model import Model
 
@@ -28,16 +28,13 @@ _PREFIXES = ("p", "n", "µ", "m", "", "k", "M", "G", "T")
 #: near those of ``series.plot_energy``.
 _ENERGIES: dict[str, Any] = {
     # Above the curve that it may lie on.
-    "work put in": (
-        ("load_work", "support_work"),
-        {"color": BLACK, "linestyle": "--", "zorder": 3},
-    ),
+    "work put in": (("load_work", "support_work"), {"color": BLACK, "ls": "--", "zorder": 3}),
     "kinetic": (("kinetic",), {"color": "#08306B"}),
     "strain": (("bond_strain", "sphere_strain"), {"color": "#3A87C2"}),
     "dissipated": (
         (
-            *("bond_dashpot", "softening", "release", "slip", "sphere_dashpot", "friction"),
-            "ground_dashpot",
+            *("bond_dashpot", "softening", "release", "slip"),
+            *("sphere_dashpot", "friction", "ground_dashpot"),
         ),
         {"color": "#E6700F"},
     ),
@@ -93,50 +90,25 @@ def _draw_block(axes, view, model, frames, broken_time, peak_speed):
         return lines, f"time of breaking [{unit}]"
     extent = np.ptp(model.mesh.points, axis=0).max()
     moved = np.linalg.norm(frames[-1].displacement, axis=1) if frames else np.full(1, np.nan)
+    look = {"cmap": "viridis", "axis": view.toward}
     # What flew off, or fell as a whole, would leave the picture.
-    if moved.max() < extent:
-        return _draw_displaced(axes, view, model, frames[-1], moved)
-    return _draw_speeds(axes, view, model, peak_speed)
-
-
-def _draw_displaced(axes, view, model, frame, moved):
-    """The block as it was in a frame, its displacement magnified to be seen."""
-    extent = np.ptp(model.mesh.points, axis=0).max()
+    if not moved.max() < extent:
+        factor, unit = scale(_largest(peak_speed), "m/s")
+        look["clim"] = 0.0, factor * _largest(peak_speed) or 1.0
+        axes.set_title("no broken bonds, block undeformed")
+        speeds = factor * np.ma.masked_invalid(peak_speed)
+        return draw_bodies(axes, model, None, speeds, **look), f"largest speed [{unit}]"
     magnify = 1.0
     if _ROUND_OFF < moved.max() / extent < _VISIBLE:
         magnify = _round_down(_VISIBLE * extent / moved.max())
     factor, unit = scale(moved.max(), "m")
-    drawn = draw_bodies(
-        axes,
-        model,
-        frame,
-        factor * moved,
-        magnify=magnify,
-        clim=(0.0, factor * moved.max() or 1.0),
-        cmap="viridis",
-        axis=view.toward,
-    )
+    look.update(magnify=magnify, clim=(0.0, factor * moved.max() or 1.0))
+    drawn = draw_bodies(axes, model, frames[-1], factor * moved, **look)
     axes.autoscale()
     words = f", displacement × {magnify:,.0f}" if magnify > 1.0 else ""
-    time, time_unit = scale(frame.time_s, "s")
-    axes.set_title(f"t = {time * frame.time_s:.3g} {time_unit}{words}")
+    time, time_unit = scale(frames[-1].time_s, "s")
+    axes.set_title(f"t = {time * frames[-1].time_s:.3g} {time_unit}{words}")
     return drawn, f"displacement [{unit}]"
-
-
-def _draw_speeds(axes, view, model, peak_speed):
-    """The block at rest, coloured by the largest speed of each body."""
-    factor, unit = scale(_largest(peak_speed), "m/s")
-    drawn = draw_bodies(
-        axes,
-        model,
-        None,
-        factor * np.ma.masked_invalid(peak_speed),
-        clim=(0.0, factor * _largest(peak_speed) or 1.0),
-        cmap="viridis",
-        axis=view.toward,
-    )
-    axes.set_title("no broken bonds, block undeformed")
-    return drawn, f"largest speed [{unit}]"
 
 
 def _draw_curves(panels, history):
@@ -145,10 +117,10 @@ def _draw_curves(panels, history):
     factor, unit = scale(_largest(time_s), "s")
     none = np.full(len(time_s), np.nan)
     # A term that no effect of the scene has is no column.
-    known = [
+    known = (
         [history[f"{term}_J"] for term in terms if f"{term}_J" in history]
         for terms, _ in _ENERGIES.values()
-    ]
+    )
     sums = [sum(columns) if columns else none for columns in known]
     per_joule, joule = scale(max(map(_largest, sums)), "J")
     for (name, (_, look)), values in zip(_ENERGIES.items(), sums):
@@ -176,14 +148,12 @@ def _events(history):
     nothing = np.full(len(history.get("time_s", ())), np.nan)
     if _largest(history.get("broken_faces", nothing)) > 0.0:
         return history["broken_faces"], _BROKEN
-    outward = outward_columns(history)
-    if outward:
-        hole, values = next((hole, 1e-3 * moved) for hole, moved in outward.items())
-        factor, unit = scale(_largest(values), "m")
-        return factor * values, f"{hole}, mean outward\ndisplacement [{unit}]"
-    values = history.get("largest_speed_m_s", nothing)
-    factor, unit = scale(_largest(values), "m/s")
-    return factor * values, f"largest speed [{unit}]"
+    values, unit = history.get("largest_speed_m_s", nothing), "m/s"
+    words = "largest speed"
+    for hole, moved in list(outward_columns(history).items())[:1]:
+        values, unit, words = 1e-3 * moved, "m", f"{hole}, mean outward\ndisplacement"
+    factor, unit = scale(_largest(values), unit)
+    return factor * values, f"{words} [{unit}]"
 
 
 def _largest(values):

@@ -10,6 +10,7 @@ from taichi_dem.kit.display import counted
 from taichi_dem.kit.validation import FileName
 from taichi_dem.kit.viewer import WebPage, pack, quantise, select_frames, show_page, time_unit
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
+from taichi_dem.output.export.rigid_motion import quaternions_of
 from taichi_dem.output.record import Frame
 from taichi_dem.plot.view import edge_keys, first_breaks, skin
 from taichi_dem.state.model import Model
@@ -123,21 +124,8 @@ def _shape(model: Model, bodies: np.ndarray) -> Any:
 
 
 def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
-    """Axis times angle [rad] of rotation matrices (n, 3, 3), (n, 3), angles up to pi.
-
-    Source: Shepperd (1978), the quaternion from its largest component, which holds at all angles.
-    """
-    diagonal = np.einsum("nii->ni", rotation)
-    trace = diagonal.sum(axis=1, keepdims=True)
-    squares = 1.0 + np.concatenate([trace, 2.0 * diagonal - trace], axis=1)
-    pairs = rotation + rotation.transpose(0, 2, 1)
-    skew = (rotation - rotation.transpose(0, 2, 1))[:, [2, 0, 1], [1, 2, 0]]
-    products = np.zeros((len(rotation), 4, 4))
-    products[:, 0, 1:] = products[:, 1:, 0] = skew
-    products[:, 1:, 1:] = pairs
-    products[:, np.arange(4), np.arange(4)] = squares
-    best = squares.argmax(axis=1)
-    quaternion = products[np.arange(len(rotation)), best]
+    """Axis times angle [rad] of rotation matrices (n, 3, 3), (n, 3), angles up to pi."""
+    quaternion = quaternions_of(rotation)
     quaternion *= np.where(quaternion[:, :1] < 0.0, -1.0, 1.0)
     sine = np.linalg.norm(quaternion[:, 1:], axis=1, keepdims=True)
     angle = 2.0 * np.arctan2(sine, quaternion[:, :1])

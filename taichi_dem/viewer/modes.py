@@ -8,9 +8,9 @@ import numpy as np
 from taichi_dem.kit.plot_style import colour_table, table_of
 from taichi_dem.kit.viewer import pack, quantise
 from taichi_dem.output.record import Frame
-from taichi_dem.plot.acting import TITLES
-from taichi_dem.plot.animation import speed_edges
-from taichi_dem.plot.levels import level_names, level_shades
+from taichi_dem.plot.block import TITLES
+from taichi_dem.plot.film import speed_edges
+from taichi_dem.plot.series import level_names, level_shades
 
 #: Colours of bodies on which an effect does not act and of outer faces; and of cracks.
 _PLAIN, _CRACK = (228, 224, 214), {"label": "cracks", "colour": (20, 20, 23)}

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from taichi_dem import InputError, checked_mesh, read_mesh
+from taichi_dem.mesh.check import joined_bodies as parts_of
+from taichi_dem.mesh.check import unbonded_places
 from taichi_dem.mesh.mesh import volumes
-from taichi_dem.mesh.parts_in_files import parts_of, unbonded_places
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
 from taichi_dem.mesh.topology import topology_of
 

@@ -1,5 +1,7 @@
 """A run as a glTF scene (.glb) for browsers and Blender: every fragment moves as a rigid piece."""
 
+import json
+import struct
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,7 +11,6 @@ from taichi_dem.kit.files import write_bytes
 from taichi_dem.kit.validation import FileName, positive
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
 from taichi_dem.mesh.topology import skin
-from taichi_dem.output.export.glb import GlbFile
 from taichi_dem.output.export.rigid_motion import quaternions_of, rigid_motion
 from taichi_dem.output.fragments import broken_by, centres, fragment_of_body
 from taichi_dem.output.record import Frame
@@ -23,6 +24,8 @@ _SCALE = np.array(
     ]
 )
 _INSIDE = np.array((181, 173, 156))
+_FLOAT, _BYTE, _VERTICES = 5126, 5121, 34962
+_TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 
 
 def write_gltf(
@@ -63,7 +66,7 @@ def write_gltf(
     seconds = positive("seconds", seconds)
     broken = broken_by(broken_time, frames[-1].time_s)
     of_body = fragment_of_body(model, broken)
-    file = GlbFile()
+    file = _GlbFile()
     for number, surface in enumerate(_surfaces(model, broken, of_body, values)):
         file.add_piece(f"fragment {number}", *surface)
     times = np.array([frame.time_s for frame in frames])
@@ -105,3 +108,95 @@ def _motions(model: Model, frames: Sequence[Frame], of_body: np.ndarray) -> Any:
         places.append(centre)
         turns.append(turn)
     return np.array(places), np.array(turns)
+
+
+class _GlbFile:
+    """The binary container of glTF: nodes with a mesh of coloured triangles each, one animation."""
+
+    def __init__(self):
+        names = "nodes", "meshes", "accessors", "bufferViews", "animations"
+        self._parts: dict[str, list] = {name: [] for name in names}
+        self._data = bytearray()
+
+    def _add(self, part, entry):
+        self._parts[part].append(entry)
+        return len(self._parts[part]) - 1
+
+    def add_piece(self, name, triangles, colours):
+        """Add a node; triangles (n, 3, 3) [m], counter-clockwise; colours (n, 3), sRGB to 255."""
+        normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        normal = normal / np.linalg.norm(normal, axis=1)[:, None]
+        shades = np.full((len(colours), 4), 255, dtype=np.uint8)
+        shades[:, :3] = np.round(255.0 * _linear(colours / 255.0))
+        corners = triangles.reshape(-1, 3).astype(np.float32)
+        bounds = {"min": corners.min(axis=0).tolist(), "max": corners.max(axis=0).tolist()}
+        attributes = {
+            "POSITION": self._accessor(corners, **bounds),
+            "NORMAL": self._accessor(np.repeat(normal, 3, axis=0).astype(np.float32)),
+            "COLOR_0": self._accessor(np.repeat(shades, 3, axis=0), normalized=True),
+        }
+        mesh = {"primitives": [{"attributes": attributes, "material": 0}]}
+        self._add("nodes", {"name": name, "mesh": self._add("meshes", mesh)})
+
+    def move(self, times, places, turns):
+        """Move all nodes; they begin where they are at the first time.
+
+        times: (k,) [s], ascending; where there is but one, nothing moves. places: (k, nodes, 3)
+        [m]; turns: (k, nodes, 4), unit quaternions x, y, z, w.
+        """
+        for one, place, turn in zip(self._parts["nodes"], places[0], turns[0]):
+            one.update(translation=place.tolist(), rotation=turn.tolist())
+        if len(times) < 2:
+            return
+        clock = times.astype(np.float32)
+        bounds = {"min": [float(clock[0])], "max": [float(clock[-1])]}
+        given = self._accessor(clock[:, None], vertices=False, **bounds)
+        samplers: list[dict] = []
+        channels: list[dict] = []
+        for path, values in (("translation", places), ("rotation", turns)):
+            for node in range(places.shape[1]):
+                ways = self._accessor(values[:, node].astype(np.float32), vertices=False)
+                target = {"node": node, "path": path}
+                channels.append({"sampler": len(samplers), "target": target})
+                samplers.append({"input": given, "output": ways})
+        self._add("animations", {"samplers": samplers, "channels": channels})
+
+    def content(self, extras):
+        """The file, in bytes; extras: numbers that viewers pass over."""
+        material = {"doubleSided": True, "pbrMetallicRoughness": {"metallicFactor": 0.0}}
+        scene = {
+            "asset": {"version": "2.0", "generator": "taichi-dem", "extras": extras},
+            "scene": 0,
+            "scenes": [{"nodes": list(range(len(self._parts["nodes"])))}],
+            "materials": [material],
+            "buffers": [{"byteLength": len(self._data)}],
+            **{name: part for name, part in self._parts.items() if part},
+        }
+        text = json.dumps(scene, separators=(",", ":")).encode()
+        chunks = _chunk(b"JSON", text, b" ") + _chunk(b"BIN\0", bytes(self._data), b"\0")
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+    def _accessor(self, values, vertices=True, **about):
+        """Number of an accessor of values (n, k), whose data are added; vertices: of a mesh."""
+        raw = np.ascontiguousarray(values).tobytes()
+        view = {"buffer": 0, "byteOffset": len(self._data), "byteLength": len(raw)}
+        if vertices:
+            view["target"] = _VERTICES
+        # All values have four bytes, or four of one byte: what follows stays aligned.
+        self._data += raw
+        kind = _FLOAT if values.dtype == np.float32 else _BYTE
+        shape = {"componentType": kind, "count": len(values), "type": _TYPES[values.shape[1]]}
+        return self._add(
+            "accessors", {"bufferView": self._add("bufferViews", view), **shape, **about}
+        )
+
+
+def _linear(shade):
+    """Light of sRGB colours in [0, 1] (IEC 61966-2-1), which glTF takes in vertices."""
+    return np.where(shade <= 0.04045, shade / 12.92, ((shade + 0.055) / 1.055) ** 2.4)
+
+
+def _chunk(kind, data, filler):
+    """A chunk of the container, filled up to a multiple of four bytes."""
+    data = data + filler * (-len(data) % 4)
+    return struct.pack("<I4s", len(data), kind) + data

@@ -7,20 +7,22 @@ from matplotlib.figure import Figure
 
 from taichi_dem.kit.validation import FileName, positive, unit_vector
 from taichi_dem.output.run_tables import RunTables
-from taichi_dem.plot.attenuation import plot_attenuation
 from taichi_dem.plot.block import plot_cracks
-from taichi_dem.plot.result.block import plot_block
-from taichi_dem.plot.result.columns import plot_columns
-from taichi_dem.plot.result.energy_shares import plot_energy_shares
-from taichi_dem.plot.result.fragments import plot_fragments
-from taichi_dem.plot.result.rose import plot_rose
+from taichi_dem.plot.bodies import ALONG_Z
+from taichi_dem.plot.result.pictures import (
+    plot_attenuation,
+    plot_block,
+    plot_columns,
+    plot_energy_shares,
+    plot_fragments,
+    plot_rose,
+)
 from taichi_dem.plot.series import plot_energy, plot_history
 
 #: Columns that are drawn where there is no hole to look at.
 _PLAIN = ("largest_speed_m_s", "broken_faces", "smallest_step_s")
 #: Radii of a hole from which on its crushed zone does not matter.
 _NEAREST = 4.0
-_ALONG_Z = (0.0, 0.0, 1.0)
 
 
 class ResultPlots:
@@ -70,7 +72,7 @@ class ResultPlots:
         frame: int = -1,
         *,
         magnify: float = 5.0,
-        axis: Sequence[float] = _ALONG_Z,
+        axis: Sequence[float] = ALONG_Z,
         path: Optional[FileName] = None,
     ) -> Figure:
         """Draw broken faces by time of breaking, at rest and as the block is in a frame.
@@ -99,7 +101,7 @@ class ResultPlots:
 
     def rose(
         self,
-        axis: Sequence[float] = _ALONG_Z,
+        axis: Sequence[float] = ALONG_Z,
         *,
         sectors: int = 36,
         path: Optional[FileName] = None,
@@ -133,7 +135,7 @@ class ResultPlots:
         *,
         colour: str = "speed",
         magnify: float = 1.0,
-        axis: Sequence[float] = _ALONG_Z,
+        axis: Sequence[float] = ALONG_Z,
         path: Optional[FileName] = None,
     ) -> Figure:
         """Draw the bodies in a frame, coloured by a value.

@@ -1,0 +1,315 @@
+"""Arrays of a mesh checked: small defects are repaired and told, others refused (NumPy only)."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from taichi_dem.kit.display import counted
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import finite, shown, told_apart, word
+from taichi_dem.mesh import tetrahedra as geometry
+
+#: Share of (longest edge)^3 below which a volume counts as zero, as it may be round-off.
+FLAT = 1e-12
+#: Points nearer than this share of the mesh's extent count as one and the same place.
+COINCIDENT = 1e-9
+#: The extent of a mesh lies between these [m]: a moment of inertia is its fifth power.
+_LEAST_EXTENT, _MOST_EXTENT = 1e-30, 1e30
+
+
+def checked_arrays(
+    points: Any, tetrahedra: Any, groups: Any, tolerance: float, coincident: bool, notes: list[str]
+) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], tuple[str, ...]]:
+    """Points, tetrahedra and groups as a Mesh holds them, and the names of those of inner faces.
+
+    Arguments as for ``checked_mesh``; notes: a list to which sentences on repairs are added.
+    """
+    places = checked_points(points)
+    corners = _checked_indices("tetrahedra", tetrahedra, 4, len(places))
+    faces = _checked_groups(groups, len(places))
+    label = weld_labels(places, corners, tolerance, notes)
+    corners, faces = label[corners], {name: label[faces[name]] for name in faces}
+    places, corners, faces = _without_loose_points(places, corners, faces, notes)
+    extent = np.ptp(places, axis=0).max()
+    if extent < _LEAST_EXTENT:
+        got, least = told_apart(extent, _LEAST_EXTENT)
+        raise InputError(f"points must span at least {least} m, got {got} m")
+    pairs = _coincident(places)
+    if len(pairs) and not coincident:
+        _refuse_coincident(places, pairs)
+    corners = _positive(places, corners, notes)
+    _refuse_bad_sharing(corners)
+    if coincident and tolerance:
+        raise InputError(
+            f"weld_tolerance must be 0 with keep_coincident=True, got {shown(tolerance)}"
+        )
+    if len(pairs):
+        # Joined where they coincide, no body may lie in another.
+        _refuse_bad_sharing(geometry.components(len(places), pairs)[corners])
+        count = len(np.unique(pairs))
+        notes.append(f"kept {count} points apart that coincide with another: no bond joins them")
+    return places, corners, *_checked_faces(corners, faces, notes)
+
+
+def checked_points(points: Any) -> np.ndarray:
+    """Copy as (n, 3) float64, or InputError."""
+    found = _rows("points", points, 3, "iuf", "numbers")
+    with np.errstate(over="ignore"):
+        found = found.astype(np.float64)
+    bad = np.flatnonzero(~(np.abs(found) <= _MOST_EXTENT).all(axis=1))
+    if len(bad):
+        raise InputError(
+            f"points must be finite, within {_MOST_EXTENT:g} m, but {len(bad)} are not, the first "
+            f"is number {bad[0]}: {found[bad[0]].tolist()}"
+        )
+    return found
+
+
+def _rows(what, values, width, kinds, words):
+    """An array of rows of numbers; kinds: of NumPy's types, words: what they are called."""
+    try:
+        found = np.asarray(values)
+    except ValueError:
+        raise InputError(f"{what} must be rows of {width} {words} each") from None
+    if found.size == 0:
+        raise InputError(f"{what} must not be empty")
+    if found.dtype.kind not in kinds:
+        raise InputError(f"{what} must hold {words}, got {found.dtype}")
+    if found.ndim != 2 or found.shape[1] != width:
+        raise InputError(f"{what} must have shape (n, {width}), got {found.shape}")
+    return found
+
+
+def weld_labels(
+    points: np.ndarray, tetrahedra: np.ndarray, tolerance: float, notes: list[str]
+) -> np.ndarray:
+    """For every point the first of those that become one with it, (n,) int32.
+
+    points (n, 3) [m], tetrahedra (m, 4). tolerance: distance up to which points become one [m].
+    Raises InputError for a tolerance that would join the ends of an edge.
+    """
+    lengths = geometry.edge_lengths(points, tetrahedra)
+    shortest = lengths[lengths > COINCIDENT * np.ptp(points, axis=0).max()].min(initial=np.inf)
+    if not (finite(tolerance) and 0.0 <= tolerance < shortest):
+        raise InputError(
+            f"weld_tolerance must lie in [0, {shortest:.6g}) m, the shortest edge, "
+            f"got {shown(tolerance)}"
+        )
+    if tolerance == 0.0:
+        return np.arange(len(points), dtype=np.int32)
+    label = geometry.components(len(points), geometry.close_pairs(points, tolerance))
+    ends = label[tetrahedra[:, geometry.LOCAL_EDGES]]
+    joined = (ends[..., 0] == ends[..., 1]) & (lengths > tolerance)
+    if joined.any():
+        raise InputError(
+            f"weld_tolerance must be smaller than {tolerance:g} m: it joins the ends of an edge "
+            f"of {lengths[joined].min():.6g} m through points between them"
+        )
+    count = int(np.sum(label != np.arange(len(points))))
+    if count:
+        notes.append(f"welded {count} points closer than {tolerance:g} m to another")
+    return label.astype(np.int32)
+
+
+def checked_body_groups(groups: Any, body_count: int) -> dict[str, np.ndarray]:
+    """Numbers of bodies by name, each once and in rising order, or InputError."""
+    if not isinstance(groups, Mapping):
+        raise InputError(f"body_groups must be a dict of name to bodies, got {shown(groups)}")
+    return {
+        word("name of a body group", name): _checked_bodies(name, bodies, body_count)
+        for name, bodies in groups.items()
+    }
+
+
+def _checked_bodies(name, bodies, body_count):
+    try:
+        found = np.asarray(bodies)
+    except ValueError:
+        found = np.zeros(0)
+    if found.ndim != 1 or not found.size or found.dtype.kind not in "iu":
+        raise InputError(f"body group {name!r} must be a list of body numbers, got {shown(bodies)}")
+    refuse_outside(f"body group {name!r}", "body", found[:, None], body_count)
+    return np.unique(found).astype(np.int32)
+
+
+def refuse_outside(what: str, of: str, rows: np.ndarray, count: int) -> None:
+    """Refuse numbers (n, k) of points or bodies that are not there."""
+    bad = np.flatnonzero(((rows < 0) | (rows >= count)).any(axis=1))
+    if len(bad):
+        raise InputError(
+            f"{what}: {of} numbers must lie in [0, {count - 1}], but row {bad[0]} is "
+            f"{rows[bad[0]].tolist()}"
+        )
+
+
+def _checked_groups(groups, point_count):
+    if not isinstance(groups, Mapping):
+        raise InputError(f"groups must be a dict of name to faces, got {shown(groups)}")
+    return {
+        word("name of a group", name): _checked_indices(f"group {name!r}", faces, 3, point_count)
+        for name, faces in groups.items()
+    }
+
+
+def _checked_indices(what, indices, width, point_count):
+    """Copy as (n, width) int32 with all values in range, or InputError."""
+    found = _rows(what, indices, width, "iu", "integer point numbers")
+    refuse_outside(what, "point", found, point_count)
+    return found.astype(np.int32)
+
+
+def _without_loose_points(points, tetrahedra, groups, notes):
+    """Drop the points that no tetrahedron uses; a group's face that uses one gets -1 there."""
+    used = np.unique(tetrahedra)
+    if len(used) < len(points):
+        notes.append(f"dropped {len(points) - len(used)} points that belong to no tetrahedron")
+    new = np.full(len(points), -1, dtype=np.int32)
+    new[used] = np.arange(len(used), dtype=np.int32)
+    return points[used], new[tetrahedra], {name: new[faces] for name, faces in groups.items()}
+
+
+def _coincident(points):
+    """Pairs of points at one place, (n, 2)."""
+    return geometry.close_pairs(points, COINCIDENT * np.ptp(points, axis=0).max())
+
+
+def _refuse_coincident(points, pairs):
+    """Refuse coincident points: bodies that seem joined there would not be bonded."""
+    first = points[pairs[0, 0]]
+    wide = 2.0 * COINCIDENT * np.ptp(points, axis=0).max()
+    raise InputError(
+        f"{len(np.unique(pairs[:, 1]))} points coincide with another, the first at "
+        f"({first[0]:g}, {first[1]:g}, {first[2]:g}) m; pass weld_tolerance={wide:.1e} to join "
+        "them, or keep_coincident=True to keep the faces on them apart"
+    )
+
+
+def _positive(points, tetrahedra, notes):
+    """Turn negative volumes, refuse flat ones."""
+    volume = geometry.signed_volumes(points, tetrahedra)
+    longest = geometry.edge_lengths(points, tetrahedra).max(axis=1)
+    flat = np.flatnonzero(np.abs(volume) <= FLAT * longest**3)
+    if len(flat):
+        raise InputError(
+            f"{len(flat)} tetrahedra have no volume, the first is number {flat[0]} with "
+            f"{volume[flat[0]]:.3g} m3 (at least {FLAT:g} of its longest edge cubed is needed)"
+        )
+    negative = volume < 0.0
+    if negative.any():
+        notes.append(f"turned {int(negative.sum())} tetrahedra of negative volume")
+        tetrahedra = np.where(negative[:, None], tetrahedra[:, [0, 1, 3, 2]], tetrahedra)
+    return np.ascontiguousarray(tetrahedra, dtype=np.int32)
+
+
+def _refuse_bad_sharing(tetrahedra):
+    """Refuse repeated bodies, faces of three bodies and bodies that lie in each other."""
+    points = np.sort(tetrahedra, axis=1)
+    _, number, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
+    repeated = np.flatnonzero(count > 1)
+    if len(repeated):
+        twins = np.flatnonzero(number.reshape(-1) == repeated[0])
+        raise InputError(f"tetrahedra {_listed(twins)} have the same four points")
+    face = geometry.face_numbers(geometry.all_faces(tetrahedra))
+    crowded = np.flatnonzero(np.bincount(face) > 2)
+    if len(crowded):
+        owners = np.flatnonzero(face == crowded[0]) // 4
+        raise InputError(
+            f"tetrahedra {_listed(owners)} share one face; at most two may "
+            f"({len(crowded)} such faces)"
+        )
+    rows = geometry.shared_faces(tetrahedra)
+    first, second = (geometry.all_faces(tetrahedra)[rows[:, side]] for side in (0, 1))
+    start = np.argmax(second == first[:, :1], axis=1)
+    following = np.take_along_axis(second, ((start + 1) % 3)[:, None], axis=1)[:, 0]
+    bad = np.flatnonzero(following == first[:, 1])
+    if len(bad):
+        raise InputError(
+            f"tetrahedra {_listed(rows[bad[0]] // 4)} lie on the same side of the face they share"
+        )
+
+
+def _listed(numbers):
+    """Numbers as "3, 5 and 9"."""
+    *most, last = map(str, numbers.tolist())
+    return f"{', '.join(most)} and {last}"
+
+
+def _checked_faces(tetrahedra, groups, notes):
+    """Groups with each face once, and the names of those of inner faces.
+
+    Faces are ordered by their bodies, and look outward, an inner one out of the body of lower
+    index.
+    """
+    faces = geometry.all_faces(tetrahedra)
+    number, *members = geometry.numbers_in(faces, *groups.values())
+    most = max(map(np.max, (number, *members)))
+    count = np.bincount(number, minlength=most + 1)
+    row_of = np.full(len(count), -1)
+    row_of[number[::-1]] = np.arange(len(faces))[::-1]
+    result, inner = {}, []
+    for name, mine in zip(groups, members):
+        wrong = int(np.sum(count[mine] != 1))
+        if (count[mine] == 2).all():
+            inner.append(name)
+        elif wrong:
+            raise InputError(
+                f"group {name!r}: {wrong} of its {len(mine)} faces are not outer faces of the "
+                "mesh, as those of a group must be unless two bodies share each of them"
+            )
+        once = np.unique(row_of[mine])
+        if len(once) < len(mine):
+            notes.append(f"dropped {len(mine) - len(once)} repeated faces of group {name!r}")
+        result[name] = faces[once]
+    return result, tuple(inner)
+
+
+def joined_bodies(tetrahedra: np.ndarray) -> np.ndarray:
+    """For every body the first of those it is joined to through shared faces, (body_count,)."""
+    return geometry.components(len(tetrahedra), geometry.shared_faces(tetrahedra) // 4)
+
+
+def unbonded_places(points: np.ndarray, tetrahedra: np.ndarray) -> str:
+    """A sentence on bodies that meet without a common face although their points are the same.
+
+    "" where there are none. points (n, 3) [m], tetrahedra (m, 4) of positive volume, at most two
+    at a face.
+    """
+    crossed = _crossed_quadrangles(points, tetrahedra)
+    if len(crossed):
+        place = ", ".join(f"{x:g}" for x in points[list(crossed[0])].mean(axis=0))
+        return (
+            f"at {counted(len(crossed), 'quadrangle')}, the first around ({place}) m, the "
+            "tetrahedra of one side have the other diagonal than those of the other side: they "
+            "share no face there and are not bonded"
+        )
+    part = np.unique(joined_bodies(tetrahedra), return_inverse=True)[1]
+    held = np.unique(np.stack([tetrahedra.ravel(), np.repeat(part, 4)]), axis=1)[0]
+    count = int((np.bincount(held) > 1).sum())
+    if count:
+        return (
+            f"{count} points belong to several of the mesh's {part.max() + 1} parts, which share "
+            "no face and are not bonded"
+        )
+    return ""
+
+
+def _crossed_quadrangles(points, tetrahedra):
+    """Quadrangles that outer faces cut by both diagonals, their four points, a list.
+
+    Two outer faces of different bodies with a common edge make up a quadrangle where they look the
+    same way; a hole of the shape of one tetrahedron has none, as its faces look at each other.
+    """
+    faces = geometry.all_faces(tetrahedra)
+    outer = geometry.outer_rows(faces)
+    faces, body = faces[outer], outer // 4
+    normal = geometry.area_vectors(points, faces)
+    first, second = geometry.pairs_at_edges(faces)
+    alike = np.einsum("ij,ij->i", normal[first], normal[second]) > 0.0
+    chosen = alike & (body[first] != body[second])
+    cut = set()
+    for one, other in zip(faces[first[chosen]].tolist(), faces[second[chosen]].tolist()):
+        four = frozenset(one + other)
+        if len(four) == 4:  # not two triangles on the same three points
+            cut.add((four, frozenset(one) & frozenset(other)))
+    return sorted({tuple(sorted(four)) for four, diagonal in cut if (four, four - diagonal) in cut})

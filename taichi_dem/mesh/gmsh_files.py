@@ -1,0 +1,163 @@
+"""Gmsh files: what readers would take as something else than it says, and names of groups.
+
+A number of a point that is not positive, for instance, is read as another point counted from the
+end, and of faces and bodies in groups of one name a reader loses the faces.
+"""
+
+import os
+import re
+import tempfile
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import shown
+
+_ENDS = re.compile(rb"^\$((?:End)?(?:Nodes|Elements))[ \t\r]*$", re.MULTILINE)
+_WHOLE = [b"Nodes", b"EndNodes", b"Elements", b"EndElements"]
+_NAMES = re.compile(rb"^\$PhysicalNames\s*\n(.*?)^\$EndPhysicalNames", re.MULTILINE | re.DOTALL)
+_NAME = re.compile(r'\s*(\d+)\s+(\d+)\s+("?)(.*?)\3\s*')
+
+
+class PhysicalName(NamedTuple):
+    """A name in a file, the dimension of the cells that it names, and the number that they carry.
+
+    These are the keys of ``field_data`` and ``cell_sets`` of a Gmsh file.
+    """
+
+    dimension: int
+    tag: int
+    name: str
+
+
+def refuse_bad_gmsh(path: str) -> None:
+    """Raise InputError for a Gmsh file that is cut off, or whose numbers do not fit each other.
+
+    Text of the versions 2.2 and 4.1 is checked by its rows, other files by the ends of sections.
+    Files that do not begin like one of Gmsh's are left to other readers.
+    """
+    with open(path, "rb") as file:
+        content = file.read()
+    if not content.startswith(b"$MeshFormat"):
+        return
+    marks = list(_ENDS.finditer(content))
+    if [mark[1] for mark in marks] != _WHOLE:
+        raise InputError("it must have one whole section $Nodes, then $Elements; it may be cut off")
+    version, kind = content[:200].split()[1:3]
+    if kind == b"1" or version not in (b"2", b"2.2", b"4", b"4.1"):
+        return
+    nodes, elements = (
+        [line.split() for line in content[start.end() : end.start()].splitlines()[1:]]
+        for start, end in zip(marks[::2], marks[1::2])
+    )
+    try:
+        numbers = _numbers_2 if version.startswith(b"2") else _numbers_4
+        points, corners = (np.array(found, dtype=np.int64) for found in numbers(nodes, elements))
+    except (ValueError, IndexError, OverflowError):
+        raise InputError("its sections must hold as many whole numbers as they announce") from None
+    number, count = np.unique(points, return_counts=True)
+    wrong = number[(number < 1) | (count > 1)]
+    if len(wrong):
+        raise InputError(f"its points must have different numbers from 1 on, got {wrong[0]}")
+    missing = np.setdiff1d(corners, points)
+    if len(missing):
+        raise InputError(f"its elements have the point {missing[0]}, which is not there")
+
+
+def _numbers_2(nodes, elements):
+    """Numbers of points and of corners in version 2.2, where each row says how many tags it has."""
+    sizes: dict[bytes, int] = {}
+    corners: list[int] = []
+    for _, kind, tags, *rest in elements[1:]:
+        own = rest[int(tags) :]
+        _require(int(tags) >= 0 and len(own) == sizes.setdefault(kind, len(own)) > 0)
+        corners += map(int, own)
+    for rows in (nodes, elements):
+        _require(int(rows[0][0]) == len(rows) - 1)
+    _require(all(len(row) == 4 for row in nodes[1:]))
+    return [int(row[0]) for row in nodes[1:]], corners
+
+
+def _numbers_4(nodes, elements):
+    """The same in version 4.1, where a row of four numbers, the last its size, heads a block."""
+    points, corners = (
+        [[int(one) for one in row] for row in _rows_4(rows, each)]
+        for rows, each in ((nodes, 2), (elements, 1))
+    )
+    return [one for (one,) in points], [one for row in corners for one in row[1:]]
+
+
+def _rows_4(rows, each):
+    """Rows of all blocks; each: how many an entry has, the places of a point are not among them."""
+    at, found = 1, []
+    for _ in range(int(rows[0][0])):
+        _, _, _, size = map(int, rows[at])
+        block = rows[at + 1 : at + 1 + each * size]
+        _require(len(block) == each * size >= 0)
+        _require(all(len(row) == len(block[0]) for row in block[:size]))
+        _require(all(len(row) == 3 for row in block[size:]))
+        found += block[:size]
+        at += 1 + len(block)
+    _require(at == len(rows))
+    return found
+
+
+def _require(right):
+    if not right:
+        raise ValueError
+
+
+@contextmanager
+def with_own_keys(path: str) -> Iterator[tuple[str, Mapping[str, str]]]:
+    """A file in which each physical group has a name of its own, and its true name by that.
+
+    It is the file itself, or a copy where names repeat or hold what a reader takes for an escape.
+    """
+    with open(path, "rb") as file:
+        content = file.read()
+    section = _NAMES.search(content)
+    rows = section[1].decode("utf-8").splitlines()[1:] if section else []
+    found = [m.group(1, 2, 4) for m in map(_NAME.fullmatch, rows) if m]
+    names = [name for _, _, name in found]
+    clear = len({*names}) == len(names) and not any("\\" in name for name in names)
+    if section is None or clear or len(found) < len(rows):
+        yield path, {}
+        return
+    lines = [f'{dimension} {tag} "{k}"\n' for k, (dimension, tag, _) in enumerate(found)]
+    start, end = section.span(1)
+    with tempfile.TemporaryDirectory() as folder:
+        copy = os.path.join(folder, "keyed.msh")
+        with open(copy, "wb") as file:
+            file.write(content[:start] + f"{len(lines)}\n{''.join(lines)}".encode() + content[end:])
+        yield copy, {str(k): name for k, name in enumerate(names)}
+
+
+def keyed_by_dimension(raw: Any, names: Mapping[str, str]) -> Any:
+    """A file of meshio's with groups by PhysicalName; names: the true ones of ``with_own_keys``."""
+    keys = {
+        key: PhysicalName(int(value[1]), int(value[0]), names.get(key, key))
+        for key, value in raw.field_data.items()
+        if np.shape(value) == (2,)
+    }
+    raw.field_data = {keys[key]: raw.field_data[key] for key in keys}
+    raw.cell_sets = {keys.get(key, key): members for key, members in raw.cell_sets.items()}
+    return raw
+
+
+def physical_names(raw: Any, dimension: int) -> dict[int, str]:
+    """Names of the physical groups of a dimension in a file of meshio's, by their numbers."""
+    return {key.tag: key.name for key in raw.field_data if key.dimension == dimension}
+
+
+def made_name(name: str, value: int, taken: Collection[Any]) -> str:
+    """The name "NAME_VALUE" of a group that has only a number; InputError where another has it."""
+    made = f"{name}_{value}"
+    if made in taken:
+        raise InputError(
+            f"the group of number {value} must have a name, as {shown(made)}, which stands for it, "
+            "must be that of one group only, got another group of this name"
+        )
+    return made
