@@ -6,7 +6,7 @@ else brazilian, by the tensile strength of bonds, compression by their cohesion.
 brazilian are both asked for, tension is met and brazilian compared. Expect each misfit to fall
 below the tolerance within a few rounds, or a sentence that says why it does not.
 
-    python experiments/calibrate_material.py              # ten minutes
+    python experiments/calibrate_material.py              # a minute
     python experiments/calibrate_material.py --mesh block.msh --young 30e9 --tension 3e6
     python experiments/calibrate_material.py --quick      # static solves alone
 
@@ -216,7 +216,8 @@ def run(options):
     study.write_rows(folder / "targets.csv", rows)
     draw(folder / "calibration.png", history, targets, options.tolerance)
     figures = {f"{row['target']}_misfit": (row["misfit"], "1") for row in rows}
-    figures.update({f"bond_{name}": (constants[name], "") for name in dict.fromkeys(SETS.values())})
+    for name in dict.fromkeys(SETS.values()):
+        figures[f"bond_{name}"] = constants[name], "1" if name == "poisson" else "Pa"
     study.finish(options, NAME, figures, 0.0)
 
 

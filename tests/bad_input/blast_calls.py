@@ -169,7 +169,7 @@ def _questions():
     yield "estimated_effects", estimated_effects, {"scene": SCENE, "until": 1e-5}
     yield "mesh_stiffness", mesh_stiffness, {"mesh": BAR, "material": rock}
     yield "quality_report", quality_report, {"mesh": BAR, "material": CONCRETE}
-    yield "step_report", step_report, {"scene": BAR, "material": CONCRETE}
+    yield "step_report", step_report, {"scene": SCENE}
     yield "Simulation", Simulation, {"scene": ALONE, "method": METHOD}
     moving = simulation()
     yield "Simulation.reset", moving.reset, {"scene": ALONE, "method": METHOD}
