@@ -194,9 +194,8 @@ class StabilityLimits:
         dashpot = self.dashpot_table[i, intact]
         contact_c, contact_k = 0.0, 0.0
         if ti.static(self.has_contact):
-            share = self.contact_limits.eigenvalue(i)
-            largest = self.contact_limits.largest_constants(i)
-            contact_c, contact_k = largest[0] * share, largest[1] * share
+            rates = self.contact_limits.rates(i)
+            contact_c, contact_k = rates[0], rates[1]
         self.bond_damping[i], self.contact_damping[i] = dashpot, contact_c
         if ti.static(self.controlled):
             self._limit(i, dashpot, contact_c, self.spring_table[i, intact], contact_k)
