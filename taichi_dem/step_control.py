@@ -164,14 +164,6 @@ def level_of(step, dt0):
 
 
 @ti.func
-def shorter(step, bound, other, criterion):
-    """The shorter of two steps [s], with its criterion."""
-    if other < step:
-        step, bound = other, criterion
-    return step, bound
-
-
-@ti.func
 def finer(level, bound, other, criterion):
     """The finer of two levels, with its criterion."""
     if other > level:

@@ -1,4 +1,4 @@
-"""Explicit step limits of the bonds of a mesh: rates of each body, and the steps they allow."""
+"""Rates of each body of a mesh: how fast its bonds or contacts answer, which limits its step."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from taichi_dem.kit.fixed_order import (
 from taichi_dem.materials.body_materials import AnyMaterial
 from taichi_dem.materials.bond_rules import Constant, Density, per_bond
 from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import Topology, body_properties, face_vertices
 
@@ -90,6 +91,34 @@ def _face_blocks(mesh, body, face, centre, coefficients):
     law = across * np.eye(3) + (normally - across) * (normal[:, :, None] * normal[:, None, :])
     arms = mesh.points[vertices] - centre[:, None]
     return area[:, None, None] / 3.0 * point_blocks(arms, law)
+
+
+def contact_eigenvalues(
+    mesh: Mesh, density: Density, divisions: int, friction: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Largest eigenvalues of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], two arrays (n,).
+
+    The first is for the worst of its spheres in contact, the second for all of the worst face. D is
+    the identity with friction, n n^T without; contacts act where a sphere touches its face. The
+    step finds the same from the near contacts (``stability/contact_limits.py``).
+    """
+    mass, centre, inertia = body_properties(mesh, density)
+    spheres = spheres_of_faces(mesh, centre, divisions)
+    root = inverse_root(mass, inertia)
+    one, whole_face = np.zeros(len(mass)), np.zeros(len(mass))
+    faces = geometry.all_faces(mesh.tetrahedra)
+    vectors = geometry.area_vectors(mesh.points, faces).reshape(-1, 4, 3)
+    for face in range(4):
+        outward = vectors[:, face] / length(vectors[:, face])[:, None]
+        arms = spheres.centre[:, face] + spheres.radius[:, face, :, None] * outward[:, None]
+        along = outward[:, :, None] * outward[:, None, :]
+        law = np.broadcast_to(np.eye(3), along.shape) if friction else along
+        found = scaled_eigenvalues(root, point_blocks(arms, law))
+        whole_face = np.maximum(whole_face, found)
+        for k in range(spheres.per_face):
+            found = scaled_eigenvalues(root, point_blocks(arms[:, k : k + 1], law))
+            one = np.maximum(one, found)
+    return one, whole_face
 
 
 def point_blocks(arms: np.ndarray, law: np.ndarray) -> np.ndarray:

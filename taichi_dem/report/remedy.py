@@ -7,9 +7,8 @@ import numpy as np
 
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.report.energy_balance import EnergyBalance, unexplained_share
-from taichi_dem.stability.contact_limits import contact_rates
-from taichi_dem.stability.quality import quality_report
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
+from taichi_dem.stability.step_report import bond_steps
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.step.schedule import Schedule
@@ -109,17 +108,19 @@ class Remedies:
 
         Dashpots that are solved or limited set none.
         """
-        steps = quality_report(self.model.mesh, self.model.materials)
-        limits = {"bond springs": steps.spring_step_s}
+        steps = bond_steps(self.model.mesh, self.model.materials)
+        limits = {"bond springs": steps["bond_stiffness"]}
         tame = self.solves or self.limited
         if self.model.by_role["dashpot"] and not tame:
-            limits["bond dashpots"] = steps.dashpot_step_s
+            limits["bond dashpots"] = steps["bond_dashpot"]
         if self.contacts is not None:
             stiffness, damping = map(
                 self.model.materials.of_contacts, ("contact_stiffness", "contact_damping")
             )
             pairs, counts, _ = self.contacts.store.near_table()
-            rates = contact_rates(pairs, counts, self.model.body_mass)
+            # Most sphere pairs that a body has with another, over its mass [1/kg].
+            rates, mass = np.zeros(self.model.body_count), self.model.body_mass
+            np.maximum.at(rates, pairs, np.maximum(1, counts)[:, None] / mass[pairs])
             limits["contact springs"] = spring_step(stiffness * rates)
             if not tame:
                 limits["sphere dashpots"] = dashpot_step(damping * rates)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import taichi as ti
-from numpy.typing import ArrayLike
 
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.elasticity.rates import inverse_root
@@ -20,19 +19,6 @@ from taichi_dem.state.timeline import MAX_LEVEL
 #: Squarings of the block of near contacts: tr(A^32)^(1/32) exceeds its largest eigenvalue by at
 #: most 6^(1/32), 6 %, and is never below it.
 SQUARINGS = 5
-
-
-def contact_rates(pairs: np.ndarray, counts: ArrayLike, mass: np.ndarray) -> np.ndarray:
-    """Most sphere pairs that a body has with another, over its mass [1/kg], (body_count,).
-
-    pairs: bodies that are near each other, (n, 2). counts: their sphere pairs, at least 1 counts.
-    mass: of the bodies [kg]. An estimate from single pairs, for a sentence; ``StepReport`` has
-    bounds.
-    """
-    rates = np.zeros(len(mass))
-    for bodies, count in zip(pairs, np.maximum(1, counts)):
-        rates[bodies] = np.maximum(rates[bodies], count / mass[bodies])
-    return rates
 
 
 @ti.func

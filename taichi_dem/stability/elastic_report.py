@@ -60,15 +60,13 @@ class ElasticReport:
     def _coarse(self):
         """A sentence where elements are too large for cracks."""
         coarse = int((self.elements < ELEMENTS).sum())
-        if not coarse:
-            return ()
         words = (
             f"the characteristic length E G_f / tensile_strength^2 = {self._crack_words()} m is "
             f"less than {ELEMENTS:g} elements at {coarse} of {len(self.element_size)} bodies, with "
             f"edges of up to {self.element_size.max():.3g} m: strength and paths of cracks there "
             "are the mesh's"
         )
-        return (words,)
+        return (words,) if coarse else ()
 
     def _crack_words(self):
         """The characteristic length, or the range of several, as a number for a sentence."""
@@ -123,13 +121,12 @@ def elastic_report(scene: Scene) -> ElasticReport:
     steps, sizes = step_report(scene), element_sizes(mesh)
     if laid.is_one:
         material = laid.materials[0]
-        crack = _crack_length(stiffness, material)
-        return ElasticReport(stiffness, _asked(material), crack, sizes, steps)
-    lengths = [_crack_length(mesh_stiffness(mesh, each), each) for each in laid.materials]
-    return ElasticReport(stiffness, None, np.array(lengths)[laid.of_body], sizes, steps)
+        return ElasticReport(stiffness, _asked(material), _crack(stiffness, material), sizes, steps)
+    lengths = np.array([_crack(mesh_stiffness(mesh, each), each) for each in laid.materials])
+    return ElasticReport(stiffness, None, lengths[laid.of_body], sizes, steps)
 
 
-def _crack_length(stiffness, material):
+def _crack(stiffness, material):
     """Characteristic length of a crack's tip [m]."""
     return stiffness.young * material.fracture_energy / material.tensile_strength**2
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.terminal import aligned
 from taichi_dem.kit.validation import instance
 from taichi_dem.materials import Material
@@ -17,7 +16,7 @@ from taichi_dem.mesh.topology import body_properties, topology_of
 from taichi_dem.stability.step_report import StepReport, bond_steps
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class QualityReport(StepReport):
     """Quality of each body, arrays (body_count,), and the explicit steps that its bonds allow.
 
@@ -61,16 +60,6 @@ class QualityReport(StepReport):
     def spring_step_s(self) -> np.ndarray:
         """The same with its bond springs [s]."""
         return self.limits["bond_stiffness"]
-
-    @property
-    def critical_step_s(self) -> np.ndarray:
-        """The smaller of both limits of every body [s], shape (body_count,)."""
-        return self.step_s
-
-    def __repr__(self) -> str:
-        bodies, bonds = counted(len(self.mass_kg), "body"), counted(self.bond_count, "bond")
-        step = f"critical step {self.step_s.min(initial=np.inf):.3g} s"
-        return in_brief(self, bodies, bonds, step, "print it for the table")
 
     def __str__(self) -> str:
         """Counts, ranges and the worst bodies as a table."""

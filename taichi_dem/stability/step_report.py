@@ -7,27 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_dem.elasticity.rates import (
-    bond_rates,
-    dashpots_of,
-    inverse_root,
-    point_blocks,
-    scaled_eigenvalues,
-    springs_of,
-)
+from taichi_dem.elasticity.rates import bond_rates, contact_eigenvalues, dashpots_of, springs_of
 from taichi_dem.kit.display import counted, in_brief
-from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.terminal import aligned
 from taichi_dem.kit.validation import instance, whole
 from taichi_dem.materials.body_materials import AnyMaterial
-from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
-from taichi_dem.mesh.topology import Density, body_properties, topology_of
+from taichi_dem.mesh.topology import topology_of
 from taichi_dem.scene import Scene, scene_warnings
 from taichi_dem.stability.body_limits import LIMITED
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
-from taichi_dem.step_control import StepControl
 
 #: Elements listed in the printed table.
 WORST = 10
@@ -164,35 +153,23 @@ class StepReport:
         if not np.isfinite(self.step_s).any():
             words = "nothing limits the step: no body has a bond, and no contact is listed"
             return "\n".join([words, *warnings])
-        tables = self._of_methods(), self._of_criteria(), self._of_bodies()
-        lines = [line for table in tables for line in [*aligned(table), ""]]
+        methods = [["largest stable step", "in bonds s", "in contact s"]]
+        for dashpots, words in METHODS.items():
+            bond, contact = (self.borne(dashpots, link).min() for link in ("bond", "contact"))
+            methods.append([words, f"{bond:.3g}", f"{contact:.3g}"])
+        step, binding = self.step_s, self.binding
+        criteria = [["step bound by", "bodies", "smallest s", "median s"]]
+        for name, own in self.limits.items():
+            figures = f"{own.min():.3g}", f"{np.median(own):.3g}"
+            criteria.append([name, f"{(binding == name).sum()}", *figures])
+        worst = [["worst body", "step s", "bound by"]]
+        worst += [[f"{body}", f"{step[body]:.3g}", binding[body]] for body in self.worst()]
+        lines = [line for table in (methods, criteria, worst) for line in [*aligned(table), ""]]
         explained = (
             "in contact: every sphere of the worst face at once; Multirate: of the worst body, as "
-            f"each has its own; control=StepControl() keeps to {StepControl().safety:g} of them"
+            "each has its own; a StepControl keeps to its safety's share of them"
         )
         return "\n".join([*lines, explained, *self._prices(), *warnings])
-
-    def _of_methods(self):
-        """A row for every treatment of dashpots."""
-        rows = [["largest stable step", "in bonds s", "in contact s"]]
-        for dashpots, words in METHODS.items():
-            steps = (self.borne(dashpots, link).min() for link in ("bond", "contact"))
-            rows.append([words, *map(_seconds, steps)])
-        return rows
-
-    def _of_criteria(self):
-        """A row for every criterion."""
-        binding = self.binding
-        rows = [["explicit step bound by", "bodies", "smallest s", "median s"]]
-        for name, steps in self.limits.items():
-            figures = map(_seconds, (steps.min(), np.median(steps)))
-            rows.append([name, str((binding == name).sum()), *figures])
-        return rows
-
-    def _of_bodies(self):
-        """A row for each of the worst bodies."""
-        rows = [[str(k), _seconds(self.step_s[k]), self.binding[k]] for k in self.worst()]
-        return [["worst body", "step s", "bound by"], *rows]
 
     def _prices(self):
         """Cost of the worst bodies, where the step of others is limited too."""
@@ -200,11 +177,6 @@ class StepReport:
         share = f"{100 * self.work_share():.3g} % of the updates"
         words = f"without the worst {WORST} the step of all would be {price:.3g} times as long"
         return [f"{words}; with steps of their own they take {share}"] if price < np.inf else []
-
-
-def _seconds(step):
-    """A step [s] for a table."""
-    return f"{step:.3g}" if np.isfinite(step) else "unlimited"
 
 
 def stable_together(springs: ArrayLike, drags: ArrayLike) -> np.ndarray:
@@ -268,30 +240,3 @@ def bond_steps(mesh: Mesh, material: AnyMaterial) -> dict[str, np.ndarray]:
         "bond_stiffness": spring_step(bond_rates(*of_bonds, springs_of(material))),
         "bond_dashpot": dashpot_step(bond_rates(*of_bonds, dashpots_of(material))),
     }
-
-
-def contact_eigenvalues(
-    mesh: Mesh, density: Density, divisions: int, friction: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Largest eigenvalues of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], two arrays (n,).
-
-    The first is for the worst of its spheres in contact, the second for all of the worst face. D is
-    the identity with friction, n n^T without; contacts act where a sphere touches its face. The
-    step finds the same from the near contacts (``stability/contact_limits.py``).
-    """
-    mass, centre, inertia = body_properties(mesh, density)
-    spheres = spheres_of_faces(mesh, centre, divisions)
-    root = inverse_root(mass, inertia)
-    one, whole_face = np.zeros(len(mass)), np.zeros(len(mass))
-    vectors = area_vectors(mesh.points, all_faces(mesh.tetrahedra)).reshape(-1, 4, 3)
-    for face in range(4):
-        outward = vectors[:, face] / length(vectors[:, face])[:, None]
-        arms = spheres.centre[:, face] + spheres.radius[:, face, :, None] * outward[:, None]
-        along = outward[:, :, None] * outward[:, None, :]
-        law = np.broadcast_to(np.eye(3), along.shape) if friction else along
-        found = scaled_eigenvalues(root, point_blocks(arms, law))
-        whole_face = np.maximum(whole_face, found)
-        for k in range(spheres.per_face):
-            found = scaled_eigenvalues(root, point_blocks(arms[:, k : k + 1], law))
-            one = np.maximum(one, found)
-    return one, whole_face
