@@ -84,13 +84,24 @@ def _sum_of(blocks, subset):
 def _face_blocks(mesh, body, face, centre, coefficients):
     """The block G of single faces, shape (n, 6, 6); coefficients: of each, (n, 2)."""
     vertices = face_vertices(mesh, body, face)
-    vector = geometry.area_vectors(mesh.points, vertices)
+    area, law = face_laws(mesh.points, vertices, coefficients)
+    arms = mesh.points[vertices] - centre[:, None]
+    return area[:, None, None] / 3.0 * point_blocks(arms, law)
+
+
+def face_laws(
+    points: np.ndarray, faces: np.ndarray, coefficients: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Areas [m^2] of faces, and what resists a velocity there per area: (n,) and (n, 3, 3).
+
+    faces: point indices, (n, 3). coefficients: normal and tangential one of each, (n, 2).
+    """
+    vector = geometry.area_vectors(points, faces)
     area = length(vector)
     normal = vector / area[:, None]
     normally, across = coefficients[:, 0, None, None], coefficients[:, 1, None, None]
-    law = across * np.eye(3) + (normally - across) * (normal[:, :, None] * normal[:, None, :])
-    arms = mesh.points[vertices] - centre[:, None]
-    return area[:, None, None] / 3.0 * point_blocks(arms, law)
+    along = normal[:, :, None] * normal[:, None, :]
+    return area, across * np.eye(3) + (normally - across) * along
 
 
 def contact_eigenvalues(
@@ -127,18 +138,18 @@ def point_blocks(arms: np.ndarray, law: np.ndarray) -> np.ndarray:
     arms: points from the centre [m], shape (n, points, 3). law: what resists their velocity,
     shape (n, 3, 3). Returns (n, 6, 6).
     """
-    lever = np.zeros((*arms.shape[:2], 3, 6))
-    lever[..., :3] = np.eye(3)
-    lever[..., 3:] = -_cross_matrix(arms)  # w x r = -[r]x w
+    lever = levers(arms)
     return product(transposed(lever), product(law[:, None], lever)).sum(axis=1)
 
 
-def _cross_matrix(vectors):
-    """Matrices [r]x with [r]x w = r x w, shape (..., 3, 3)."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    zero = np.zeros_like(x)
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+def levers(arms: np.ndarray) -> np.ndarray:
+    """Maps J from (velocity, spin) to the velocity of points at arms (..., 3), (..., 3, 6)."""
+    made = np.zeros((*arms.shape, 6))
+    made[..., :3] = np.eye(3)
+    x, y, z = np.moveaxis(arms, -1, 0)
+    for row, column, part in ((0, 1, z), (1, 2, x), (2, 0, y)):
+        made[..., row, 3 + column], made[..., column, 3 + row] = part, -part
+    return made
 
 
 def scaled_eigenvalues(root: np.ndarray, blocks: np.ndarray) -> np.ndarray:
