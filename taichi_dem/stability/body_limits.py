@@ -19,9 +19,11 @@ from taichi_dem.stability.stable_step import dashpot_limit, spring_limit
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
-from taichi_dem.step_control import CRITERIA, EVENTS, Displacement, StepControl, finer, level_of
+from taichi_dem.step_control import Displacement, StepControl, finer, level_of
 
-HIT, RELEASE, CLOSE = (1 << k for k in range(len(EVENTS)))
+#: Events at which a body between its own times is brought to the present and takes its new step at
+#: once: a contact comes near, a bond near it breaks, a body that it touches refined its step much.
+HIT, RELEASE, CLOSE = 1, 2, 4
 #: With c min(1, LIMITED / X) no dashpot takes more than this in a step (X = 2 is unstable).
 LIMITED = 1.7
 #: Part of it that near contacts get at least, if they need it: a meeting is over in a few steps.
@@ -75,15 +77,12 @@ class StabilityLimits:
         self.has_distance = method.distance is not None
         self.limited = method.dashpot == "limited"
         self.spreads = rule.level_jump is not None
-        self.counts = {name: name in rule.criteria for name in CRITERIA}
-        self.has_load = self.counts["load"] and self.has_distance and bool(tables.loads)
-        self.wakes = sum(HIT << EVENTS.index(event) for event in rule.wake)
+        self.has_load = self.has_distance and bool(tables.loads)
         if self.has_distance:
             self.displacement = Displacement()
         if self.has_load:
             self.leap = Displacement(power=2)
-        if self.counts["rotation"]:
-            self.turn = Displacement()
+        self.turn = Displacement()
         self.contact_limits = ContactLimits(tables, state, contacts) if contacts else None
         self.jump = ti.field(ti.i32, shape=())
         self.rule = ti.field(real, shape=3)
@@ -109,8 +108,7 @@ class StabilityLimits:
             self.displacement.load(distance, method.dt0)
         if self.has_load:
             self.leap.load(distance, method.dt0)
-        if self.counts["rotation"]:
-            self.turn.load(rule.angle, method.dt0)
+        self.turn.load(rule.angle, method.dt0)
         if self.has_contact:
             self.contact_limits.load(model, rule.ahead * method.dt0)
         if self.tables.dashpot.name:
@@ -182,14 +180,7 @@ class StabilityLimits:
 
     @ti.func
     def _limit(self, i, bond_c, contact_c, bond_k, contact_k):
-        """Rates of bonds and contacts add up; the larger one of the two counts as the cause.
-
-        A criterion that the user left out does not add.
-        """
-        bond_c = bond_c if ti.static(self.counts["bond_dashpot"]) else 0.0
-        contact_c = contact_c if ti.static(self.counts["contact_dashpot"]) else 0.0
-        bond_k = bond_k if ti.static(self.counts["bond_stiffness"]) else 0.0
-        contact_k = contact_k if ti.static(self.counts["contact_stiffness"]) else 0.0
+        """Rates of bonds and contacts add up; the larger one of the two counts as the cause."""
         step, by = self.rule[0], steps.LARGEST
         borne = self.rule[1] * spring_limit(bond_k + contact_k)
         if borne < step:
@@ -215,9 +206,8 @@ class StabilityLimits:
         if ti.static(self.has_distance):
             speed2 = self.state.velocity[i].norm_sqr()
             level, by = finer(level, by, self.displacement.finer(level, speed2), steps.DISPLACEMENT)
-        if ti.static(self.counts["rotation"]):
-            spin2 = self.state.spin[i].norm_sqr()
-            level, by = finer(level, by, self.turn.finer(level, spin2), steps.ROTATION)
+        spin2 = self.state.spin[i].norm_sqr()
+        level, by = finer(level, by, self.turn.finer(level, spin2), steps.ROTATION)
         if ti.static(self.has_load):
             push2 = self._push2(i, now)
             level, by = finer(level, by, self.leap.finer(level, push2), steps.LOAD)

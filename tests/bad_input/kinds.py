@@ -92,9 +92,9 @@ KINDS = {
         pairs_per_body particles place record_every recorded_samples s sample_every samples scene
         scenes sectors seed seeds spheres_per_body steps substeps sweeps threads total
         transient_cycles""",
-    "word": """accounting accumulator arch colour criteria dashpot driver effects friction_law
+    "word": """accounting accumulator arch colour dashpot driver effects friction_law
         if_diverged kind measure mount neighbour of outer_faces pair_rule priority rules search
-        start traversal wake way progress term Spheres.damping""",
+        start traversal way progress term Spheres.damping""",
     "any": """about acceleration axis base bend by displacement factor force history hole notch
         normal phase phases points shapes start_velocity t time_s times times_s turned u v values
         value velocity x y spin sizes motion tetrahedra goal boxes excitation observers amplitude
