@@ -11,7 +11,7 @@ below the tolerance within a few rounds, or a sentence that says why it does not
     python experiments/calibrate_material.py --quick      # static solves alone
 
 Compression needs slip-energy, and scenes that then list SlipWeakening: bonds that keep their
-cohesion harden without a peak. Writes calibration.png, targets.csv, material.txt and summary.json
+cohesion harden without a peak. Writes calibration.png, targets.csv and summary.json
 to results/calibrate_material/.
 """
 
@@ -27,7 +27,6 @@ from scipy.optimize import root
 from _strength_tests import TESTS
 from taichi_dem import InputError, Material, mesh_stiffness, read_mesh
 from taichi_dem.kit import study
-from taichi_dem.kit.files import write_text
 from taichi_dem.kit.plot_style import GREY, picture
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.materials.moduli import POISSON
@@ -35,24 +34,19 @@ from taichi_dem.mesh.shapes import bar
 from taichi_dem.stability.elastic_report import element_sizes
 
 NAME = "calibrate_material"
-STRESS, RATIO = study.number(0, 1e12), study.number(*POISSON, open_low=False)
+STRESS, ENERGY = study.number(0, 1e12), study.number(0, 1e9)
 SETTINGS = {
     "mesh": (None, None, str, "file of the mesh, a bar of 192 bodies"),
     "young": (None, None, STRESS, "Young's modulus that the mesh is to show [Pa]"),
-    "poisson": (None, None, RATIO, "its Poisson's ratio"),
+    "poisson": (None, None, study.number(*POISSON, open_low=False), "its Poisson's ratio"),
     "tension": (None, None, STRESS, "strength of a prism in direct tension [Pa]"),
     "brazilian": (None, None, STRESS, "2 P / (pi D t) of a disc between two arcs [Pa]"),
     "compression": (None, None, STRESS, "strength of a prism between held ends [Pa]"),
-    "slip_energy": (
-        None,
-        None,
-        study.number(0, 1e9),
-        "G_II of SlipWeakening [J/m2]; else bonds slip",
-    ),
+    "slip_energy": (None, None, ENERGY, "G_II of SlipWeakening [J/m2]; else bonds slip"),
     "tolerance": (0.02, 0.02, study.tolerance, "misfit that is allowed, 2%%"),
     "seed": (0, 0, study.whole(0, 2**31 - 1), "of the specimens, 0"),
     "density": (2450.0, 2450.0, study.number(0, 1e6), "[kg/m3], 2450"),
-    "fracture_energy": (60.0, 60.0, study.number(0, 1e9), "of a bond [J/m2], 60"),
+    "fracture_energy": (60.0, 60.0, ENERGY, "of a bond [J/m2], 60"),
     "friction_angle": (40.0, 40.0, study.number(0, 90, open_low=False), "[degrees], 40"),
     "damping_ratio": (0.05, 0.05, study.number(0, 10, open_low=False), "0.05"),
     "tensile_strength": (4e6, 4e6, STRESS, "of a bond to begin with [Pa], 4e6"),
@@ -67,7 +61,6 @@ SETS = {
 #: Targets of the full and of the quick job where no option gives one.
 ELASTIC = {"young": 32e9, "poisson": 0.2}
 FULL = {**ELASTIC, "tension": 4e6, "brazilian": 7.6e6, "compression": 1.2e8}
-SLIP_ENERGY = 300.0
 GIVEN = ("density", "fracture_energy", "friction_angle", "damping_ratio", "tensile_strength")
 #: Rounds of static solves and of tests at most; a constant changes by this factor at most.
 SOLVES, ROUNDS, FACTOR = 8, 6, 10.0
@@ -186,33 +179,29 @@ def run(options):
     """Calibrate, compare, picture; say which target is not met."""
     targets = {name: value for name in SETS if (value := getattr(options, name)) is not None}
     if not targets:
-        targets, options.slip_energy = ELASTIC if options.quick else FULL, SLIP_ENERGY
+        targets = ELASTIC if options.quick else FULL
+        options.slip_energy = options.slip_energy or 300.0
     if "compression" in targets and options.slip_energy is None:
         raise InputError("slip-energy must be a number where compression is asked for, got None")
     folder = study.begin(options)
     mesh = bar(0.08, 0.02, (8, 2, 2)) if options.mesh is None else read_mesh(options.mesh)
     own = {name: getattr(options, name) for name in (*GIVEN, "cohesion")}
     start = {name: targets.get(name, value) for name, value in ELASTIC.items()} | own
-    element = float(np.median(element_sizes(mesh)))
+    element, drawn = float(np.median(element_sizes(mesh))), (options.seed, options.slip_energy)
 
     def test(name, constants, target):
         """Strength [Pa] of a specimen in a test."""
         with ProgressBar(f"{name} at {target:.3g} Pa"):
             material = Material.from_elastic(**constants)
-            return TESTS[name].strength(
-                material, element, target, options.seed, options.slip_energy
-            )
+            return TESTS[name].strength(material, element, target, *drawn)
 
     constants, history, matches = calibrate(mesh, start, targets, options.tolerance, test)
     rows = TABLE.rows(matches)
     TABLE.show(rows)
-    for match in matches:
-        if said := match.complaint(options.tolerance):
-            print(f"not met: {said}")
+    print(*filter(None, (match.complaint(options.tolerance) for match in matches)), sep="\n")
     lines = [f"{name}={value!r}," for name, value in constants.items()]
     text = "\n    ".join(["Material.from_elastic(", *lines]) + "\n)\n"
     print(text)
-    write_text(folder / "material.txt", text)
     study.write_rows(folder / "targets.csv", rows)
     draw(folder / "calibration.png", history, targets, options.tolerance)
     figures = {f"{row['target']}_misfit": (row["misfit"], "1") for row in rows}
