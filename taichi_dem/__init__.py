@@ -19,7 +19,6 @@ from taichi_dem.kit import runtime  # isort: skip
 
 # The second is imported for what it tells ``kit.pictures``.
 from taichi_dem import effects, goals, methods, scene_pictures, shapes  # noqa: F401
-from taichi_dem.calibration.calibrate import Targets, calibrate
 from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.goals import Goal
 from taichi_dem.kit.accuracy.answer import Answer
@@ -82,10 +81,8 @@ __all__ = [
     "StepControl",
     "SweepTable",
     "Table",
-    "Targets",
     "Uniform",
     "__version__",
-    "calibrate",
     "checked_mesh",
     "effects",
     "elastic_report",

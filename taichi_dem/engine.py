@@ -10,7 +10,7 @@ from taichi_dem.laws.base import Effect
 from taichi_dem.laws.bound import bound_by_role
 from taichi_dem.methods import Method, structure_of
 from taichi_dem.report.readings import Readings
-from taichi_dem.stability.body_limits import limits_for
+from taichi_dem.stability.body_limits import StabilityLimits
 from taichi_dem.state.capacity import LEAST, Capacity
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
@@ -75,8 +75,9 @@ class BlastEngine(Engine):
         self.readings = Readings(self.tables, self.state, self.advance)
 
     def _schedule(self, method):
-        limits = limits_for(self.tables, self.state, self.contacts, method)
         parts = self.tables, self.state, self.contacts
+        limited = method.control or method.dashpot == "limited"
+        limits = StabilityLimits(*parts, method) if limited else None
         drifted = method.neighbour == "drifted"
         return Schedule(*parts, method.criterion(), method.uniform, drifted, limits)
 

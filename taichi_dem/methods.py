@@ -113,7 +113,7 @@ def structure_of(method: Any) -> Hashable:
         return getattr(method, "structure", (type(method), repr(method)))
     rule = method.control
     if rule is not None:
-        rule = rule.criteria, rule.wake, rule.level_jump is not None
+        rule = rule.level_jump is not None
     return type(method), method.neighbour, method.dashpot, method.distance is None, rule
 
 

@@ -8,7 +8,7 @@ import taichi as ti
 
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real
-from taichi_dem.kit.validation import between, choices, plain_fields, whole
+from taichi_dem.kit.validation import between, plain_fields, whole
 from taichi_dem.state.timeline import MAX_LEVEL
 
 #: Criteria that may bound the step of a body; the state holds an index into this tuple for each.
@@ -24,10 +24,6 @@ CRITERIA = (
     "neighbour",
 )
 LARGEST, DISPLACEMENT, ROTATION, BOND_K, BOND_C, CONTACT_K, CONTACT_C, LOAD, NEIGHBOUR = range(9)
-#: Criteria that a user may leave out, for comparison.
-OPTIONAL = CRITERIA[2:8]
-#: Events at which a body is brought to the present time and chooses a new step.
-EVENTS = ("hit", "release", "neighbour")
 
 
 @dataclass(frozen=True)
@@ -40,12 +36,6 @@ class StepControl:
         Share of each stability limit that a step may take, above 0 and at most 1.
     angle : float, default 0.02
         Largest rotation in a step [rad].
-    criteria : tuple of str, default OPTIONAL
-        Criteria that count, out of ``step_control.OPTIONAL``.
-    wake : tuple of str, default EVENTS
-        Events at which a body between its own times is brought to the present and takes its new
-        step at once: ``"hit"`` (a contact comes near), ``"release"`` (a bond near it breaks),
-        ``"neighbour"`` (a body that it touches refined its step strongly).
     level_jump : int or None, default 2
         Levels by which a body may be coarser than one that it touches; None for any number.
     ahead : float, default 2.0
@@ -58,7 +48,7 @@ class StepControl:
     Raises
     ------
     InputError
-        A value is out of its range, or a name is unknown.
+        A value is out of its range.
 
     Notes
     -----
@@ -76,8 +66,6 @@ class StepControl:
 
     safety: float = 0.25
     angle: float = 0.02
-    criteria: tuple = OPTIONAL
-    wake: tuple = EVENTS
     level_jump: Optional[int] = 2
     ahead: float = 2.0
     dashpot_floor: float = 0.0
@@ -88,8 +76,6 @@ class StepControl:
             between(name, getattr(self, name), 1e-6, 1.0)
         between("ahead", self.ahead, 1.0, 100.0)
         between("dashpot_floor", self.dashpot_floor, 0.0, 1.0)
-        for name, known in (("criteria", OPTIONAL), ("wake", EVENTS)):
-            object.__setattr__(self, name, choices(name, getattr(self, name), known))
         if self.level_jump is not None:
             whole("level_jump", self.level_jump, 0, MAX_LEVEL)
 
@@ -161,14 +147,6 @@ def level_of(step, dt0):
         k += 1
         length *= 0.5
     return k
-
-
-@ti.func
-def shorter(step, bound, other, criterion):
-    """The shorter of two steps [s], with its criterion."""
-    if other < step:
-        step, bound = other, criterion
-    return step, bound
 
 
 @ti.func

@@ -5,9 +5,9 @@ from functools import partial
 
 import numpy as np
 
+from _strength_tests import TESTS
+from _strength_tests import disc as disc_mesh
 from _trust.number import Number
-from taichi_dem.calibration.specimens import disc as disc_mesh
-from taichi_dem.calibration.strength_tests import TESTS
 from taichi_dem.kit.plot_style import BLACK, GREY, RED
 from taichi_dem.materials import Material
 

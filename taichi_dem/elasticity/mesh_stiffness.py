@@ -11,6 +11,7 @@ from taichi_dem.elasticity.statics import BondStatics
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
+from taichi_dem.kit.terminal import aligned
 from taichi_dem.kit.validation import instance, shown
 from taichi_dem.materials.bond_rules import BondGeometry, evaluated, per_bond
 from taichi_dem.mesh.mesh import Mesh, volumes
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 
 #: Components of stress and strain, in Voigt's order; strains yz, zx and xy are twice the tensor's.
 VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))
-_NAMES = "xyz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,23 +102,15 @@ class MeshStiffness:
 
     def __str__(self):
         """A line for each axis, the means, and the wave speeds."""
-        head = f"{'block of the mesh':24s}{'E GPa':>10s}{'nu':>8s}{'G GPa':>10s}"
-        lines = [f"{head}{'uniaxial strain GPa':>21s}"]
-        confined = np.diag(self.stiffness)[:3]
-        across = self.shear_across
-        for k, name in enumerate(_NAMES):
-            shear = f"{across[k] * 1e-9:10.4g}"
-            lines.append(
-                f"{'along ' + name:24s}{self.young_along[k] * 1e-9:10.4g}"
-                f"{self.poisson_along[k]:8.3f}{shear}{confined[k] * 1e-9:21.4g}"
-            )
-        mean = self.bulk + 4.0 / 3.0 * self.shear
-        lines.append(
-            f"{'all directions':24s}{self.young * 1e-9:10.4g}{self.poisson:8.3f}"
-            f"{self.shear * 1e-9:10.4g}{mean * 1e-9:21.4g}"
-        )
+        means = self.young, self.poisson, self.shear, self.bulk + 4.0 / 3.0 * self.shear
+        columns = self.young_along, self.poisson_along, self.shear_across, np.diag(self.stiffness)
+        rows = {f"along {name}": [one[k] for one in columns] for k, name in enumerate("xyz")}
+        cells = [["block of the mesh", "E GPa", "nu", "G GPa", "uniaxial strain GPa"]]
+        for name, (young, poisson, *moduli) in {**rows, "all directions": means}.items():
+            own = f"{young * 1e-9:.4g}", f"{poisson:.3f}"
+            cells.append([name, *own, *(f"{modulus * 1e-9:.4g}" for modulus in moduli)])
         speeds = ", ".join(f"{name} {speed:.4g} m/s" for name, speed in self.wave_speeds.items())
-        return "\n".join([*lines, f"long waves: {speeds}"])
+        return "\n".join([*aligned(cells), f"long waves: {speeds}"])
 
 
 def mesh_stiffness(mesh: Mesh, material: AnyMaterial) -> MeshStiffness:

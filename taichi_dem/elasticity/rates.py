@@ -1,4 +1,4 @@
-"""Explicit step limits of the bonds of a mesh: rates of each body, and the steps they allow."""
+"""Rates of each body of a mesh: how fast its bonds or contacts answer, which limits its step."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from taichi_dem.kit.fixed_order import (
 from taichi_dem.materials.body_materials import AnyMaterial
 from taichi_dem.materials.bond_rules import Constant, Density, per_bond
 from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import Topology, body_properties, face_vertices
 
@@ -83,13 +84,52 @@ def _sum_of(blocks, subset):
 def _face_blocks(mesh, body, face, centre, coefficients):
     """The block G of single faces, shape (n, 6, 6); coefficients: of each, (n, 2)."""
     vertices = face_vertices(mesh, body, face)
-    vector = geometry.area_vectors(mesh.points, vertices)
+    area, law = face_laws(mesh.points, vertices, coefficients)
+    arms = mesh.points[vertices] - centre[:, None]
+    return area[:, None, None] / 3.0 * point_blocks(arms, law)
+
+
+def face_laws(
+    points: np.ndarray, faces: np.ndarray, coefficients: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Areas [m^2] of faces, and what resists a velocity there per area: (n,) and (n, 3, 3).
+
+    faces: point indices, (n, 3). coefficients: normal and tangential one of each, (n, 2).
+    """
+    vector = geometry.area_vectors(points, faces)
     area = length(vector)
     normal = vector / area[:, None]
     normally, across = coefficients[:, 0, None, None], coefficients[:, 1, None, None]
-    law = across * np.eye(3) + (normally - across) * (normal[:, :, None] * normal[:, None, :])
-    arms = mesh.points[vertices] - centre[:, None]
-    return area[:, None, None] / 3.0 * point_blocks(arms, law)
+    along = normal[:, :, None] * normal[:, None, :]
+    return area, across * np.eye(3) + (normally - across) * along
+
+
+def contact_eigenvalues(
+    mesh: Mesh, density: Density, divisions: int, friction: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Largest eigenvalues of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], two arrays (n,).
+
+    The first is for the worst of its spheres in contact, the second for all of the worst face. D is
+    the identity with friction, n n^T without; contacts act where a sphere touches its face. The
+    step finds the same from the near contacts (``stability/contact_limits.py``).
+    """
+    mass, centre, inertia = body_properties(mesh, density)
+    spheres = spheres_of_faces(mesh, centre, divisions)
+    root = inverse_root(mass, inertia)
+    one, whole_face = np.zeros(len(mass)), np.zeros(len(mass))
+    faces = geometry.all_faces(mesh.tetrahedra)
+    vectors = geometry.area_vectors(mesh.points, faces).reshape(-1, 4, 3)
+    for face in range(4):
+        outward = vectors[:, face] / length(vectors[:, face])[:, None]
+        arms = spheres.centre[:, face] + spheres.radius[:, face, :, None] * outward[:, None]
+        along = outward[:, :, None] * outward[:, None, :]
+        law = np.broadcast_to(np.eye(3), along.shape) if friction else along
+        found = scaled_eigenvalues(root, point_blocks(arms, law))
+        whole_face = np.maximum(whole_face, found)
+        for k in range(spheres.per_face):
+            found = scaled_eigenvalues(root, point_blocks(arms[:, k : k + 1], law))
+            one = np.maximum(one, found)
+    return one, whole_face
 
 
 def point_blocks(arms: np.ndarray, law: np.ndarray) -> np.ndarray:
@@ -98,18 +138,18 @@ def point_blocks(arms: np.ndarray, law: np.ndarray) -> np.ndarray:
     arms: points from the centre [m], shape (n, points, 3). law: what resists their velocity,
     shape (n, 3, 3). Returns (n, 6, 6).
     """
-    lever = np.zeros((*arms.shape[:2], 3, 6))
-    lever[..., :3] = np.eye(3)
-    lever[..., 3:] = -_cross_matrix(arms)  # w x r = -[r]x w
+    lever = levers(arms)
     return product(transposed(lever), product(law[:, None], lever)).sum(axis=1)
 
 
-def _cross_matrix(vectors):
-    """Matrices [r]x with [r]x w = r x w, shape (..., 3, 3)."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    zero = np.zeros_like(x)
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+def levers(arms: np.ndarray) -> np.ndarray:
+    """Maps J from (velocity, spin) to the velocity of points at arms (..., 3), (..., 3, 6)."""
+    made = np.zeros((*arms.shape, 6))
+    made[..., :3] = np.eye(3)
+    x, y, z = np.moveaxis(arms, -1, 0)
+    for row, column, part in ((0, 1, z), (1, 2, x), (2, 0, y)):
+        made[..., row, 3 + column], made[..., column, 3 + row] = part, -part
+    return made
 
 
 def scaled_eigenvalues(root: np.ndarray, blocks: np.ndarray) -> np.ndarray:

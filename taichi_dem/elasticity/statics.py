@@ -1,18 +1,15 @@
 """Statics of bonded bodies: small displacements and turns under forces, by conjugate gradients.
 
-NumPy only. The three units of a face with relative displacement d at its middle and relative turn w
-give the force A D d and a moment that depends on w alone, D = diag(k_n, k_s, k_s) in the face's
-axes: the corners' distances from the middle add up to zero.
+NumPy only.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from taichi_dem.elasticity.rates import face_laws, levers
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.fixed_order import length
 from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import Topology, body_properties
 
 #: Residual of a solution, as a share of the largest load, and iterations at most.
@@ -29,23 +26,24 @@ class BondStatics:
     """
 
     def __init__(self, mesh: Mesh, topology: Topology, springs: np.ndarray):
-        linear, angular = _face_springs(mesh, topology, springs)
         _, centre, _ = body_properties(mesh, 1.0)
-        middle = mesh.points[topology.vertices].mean(axis=1)
+        corners = mesh.points[topology.vertices]
         sides = topology.master, topology.slave
-        levers = [_lever(middle - centre[side]) for side in sides]
+        faces = topology.master_face, topology.slave_face
+        maps = [levers(corners - centre[side][:, None]) for side in sides]
+        area, law = face_laws(mesh.points, topology.vertices, springs)
+        law = (area[:, None, None] / 3.0 * law)[:, None]
         count = mesh.body_count
         #: Body behind each local face, its own number where there is none: its block is zero.
         self.neighbour = np.tile(np.arange(count)[:, None], (1, 4))
-        self.own, self.across = np.zeros((count, 6, 6)), np.zeros((count, 4, 6, 6))
-        faces = topology.master_face, topology.slave_face
+        self.own, across = np.zeros((count, 6, 6)), np.zeros((count, 4, 6, 6))
         for here, there in ((0, 1), (1, 0)):
             body, face = sides[here], faces[here]
             self.neighbour[body, face] = sides[there]
-            turned = levers[here].swapaxes(1, 2) @ linear
-            self.across[body, face] = -_with_turn(turned @ levers[there], angular)
-            np.add.at(self.own, body, _with_turn(turned @ levers[here], angular))
-        self.rows = np.moveaxis(self.across, 1, 2).reshape(count, 6, 24)
+            pulled = maps[here].swapaxes(2, 3) @ law
+            across[body, face] = -(pulled @ maps[there]).sum(axis=1)
+            np.add.at(self.own, body, (pulled @ maps[here]).sum(axis=1))
+        self.rows = np.moveaxis(across, 1, 2).reshape(count, 6, 24)
 
     def forces(self, motion: np.ndarray) -> np.ndarray:
         """Forces that hold the bodies at a field of motions (bodies, 6, loads)."""
@@ -81,43 +79,6 @@ class BondStatics:
             f"the springs of a mesh must be solved within {_MOST_ITERATIONS} iterations, and are "
             f"not: is it made of bodies that hang on single bonds, or of very uneven size?"
         )
-
-
-def _face_springs(mesh, topology, springs):
-    """Stiffness of the three units of every bond about the middle of its face.
-
-    Two arrays (bond_count, 3, 3): force over displacement [N/m], moment over turn [N m].
-    """
-    corners = mesh.points[topology.vertices]
-    vector = area_vectors(mesh.points, topology.vertices)
-    area = length(vector)[:, None, None]
-    normal = vector / area[:, 0]
-    across, along = springs[:, 1, None, None], (springs[:, 0] - springs[:, 1])[:, None, None]
-    law = across * np.eye(3) + along * normal[:, :, None] * normal[:, None, :]
-    # A turn w displaces a corner s by w x s and the force f there has the moment s x f.
-    spread = cross_matrices(corners - corners.mean(axis=1)[:, None])
-    turned = -(spread @ law[:, None] @ spread).sum(axis=1)
-    return area * law, area / 3.0 * turned
-
-
-def _lever(arms):
-    """Map from (displacement, turn) of bodies to the displacement at arms (n, 3), (n, 3, 6)."""
-    return np.concatenate([np.tile(np.eye(3), (len(arms), 1, 1)), -cross_matrices(arms)], axis=2)
-
-
-def _with_turn(blocks, angular):
-    """Blocks (n, 6, 6) with the moments over turns (n, 3, 3) added."""
-    blocks[:, 3:, 3:] += angular
-    return blocks
-
-
-def cross_matrices(vectors: np.ndarray) -> np.ndarray:
-    """Matrices [r]x with [r]x w = r x w, (..., 3, 3), of vectors (..., 3)."""
-    made = np.zeros((*vectors.shape, 3))
-    for row, column, part, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
-        made[..., row, column] = sign * vectors[..., part]
-        made[..., column, row] = -made[..., row, column]
-    return made
 
 
 def _products(one, other):

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_dem.elasticity.rates import levers
 from taichi_dem.kit.fixed_order import dot, inverse, length, product, transposed
 from taichi_dem.mesh.tetrahedra import area_vectors, signed_volumes
 
@@ -77,13 +78,13 @@ def _body_sums(model, bodies):
     chosen[bodies] = True
     bonds = np.flatnonzero(chosen[top.master] | chosen[top.slave])
     links = np.stack([top.master[bonds], top.slave[bonds]])
-    levers, laws = _levers(model, bonds, links)
+    maps, laws = _openings(model, bonds, links)
     opening = product(
         _STRAINS[None], (model.centre[links[1]] - model.centre[links[0]])[:, None, :, None]
     )
     opening = np.repeat(transposed(opening[..., 0])[:, None], 3, axis=1)
     givers = bodies[(top.body_bond[bodies] >= 0).all(axis=1)]
-    opening = opening + _given_way(levers, laws, links, opening, givers)
+    opening = opening + _given_way(maps, laws, links, opening, givers)
     energy = product(transposed(opening), product(laws, opening)).sum(axis=1).reshape(-1, 36)
     volume = signed_volumes(model.mesh.points, model.mesh.tetrahedra)
     sums = np.zeros((model.body_count, 37))
@@ -92,18 +93,14 @@ def _body_sums(model, bodies):
     return sums
 
 
-def _levers(model, bonds, links):
+def _openings(model, bonds, links):
     """Maps (2, n, 3, 3, 6) from the motion of both bodies to the opening of a bond's three units.
 
     And the laws of the units, (n, 1, 3, 3) [N/m].
     """
     corners = model.mesh.points[model.topology.vertices[bonds]]
-    levers = np.zeros((2, len(bonds), 3, 3, 6))
-    for side, sign in ((0, -1.0), (1, 1.0)):
-        x, y, z = np.moveaxis(corners - model.centre[links[side]][:, None], -1, 0)
-        levers[side, ..., :3] = sign * np.eye(3)
-        for a, b, arm in ((0, 1, z), (1, 2, x), (2, 0, y)):
-            levers[side, ..., a, 3 + b], levers[side, ..., b, 3 + a] = sign * arm, -sign * arm
+    arms = (corners - model.centre[side][:, None] for side in links)
+    maps = np.stack([sign * levers(each) for sign, each in zip((-1.0, 1.0), arms)])
     vector = area_vectors(model.mesh.points, model.topology.vertices[bonds])
     area = length(vector)
     normal = vector / area[:, None]
@@ -111,20 +108,20 @@ def _levers(model, bonds, links):
     out = normal[:, :, None] * normal[:, None, :]
     along, across = (model.bond_stiffness[bonds, k][:, None, None] for k in range(2))
     law = along * out + across * (np.eye(3) - out)
-    return levers, (bonded[:, None, None] * law)[:, None]
+    return maps, (bonded[:, None, None] * law)[:, None]
 
 
-def _given_way(levers, laws, links, opening, bodies):
+def _given_way(maps, laws, links, opening, bodies):
     """Opening (n, 3, 3, 6) that some bodies add as each goes towards its own balance."""
     count = links.max(initial=-1) + 1
     force, block = np.zeros((count, 6, 6)), np.zeros((count, 6, 6))
-    for lever, side in zip(levers, links):
+    for lever, side in zip(maps, links):
         pulled = product(transposed(lever), laws)
         np.add.at(force, side, product(pulled, opening).sum(axis=1))
         np.add.at(block, side, product(pulled, lever).sum(axis=1))
     way = np.zeros((count, 6, 6))
     way[bodies] = -_STEP * product(inverse(block[bodies]), force[bodies])
-    return sum(product(lever, way[side][:, None]) for lever, side in zip(levers, links))
+    return sum(product(lever, way[side][:, None]) for lever, side in zip(maps, links))
 
 
 def _bodies_at(tetrahedra, corners, point_count):

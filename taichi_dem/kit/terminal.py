@@ -42,7 +42,7 @@ def print_table(rows: Sequence[Sequence[Any]], header: Sequence[str]) -> None:
     filled = [["-" if str(cell) in BLANK else str(cell) for cell in row] for row in rows]
     cells, console = [[*header], *filled], _console()
     if console is None:
-        _show_aligned(cells)
+        print(*aligned(cells), sep="\n")
         return
     least = [max(len(word) for row in cells for word in [*row[k].split(), ""]) for k in _of(cells)]
     # A name that takes more than half of a line is cut.
@@ -84,10 +84,11 @@ def _show_styled(console, cells, least):
     console.print(table)
 
 
-def _show_aligned(cells):
-    widths = [max(len(row[k]) for row in cells) for k in _of(cells)]
-    for row in cells:
-        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
+def aligned(cells: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of rows of cells, columns as wide as they need to be."""
+    widths, gap = [max(len(row[k]) for row in cells) for k in _of(cells)], " " * _GAP
+    padded = ([cell.ljust(width) for cell, width in zip(row, widths)] for row in cells)
+    return [gap.join(row).rstrip() for row in padded]
 
 
 def show_names(title: str, rows: Iterable[tuple[str, str]]) -> None:

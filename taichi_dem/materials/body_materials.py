@@ -53,9 +53,7 @@ def joined(first: Material, second: Material) -> Material:
     series = {
         name: joined_constants(getattr(first, name), getattr(second, name)) for name in _SERIES
     }
-    density = (
-        first.density if first.density == second.density else 0.5 * (first.density + second.density)
-    )
+    density = 0.5 * (first.density + second.density)
     return unchecked(first, density=density, **least, **series)
 
 

@@ -12,9 +12,8 @@ from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.report.energy_balance import EnergyBalance, unexplained_share
 from taichi_dem.report.run import Run
 from taichi_dem.report.shared_volume import SharedVolume
-from taichi_dem.stability.contact_limits import contact_rates
-from taichi_dem.stability.quality import quality_report
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
+from taichi_dem.stability.step_report import bond_steps
 from taichi_dem.step.drivers import CALL_SECONDS
 
 #: Unexplained energy beyond which a run counts as diverged, as a share of the energy present.
@@ -204,16 +203,18 @@ class DivergenceCheck:
         Dashpots that are solved or limited set none.
         """
         model, run = self.run.model, self.run
-        steps = quality_report(model.mesh, model.materials)
-        limits = {"bond springs": steps.spring_step_s}
+        steps = bond_steps(model.mesh, model.materials)
+        limits = {"bond springs": steps["bond_stiffness"]}
         limited = run.schedule.has_limits and run.schedule.limits.limited
         stiff = not (run.advance.solves or limited)
         if model.by_role["dashpot"] and stiff:
-            limits["bond dashpots"] = steps.dashpot_step_s
+            limits["bond dashpots"] = steps["bond_dashpot"]
         if run.contacts is not None:
             of_contacts = model.materials.of_contacts
             pairs, counts, _ = run.contacts.store.near_table()
-            rates = contact_rates(pairs, counts, model.body_mass)
+            # Most sphere pairs that a body has with another, over its mass [1/kg].
+            rates, mass = np.zeros(model.body_count), model.body_mass
+            np.maximum.at(rates, pairs, np.maximum(1, counts)[:, None] / mass[pairs])
             limits["contact springs"] = spring_step(of_contacts("contact_stiffness") * rates)
             if stiff:
                 limits["sphere dashpots"] = dashpot_step(of_contacts("contact_damping") * rates)

@@ -9,6 +9,7 @@ from typing import Any, Optional
 import numpy as np
 import taichi as ti
 
+from taichi_dem import step_control as steps
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real
@@ -18,25 +19,11 @@ from taichi_dem.stability.stable_step import dashpot_limit, spring_limit
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
-from taichi_dem.step_control import (
-    BOND_C,
-    BOND_K,
-    CONTACT_C,
-    CONTACT_K,
-    CRITERIA,
-    DISPLACEMENT,
-    EVENTS,
-    LARGEST,
-    LOAD,
-    ROTATION,
-    Displacement,
-    StepControl,
-    finer,
-    level_of,
-    shorter,
-)
+from taichi_dem.step_control import Displacement, StepControl, finer, level_of
 
-HIT, RELEASE, CLOSE = (1 << k for k in range(len(EVENTS)))
+#: Events at which a body between its own times is brought to the present and takes its new step at
+#: once: a contact comes near, a bond near it breaks, a body that it touches refined its step much.
+HIT, RELEASE, CLOSE = 1, 2, 4
 #: With c min(1, LIMITED / X) no dashpot takes more than this in a step (X = 2 is unstable).
 LIMITED = 1.7
 #: Part of it that near contacts get at least, if they need it: a meeting is over in a few steps.
@@ -51,10 +38,10 @@ class StabilityLimits:
 
     dashpot_table, spring_table: largest eigenvalue of the bonds' block by the set of intact
     bonds, [1/s] and [1/s^2]. bond_damping, contact_damping: rates of a body's dashpots [1/s].
-    limit, limit_level, limit_by: longest stable step [s], its level, and the criterion that sets
-    it. displacement, turn, leap: levels for speed, spin and acceleration. listed, listed_count:
-    bodies to look at; events: why, as bits. woken: how many were brought to the present between
-    their times. control: a StepControl, None for a method that only limits dashpots. rule: dt0 [s],
+    limit_level, limit_by: level of the longest stable step, and the criterion that sets it.
+    displacement, turn, leap: levels for speed, spin and acceleration. listed, listed_count: bodies
+    to look at; events: why, as bits. woken: how many were brought to the present between their
+    times. control: a StepControl, None for a method that only limits dashpots. rule: dt0 [s],
     safety and dashpot floor [s]. jump: levels between neighbours, where they are limited.
 
     Limited dashpots share 1.7 by need. With X = 2 dt rate for bonds (b) and contacts (c) of a body
@@ -84,35 +71,26 @@ class StabilityLimits:
 
     def __init__(self, tables: Tables, state: State, contacts: Optional[Contacts], method: Method):
         self.tables, self.state, self.contacts = tables, state, contacts
-        self.control = method.control
-        self.controlled = method.control is not None
+        self.control, rule = method.control, method.control or StepControl()
+        self.controlled = self.control is not None
         self.has_contact = contacts is not None
         self.has_distance = method.distance is not None
-        rule = self.control or StepControl()
         self.limited = method.dashpot == "limited"
         self.spreads = rule.level_jump is not None
-        self.jump = ti.field(ti.i32, shape=())
-        self.rule = ti.field(real, shape=3)
-        self.counts = {name: name in rule.criteria for name in CRITERIA}
-        self.has_load = self.counts["load"] and self.has_distance and bool(tables.loads)
+        self.has_load = self.has_distance and bool(tables.loads)
         if self.has_distance:
             self.displacement = Displacement()
         if self.has_load:
             self.leap = Displacement(power=2)
-        if self.counts["rotation"]:
-            self.turn = Displacement()
-        self.wakes = 0
-        if self.control is not None:
-            self.wakes = sum(1 << k for k, event in enumerate(EVENTS) if event in rule.wake)
-        self.contact_limits = None
-        if contacts is not None:
-            self.contact_limits = ContactLimits(tables, state, contacts)
+        self.turn = Displacement()
+        self.contact_limits = ContactLimits(tables, state, contacts) if contacts else None
+        self.jump = ti.field(ti.i32, shape=())
+        self.rule = ti.field(real, shape=3)
         n = tables.capacity.bodies
         self.dashpot_table = ti.field(real, shape=(n, 16))
         self.spring_table = ti.field(real, shape=(n, 16))
         self.bond_damping = ti.field(real, shape=n)
         self.contact_damping = ti.field(real, shape=n)
-        self.limit = ti.field(real, shape=n)
         self.limit_by = ti.field(ti.i32, shape=n)
         self.limit_level = ti.field(ti.i32, shape=n)
         self.events = ti.field(ti.i32, shape=n)
@@ -130,8 +108,7 @@ class StabilityLimits:
             self.displacement.load(distance, method.dt0)
         if self.has_load:
             self.leap.load(distance, method.dt0)
-        if self.counts["rotation"]:
-            self.turn.load(rule.angle, method.dt0)
+        self.turn.load(rule.angle, method.dt0)
         if self.has_contact:
             self.contact_limits.load(model, rule.ahead * method.dt0)
         if self.tables.dashpot.name:
@@ -156,7 +133,7 @@ class StabilityLimits:
             self.listed[ti.atomic_add(self.listed_count[None], 1)] = i
 
     @ti.func
-    def notice_pair(self, p, count, event: ti.template()):
+    def notice_pair(self, p, count, event):
         """Note how many contacts of a pair are near; list both bodies if the number changed."""
         if count != self.contact_limits.count[p]:
             self.contact_limits.count[p] = count
@@ -170,10 +147,11 @@ class StabilityLimits:
         Entering the list does not change a body's limits, as results must not depend on the reach
         of a search. Spheres that a break has just exposed may touch already.
         """
+        event = HIT
         if fresh != 0:
-            self.notice_pair(p, self.contact_limits.count_within_margin(p), RELEASE)
-        elif entered != 0:
-            self.notice_pair(p, self.contact_limits.count_within_margin(p), HIT)
+            event = RELEASE
+        if fresh != 0 or entered != 0:
+            self.notice_pair(p, self.contact_limits.count_within_margin(p), event)
 
     @ti.func
     def done(self):
@@ -194,41 +172,29 @@ class StabilityLimits:
         dashpot = self.dashpot_table[i, intact]
         contact_c, contact_k = 0.0, 0.0
         if ti.static(self.has_contact):
-            share = self.contact_limits.eigenvalue(i)
-            largest = self.contact_limits.largest_constants(i)
-            contact_c, contact_k = largest[0] * share, largest[1] * share
+            rates = self.contact_limits.rates(i)
+            contact_c, contact_k = rates[0], rates[1]
         self.bond_damping[i], self.contact_damping[i] = dashpot, contact_c
         if ti.static(self.controlled):
             self._limit(i, dashpot, contact_c, self.spring_table[i, intact], contact_k)
 
     @ti.func
     def _limit(self, i, bond_c, contact_c, bond_k, contact_k):
-        """Rates of bonds and contacts add up; the larger one of the two counts as the cause.
-
-        A criterion that the user left out does not add.
-        """
-        step, by = self.rule[0], LARGEST
-        if ti.static(not self.counts["bond_dashpot"]):
-            bond_c = 0.0
-        if ti.static(not self.counts["contact_dashpot"]):
-            contact_c = 0.0
-        if ti.static(not self.counts["bond_stiffness"]):
-            bond_k = 0.0
-        if ti.static(not self.counts["contact_stiffness"]):
-            contact_k = 0.0
-        cause = BOND_K
-        if contact_k > bond_k:
-            cause = CONTACT_K
-        step, by = shorter(step, by, self.rule[1] * spring_limit(bond_k + contact_k), cause)
-        cause = BOND_C
-        if contact_c > bond_c:
-            cause = CONTACT_C
+        """Rates of bonds and contacts add up; the larger one of the two counts as the cause."""
+        step, by = self.rule[0], steps.LARGEST
+        borne = self.rule[1] * spring_limit(bond_k + contact_k)
+        if borne < step:
+            step, by = borne, steps.BOND_K
+            if contact_k > bond_k:
+                by = steps.CONTACT_K
         borne = self.rule[1] * dashpot_limit(bond_c + contact_c)
         if ti.static(self.limited):
             borne = ti.max(borne, self.rule[2])
-        step, by = shorter(step, by, borne, cause)
-        self.limit[i], self.limit_by[i] = step, by
-        self.limit_level[i] = level_of(step, self.rule[0])
+        if borne < step:
+            step, by = borne, steps.BOND_C
+            if contact_c > bond_c:
+                by = steps.CONTACT_C
+        self.limit_level[i], self.limit_by[i] = level_of(step, self.rule[0]), by
 
     @ti.func
     def wanted(self, i, now):
@@ -239,13 +205,12 @@ class StabilityLimits:
         level, by = self.limit_level[i], self.limit_by[i]
         if ti.static(self.has_distance):
             speed2 = self.state.velocity[i].norm_sqr()
-            level, by = finer(level, by, self.displacement.finer(level, speed2), DISPLACEMENT)
-        if ti.static(self.counts["rotation"]):
-            spin2 = self.state.spin[i].norm_sqr()
-            level, by = finer(level, by, self.turn.finer(level, spin2), ROTATION)
+            level, by = finer(level, by, self.displacement.finer(level, speed2), steps.DISPLACEMENT)
+        spin2 = self.state.spin[i].norm_sqr()
+        level, by = finer(level, by, self.turn.finer(level, spin2), steps.ROTATION)
         if ti.static(self.has_load):
             push2 = self._push2(i, now)
-            level, by = finer(level, by, self.leap.finer(level, push2), LOAD)
+            level, by = finer(level, by, self.leap.finer(level, push2), steps.LOAD)
         return level, by
 
     @ti.func
@@ -282,11 +247,3 @@ class StabilityLimits:
         """Part of LIMITED that the bonds take."""
         contacts = ti.min(FOR_CONTACTS, 2.0 * step * self.contact_damping[i])
         return ti.min(2.0 * step * self.bond_damping[i], LIMITED - contacts)
-
-
-def limits_for(
-    tables: Tables, state: State, contacts: Optional[Contacts], method: Method
-) -> Optional[StabilityLimits]:
-    """Limits for a method; None where it neither controls steps nor limits dashpots."""
-    wanted = getattr(method, "control", None) or getattr(method, "dashpot", "full") == "limited"
-    return StabilityLimits(tables, state, contacts, method) if wanted else None

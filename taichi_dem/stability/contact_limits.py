@@ -2,7 +2,6 @@
 
 import numpy as np
 import taichi as ti
-from numpy.typing import ArrayLike
 
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.elasticity.rates import inverse_root
@@ -20,19 +19,6 @@ from taichi_dem.state.timeline import MAX_LEVEL
 #: Squarings of the block of near contacts: tr(A^32)^(1/32) exceeds its largest eigenvalue by at
 #: most 6^(1/32), 6 %, and is never below it.
 SQUARINGS = 5
-
-
-def contact_rates(pairs: np.ndarray, counts: ArrayLike, mass: np.ndarray) -> np.ndarray:
-    """Most sphere pairs that a body has with another, over its mass [1/kg], (body_count,).
-
-    pairs: bodies that are near each other, (n, 2). counts: their sphere pairs, at least 1 counts.
-    mass: of the bodies [kg]. An estimate from single pairs, for a sentence; ``StepReport`` has
-    bounds.
-    """
-    rates = np.zeros(len(mass))
-    for bodies, count in zip(pairs, np.maximum(1, counts)):
-        rates[bodies] = np.maximum(rates[bodies], count / mass[bodies])
-    return rates
 
 
 @ti.func
@@ -98,43 +84,31 @@ class ContactLimits:
         return self.contacts.closer(p, self.margin(pair[0], pair[1]))
 
     @ti.func
-    def eigenvalue(self, i):
-        """Largest eigenvalue of M^-1/2 (sum of J^T D J) M^-1/2 over near contacts of body i [1/kg].
+    def rates(self, i):
+        """Rate of the dashpots [1/s] and squared rate of the springs [1/s^2] of body i.
 
-        J maps velocity and spin to the velocity at the contact; D is the identity with friction,
-        whose dashpot acts along all three axes, and n n^T without. Times a coefficient [N s/m] it
-        is the rate of the contacts' dashpots [1/s], times a stiffness [N/m] bounds that of their
-        springs [1/s^2]. Partners stand still, as in ``quality.bond_rates``.
+        The largest eigenvalue of M^-1/2 (sum of J^T D J) M^-1/2 over near contacts [1/kg], times
+        their largest dashpot [N s/m] and stiffness [N/m]: a bound where partners are of several
+        materials. J maps velocity and spin to the velocity at the contact; D is the identity with
+        friction, whose dashpot acts along all three axes, and n n^T without. Partners stand still,
+        as in ``elasticity.rates.bond_rates``.
         """
         a, b, c = mat3(0.0), mat3(0.0), mat3(0.0)
-        for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
-            if self.count[self.store.near_slot[k]] != 0:
-                a, b, c = self._add_pair(self.store.near_slot[k], 0, a, b, c)
-        for k in range(self.store.second_start[i], self.store.second_start[i + 1]):
-            if self.count[self.store.second_slot[k]] != 0:
-                a, b, c = self._add_pair(self.store.second_slot[k], 1, a, b, c)
-        return largest_eigenvalue(a, b, c)
-
-    @ti.func
-    def largest_constants(self, i):
-        """Largest dashpot [N s/m] and stiffness [N/m] of the near contacts of body i.
-
-        Times ``eigenvalue`` they bound the rates of contacts with bodies of several materials.
-        """
-        dashpot, stiffness = 0.0, 0.0
-        for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
-            p = self.store.near_slot[k]
+        largest = ti.Vector([0.0, 0.0])
+        first, second = self.store.first_of[i], self.store.second_start[i]
+        swap = self.store.first_of[i + 1] - first
+        for k in range(swap + self.store.second_start[i + 1] - second):
+            p, side = 0, 0
+            if k < swap:
+                p = self.store.near_slot[first + k]
+            else:
+                p, side = self.store.second_slot[second + k - swap], 1
             if self.count[p] != 0:
-                m = self.tables.pair(i, self.store.body[p][1])
-                dashpot = ti.max(dashpot, self.contacts.law.damping(m))
-                stiffness = ti.max(stiffness, self.contacts.law.elastic(m, 1.0))
-        for k in range(self.store.second_start[i], self.store.second_start[i + 1]):
-            p = self.store.second_slot[k]
-            if self.count[p] != 0:
-                m = self.tables.pair(self.store.body[p][0], i)
-                dashpot = ti.max(dashpot, self.contacts.law.damping(m))
-                stiffness = ti.max(stiffness, self.contacts.law.elastic(m, 1.0))
-        return ti.Vector([dashpot, stiffness])
+                a, b, c = self._add_pair(p, side, a, b, c)
+                m = self.tables.pair(self.store.body[p][0], self.store.body[p][1])
+                constants = self.contacts.law.damping(m), self.contacts.law.elastic(m, 1.0)
+                largest = ti.max(largest, ti.Vector(constants))
+        return largest_eigenvalue(a, b, c) * largest
 
     @ti.func
     def _add_pair(self, p, side, a, b, c):
@@ -145,21 +119,15 @@ class ContactLimits:
         branch, margin = self.state.position[j] - self.state.position[i], self.margin(i, j)
         turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
         for k in range(self.store.first[p], self.store.last[p]):
-            near = self._nearest(k, side, turn, offset)
+            own, other = self.store.sphere[k][0], self.store.sphere[k][1]
+            if side == 1:
+                own, other = other, own
+            near = self.contacts.law.nearest(own, other, turn, offset)
             if is_within(near, margin):
                 normal = near.apart / ti.max(near.apart.norm(), 1e-30)
                 da, db, dc = self._contact(i, near.first.xyz + near.first[3] * normal, normal)
                 a, b, c = a + da, b + db, c + dc
         return a, b, c
-
-    @ti.func
-    def _nearest(self, k, side, turn, offset):
-        """Entry k of the pair store as its first (0) or second (1) body sees it, a ``Nearest``."""
-        entry = self.store.sphere[k]
-        a, b = entry[0], entry[1]
-        if side == 1:
-            a, b = b, a
-        return self.contacts.law.nearest(a, b, turn, offset)
 
     @ti.func
     def _contact(self, i, arm, normal):
@@ -170,6 +138,3 @@ class ContactLimits:
         root = self.root_mass[i]
         lever = matmul(matmul(self.root_inertia[i], cross_matrix(arm)), along)
         return along * root * root, lever * root, matmul_transposed(lever, lever)
-
-
-__all__ = ["ContactLimits", "largest_eigenvalue"]

@@ -15,7 +15,7 @@ from taichi_dem.materials.bond_rules import ModulusOverDistance
 from taichi_dem.materials.moduli import elastic_constants
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.scene import Scene
-from taichi_dem.stability.step_report import METHODS, StepReport, step_report
+from taichi_dem.stability.step_report import StepReport, step_report
 
 #: Elements in a characteristic length below which cracks are those of the mesh.
 ELEMENTS = 4.0
@@ -55,16 +55,18 @@ class ElasticReport:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences about the scene: elements too large for its cracks, and those of its steps."""
+        return (*self._coarse(), *self.steps.warnings)
+
+    def _coarse(self):
+        """A sentence where elements are too large for cracks."""
         coarse = int((self.elements < ELEMENTS).sum())
-        if not coarse:
-            return self.steps.warnings
-        largest = float(self.element_size.max())
         words = (
             f"the characteristic length E G_f / tensile_strength^2 = {self._crack_words()} m is "
             f"less than {ELEMENTS:g} elements at {coarse} of {len(self.element_size)} bodies, with "
-            f"edges of up to {largest:.3g} m: strength and paths of cracks there are the mesh's"
+            f"edges of up to {self.element_size.max():.3g} m: strength and paths of cracks there "
+            "are the mesh's"
         )
-        return (words, *self.steps.warnings)
+        return (words,) if coarse else ()
 
     def _crack_words(self):
         """The characteristic length, or the range of several, as a number for a sentence."""
@@ -76,31 +78,18 @@ class ElasticReport:
         return in_brief(self, stiffness, *self.warnings, "print it for the table")
 
     def __str__(self):
-        """Elastic constants, wave speeds, elements in a characteristic length, steps, warnings."""
+        """Elastic constants, wave speeds, elements in a characteristic length, warnings, steps."""
         lines = [str(self.stiffness)]
         if self.asked:
-            head = f"{'asked for':24s}{self.asked[0] * 1e-9:10.4g}{self.asked[1]:8.3f}"
-            lines.insert(0, f"{head}{0.5e-9 * self.asked[0] / (1.0 + self.asked[1]):10.4g}")
+            young, poisson = self.asked
+            lines.insert(0, f"asked for: E {young * 1e-9:.4g} GPa, nu {poisson:.3f}")
         fewest, median = self.elements.min(), float(np.median(self.elements))
         lines.append(
             f"characteristic length of cracks {self._crack_words()} m: {fewest:.2g} of the "
             f"largest element, {median:.2g} of the median one"
         )
-        lines += [f"warning: {warning}" for warning in self.warnings]
-        return "\n".join([*lines, *self._step_lines()])
-
-    def _step_lines(self):
-        """Largest stable step of each method, of bonds and of all spheres of a face in contact."""
-        lines = []
-        for dashpots, words in METHODS.items():
-            bond, contact = (self.steps.borne(dashpots, link).min() for link in ("bond", "contact"))
-            text = ", ".join(
-                f"{name} {step:.3g} s"
-                for name, step in (("bonds", bond), ("contact", contact))
-                if np.isfinite(step)
-            )
-            lines.append(f"largest stable step, {words}: {text or 'unlimited'}")
-        return lines
+        lines += [f"warning: {words}" for words in self._coarse()]
+        return "\n".join([*lines, str(self.steps)])
 
 
 def elastic_report(scene: Scene) -> ElasticReport:
@@ -132,13 +121,12 @@ def elastic_report(scene: Scene) -> ElasticReport:
     steps, sizes = step_report(scene), element_sizes(mesh)
     if laid.is_one:
         material = laid.materials[0]
-        crack = _crack_length(stiffness, material)
-        return ElasticReport(stiffness, _asked(material), crack, sizes, steps)
-    lengths = [_crack_length(mesh_stiffness(mesh, each), each) for each in laid.materials]
-    return ElasticReport(stiffness, None, np.array(lengths)[laid.of_body], sizes, steps)
+        return ElasticReport(stiffness, _asked(material), _crack(stiffness, material), sizes, steps)
+    lengths = np.array([_crack(mesh_stiffness(mesh, each), each) for each in laid.materials])
+    return ElasticReport(stiffness, None, lengths[laid.of_body], sizes, steps)
 
 
-def _crack_length(stiffness, material):
+def _crack(stiffness, material):
     """Characteristic length of a crack's tip [m]."""
     return stiffness.young * material.fracture_energy / material.tensile_strength**2
 

@@ -75,16 +75,15 @@ KINDS = {
         decay_ratio skin stiffness_ratio p_speed s_speed max_speed scale width height length radius
         thickness element size particle_mass diameter reference_speed wall_young v_max mass
         stiffness atol interval duration until budget_s seconds frequency frequencies Every.time_s
-        wall_s every_s every_wall_s compression brazilian tension slip_energy ratio ratios low high
-        step ImpactDamper.clearance masses""",
+        wall_s every_s every_wall_s slip_energy ratio ratios low high step ImpactDamper.clearance
+        masses""",
     "zero or positive": """cohesion normal_damping shear_damping friction contact_damping ramp
         damping_ratio wall_friction gravity static_threshold base_amplitude damping rtol added_mass
         weld_tolerance effects.GasPressure.start nearest dashpot_floor clearance clearances gap
         effects.PrescribedMotion.frequency SceneTable.frequency SceneTable.change.frequency
         SceneTable.drive.frequency Oscillator.right_hand_side.frequency added_masses damping_ratios
         excitation.SineForce.frequency effects.Pressure.rise needed_effects.tolerance
-        calibration.calibrate.Match.tolerance damper_map.amplitudes
-        collect_and_collide.amplitude""",
+        damper_map.amplitudes collect_and_collide.amplitude""",
     "share": """restitution wall_restitution sleep share theta confidence solve.tolerance
         solve_response.tolerance""",
     "limited": "friction_angle poisson wall_poisson",
@@ -94,9 +93,9 @@ KINDS = {
         pairs_per_body particles place record_every recorded_samples s sample_every samples scene
         scenes sectors seed seeds spheres_per_body steps substeps sweeps threads total
         transient_cycles""",
-    "word": """accounting accumulator arch colour criteria dashpot driver effects friction_law
+    "word": """accounting accumulator arch colour dashpot driver effects friction_law
         if_diverged kind measure mount neighbour of outer_faces pair_rule priority rules search
-        start traversal wake way progress term Spheres.damping""",
+        start traversal way progress term Spheres.damping""",
     "any": """about acceleration axis base bend by displacement factor force history hole notch
         normal phase phases points shapes start_velocity t time_s times times_s turned u v values
         value velocity x y spin sizes motion tetrahedra goal boxes excitation observers amplitude

@@ -120,6 +120,7 @@ EVERY = {
     "blast_sweeps": Row(
         {f"sweeps_gauss_seidel_{x}": below(f"sweeps_jacobi_{x}") for x in ("0.05", "0.01", "0.001")}
     ),
+    "calibrate_material": Row({f"{name}_misfit": (-0.02, 0.02) for name in ("young", "poisson")}),
     # An independent method, also of first order, at a step known to be converged.
     "cost_of_accuracy_blast": Row(
         {

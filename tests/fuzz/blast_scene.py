@@ -155,7 +155,7 @@ class BlastScene:
         """The method of the kind at a step about the longest stable one."""
         draws, name = self.draws, self.kind.method
         limits = quality_report(mesh, material)
-        damped = limits.spring_step_s if name in ("solved", "limited") else limits.critical_step_s
+        damped = limits.spring_step_s if name in ("solved", "limited") else limits.step_s
         longest = float(damped.min()) if np.isfinite(damped.min()) else 1e-6
         dt = draws.given(longest * draws.power(-2.0, 0.7))
         way = draws.given(float(np.ptp(mesh.points)) * draws.power(-8.0, -2.0))

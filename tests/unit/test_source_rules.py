@@ -12,7 +12,7 @@ LAYERS = {
         | stability | step | report | engine engine_view | simulation
         | output measured_speedup observers run_plan | plot | viewer
         | result scene_pictures | simulate needed_effects | goals
-        | accuracy calibration | solve | demo | __init__ | __main__""",
+        | accuracy | solve | demo | __init__ | __main__""",
     "ca_damper": """
         errors random_numbers progress measures report contracts certificate checked_range
         steady_state | rk45 oscillator structure record excitation bouncing

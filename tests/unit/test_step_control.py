@@ -37,7 +37,7 @@ from taichi_dem.step_control import CRITERIA
 def test_the_limit_of_a_step_is_that_of_contacts_or_else_of_bonds():
     """A bar with spheres of six a face: its contact dashpots bind; without them its bonds'."""
     mesh = bar(0.4, 0.1, (4, 1, 1))
-    assert set(step_report(mesh, CONCRETE).binding) == {"contact_dashpot"}
+    assert set(step_report(Scene(mesh, CONCRETE, "all")).binding) == {"contact_dashpot"}
     bonded = step_report(Scene(mesh, CONCRETE, [effects.BondDamping()]))
     rates = bond_rates(mesh, topology_of(mesh), CONCRETE.density, dashpots_of(CONCRETE))
     assert np.array_equal(bonded.step_s, dashpot_step(rates))

@@ -17,6 +17,7 @@ from taichi_dem import (
 )
 from taichi_dem.elasticity.rates import (
     bond_rates,
+    contact_eigenvalues,
     dashpots_of,
     springs_of,
 )
@@ -25,7 +26,6 @@ from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
-from taichi_dem.stability.step_report import contact_eigenvalues
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL
 
 STILL = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))

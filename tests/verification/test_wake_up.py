@@ -99,8 +99,7 @@ class Sleepers:
     """The pair at rest, opened along its normal; three bodies, the last one ticks."""
 
     def __init__(self):
-        events = {"wake": ("hit", "release"), "criteria": ("contact_dashpot",)}
-        control = StepControl(**events, level_jump=None)
+        control = StepControl(level_jump=None)
         scene = Scene(pair_and_clock(), CONCRETE, [effects.Softening()])
         self.simulation = Simulation(scene, Multirate(DT0, WAY, control=control))
         self.state, model = self.simulation.state, self.simulation.model

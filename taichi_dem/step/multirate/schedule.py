@@ -61,7 +61,7 @@ class Schedule:
         self.sleeps, self.woken = tables.on_demand, None
         self.sleeping = Sleeping(tables) if self.sleeps else None
         self.controlled = self.has_limits and limits.control is not None
-        self.retimes = self.controlled and limits.wakes != 0
+        self.retimes = self.controlled
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
         self.applied_until = (
             AppliedUntil(tables, state, self.step_seconds, contacts) if self.retimes else None

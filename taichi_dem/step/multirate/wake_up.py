@@ -31,7 +31,7 @@ class WakeUp:
     @ti.func
     def wake_up(self, i):
         """Bring body i to the present tick when it wants a shorter step because of an event."""
-        if self.limits.events[i] & self.limits.wakes != 0 and self._is_awake(i):
+        if self.limits.events[i] != 0 and self._is_awake(i):
             wanted, bound = self.schedule.controlled_level(i)
             if ti.static(self.schedule.uniform):
                 ti.atomic_max(self.schedule.wanted[None], wanted)
