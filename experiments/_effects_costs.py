@@ -1,7 +1,7 @@
 """Costs of a step of the blast with other effects, from the same states (``cost_of_effects.py``).
 
-The functions are called in a process of their own, where all candidates are alive at once and take
-turns. A cost is a dict of the numbers in a ``StepCost``.
+The functions are called in a process of their own, where all candidates are alive at once and
+timed by turns. A cost is a dict of the numbers in a ``StepCost``.
 """
 
 from dataclasses import asdict, replace

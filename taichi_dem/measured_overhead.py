@@ -50,7 +50,7 @@ def _elastic(mesh: Mesh, stripped: Any) -> Callable[[int], Any]:
     simulation.start()
     driver = simulation.driver
     if stripped is not None:
-        engine = simulation.loan.engine
+        engine = simulation.engine
         advance = stripped(engine.tables, engine.state, engine.schedule, None)
         driver = Resident(Step(advance, engine.schedule, None))
     driver.prepare()

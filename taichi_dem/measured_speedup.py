@@ -10,6 +10,7 @@ from typing import Optional
 
 import numpy as np
 
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.kit.progress.progress import listening
 from taichi_dem.kit.validation import LARGEST
@@ -47,41 +48,40 @@ def measured_speedup(simulation: Simulation, seconds: float = MOST_SECONDS) -> f
     """CPU time that one step for all would have taken, over that of the run; 1 if it had one step.
 
     The number of evaluations with one step is counted during the run. Their cost is measured for a
-    number of CPU seconds on a twin in the same engine: it begins at the present state, and all of
-    its bodies take the smallest step present.
+    number of CPU seconds on a twin: it begins at the present state, and all of its bodies take the
+    smallest step present. The simulation itself becomes the twin, so its run must be over.
     Raises SimulationDiverged when the twin leaves its bounds.
     """
     if simulation.method.uniform or simulation.run_cpu_seconds == 0.0:
         return 1.0
     report = simulation.report()
-    twin = _twin(simulation, report.smallest_step_s)
+    _become_twin(simulation, report.smallest_step_s)
     substeps, spent, done = _FIRST, 0.0, 0
     while spent < seconds:
-        spent, done = -twin.run_cpu_seconds, -twin.evaluations()
-        twin.advance_to(substeps)
-        spent, done = spent + twin.run_cpu_seconds, done + twin.evaluations()
+        spent, done = -simulation.run_cpu_seconds, -simulation.evaluations()
+        simulation.advance_to(substeps)
+        spent, done = spent + simulation.run_cpu_seconds, done + simulation.evaluations()
         # A call costs time of its own: only a long one measures a substep.
         substeps *= 2
     return report.uniform_evaluations * spent / max(1, done) / report.run_cpu_seconds
 
 
-def _twin(simulation, step):
-    """A simulation at the same state with one step [s] for all, at time zero.
+def _become_twin(simulation, step):
+    """Begin at the same state with one step [s] for all, at time zero.
 
-    Its largest step is that of all bodies, as none moves far enough in it to require less.
+    The largest step is that of all bodies, as none moves far enough in it to require less.
     """
-    given = {name: field.to_numpy() for name, field in simulation.state.fields().items()}
-    method = replace(simulation.method, dt0=step, distance=LARGEST)
-    twin = Simulation(simulation.scene, method, simulation.driver.name.partition(" ")[0])
-    for name, field in twin.state.fields().items():
+    state = simulation.state
+    given = {name: values(field) for name, field in state.fields().items()}
+    simulation.driver = simulation.engine.drivers[simulation.driver.name.partition(" ")[0]]
+    simulation.reset(method=replace(simulation.method, dt0=step, distance=LARGEST))
+    for name, field in state.fields().items():
+        if name.endswith("_tick"):
+            # Ticks have another length: all past events count as at the start.
+            given[name] = np.where(given[name] == NEVER, NEVER, 0)
         if name not in _ANEW:
-            values = given[name]
-            if name.endswith("_tick"):
-                # Ticks have another length: all past events count as at the start.
-                values = np.where(values == NEVER, NEVER, 0)
-            field.from_numpy(values)
-    twin.start()
+            assign(field, given[name])
+    simulation.start()
     # The velocities are half a step before the positions already.
     for name in ("velocity", "angular_momentum", "spin"):
-        getattr(twin.state, name).from_numpy(given[name])
-    return twin
+        assign(getattr(state, name), given[name])

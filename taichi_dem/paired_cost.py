@@ -66,7 +66,7 @@ def states_of_run(scene: Scene, method: Method, times: Sequence[float]) -> list[
     found = []
     for time in times:
         simulation.advance_to(round(time / method.dt0))
-        arrays = _memory(simulation).read()
+        arrays = FieldMemory(simulation.engine).read()
         found.append(RunState(simulation.time_s, _contact(simulation), arrays))
     return found
 
@@ -85,7 +85,7 @@ class FrozenScene(Uncopied):
     ):
         self.simulation, self.substeps = Simulation(scene, method, _driver()), substeps
         self.simulation.driver.prepare()
-        self.memory = _memory(self.simulation)
+        self.memory = FieldMemory(self.simulation.engine)
         self.states = [self._placed(state) for state in states]
         self.counts = np.array([self._counted(k) for k in range(len(states))])
 
@@ -95,7 +95,6 @@ class FrozenScene(Uncopied):
         return seconds_of(self._step, self.substeps) / self.substeps
 
     def _restore(self, state):
-        self.simulation.loan.activate()
         self.memory.write(self.states[state])
         self._step(WARM)
 
@@ -123,7 +122,7 @@ class FrozenScene(Uncopied):
     def _counted(self, state):
         """Sweeps, searches and pairs in a substep from a state."""
         self._restore(state)
-        before, tick = self._counters(), int(values(self.simulation.state.tick.field))
+        before, tick = self._counters(), int(values(self.simulation.state.tick))
         self._step(self.substeps)
         found = self._counters() - before
         if found[0] != self.substeps:
@@ -135,7 +134,7 @@ class FrozenScene(Uncopied):
 
     def _counters(self):
         simulation = self.simulation
-        evaluations = simulation.schedule.evaluations
+        evaluations = values(simulation.schedule.evaluations)
         counts = evaluations[0], simulation.sweeps(), simulation.searches, evaluations[3]
         return np.array(counts, dtype=np.int64)
 
@@ -173,11 +172,6 @@ def paired_cost(
 
 def _driver():
     return "parallel" if on_device() else "resident"
-
-
-def _memory(simulation):
-    simulation.loan.activate()
-    return FieldMemory(simulation.loan.engine)
 
 
 def _contact(simulation):

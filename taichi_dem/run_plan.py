@@ -117,8 +117,8 @@ class _Sampler:
 class _EvenlySpaced:
     """A number of times after the start; none for 0.
 
-    Apart from its observer: one that named itself would keep its simulation until the next
-    collection of garbage, and the engine would put its data aside meanwhile.
+    Apart from its observer: one that named itself would keep its simulation, and so its engine,
+    until the next collection of garbage.
     """
 
     def __init__(self, count):

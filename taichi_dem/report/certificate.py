@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.audit import Audit
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.effect_usage import EffectUse
@@ -175,11 +176,11 @@ def acting_since(model: Model, state: State, schedule: Schedule) -> dict[str, np
     if state.activity is None:
         return {}
     n, seconds = model.body_count, schedule.tick_seconds
-    bonds = _times(state.activity.since.to_numpy()[: model.bond_count], NEVER, seconds)
-    bodies = _times(state.activity.touched.to_numpy()[:n], LATER, seconds)
+    bonds = _times(values(state.activity.since, slice(model.bond_count)), NEVER, seconds)
+    bodies = _times(values(state.activity.touched, slice(n)), LATER, seconds)
     own = np.append(bonds, [[np.nan, np.nan]], axis=0)[model.topology.body_bond]
     first = np.fmin.reduce(own, axis=1, initial=np.nan)
-    awake = _times(schedule.sleeping.since.to_numpy()[:n], NEVER, seconds)
+    awake = _times(values(schedule.sleeping.since, slice(n)), NEVER, seconds)
     found = first[:, SOFTENING], first[:, SLIP], bodies[:, 0], bodies[:, 1], awake
     return dict(zip((*_TIMES.values(), "awake"), found))
 
@@ -205,7 +206,7 @@ def certificate_of(run: Any, report: Any) -> Certificate:
         acting=tuple(_acting(model, use, since) for use in report.effect_activity),
         law_evaluations=int(evaluated.sum()),
         all_law_evaluations=int(laws.sum()),
-        sleep=float(schedule.sleeping.share[None]),
+        sleep=float(values(schedule.sleeping.share)),
         asleep=float(awake.mean() / now) if now > 0.0 else 0.0,
         impulse=impulse,
         energy=left_energy,
@@ -218,8 +219,8 @@ def certificate_of(run: Any, report: Any) -> Certificate:
 
 def _law_evaluations(model, state, schedule):
     """Evaluations of softening and slip, a unit each: those made, and those of effects="all"."""
-    evaluated = state.activity.evaluated.to_numpy()[: model.bond_count].sum(axis=0)
-    units = 3 * (int(schedule.evaluations[5]) + model.bond_count)
+    evaluated = values(state.activity.evaluated, slice(model.bond_count)).sum(axis=0)
+    units = 3 * (int(values(schedule.evaluations)[5]) + model.bond_count)
     return evaluated, units * np.array(state.activity.laws, dtype=np.int64)
 
 
@@ -231,7 +232,7 @@ def _energy(run, scales):
     body, bond, _ = run.energy_balance.tables()
     given = sum(np.abs(scales.sum(column)) for column in body[:, 1:3].T)
     taken = scales.sum(body[:, 0]) + scales.sum_of_bonds(bond.sum(axis=1))
-    substeps = int(run.schedule.evaluations[0])
+    substeps = int(values(run.schedule.evaluations)[0])
     rounding = scales.sum_of_bonds(bond_rounding(run.model, run.state, substeps))
     energy = np.maximum(given, taken)
     return np.where(energy > rounding, energy, 0.0)
@@ -251,7 +252,7 @@ def _not_served(run, scales, energy):
     motion, model = run.motion(), run.model
     moved = motion["position"] - run.first_motion["position"]
     speed = np.linalg.norm(motion["velocity"], axis=1)
-    touched = run.state.active_effects.to_numpy()[: model.body_count] & np.int64(CONTACT)
+    touched = values(run.state.active_effects, slice(model.body_count)) & np.int64(CONTACT)
     borne = scales.under((*model.supports, *model.ground)) | (scales.sum(touched) > 0)
     return estimates_after(scales, moved, speed, run.time_s, energy, borne)
 
@@ -264,7 +265,7 @@ def _acting(model, use, since):
 
 
 def _audits(audit, skipped):
-    counts = zip(_SKIPPED.values(), skipped, audit.audited.to_numpy(), audit.misses.to_numpy())
+    counts = zip(_SKIPPED.values(), skipped, values(audit.audited), values(audit.misses))
     return tuple(
         Audit(max(int(most), int(audited)), int(audited), int(missed), what)
         for what, most, audited, missed in counts

@@ -11,11 +11,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.mesh.tetrahedra import components
 from taichi_dem.report.readings import Readings
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
-from taichi_dem.state.timeline import NEVER
 
 #: Share of its limit below which friction would hold; a contact near it may slide next.
 _HELD = 0.98
@@ -51,7 +51,7 @@ class Creep:
         bodies, (force, bound, power) = self.readings.rubbing()
         slides = (force > 0.0) & (force < _HELD * bound)
         bodies, force, bound = bodies[slides], force[slides], bound[slides]
-        place = self.state.position.to_numpy()[: self.model.body_count]
+        place = values(self.state.position, slice(self.model.body_count))
         offset, speed = place[bodies[:, 1]] - place[bodies[:, 0]], power[slides] / force
         code = bodies[:, 0].astype(np.int64) * self.model.body_count + bodies[:, 1]
         rest = np.zeros_like(force)
@@ -96,7 +96,7 @@ class Creep:
     def _piece_of_body(self):
         """Piece of each body, which intact bonds hold together, (body_count,)."""
         top = self.model.topology
-        intact = self.state.broken_tick.to_numpy()[: self.model.bond_count] == NEVER
+        intact = ~self.state.broken()
         if self._pieces[0] != intact.sum():
             ends = np.column_stack([top.master, top.slave])[intact]
             self._pieces = int(intact.sum()), components(self.model.body_count, ends)

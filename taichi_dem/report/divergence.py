@@ -7,6 +7,7 @@ from typing import Optional
 import numpy as np
 
 from taichi_dem.contact.contacts import FARTHEST, Contacts
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.report.energy_balance import EnergyBalance
 from taichi_dem.report.remedy import Remedies, Remedy, shorter_step
@@ -72,13 +73,13 @@ class DivergenceCheck:
             self.last_spent = spent
 
     def _check_speed(self):
-        body = self.state.bad_body[None]
+        body = int(values(self.state.bad_body))
         if body < self.model.body_count:
             motion = self.state.motion()
             speed = math.hypot(*motion["velocity"][body])
             words = f"moves at {speed:.3g} m/s"
             links = self._links(body)
-            if speed < self.state.max_speed2[None] ** 0.5 and self.contacts is not None:
+            if speed < float(values(self.state.max_speed2)) ** 0.5 and self.contacts is not None:
                 extent = float(self.model.spheres.extent[body])
                 whole = speed + math.hypot(*motion["spin"][body]) * extent
                 words += ", too far in a step for its contacts to be followed"
@@ -89,7 +90,7 @@ class DivergenceCheck:
             raise self._exception(body, motion, words, links, remedy)
 
     def _check_overlap(self):
-        if self.contacts is None or not self.contacts.store.near_count[None]:
+        if self.contacts is None or not values(self.contacts.store.near_count):
             return
         bodies, _, deepest = self.contacts.store.near_table()
         pair = int(deepest.argmax())
@@ -136,7 +137,7 @@ class DivergenceCheck:
 
     def round_off(self) -> float:
         """Bound of the energy [J] that rounding of positions has put into the bonds so far."""
-        return max(1, int(self.schedule.evaluations[0])) * self.rounded_once
+        return max(1, int(values(self.schedule.evaluations)[0])) * self.rounded_once
 
     def _rounded_once(self):
         """Energy [J] of springs whose ends are known to a few units in the last place."""
@@ -148,7 +149,7 @@ class DivergenceCheck:
     def _exception(self, body, motion, what, links, remedy: Remedy):
         """SimulationDiverged that says what is wrong with a body, and what to change."""
         level = int(motion["level"][body])
-        time_s = self.state.tick[None] * self.schedule.tick_seconds
+        time_s = self.schedule.time_s
         step = self.schedule.dt0 / 2.0**level
         error = SimulationDiverged(
             f"diverged at t = {time_s:.6g} s: body {body} {what}; "
@@ -161,7 +162,7 @@ class DivergenceCheck:
     def _links(self, body):
         """Bodies that a body is tied to or near, and how, as pairs."""
         top = self.model.topology
-        intact = self.state.broken_tick.to_numpy() < 0
+        intact = ~self.state.broken()
         links = [
             (int(top.master[b] + top.slave[b] - body), f"bond {b} to body")
             for b in top.body_bond[body]

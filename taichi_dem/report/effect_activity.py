@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.report.energy_balance import EnergyBalance, EnergyTables
@@ -47,7 +48,7 @@ def effect_activity(
     state = energy_balance.state
     given = abs(account["load_work"]) + abs(account["support_work"]) + energy_balance.start_energy
     rounding = _Rounding(substeps * _EPSILON * given, bond_rounding(model, state, substeps))
-    active = state.active_effects.to_numpy()[: model.body_count], readings.active_bonds()
+    active = values(state.active_effects, slice(model.body_count)), readings.active_bonds()
     found = [
         _by_role(model, energy_balance, tables, active, rounding, effect)
         for effect in _listed(model)

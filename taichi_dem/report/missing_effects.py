@@ -7,6 +7,7 @@ from typing import Optional, Union
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
 from taichi_dem.mesh.tetrahedra import penetration
 from taichi_dem.physics.sphere_pair import CONTACT
@@ -41,7 +42,7 @@ def bond_rounding(model: Model, state: State, substeps: int) -> np.ndarray:
     A (k_n + k_s) (eps X)^2 / 2, which its dashpots then take.
     """
     corners = np.abs(model.mesh.points[model.mesh.tetrahedra]).max(axis=(1, 2))
-    places = np.abs(state.position.to_numpy()[: model.body_count]).max(axis=1)
+    places = np.abs(values(state.position, slice(model.body_count))).max(axis=1)
     far = np.maximum(corners, places)
     reach = np.maximum(far[model.topology.master], far[model.topology.slave])
     area = 3.0 * model.bonds["area"]
@@ -167,7 +168,7 @@ class MissingEffects:
         if self.model.bond_count and "dashpot" in self.needed:
             self.strain = np.maximum(self.strain, self.readings.bonds()[:, 0])
         if "friction" in self.needed:
-            active = self.state.active_effects.to_numpy()[: self.model.body_count]
+            active = values(self.state.active_effects, slice(self.model.body_count))
             self.needed["friction"].see(np.flatnonzero(active & CONTACT), time_s)
 
         if self.creep is not None:
@@ -176,7 +177,7 @@ class MissingEffects:
     def _pressed(self):
         """Released bonds whose bodies are within each other, by more than rounding."""
         top, (place, turn) = self.model.topology, self.volume.now()
-        bonds = np.flatnonzero(self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER)
+        bonds = np.flatnonzero(self.state.broken())
         ends = top.master[bonds], top.slave[bonds]
         depth = penetration(*(self.volume.corners(place, turn, bodies) for bodies in ends))
         reach = np.abs(place).max() + self.model.body_radius.max()
@@ -194,7 +195,7 @@ class MissingEffects:
         is on a bare outer face.
         """
         pairs = volume.near_pairs[:_MOST_PAIRS]
-        broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
+        broken = self.state.broken()
         bonds = self.model.topology.body_bond
         # Bond -1 stands for an outer face, which is as free as a broken one.
         free, outer = np.append(broken, True)[bonds], bonds < 0
@@ -255,13 +256,13 @@ class MissingEffects:
         """
         needed = {name: replace(finding) for name, finding in self.needed.items()}
         volume = self.volume if volume is None else volume
-        self._see_bodies(needed, volume, int(self.state.tick[None]) * self.schedule.tick_seconds)
-        ticks = self.state.passed.to_numpy()[: self.model.bond_count]
+        self._see_bodies(needed, volume, self.schedule.time_s)
+        ticks = values(self.state.passed, slice(self.model.bond_count))
         for column, name in enumerate(("tension", "shear")):
             if name in needed:
                 self._see_passed(needed[name], ticks[:, column])
         if "dashpot" in needed:
-            substeps = int(self.schedule.evaluations[0])
+            substeps = int(values(self.schedule.evaluations)[0])
             rounding = bond_rounding(self.model, self.state, substeps)
             needed["dashpot"].see(np.flatnonzero(self.strain > rounding), self.last_s)
         if self.creep is not None:

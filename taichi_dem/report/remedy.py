@@ -6,6 +6,7 @@ from typing import NamedTuple, Optional
 import numpy as np
 
 from taichi_dem.contact.contacts import Contacts
+from taichi_dem.kit.allocation import values
 from taichi_dem.report.energy_balance import EnergyBalance, unexplained_share
 from taichi_dem.stability.contact_limits import contact_rates
 from taichi_dem.stability.quality import quality_report
@@ -64,7 +65,7 @@ class Remedies:
 
     def of_overlap(self, body: int, beside: Sequence[int]) -> Remedy:
         """For a body that has sunk too deep into one of those near it."""
-        if not self.state.tick[None]:
+        if not values(self.state.tick):
             return Remedy("and the scene begins like this: move the bodies apart", {})
         remedy = self._of_step(body, beside)
         if remedy is None:
@@ -85,7 +86,7 @@ class Remedies:
         Control keeps bodies below their limits: there, and below half of them, a shorter step helps
         where the account of energy does not close.
         """
-        level = self.state.level.to_numpy()[[body, *beside]].max()
+        level = values(self.state.level, [body, *beside]).max()
         taken = self.schedule.dt0 / 2.0 ** (int(level) if self.controlled else 0)
         limits = self._limits()
         limit, cause, tight = min(

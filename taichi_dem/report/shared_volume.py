@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.types import vec3, vec4
 from taichi_dem.mesh.tetrahedra import components, points_of_parts
 from taichi_dem.scene import remedy
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
-from taichi_dem.state.timeline import NEVER
 
 #: Share of the smaller body beyond which two bodies count as within each other.
 DEEP = 0.1
@@ -100,8 +100,8 @@ class SharedVolume:
 
     def now(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions [m] and rotations of the bodies."""
-        count = self.model.body_count
-        return self.state.position.to_numpy()[:count], self.state.rotation.to_numpy()[:count]
+        here = slice(self.model.body_count)
+        return values(self.state.position, here), values(self.state.rotation, here)
 
     def findings(self) -> tuple[str, ...]:
         """A sentence where bodies are within each other although contact is listed; or none."""
@@ -122,8 +122,7 @@ class SharedVolume:
     def fragments(self) -> int:
         """Number of pieces that intact bonds hold together."""
         top = self.model.topology
-        intact = self.state.broken_tick.to_numpy()[: self.model.bond_count] == NEVER
-        ends = np.column_stack([top.master, top.slave])[intact]
+        ends = np.column_stack([top.master, top.slave])[~self.state.broken()]
         return len(np.unique(components(self.model.body_count, ends)))
 
     def saved(self) -> dict[str, np.ndarray]:
@@ -152,8 +151,7 @@ class SharedVolume:
 
     def _compare(self, corners):
         """Find all pairs and their shares; corners (n, 4, 3) [m]."""
-        top = self.model.topology
-        broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
+        top, broken = self.model.topology, self.state.broken()
         # Bond -1 stands for an outer face, which is as free as a broken one.
         free = np.append(broken, True)[top.body_bond]
         surface = np.flatnonzero(free.any(axis=1))

@@ -6,10 +6,11 @@ from typing import Optional
 import numpy as np
 
 from taichi_dem.contact.contacts import Contacts
+from taichi_dem.kit.allocation import values
 from taichi_dem.report.readings import Readings
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
-from taichi_dem.state.timeline import MAX_LEVEL, NEVER
+from taichi_dem.state.timeline import MAX_LEVEL
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.schedule import Schedule
 
@@ -65,15 +66,15 @@ class StepResolution:
             return
         if self.limited and self.has_dashpot and self.model.bond_count:
             self.readings.bond_shares(self.share)
-        if self.contacts is not None and self.contacts.store.near_count[None]:
+        if self.contacts is not None and values(self.contacts.store.near_count):
             if self.limited:
                 self._note_partners()
             self.readings.contact_shares(self.pair_share, self.taken)
 
     def _note_partners(self):
         """Remember steps and light partners: few contacts last until a recording."""
-        schedule, mass = self.schedule, self.model.body_mass
-        self.step = np.minimum(self.step, schedule.dt0 / 2.0 ** self.state.level.to_numpy())
+        mass, level = self.model.body_mass, values(self.state.level, slice(self.model.body_count))
+        self.step = np.minimum(self.step, self.schedule.dt0 / 2.0**level)
         pairs, _, _ = self.contacts.store.near_table()
         for one, other in (pairs.T, pairs.T[::-1]):
             np.minimum.at(self.lightest, one, mass[other])
@@ -88,7 +89,7 @@ class StepResolution:
         return (*bonds, *self._pairs(bodies), *self._sweeps(), *self._levels())
 
     def _levels(self):
-        if not self.schedule.undivided[None]:
+        if not values(self.schedule.undivided):
             return ()
         least = self.schedule.dt0 / 2.0**MAX_LEVEL
         return (
@@ -104,17 +105,17 @@ class StepResolution:
         """
         if self.solver is None:
             return 0, 0.0
-        return int(self.solver.unconverged[None]), float(self.solver.worst[None])
+        return int(values(self.solver.unconverged)), float(values(self.solver.worst))
 
     def _sweeps(self):
         steps, worst = self.unconverged
         if not steps:
             return ()
-        allowed = float(self.solver.tolerance[None])
+        allowed = float(values(self.solver.tolerance))
         return (
             f"the dashpots of {steps} steps were not solved: sweeps ended with changes of up to "
             f"{100 * worst:.2g} % of the largest speed, where {100 * allowed:.2g} % is asked; "
-            f"allow more sweeps than {int(self.solver.bounds[1])}, or take a shorter step",
+            f"allow more sweeps than {int(values(self.solver.bounds)[1])}, or take a shorter step",
         )
 
     def _bonds(self, inside):
@@ -167,7 +168,8 @@ class StepResolution:
         damping = self.model.materials.of_contacts("contact_damping")
         if self.contacts is None or not self.limited or not np.any(damping):
             return self.pair_share
-        acted = self.state.contact_heat.to_numpy()[:, :2].sum(axis=1) > 0.0
+        heat = values(self.state.contact_heat, slice(self.model.body_count))
+        acted = heat[:, :2].sum(axis=1) > 0.0
         x = 2.0 * damping * self.step / self.lightest
         return np.minimum(self.pair_share, np.where(acted, 1.0 / np.maximum(1.0, x), 1.0))
 
@@ -177,7 +179,6 @@ class StepResolution:
         units = self.state.fields().get("softening_unit")
         if units is None:
             return np.zeros(bonds)
-        widest = units.to_numpy()[: 3 * bonds, 0].reshape(bonds, 3).max(axis=1)
-        failed = self.state.broken_tick.to_numpy()[:bonds] != NEVER
+        widest = values(units, slice(3 * bonds))[:, 0].reshape(bonds, 3).max(axis=1)
         opening = self.model.of_bonds(lambda material: material.failure_opening)
-        return np.where(failed, widest / opening, 0.0)
+        return np.where(self.state.broken(), widest / opening, 0.0)

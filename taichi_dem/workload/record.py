@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.validation import AUTO
 from taichi_dem.observers import Every
@@ -79,7 +80,7 @@ class EvaluationCounter:
     """
 
     def __init__(self, simulation: Simulation):
-        engine = simulation.loan.engine
+        engine = simulation.engine
         self.tables, self.schedule = engine.tables, engine.schedule
         self.store = engine.contacts.store
         shape = (simulation.model.body_count, MAX_LEVEL + 1)
@@ -108,7 +109,7 @@ class EvaluationCounter:
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
         """Counts (bodies, classes, kinds) and ticks (classes,) since the last time; then zero."""
-        found = self.counts.to_numpy(), self.ticks.to_numpy()
+        found = values(self.counts), values(self.ticks)
         self.counts.fill(0)
         self.ticks.fill(0)
         return found
@@ -158,7 +159,7 @@ def record_workload(
     undisturbed one.
     """
     simulation = Simulation(scene, method, "resident")
-    counter, engine = EvaluationCounter(simulation), simulation.loan.engine
+    counter, engine = EvaluationCounter(simulation), simulation.engine
     step = CountedStep(counter, engine.advance, engine.schedule, engine.broad_phase)
     simulation.driver = Resident(step)
     made = _Intervals(simulation, counter, every)

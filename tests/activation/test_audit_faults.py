@@ -23,7 +23,7 @@ def every_bond(monkeypatch, compiled_anew):
 
 def missed(simulation):
     """Misses by kind."""
-    return simulation.step.audit.misses.to_numpy().tolist()
+    return simulation.values(simulation.step.audit.misses).tolist()
 
 
 @ti.data_oriented

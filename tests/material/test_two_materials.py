@@ -55,7 +55,7 @@ def moved(scene, method, steps, share=1.0):
 def test_a_second_material_of_equal_constants_changes_no_bit():
     """Not merged with the first, so that every law reads another row of its numbers."""
     first, second = (thrown({}, twin) for twin in (False, True))
-    broken = [one.state.broken_tick.to_numpy() for one in (first, second)]
+    broken = [one.values(one.state.broken_tick) for one in (first, second)]
     assert (broken[0][: first.model.bond_count] >= 0).sum() > 3
     assert np.array_equal(*broken)
     found, motion = first.state.motion(), second.state.motion()

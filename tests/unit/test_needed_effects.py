@@ -5,7 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Uniform, checked_mesh, effects, needed_effects, simulate
+from taichi_dem import (
+    CONCRETE,
+    Scene,
+    Simulation,
+    Uniform,
+    checked_mesh,
+    effects,
+    needed_effects,
+    simulate,
+)
+from taichi_dem.kit.allocation import assign
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.report.effect_activity import effect_activity
@@ -51,11 +61,6 @@ def test_weight_of_all_is_all_the_work(gentle):
     assert use.energy_J == pytest.approx(0.5 * mass * (9.81 * UNTIL) ** 2, rel=1e-9)
 
 
-def column(values):
-    """A field of these values, to be read."""
-    return SimpleNamespace(to_numpy=lambda: np.asarray(values))
-
-
 def used(listed, bits=0, marked=0, heat=0.0, **account):
     """What is said of effects whose account holds these terms [J]; every effect by its name.
 
@@ -63,9 +68,10 @@ def used(listed, bits=0, marked=0, heat=0.0, **account):
     heat: in each bond [J].
     """
     model = Model(pair(), CONCRETE, listed)
-    state = SimpleNamespace(active_effects=column([bits, 0]), position=column(model.centre))
+    simulation = Simulation(Scene(pair(), CONCRETE), Uniform(STEP))
+    assign(simulation.state.active_effects, [bits, 0])
     tables = np.zeros((2, 6)), np.full((1, 5), heat), None
-    balance = SimpleNamespace(state=state, start_energy=0.0)
+    balance = SimpleNamespace(state=simulation.state, start_energy=0.0)
     balance.support_works = balance.load_works = lambda index: np.zeros(2)
     readings = SimpleNamespace(active_bonds=lambda: np.full((1, 2), marked > 0))
     filled = {**dict.fromkeys(TERMS, 0.0), **account}

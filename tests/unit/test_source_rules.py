@@ -9,7 +9,7 @@ LAYERS = {
     "taichi_dem": """
         kit | meshes mesh shapes | materials | elasticity closed_forms | physics | state
         | laws | loads | effects initial_motion | scene | step_control | methods | contact
-        | stability | step | report | engine engine_view | simulation
+        | stability | step | report | engine | simulation
         | output measured_speedup measured_overhead paired_cost observers run_plan | plot | viewer
         | result scene_pictures | simulate needed_effects outcome | workload step_study goals
         | accuracy calibration | solve | demo | __init__ | __main__""",
