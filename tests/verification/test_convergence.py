@@ -180,6 +180,7 @@ def test_solved_dashpots_are_of_second_order_before_anything_breaks():
         simulation = blown(ImplicitDashpots(step, sweeps=(2, 100), tolerance=1e-5), 8e-6)
         assert simulation.report().broken_faces == 0
         places.append(simulation.motion()["position"])
+        simulation.close()
     coarse, fine = (np.linalg.norm(a - b) for a, b in zip(places, places[1:]))
     moved = np.linalg.norm(places[-1] - simulation.model.centre)
     assert fine > 1e-5 * moved
@@ -199,6 +200,7 @@ def test_multirate_stays_within_the_error_of_its_steps():
     until = 2.5e-5
     simulation = blown(Uniform(1e-8, 2e-7), until)
     coarse, evaluated = simulation.motion()["position"], simulation.report().contact_evaluations
+    simulation.close()
     fine = blown(Uniform(5e-9, 1e-7), until).motion()["position"]
     error = 2.0 * np.linalg.norm(coarse - fine)
     several = blown(Multirate(1e-8, 2e-7), until)

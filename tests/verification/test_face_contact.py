@@ -23,7 +23,7 @@ EPS = np.finfo(float).eps
 LOSSLESS = replace(CONCRETE, contact_damping=0.0)
 
 
-@pytest.fixture(scope="module", params=[cracked, ring], ids=lambda make: make.__name__)
+@pytest.fixture(params=[cracked, ring], ids=lambda make: make.__name__)
 def at_a_block(request):
     """A tetrahedron that is put at a block, without bonds' dashpots."""
     return AtABlock(request.param(), LOSSLESS)
