@@ -391,6 +391,29 @@ class Batch(LoadedScenes):
         self._load_pace()
         self.going_on = True
 
+    def aside(self) -> tuple[dict[str, np.ndarray], ...]:
+        """Read the whole state, to keep it while another batch has the engine.
+
+        Returns
+        -------
+        tuple
+            For ``take_up`` of a batch that is made with the same arguments.
+        """
+        return self.memory.read(), self.saved()
+
+    def take_up(self, aside: tuple[dict[str, np.ndarray], ...]) -> None:
+        """Go on from a state instead of a start, with the same bits.
+
+        Parameters
+        ----------
+        aside : tuple
+            State that ``aside`` of a batch with the same arguments has returned.
+        """
+        arrays, saved = aside
+        self.memory.write(arrays)
+        self.resume(saved)
+        self._started, self.going_on = True, False
+
     def report(self) -> Report:
         """Summarize figures and cost of the run.
 

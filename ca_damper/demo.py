@@ -93,21 +93,25 @@ def let_go(options: Namespace, name: str) -> None:
     jobs = [(rigid, counts, options.seed), *((one, *scenes) for one in fillings.values())]
     recorded: dict[str, Any] = {"measured_cycles": CYCLES, "recorded_samples": 2 * SAMPLES * CYCLES}
     batches = {job[0].label: _batch(*job, options, **recorded) for job in jobs}
-    # Recorded as the others are, so that they run in the same programs.
-    alone = options.particles, options.seed, options
-    pair = [_batch(one, *alone, **recorded) for one in (rigid, shown)]
     at = study.output_paths(options.out)
     decays = {label: _decay(counts, batch) for label, batch in batches.items()}
+    reports = {label: batch.report() for label, batch in batches.items()}
+    batches.clear()
+    # Recorded as the others were, so that they run in the same engines, which are idle again.
+    alone = options.particles, options.seed, options
+    pair = [_batch(one, *alone, **recorded) for one in (rigid, shown)]
     fixed, free = (_filmed(batch, options.shown) for batch in pair)
     figures = figures_of(decays, options)
     write(at, decays, (fixed, free), shown, options)
-    words, report = sentences(decays, shown, options), batches[shown.label].report()
+    words, report = sentences(decays, shown, options), reports[shown.label]
     report.write(at("report.json"))
     write_text(at("caption.txt"), " ".join(words) + "\n")
     for sentence in words:
         show_paragraph(sentence)
     print(f"\n{report}\n")
-    study.finish(options, name, figures, [*batches.values(), *pair])
+    parts = "compile_seconds", "run_seconds"
+    spent = [sum(getattr(one, part) for one in (*reports.values(), *pair)) for part in parts]
+    study.finish(options, name, figures, (spent[0], spent[1]))
     if report.certificate is not None:
         add_to_summary(options.out, certificate=report.certificate.as_dict())
 

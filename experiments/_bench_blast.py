@@ -55,7 +55,7 @@ def bonded_phase(repeats):
     simulation.advance_to(STEPS)
     bonds = simulation.model.bond_count
     # Three units a bond.
-    work = Work(bytes_a_step(simulation.loan.engine) / (3 * bonds))
+    work = Work(bytes_a_step(simulation.engine) / (3 * bonds))
     ends = [(k + 2) * STEPS for k in range(repeats)]
     seconds = [study.seconds_of(simulation.advance_to, end) for end in ends]
     values = [3e-6 * bonds * STEPS / one for one in seconds]
@@ -70,8 +70,8 @@ def visits(repeats):
     simulation = Simulation(paper_scene(), method, driver())
     simulation.advance_to(macro_steps(SHORT, method.dt0))
     # A broken bond is no visit, although its place is looked at.
-    broken = simulation.state.broken_tick.to_numpy()[: simulation.model.bond_count] >= 0
-    count, solver = SWEEPS * int((~broken).sum()), simulation.loan.engine.advance.solver
+    broken = simulation.state.broken()
+    count, solver = SWEEPS * int((~broken).sum()), simulation.engine.advance.solver
     sweep_bonds(solver, 1)
     seconds = [study.seconds_of(sweep_bonds, solver, SWEEPS) for _ in range(repeats)]
     yield Figure("visit of a bond", "ns", [1e9 * one / count for one in seconds], "<= 14", VISIT)

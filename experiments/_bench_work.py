@@ -22,7 +22,7 @@ def bytes_a_step(engine):
 
 def counts_of(simulation):
     """Numbers of evaluated bonds, and of visits of bonds in sweeps, since the start."""
-    counts = simulation.schedule.evaluations.to_numpy().tolist()
+    counts = simulation.values(simulation.schedule.evaluations).tolist()
     # Those of the third count are both.
     return counts[5], counts[2] - counts[5]
 
@@ -34,5 +34,5 @@ def work_since(simulation, before=(0, 0), store=CACHE):
     comes to that. Contacts, searches and changes of lists are left out.
     """
     evaluated, visits = (now - then for now, then in zip(counts_of(simulation), before))
-    share = bytes_a_step(simulation.loan.engine) / simulation.model.bond_count
+    share = bytes_a_step(simulation.engine) / simulation.model.bond_count
     return Work(share * evaluated, store=store) + VISIT * visits

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.mesh.colouring import edge_colours
 
 #: All bonds.
@@ -49,7 +50,7 @@ class DashpotSystem:
         self.colours = edge_colours(self.bodies.T, model.body_count)
         self.onto = self._jacobians(read["branch"][holds])
         self.last, solved = read["last"][holds], read["block"][holds]
-        turn = solver.velocities.turn.to_numpy()[: model.body_count]
+        turn = values(solver.velocities.turn, slice(model.body_count))
         self.gives = np.zeros((model.body_count, 6, 6))
         self.gives[:, :3, :3] = (1.0 / model.body_mass)[:, None, None] * np.eye(3)
         self.gives[:, 3:, 3:] = turn

@@ -1,7 +1,7 @@
 """Costs of a step of the damper with other options, from the same states (``cost_of_effects.py``).
 
 The function ``damper_costs`` is called in a process of its own, where all candidates are alive at
-once and take turns.
+once, each in an engine of its own.
 """
 
 from dataclasses import asdict
@@ -52,16 +52,16 @@ class FrozenBatch:
         for k in range(count):
             whole = self.batch.steps_per_cycle * (gap if k else before)
             self.batch.advance(whole.astype(int))
-            found.append(self._memory().read())
+            found.append(self.memory.read())
         return found
 
     def freeze(self, states, substeps):
         """Take over states of a batch with other options, and the steps to go from each."""
-        own, self.substeps, self.states = self._memory().read(), substeps, []
+        own, self.substeps, self.states = self.memory.read(), substeps, []
         kept = {name for name in own if name.startswith(self.OWN)}
         for state in states:
             arrays = {**own, **{name: state[name] for name in own.keys() & state.keys() - kept}}
-            self._memory().write(arrays)
+            self.memory.write(arrays)
             if "device.resting.held" in state.keys() - own.keys():
                 release(self.batch.device)
             self._aim()
@@ -71,15 +71,10 @@ class FrozenBatch:
 
     def seconds(self, state):
         """Seconds of a step of a scene from a state."""
-        self._memory().write(self.states[state])
+        self.memory.write(self.states[state])
         advance = self.batch.engine.coupling.advance
         advance(self.WARM)
         return seconds_of(advance, 1.0) / ((1.0 - self.WARM) * self.substeps * self.batch.count)
-
-    def _memory(self):
-        """The fields, with the data of this batch in them."""
-        self.batch.loan.activate()
-        return self.memory
 
     def _aim(self):
         """Set the steps to go from the present ones, without measuring."""

@@ -11,6 +11,7 @@ from dataclasses import asdict
 import numpy as np
 
 from taichi_dem import InputError, Simulation
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.study.paired_timing import paired_timing
 from taichi_dem.kit.study.timing import on_device, seconds_of
@@ -53,7 +54,6 @@ class FrozenScene:
         return seconds_of(self._step, self.substeps) / self.substeps
 
     def _restore(self, state):
-        self.simulation.loan.activate()
         self.memory.write(self.states[state])
         self._step(WARM)
 
@@ -84,7 +84,7 @@ class FrozenScene:
 
     def _counters(self):
         simulation = self.simulation
-        evaluations = simulation.schedule.evaluations
+        evaluations = values(simulation.schedule.evaluations)
         counts = evaluations[0], simulation.sweeps(), simulation.searches, evaluations[3]
         return np.array(counts, dtype=np.int64)
 
@@ -113,5 +113,4 @@ def _driver():
 
 
 def _memory(simulation):
-    simulation.loan.activate()
-    return FieldMemory(simulation.loan.engine)
+    return FieldMemory(simulation.engine)

@@ -43,7 +43,7 @@ def _elastic(mesh, stripped):
     simulation.start()
     driver = simulation.driver
     if stripped is not None:
-        engine = simulation.loan.engine
+        engine = simulation.engine
         advance = stripped(engine.tables, engine.state, engine.schedule, None)
         driver = Resident(Step(advance, engine.schedule, None))
     driver.prepare()

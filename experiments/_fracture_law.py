@@ -47,7 +47,7 @@ class Bench:
     when = Every(steps=1)
 
     def __init__(self, simulation, steps, step):
-        self.state, self.steps = simulation.state, steps
+        self.simulation, self.steps = simulation, steps
         self.drives = [
             one for one in simulation.tables.supports if isinstance(one, effects.PrescribedMotion)
         ]
@@ -60,9 +60,10 @@ class Bench:
         for drive, plan in zip(self.drives, self.plans):
             if step == 0 or (step < self.steps and not np.array_equal(plan[step], plan[step - 1])):
                 drive.law[0], drive.law[1] = plan[step]
-        displacement = self.state.position.to_numpy() - view.model.centre
+        state, read = self.simulation.state, self.simulation.values
+        displacement = read(state.position) - view.model.centre
         self.moved.append(displacement[1::2] - displacement[::2])
-        self.given.append(self.state.load_impulse.to_numpy()[::2, :2])
+        self.given.append(read(state.load_impulse)[::2, :2])
 
 
 def caption(rows, steps):

@@ -11,6 +11,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem import Every, Simulation
+from taichi_dem.kit.allocation import values
 from taichi_dem.simulate import run_simulation
 from taichi_dem.state.timeline import MAX_LEVEL
 from taichi_dem.step.drivers import Resident, Step
@@ -71,7 +72,7 @@ class EvaluationCounter:
     """
 
     def __init__(self, simulation):
-        engine = simulation.loan.engine
+        engine = simulation.engine
         self.tables, self.schedule = engine.tables, engine.schedule
         self.store = engine.contacts.store
         shape = (simulation.model.body_count, MAX_LEVEL + 1)
@@ -100,7 +101,7 @@ class EvaluationCounter:
 
     def read(self):
         """Counts (bodies, classes, kinds) and ticks (classes,) since the last time; then zero."""
-        found = self.counts.to_numpy(), self.ticks.to_numpy()
+        found = values(self.counts), values(self.ticks)
         self.counts.fill(0)
         self.ticks.fill(0)
         return found
@@ -142,7 +143,7 @@ def record_workload(scene, method, until, every):
     between two steps only, so its bits are those of an undisturbed one.
     """
     simulation = Simulation(scene, method, "resident")
-    counter, engine = EvaluationCounter(simulation), simulation.loan.engine
+    counter, engine = EvaluationCounter(simulation), simulation.engine
     step = CountedStep(counter, engine.advance, engine.schedule, engine.broad_phase)
     simulation.driver = Resident(step)
     made = _Intervals(simulation, counter, every)

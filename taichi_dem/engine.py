@@ -3,8 +3,12 @@
 from collections.abc import Iterable
 from functools import partial
 
+import numpy as np
+import taichi as ti
+
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.contact.search import BroadPhase
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.engine_pool import Engine, EnginePool
 from taichi_dem.laws.base import Effect
 from taichi_dem.laws.bound import bound_by_role
@@ -91,7 +95,9 @@ class BlastEngine(Engine):
     def load(self, model: Model, method: Method, max_speed: float, sleep: float = 0.0) -> None:
         """Take over a scene, at rest and at time zero; max_speed [m/s], sleep: see ``Scene``."""
         self.clear()
-        self.enter(model)
+        self.lengths = self._lengths(model)
+        for effect, given in self.tables.matched(model):
+            effect.stand_for(given)
         self.tables.load(model)
         self.state.load(model, max_speed)
         if self.contacts is not None:
@@ -116,11 +122,10 @@ class BlastEngine(Engine):
         """Whether effect parameters compiled into kernels have the values of the scene."""
         return all(effect.accepts(given) for effect, given in self.tables.matched(model))
 
-    def enter(self, model: Model) -> None:
-        """Set the counts and effects of the scene whose data are loaded."""
-        self.lengths = self._lengths(model)
-        for effect, given in self.tables.matched(model):
-            effect.stand_for(given)
+    def values(self, field: ti.Field) -> np.ndarray:
+        """Copy of the entries of a field that the scene uses."""
+        length = self.lengths.get(field.shape[0]) if field.shape else None
+        return values(field) if length is None else values(field, slice(length))
 
 
 #: Engines of the session.

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.validation import LARGEST, instance, positive
 from taichi_dem.simulation import Simulation
 from taichi_dem.state.timeline import NEVER
@@ -25,8 +26,8 @@ def measured_speedup(simulation: Simulation, seconds: float = 0.5) -> float:
     """CPU time that one step for all would have taken, over that of a run so far.
 
     The number of evaluations with one step is counted during the run. Their cost is measured on a
-    twin in the same engine: it begins at the present state, and all of its bodies take the smallest
-    step present.
+    twin with an engine of its own: it begins at the present state, and all of its bodies take the
+    smallest step present.
 
     Parameters
     ----------
@@ -68,18 +69,17 @@ def _twin(simulation, step):
 
     Its largest step is that of all bodies, as none moves far enough in it to require less.
     """
-    given = {name: field.to_numpy() for name, field in simulation.state.fields().items()}
+    given = {name: simulation.values(field) for name, field in simulation.state.fields().items()}
     method = replace(simulation.method, dt0=step, distance=LARGEST)
     twin = Simulation(simulation.scene, method, simulation.driver.name.partition(" ")[0])
     for name, field in twin.state.fields().items():
         if name not in _ANEW:
-            values = given[name]
             if name.endswith("_tick"):
                 # Ticks have another length: all past events count as at the start.
-                values = np.where(values == NEVER, NEVER, 0)
-            field.from_numpy(values)
+                given[name] = np.where(given[name] == NEVER, NEVER, 0)
+            assign(field, given[name])
     twin.start()
     # The velocities are half a step before the positions already.
     for name in ("velocity", "angular_momentum", "spin"):
-        getattr(twin.state, name).from_numpy(given[name])
+        assign(getattr(twin.state, name), given[name])
     return twin

@@ -6,6 +6,7 @@ from typing import Any, Callable, ClassVar, Optional, Protocol, Union
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.uncopied import Uncopied
@@ -15,7 +16,7 @@ from taichi_dem.output.record import Frame, Recorder
 from taichi_dem.report.report import Report
 from taichi_dem.simulation import MOST_STEPS, Simulation
 from taichi_dem.state.model import Model
-from taichi_dem.state.timeline import MACRO_TICKS, NEVER
+from taichi_dem.state.timeline import MACRO_TICKS
 
 #: Calls of an observer in a run.
 _MOST_CALLS = 1_000_000
@@ -294,7 +295,7 @@ class RunView(Uncopied):
     @property
     def step(self) -> int:
         """Number of largest steps done."""
-        return int(self._parts[0].state.tick[None]) // MACRO_TICKS
+        return int(values(self._parts[0].state.tick)) // MACRO_TICKS
 
     @property
     def model(self) -> Model:
@@ -309,8 +310,7 @@ class RunView(Uncopied):
     @property
     def broken(self) -> np.ndarray:
         """Whether each bond has been released, (bond_count,)."""
-        ticks = self._parts[0].state.broken_tick.to_numpy()[: self.model.bond_count]
-        return _locked(ticks != NEVER)
+        return _locked(self._parts[0].state.broken())
 
     @property
     def evaluations(self) -> int:

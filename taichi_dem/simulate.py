@@ -7,9 +7,10 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.checkpoint import Checkpoint, digest, identity_of, version_text
-from taichi_dem.kit.engine_pool import LoanMemory
 from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.files import claiming, output_folder
 from taichi_dem.kit.progress.progress import Listener, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
@@ -115,6 +116,9 @@ def simulate(
         writer = _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays)
         error = _run_saved(simulation, recorder, writer, plan, report_progress)
         result = _result(simulation, recorder, error, plan)
+        if error is None:
+            # Observers may keep their view of it.
+            simulation.close()
     if output is not None:
         _write(result, output, writer)
     return _given(result, error)
@@ -194,7 +198,7 @@ def _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays):
 
     def now():
         """Present largest step, and time [s]."""
-        return simulation.state.tick[None] // MACRO_TICKS, simulation.time_s
+        return int(values(simulation.state.tick)) // MACRO_TICKS, simulation.time_s
 
     return CheckpointWriter(checkpoint, saved_run(simulation, recorder), now)
 
@@ -204,7 +208,7 @@ def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
     parts: dict[str, Owner] = {"simulation": simulation, **simulation.followed}
     parts["recorder"] = recorder
     return RunSnapshot(
-        run_identity(simulation.scene, simulation.method), LoanMemory(simulation.loan), parts
+        run_identity(simulation.scene, simulation.method), FieldMemory(simulation.engine), parts
     )
 
 
@@ -260,13 +264,13 @@ def _run(simulation, recorder, writer, plan, calls):
     A resumed run skips the marks that it has passed already.
     """
     view = RunView(simulation, recorder)
-    seen = simulation.state.tick[None] if recorder.rows else -1
+    seen = int(values(simulation.state.tick)) if recorder.rows else -1
     marks = sorted({*calls.at, *writer.marks(plan.last, plan.dt0)})
     for step in (mark for mark in marks if mark * MACRO_TICKS > seen):
 
         def between(end=step * MACRO_TICKS):
             """Observe by the clock, and save if due; at a mark its observers come first."""
-            tick = simulation.state.tick[None]
+            tick = int(values(simulation.state.tick))
             if tick < plan.last * MACRO_TICKS:
                 calls.by_clock(view)
             if tick < end:

@@ -8,10 +8,11 @@ from dataclasses import replace
 from typing import Any, Optional
 
 import numpy as np
+import taichi as ti
 
-from taichi_dem.engine import ENGINES, Structure
-from taichi_dem.engine_view import PartView
+from taichi_dem.engine import ENGINES, BlastEngine, Structure
 from taichi_dem.kit import runtime
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
@@ -33,7 +34,7 @@ from taichi_dem.state.capacity import capacity_of
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
-from taichi_dem.state.timeline import MACRO_TICKS, NEVER
+from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.auto_driver import MEASURED, AutoDriver, driver_name
 from taichi_dem.step.drivers import DRIVERS, Step
@@ -44,12 +45,18 @@ from taichi_dem.step_control import counted_criteria
 MOST_STEPS = 2**42
 
 
+def _part(name) -> Any:
+    """A part of the engine of a simulation, as a property; it checks the session."""
+    return property(lambda simulation: getattr(simulation.engine, name))
+
+
 class Simulation(Uncopied):
     """One scene, one method, one driver, on an engine of the session.
 
     ``simulate`` makes one; it is the level below for those who step by themselves. ``tables``,
-    ``state``, ``schedule``, ``contacts``, ``broad_phase``, ``advance`` and ``step`` are parts of
-    the engine with the data of this simulation; contacts and broad_phase are None without contact.
+    ``state``, ``schedule``, ``contacts``, ``broad_phase``, ``advance``, ``step`` and ``readings``
+    are the parts of its engine, which is its own as long as it lives; contacts and broad_phase are
+    None without contact. ``values`` reads their fields, which may have room for more.
 
     Parameters
     ----------
@@ -83,18 +90,14 @@ class Simulation(Uncopied):
     >>> simulation.advance_to(100)  # doctest: +SKIP
     """
 
-    # Views of these parts, with the data of this simulation.
-    tables: Tables
-    state: State
-    schedule: Schedule
-    advance: Advance
-    step: Step
-    readings: Readings
-    # None without contact.
-    contacts: Any
-    broad_phase: Any
-    # None before the start.
-    energy_balance: Any
+    tables: Tables = _part("tables")
+    state: State = _part("state")
+    schedule: Schedule = _part("schedule")
+    advance: Advance = _part("advance")
+    step: Step = _part("step")
+    readings: Readings = _part("readings")
+    contacts = _part("contacts")
+    broad_phase = _part("broad_phase")
 
     def __init__(self, scene: Scene, method: Method, driver: str = "auto"):
         instance("scene", scene, Scene)
@@ -107,8 +110,7 @@ class Simulation(Uncopied):
         self.model = Model(scene.mesh, scene.body_materials, scene.effects)
         name = driver_name(driver, self.model.bond_count)
         structure = Structure(scene.effects, method, scene.on_demand)
-        self.loan = ENGINES.borrow(structure, capacity_of(self.model), self.model, "simulation")
-        self._take_parts()
+        self._engine = ENGINES.borrow(structure, capacity_of(self.model), self.model, self)
         self._load()
         self.driver = self._driver(name)
         self.compile_seconds = time.perf_counter() - started
@@ -118,23 +120,49 @@ class Simulation(Uncopied):
         bonds = counted(self.model.bond_count, "bond")
         return in_brief(self, bodies, bonds, self.method.name, f"{self.driver.name} driver")
 
-    def _take_parts(self):
-        """Name the parts of the engine as this simulation sees them."""
-        for name in ("tables", "state", "schedule", "advance", "step", "readings"):
-            setattr(self, name, PartView(self.loan, (name,)))
-        for name in ("contacts", "broad_phase"):
-            present = self.model.has_contact
-            setattr(self, name, PartView(self.loan, (name,)) if present else None)
+    @property
+    def engine(self) -> BlastEngine:
+        """Fields and kernels; InputError once it is closed, its session has ended, or elsewhere."""
+        self._engine.check(self)
+        return self._engine
+
+    def close(self) -> None:
+        """Give the engine back, for which others else wait until nobody refers to the simulation.
+
+        Of a closed one, only what was read before is left.
+        """
+        self.engine.owner = None
+
+    @property
+    def energy_balance(self) -> Any:
+        """Account of the energy, None before the start."""
+        self._engine.check(self)
+        return self._balance
+
+    def values(self, field: ti.Field) -> np.ndarray:
+        """Copy of a field of one of the parts.
+
+        Parameters
+        ----------
+        field : Field
+            Field, such as ``simulation.state.level``.
+
+        Returns
+        -------
+        ndarray
+            Its values; of a field with an entry a body, bond, unit, face or sphere, those of the
+            scene.
+        """
+        return self.engine.values(field)
 
     def _load(self):
         """Put the scene into the engine, with its initial motion and at time zero."""
         with self._undivided("its scene was loaded"):
-            self.loan.activate()
-            engine: Any = self.loan.engine
-            engine.load(self.model, self.method, self.scene.max_speed, self.scene.sleep)
+            numbers = self.scene.max_speed, self.scene.sleep or 0.0
+            self.engine.load(self.model, self.method, *numbers)
             if self.scene.initial_motion:
                 self.state.set_motion(self.model.centre, **self.scene.initial_motion)
-            self.energy_balance = None
+            self._balance: Any = None
             self.run_seconds = self.run_cpu_seconds = 0.0
             self.first_motion: dict[str, np.ndarray] = {}
 
@@ -147,6 +175,7 @@ class Simulation(Uncopied):
 
     def _check_whole(self):
         """Raise InputError where something was interrupted that cannot be gone on with."""
+        self._engine.check(self)
         if self.cut_short:
             raise InputError(
                 f"this simulation was interrupted while {self.cut_short}, and cannot be gone on "
@@ -155,10 +184,8 @@ class Simulation(Uncopied):
 
     def _driver(self, name):
         """Driver of the engine, or one that measures both."""
-        if name == MEASURED:
-            drivers: Any = {each: PartView(self.loan, ("drivers", each)) for each in DRIVERS}
-            return AutoDriver(self.step, drivers)
-        return PartView(self.loan, ("drivers", name))
+        drivers = self.engine.drivers
+        return AutoDriver(self.step, drivers) if name == MEASURED else drivers[name]
 
     def reset(self, scene: Optional[Scene] = None, method: Optional[Method] = None) -> None:
         """Begin again at time zero as the scene says, optionally with another scene or method.
@@ -183,11 +210,10 @@ class Simulation(Uncopied):
             model = Model(scene.mesh, scene.body_materials, scene.effects)
         self._check_reset(scene, method, model)
         self.scene, self.method, self.model = scene, method, model
-        self.loan.scene = model
         self._load()
 
     def _check_reset(self, scene, method, model):
-        engine = self.loan.engine
+        engine = self.engine
         if Structure(scene.effects, method, scene.on_demand) != engine.structure:
             raise InputError(
                 "reset must have a scene and a method of the same structure, kinds of effects and "
@@ -202,7 +228,7 @@ class Simulation(Uncopied):
     @property
     def time_s(self) -> float:
         """Present time [s]."""
-        return self.state.tick[None] * self.schedule.tick_seconds
+        return self.schedule.time_s
 
     def start(self) -> None:
         """Choose the first steps, evaluate the bonds and open the account; done once.
@@ -243,7 +269,7 @@ class Simulation(Uncopied):
 
     def _open_balance(self):
         """Begin the energy balance and the other diagnostics."""
-        self.energy_balance = EnergyBalance(self.parts)
+        self._balance = EnergyBalance(self.parts)
         self.divergence_check = DivergenceCheck(self.parts, self.energy_balance)
         self.shared_volume = SharedVolume(self.parts)
         self.missing_effects = MissingEffects(self.parts, self.shared_volume)
@@ -303,16 +329,15 @@ class Simulation(Uncopied):
         SimulationDiverged
             The run left its bounds; the message names place and reason.
         """
-        runtime.check_session(self.loan.session, "simulation")
         end = whole("macro_step", macro_step, 0, MOST_STEPS) * MACRO_TICKS
         if not (on_call is None or callable(on_call)):
             raise InputError(f"on_call must be a function or None, got {shown(on_call)}")
         self.start()
-        while self.state.tick[None] < end:
+        while values(self.state.tick) < end:
             with self._undivided("it stepped"), self._timed():
                 self.driver.run(end)
             # A runaway fills the lists: it is named first.
-            self.divergence_check.check(hurried=self.state.tick[None] < end)
+            self.divergence_check.check(hurried=bool(values(self.state.tick) < end))
             self._check_capacity()
             if on_call is not None:
                 on_call()
@@ -334,7 +359,7 @@ class Simulation(Uncopied):
     @property
     def searches(self) -> int:
         """Contact searches so far."""
-        return int(self.broad_phase.searches[None]) if self.contacts is not None else 0
+        return int(values(self.broad_phase.searches)) if self.contacts is not None else 0
 
     def saved(self) -> dict[str, np.ndarray]:
         """Data for a checkpoint beside the fields, arrays by name."""
@@ -352,7 +377,7 @@ class Simulation(Uncopied):
         int
             Their number.
         """
-        return int(self.schedule.evaluations[2] + self.schedule.evaluations[3])
+        return int(values(self.schedule.evaluations)[2:4].sum())
 
     def sweeps(self) -> int:
         """Sweeps over all dashpots so far.
@@ -363,7 +388,7 @@ class Simulation(Uncopied):
             Their number, 0 for a method that solves none.
         """
         solver = self.advance.solver
-        return int(solver.total_sweeps[None]) if solver is not None else 0
+        return int(values(solver.total_sweeps)) if solver is not None else 0
 
     def evaluation_rate(self) -> float:
         """Bonds and pairs to evaluate in a simulated second, if all levels stay as they are.
@@ -376,9 +401,9 @@ class Simulation(Uncopied):
         members = self.schedule.members()
         steps = 2.0 ** np.arange(len(members))
         if self.schedule.uniform:
-            steps[:] = 2.0 ** int(self.schedule.finest[None])
+            steps[:] = 2.0 ** int(values(self.schedule.finest))
         if self.solves:
-            steps *= 1.0 + self.sweeps() / max(1, int(self.schedule.evaluations[0]))
+            steps *= 1.0 + self.sweeps() / max(1, int(values(self.schedule.evaluations)[0]))
         return float(members @ steps) / self.method.dt0
 
     def report(self, brief: bool = False) -> Report:
@@ -400,9 +425,10 @@ class Simulation(Uncopied):
             The simulation was not started.
         """
         flag("brief", brief)
-        counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
+        counts = values(self.schedule.evaluations).tolist()
         if self.energy_balance is None:
             raise InputError("report must be asked for once the simulation was started, got none")
+        here = slice(self.model.body_count)
         # A look of its own: to report changes nothing of what later samples find.
         shared_volume = copy.copy(self.shared_volume)
         if not brief:
@@ -418,8 +444,8 @@ class Simulation(Uncopied):
             until_s=self.time_s,
             body_count=self.model.body_count,
             bond_count=self.model.bond_count,
-            broken_faces=int((self.state.broken_tick.to_numpy() != NEVER).sum()),
-            smallest_step_s=self.method.dt0 / 2.0 ** int(self.state.level.to_numpy().max()),
+            broken_faces=int(self.state.broken().sum()),
+            smallest_step_s=self.method.dt0 / 2.0 ** int(values(self.state.level, here).max()),
             substeps=counts[0],
             body_updates=counts[1],
             bond_evaluations=counts[2],
@@ -443,7 +469,7 @@ class Simulation(Uncopied):
                 *open_account(account, self.divergence_check.round_off()),
             ),
             interpenetration=shared_volume.worst,
-            bound_by=counted_criteria(self.state.bound.to_numpy()),
+            bound_by=counted_criteria(values(self.state.bound, here)),
             bond_slip=self.step_resolution.bond_slip(),
             round_off_J=self.divergence_check.round_off(),
         )

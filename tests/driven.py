@@ -92,17 +92,11 @@ class Driven:
         table = SceneTable(particles, seed, dt, frequency, amplitude)
         size = (table.count, traced, *structure_of(filling).sizes.values())
         self.filling, self.count, self.done = filling, table.count, 0
-        self.loan = _POOL.borrow(_Structure(filling), size, filling, "container")
+        self.engine = _POOL.borrow(_Structure(filling), size, filling, self)
         self.engine.clear()
         self.table.load(table)
         self.device.load(filling)
         self.engine.reset(traced)
-
-    @property
-    def engine(self):
-        """The engine, with the data of these scenes on it."""
-        self.loan.activate()
-        return self.loan.engine
 
     @property
     def device(self):

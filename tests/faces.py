@@ -66,7 +66,7 @@ class AtABlock:
         self.model, self.state = self.simulation.model, self.simulation.state
         self.simulation.start()
         size = self.model.spheres.per_face
-        self.sphere = self.simulation.tables.sphere.to_numpy()
+        self.sphere = self.simulation.values(self.simulation.tables.sphere)
         self.sphere = self.sphere[: 4 * size * self.model.body_count].reshape(-1, 4, size, 4)
         self.low, self.high = self.block.points.min(axis=0), self.block.points.max(axis=0)
         self.outer = self.model.topology.body_bond[:-1] < 0

@@ -4,6 +4,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation
+from taichi_dem.kit.allocation import assign, values
 
 #: Step by which the probes divide impulses; a power of two loses no bit.
 STEP = 2.0**-20
@@ -28,9 +29,9 @@ class BondProbe:
         self.tables = simulation.tables
         corners = mesh.points[self.model.topology.vertices[0]]
         self.area = 0.5 * np.linalg.norm(np.cross(*(corners[1:] - corners[0])))
-        self.frame = self.tables.bond_frame[0].to_numpy()
+        self.frame = values(self.tables.bond_frame, 0)
         self.centre = self.model.centre
-        self._slots = self.tables.bond_slots[0].to_numpy()
+        self._slots = values(self.tables.bond_slots, 0)
         fields = self.state.fields()
         names = (
             "softening_unit",
@@ -40,12 +41,12 @@ class BondProbe:
             "exposed_tick",
             "bond_heat",
         )
-        self._changing = [(fields[n], fields[n].to_numpy()) for n in names if n in fields]
+        self._changing = [(fields[n], values(fields[n])) for n in names if n in fields]
 
     def reset(self):
         """Undo all history of the bond."""
         for field, first in self._changing:
-            field.from_numpy(first)
+            assign(field, first)
         self.state.tick[None] = 0
 
     def move(self, position, orientation=None, velocity=None, spin=None):
@@ -86,12 +87,12 @@ class BondProbe:
     @property
     def heat(self):
         """Energy taken by dashpots, slip and release [J]."""
-        return self.state.bond_heat[0].to_numpy()
+        return values(self.state.bond_heat, 0)
 
     @property
     def broken(self):
         """Whether the face is released."""
-        return self.state.broken_tick[0] >= 0
+        return values(self.state.broken_tick, 0) >= 0
 
     @ti.kernel
     def _evaluate(self, wrench: ti.types.ndarray(dtype=ti.f64, ndim=2)):
@@ -132,7 +133,7 @@ class ContactProbe:
         )
         self.tables, self.store = simulation.tables, simulation.contacts.store
         self.centre = self.model.centre
-        self.sphere = self.tables.sphere.to_numpy()
+        self.sphere = simulation.values(self.tables.sphere)
 
     def evaluate(self, spheres, position, orientation=None, velocity=None, spin=None, swap=False):
         """Force [N] and torque [N m] on both bodies (2, 6), and the three heats per STEP [W].

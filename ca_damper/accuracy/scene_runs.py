@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Optional
 
 import numpy as np
@@ -28,6 +29,14 @@ class SceneKey(NamedTuple):
     dt: float
 
 
+@dataclass(eq=False)
+class _Home:
+    """Scenes of one batch; aside: their state while another batch runs."""
+
+    table: SceneTable
+    aside: Any = None
+
+
 class SceneRuns:
     """Records of scenes of a filling with a number of particles, by SceneKey.
 
@@ -41,7 +50,8 @@ class SceneRuns:
         self.filling, self.particles, self.oscillator = filling, particles, oscillator
         self.progress = progress
         self.cpu_s, self.steps, self._pace = 0.0, 0, math.inf
-        self._homes: dict[SceneKey, tuple[Batch, int]] = {}
+        self._homes: dict[SceneKey, tuple[_Home, int]] = {}
+        self._present: Optional[tuple[_Home, Batch]] = None
         self._records: dict[SceneKey, np.ndarray] = {}
 
     @property
@@ -52,8 +62,8 @@ class SceneRuns:
     @property
     def failures(self) -> list[str]:
         """Why certificates of the runs do not hold, and what would settle it."""
-        batches = {id(batch): batch for batch, _ in self._homes.values()}
-        return sorted({batch.certificate.failure for batch in batches.values()})
+        homes = dict.fromkeys(home for home, _ in self._homes.values())
+        return sorted({self._batch(home).certificate.failure for home in homes})
 
     def cycles(self, key: SceneKey) -> int:
         """Number of cycles that a scene has gone."""
@@ -80,29 +90,45 @@ class SceneRuns:
         Raises SimulationDiverged; the scenes of that batch are then lost.
         """
         self._begin([key for key, count in cycles.items() if count and key not in self._homes])
-        batches: dict[int, tuple[Batch, dict[int, SceneKey]]] = {}
+        homes: dict[_Home, dict[int, SceneKey]] = {}
         for key, count in cycles.items():
             if count:
-                batch, s = self._homes[key]
-                batches.setdefault(id(batch), (batch, {}))[1][s] = key
-        for batch, keys in batches.values():
-            self._go(batch, keys, {s: cycles[key] for s, key in keys.items()})
+                home, s = self._homes[key]
+                homes.setdefault(home, {})[s] = key
+        for home, keys in homes.items():
+            self._go(self._batch(home), keys, {s: cycles[key] for s, key in keys.items()})
 
     def _begin(self, keys):
-        """Make batches of new scenes at rest."""
+        """Make tables of new scenes."""
         for first in range(0, len(keys), SCENES):
             some = keys[first : first + SCENES]
             ratios, seeds, steps = (np.array(column) for column in zip(*some))
             o = self.oscillator
             structure = (o.base_amplitude, o.mass, o.stiffness, o.damping)
             frequency = ratios * o.natural_frequency
-            table = SceneTable(self.particles, seeds, steps, frequency, *structure)
-            batch = Batch(self.filling, table, measured_cycles=CYCLES, if_diverged="raise")
-            batch.start("rest")
-            # Compiles, where no batch of this structure has done so.
-            batch.advance(0)
-            self._homes.update({key: (batch, s) for s, key in enumerate(some)})
+            home = _Home(SceneTable(self.particles, seeds, steps, frequency, *structure))
+            self._homes.update({key: (home, s) for s, key in enumerate(some)})
             self._records.update({key: np.empty((0, len(COLUMNS))) for key in some})
+
+    def _batch(self, home):
+        """The batch of some scenes, which begin at rest; the state of all others is kept aside."""
+        if self._present is None or self._present[0] is not home:
+            self._put_aside()
+            batch = Batch(self.filling, home.table, measured_cycles=CYCLES, if_diverged="raise")
+            if home.aside is None:
+                batch.start("rest")
+                # Compiles, where no batch of this structure has done so.
+                batch.advance(0)
+            else:
+                batch.take_up(home.aside)
+            self._present = home, batch
+        return self._present[1]
+
+    def _put_aside(self):
+        """Leave the engine to the next batch."""
+        if self._present is not None:
+            home, batch = self._present
+            home.aside, self._present = batch.aside(), None
 
     def _go(self, batch, keys, left):
         """Let scenes of a batch go on, by ``CYCLES`` at a time at most."""
@@ -122,8 +148,8 @@ class SceneRuns:
 
     def forget(self, keys: Iterable[SceneKey]) -> None:
         """Give scenes up that have diverged, with those that shared their batch."""
-        lost = {id(self._homes[key][0]) for key in keys if key in self._homes}
-        for key in [key for key, (batch, _) in self._homes.items() if id(batch) in lost]:
+        lost = {self._homes[key][0] for key in keys if key in self._homes}
+        for key in [key for key, (home, _) in self._homes.items() if home in lost]:
             del self._homes[key], self._records[key]
 
     def series(self, key: SceneKey) -> np.ndarray:

@@ -20,7 +20,7 @@ from ca_damper.gravity import gravity_along
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.scenes.table import SceneTable
-from taichi_dem.kit.engine_pool import Engine, EnginePool, Loan
+from taichi_dem.kit.engine_pool import Engine, EnginePool
 from taichi_dem.kit.errors import InputError
 
 #: Least room for scenes, measured cycles, and places of a scene: below, nothing is saved.
@@ -50,6 +50,7 @@ class DamperEngine(Engine):
         "run fewer scenes at a time, measure fewer cycles, or give back the memory of earlier "
         "batches by runtime.clear()"
     )
+    serves = "batch"
     structure: EngineStructure
 
     def declare(self) -> None:
@@ -117,8 +118,9 @@ def borrow(
     kind: ExcitationKind,
     counts: tuple[int, int],
     more: dict[str, int],
-) -> Loan:
-    """Borrow an engine in which so many scenes of a filling find room; InputError if none can.
+    owner: Any,
+) -> DamperEngine:
+    """An engine in which so many scenes of a filling find room, for an owner; or InputError.
 
     mount: its word, or a ModalKind. counts: scenes and measured cycles. more: sizes by name beside
     those of the filling.
@@ -128,4 +130,5 @@ def borrow(
     sizes = {**structure.sizes, **more}
     asked = EngineStructure(structure.key, mount, kind, tuple(sizes), filling)
     capacity = (counts[0], max(1, counts[1]), *sizes.values())
-    return _POOL.borrow(asked, capacity, filling, "batch")
+    engine: DamperEngine = _POOL.borrow(asked, capacity, filling, owner)
+    return engine

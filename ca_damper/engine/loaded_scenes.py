@@ -1,7 +1,7 @@
 """Scenes on an engine: their numbers, and access to their state between two steps.
 
 The engine is that of their structure: more or larger scenes, or other numbers, run in the same one
-and compile nothing. Those that are alive at once on one engine take turns.
+and compile nothing, once its last owner is gone.
 """
 
 import warnings
@@ -34,8 +34,8 @@ from taichi_dem.kit.validation import choice, instance, positive, whole
 class LoadedScenes(Uncopied):
     """A filling and a table of scenes on an engine; the arguments are those of a Batch.
 
-    numbers: of the scenes, as SceneNumbers. loan: of the engine. time_origin: when step 0 would
-    have been at the present step [s], (scenes,).
+    numbers: of the scenes, as SceneNumbers. time_origin: when step 0 would have been at the present
+    step [s], (scenes,).
     """
 
     def __init__(
@@ -68,7 +68,8 @@ class LoadedScenes(Uncopied):
             self._more_sizes["samples"] = self.recorded_samples
         counts = self.count, self.measured_cycles
         kind = self.mount if self.modal is None else self.modal.kind
-        self.loan = borrow(self.filling, kind, self.excitation.kind, counts, self._more_sizes)
+        asked = self.filling, kind, self.excitation.kind, counts, self._more_sizes
+        self._engine = borrow(*asked, owner=self)
         engine = self.engine
         self._tell_compiling("set-up", 0.0)
         engine.clear()
@@ -113,13 +114,12 @@ class LoadedScenes(Uncopied):
 
     @property
     def engine(self) -> DamperEngine:
-        """The engine, with the data of this batch on it.
+        """Fields and kernels of this batch.
 
         Raises InputError for a session that has been stopped or cleared, and on another thread.
         """
-        self.loan.activate()
-        engine: Any = self.loan.engine
-        return engine
+        self._engine.check(self)
+        return self._engine
 
     @property
     def device(self) -> Any:
@@ -130,7 +130,7 @@ class LoadedScenes(Uncopied):
     def memory(self) -> SceneMemory:
         """State of the batch on the device, as arrays."""
         sizes = {"cycles": max(1, self.measured_cycles), **structure_of(self.filling).sizes}
-        return SceneMemory(self.loan, {**sizes, **self._more_sizes})
+        return SceneMemory(self.engine, {**sizes, **self._more_sizes})
 
     @property
     def time_s(self) -> np.ndarray:
@@ -244,7 +244,7 @@ class LoadedScenes(Uncopied):
         return self.engine.coupling.read_status()
 
     def _check_started(self) -> None:
-        self.loan.activate()
+        self._engine.check(self)
         if not self._started:
             raise InputError("this batch has no state yet: call start() first")
 

@@ -9,10 +9,9 @@ from typing import Any, Union
 
 import numpy as np
 import taichi as ti
-from taichi.lang import impl
 
 from ca_damper.scenes.table import SceneTable
-from taichi_dem.kit.allocation import array_of, assign, values
+from taichi_dem.kit.allocation import assign, values
 
 #: Length of an axis of a field: a number, or the name of one of the sizes.
 Length = Union[int, str]
@@ -83,14 +82,11 @@ class SceneFields:
 
     def in_use(self, field: ti.Field) -> np.ndarray:
         """Rows of the scenes in use, of a field whose first axis is that of the scenes."""
-        return values(field)[: self.scene_count]
+        return values(field, slice(self.scene_count))
 
     def row(self, field: ti.Field, s: int) -> np.ndarray:
         """Entries of scene s of a field whose first axis is that of the scenes."""
-        if impl.current_cfg().arch == ti.cuda:
-            return field.to_numpy()[s]
-        ti.sync()
-        return array_of(field)[s].copy()
+        return values(field, s)
 
     @property
     def scene_count(self) -> int:

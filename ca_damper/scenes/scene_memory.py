@@ -8,25 +8,18 @@ import taichi as ti
 
 from ca_damper.scenes.scene_fields import SceneField
 from taichi_dem.kit.allocation import assign, values
-from taichi_dem.kit.engine_pool import Loan
 from taichi_dem.kit.field_memory import fields_of
 
 
 class SceneMemory:
     """Reads and writes the state of a batch, for checkpoints that another session can go on from.
 
-    loan: of the batch's engine. sizes: places that a scene of it uses, by name. Arrays of the
-    scenes are cut to what is in use, as engines differ in capacity.
+    engine: of the batch. sizes: places that a scene of it uses, by name. Arrays of the scenes are
+    cut to what is in use, as engines differ in capacity.
     """
 
-    def __init__(self, loan: Loan, sizes: dict[str, int]):
-        self.loan, self.sizes = loan, sizes
-
-    @property
-    def engine(self) -> Any:
-        """The engine, with the data of the batch on it."""
-        self.loan.activate()
-        return self.loan.engine
+    def __init__(self, engine: Any, sizes: dict[str, int]):
+        self.engine, self.sizes = engine, sizes
 
     def read(self) -> dict[str, np.ndarray]:
         """Copies of all that changes in a run, by name."""
@@ -55,9 +48,8 @@ class SceneMemory:
 
     def _others(self) -> dict[str, ti.Field]:
         """Fields that are not of the scenes: those of fillings that declare them by themselves."""
-        engine = self.engine
-        scenes = {id(one.field) for one in engine.table.made}
-        found = [one for one in fields_of(engine) if one.kind == "saved"]
+        scenes = {id(one.field) for one in self._made()}
+        found = [one for one in fields_of(self.engine) if one.kind == "saved"]
         return {f"others/{one.name}": one.field for one in found if id(one.field) not in scenes}
 
     def _cut(self, one: SceneField) -> np.ndarray:

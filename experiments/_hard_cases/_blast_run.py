@@ -55,7 +55,7 @@ class Run(MotionRecord):
 
     velocity [m/s], shift [m] and spin [rad/s] at the start are broadcast to all bodies. bodies:
     which are judged. scene: options of ``Scene``, by default concrete with ``contact_effects``.
-    dt: largest step [s]; steps: how many of them.
+    dt: largest step [s]; steps: how many of them. result: of the run.
     """
 
     def __init__(
@@ -65,11 +65,11 @@ class Run(MotionRecord):
         super().__init__(bodies)
         method = methods[trial.method]
         scene = Scene(mesh, **{"material": CONCRETE, "effects": contact_effects(), **scene})
-        simulation = self.simulation = Simulation(scene, method)
+        simulation = Simulation(scene, method)
         place = simulation.model.centre + shift
         simulation.state.set_motion(place, velocity=velocity, spin=spin)
-        until = until or soon(trial)
-        run_simulation(simulation, until=until, samples=SAMPLES, progress=None, observers=[self])
+        looks = {"samples": SAMPLES, "progress": None, "observers": [self]}
+        self.result = run_simulation(simulation, until=until or soon(trial), **looks)
         trial.compile_s += simulation.compile_seconds
         trial.warnings += simulation.step_resolution.findings()
         self.trial, self.dt, self.steps = trial, method.dt0, self.time_s[-1] / method.dt0

@@ -125,7 +125,7 @@ def sudden_pressure_on_sleepers(trial):
     methods, until = {**FREE, "multirate_held": Multirate(1e-8, 1e-7)}, soon(trial)
     run = Run(trial, bar(0.2, 0.1, (2, 1, 1)), until, methods=methods, effects=acting)
     impulse, given = run.momentum[:, 0], 100e6 * 0.1**2 * run.time_s[-1]
-    late, report = (2.0 * run.dt + 1e-8) / until, run.simulation.report()
+    late, report = (2.0 * run.dt + 1e-8) / until, run.result.report
     trial.limit("impulse error", abs(impulse[-1] / given - 1.0), late, "(2 dt + rise) / t")
     trial.limit("momentum error", report.linear_momentum_error, 1e-12, "rounding")
     residual = report.energy_residual_fraction

@@ -50,7 +50,7 @@ def undamped_block_for_long(trial):
     until = (20_000 if trial.quick else 10_000_000) * dt
     given = {"effects": (), "velocity": 0.1 * shape}
     run = Run(trial, mesh, until, methods={trial.method: method}, **given)
-    account = run.simulation.energy_balance.account()
+    account = run.result.report.energy_balance
     # Strain and kinetic energy beat by (w dt)^2 / 4; w dt is 2 at the limit of the springs.
     held = abs(account["residual"]) / run.kinetic_energy[0]
     trial.limit("energy error / given", held, 0.01, "no trend, and (w dt)^2 / 4")
@@ -168,7 +168,7 @@ def all_bonds_break_at_once(trial):
     centre = mesh.points[mesh.tetrahedra].mean(axis=1)
     velocity = 4e4 * (centre - centre.mean(axis=0))
     run = Run(trial, mesh, 2e-6, velocity=velocity)
-    bonds = run.simulation.model.bond_count
+    bonds = run.result.model.bond_count
     trial.limit("bonds that held", bonds - run.broken, 0.0, "all open at 100 m/s at least")
     run.momentum_kept()
     run.no_energy_made()
@@ -181,7 +181,7 @@ def bond_exactly_at_its_limit(trial):
     run = Run(trial, pair(), shift=apart(opening))
     run.momentum_kept()
     trial.limit("bonds broken", run.broken, 0.0, "at the onset nothing is lost")
-    softened = run.simulation.energy_balance.account()["softening"]
+    softened = run.result.report.energy_balance["softening"]
     strain = 0.5 * CONCRETE.normal_stiffness * opening**2 * 0.25 * 3.0**0.5 * 0.05**2
     # The place is rounded to an ulp of the body's size, and the opening with it.
     bound = 4.0 * np.spacing(0.05) / opening
@@ -280,4 +280,4 @@ def blocks_within_each_other(trial):
     """Two blocks that begin at one place, but for a millimetre."""
     block = bar(0.1, 0.1, (1, 1, 1))
     run = Run(trial, beside(block, np.array([1e-3, 2e-3, 3e-3]), block))
-    trial.warnings += run.simulation.report().unresolved
+    trial.warnings += run.result.report.unresolved

@@ -33,7 +33,7 @@ def piled(trial, parts, friction, step=STEP, fixed=("plate_left",), **more):
 
 def account_closes(trial, run):
     """Energy is neither made nor lost beyond what the account explains."""
-    report = run.simulation.report()
+    report = run.result.report
     residual = report.energy_residual_fraction
     trial.limit("energy from nowhere", abs(residual), 0.05, "the specification")
     trial.limit("momentum error", report.linear_momentum_error, 1e-9, "rounding")

@@ -12,7 +12,6 @@ from taichi_dem.kit.plot_style import BLACK, RED
 from taichi_dem.mesh.face_groups import with_cut
 from taichi_dem.mesh.tetrahedra import components
 from taichi_dem.output.cracks import crack_areas
-from taichi_dem.state.timeline import NEVER
 
 #: Plate and depth of its notch [m], edges of elements [m].
 LENGTH, HEIGHT, NOTCH, EDGES = 0.1, 0.05, 0.015, (10e-3, 7e-3, 5e-3)
@@ -83,7 +82,7 @@ def divided(edge, seed):
 
 def broken_bonds(simulation):
     """Whether each bond has been released."""
-    return simulation.state.broken_tick.to_numpy()[: simulation.model.bond_count] != NEVER
+    return simulation.state.broken()
 
 
 def parted(simulation):

@@ -93,15 +93,11 @@ class FieldTree(Uncopied):
             _base(self._builder.root.ptr)
             _bases[self._builder.root.ptr.id] = address
 
-    def memory(self) -> np.ndarray:
-        """Array of all bytes of the tree, in place; on a CPU only."""
-        size = self._builder.root.ptr.cell_size_bytes
-        return _array_at(_base(self._builder.root.ptr), np.uint8, (size,))
-
     def clear(self) -> None:
-        """Set all fields to zero."""
+        """Set all bytes to zero; on a CPU only."""
         ti.sync()
-        self.memory()[:] = 0
+        root = self._builder.root.ptr
+        _array_at(_base(root), np.uint8, (root.cell_size_bytes,))[:] = 0
 
     def destroy(self) -> None:
         """Free the memory; the fields must not be used any more."""
@@ -135,7 +131,7 @@ def _forget_other_sessions() -> None:
 
 def in_tree(field: ti.Field) -> bool:
     """Whether a field lies in a ``FieldTree``, on a CPU."""
-    return _base(_offset(_first_scalar(field).snode.ptr)[0]) != 0
+    return _base(_layout(field)[0]) != 0
 
 
 def array_of(field: ti.Field) -> np.ndarray:
@@ -143,9 +139,7 @@ def array_of(field: ti.Field) -> np.ndarray:
 
     Writing to it writes to the field. It serves as long as the tree exists.
     """
-    if field not in _layouts:
-        _layouts[field] = _layout(field)
-    root, offset, kind, shape, strides = _layouts[field]
+    root, offset, kind, shape, strides = _layout(field)
     return _array_at(_base(root) + offset, kind, shape, strides)
 
 
@@ -155,6 +149,12 @@ _layouts: weakref.WeakKeyDictionary = weakref.WeakKeyDictionary()
 
 def _layout(field):
     """Root of a field's tree, bytes from there to its first entry, type, shape and strides."""
+    if field not in _layouts:
+        _layouts[field] = _found_layout(field)
+    return _layouts[field]
+
+
+def _found_layout(field):
     first = _first_scalar(field).snode.ptr
     kind = np.dtype(to_numpy_type(field.dtype))
     shape: tuple[int, ...] = tuple(field.shape)

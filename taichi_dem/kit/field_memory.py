@@ -6,12 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import taichi as ti
-from taichi.lang import impl
 from taichi.lang.matrix import MatrixField
 from taichi.lang.struct import StructField
 from taichi.lang.util import to_numpy_type
 
-from taichi_dem.kit.allocation import array_of, in_tree
+from taichi_dem.kit.allocation import assign, values
 
 #: Libraries whose objects are not searched for fields.
 _FOREIGN = ("taichi", "numpy", "builtins")
@@ -67,27 +66,14 @@ def _declared(owner, name):
 
 
 class FieldMemory:
-    """Reads and writes the fields of an object bit by bit; kind: as in ``FieldOf``.
-
-    On a CPU where they lie, if they are in a ``FieldTree``: Taichi's own way compiles two kernels
-    a field.
-    """
+    """Reads and writes the fields of an object bit by bit; kind: as in ``FieldOf``."""
 
     def __init__(self, root: object, kind: str = "saved"):
-        kept = [one for one in fields_of(root) if one.kind == kind]
-        self.fields = {one.name: one.field for one in kept}
-        self.views = {}
-        if impl.current_cfg().arch != ti.cuda:
-            inside = {name: field for name, field in self.fields.items() if in_tree(field)}
-            self.views = {name: array_of(field) for name, field in inside.items()}
+        self.fields = {one.name: one.field for one in fields_of(root) if one.kind == kind}
 
     def read(self) -> dict[str, np.ndarray]:
         """Copies of all fields as arrays by name, without the zeros at their ends."""
-        ti.sync()
-        return {name: without_end(self._whole(name)).copy() for name in self.fields}
-
-    def _whole(self, name):
-        return self.views[name] if name in self.views else self.fields[name].to_numpy()
+        return {name: without_end(values(field)).copy() for name, field in self.fields.items()}
 
     def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
         """Name of a field that the arrays of ``read`` lack or do not fit; else ""."""
@@ -101,14 +87,10 @@ class FieldMemory:
 
     def write(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Restore all fields from arrays that ``read`` returned and ``misfit`` accepts."""
-        ti.sync()
         for name, field in self.fields.items():
             whole = np.zeros(_shape(field), arrays[name].dtype)
             whole[slice(len(arrays[name])) if whole.ndim else ()] = arrays[name]
-            if name in self.views:
-                self.views[name][...] = whole
-            else:
-                field.from_numpy(whole)
+            assign(field, whole)
 
 
 def without_end(array: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ from taichi_dem.kit.validation import FileName
 
 
 class Memory(Protocol):
-    """Fields on the device, such as ``FieldMemory`` or ``engine_pool.LoanMemory``."""
+    """Fields on the device, such as ``FieldMemory``."""
 
     def read(self) -> dict[str, np.ndarray]:
         """Copies of all fields as arrays by name."""

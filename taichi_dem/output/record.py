@@ -8,6 +8,7 @@ from typing import Any, Optional
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.files import output_folder, remove_files, write_csv
@@ -99,7 +100,7 @@ class Recorder:
 
     def __init__(self, simulation: Simulation, *groups: str):
         self.simulation = simulation
-        self.model, self.state = simulation.model, simulation.state
+        self.model = simulation.model
         self.holes = {group: HoleMonitor(self.model, group) for group in groups}
         loads = enumerate(self.model.loads)
         self.gas = [place for place, load in loads if isinstance(load, GasPressure)]
@@ -126,7 +127,7 @@ class Recorder:
             monitored = hole.monitored_displacement(motion["position"])
             for name, way in zip(hole_columns(group, len(self.holes)), (moved, monitored)):
                 row[name] = 1e3 * way
-        row["broken_faces"] = int((self.state.broken_tick.to_numpy() != NEVER).sum())
+        row["broken_faces"] = int(sim.state.broken().sum())
         row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})
         if self.model.ground:
             row["ground_dashpot_J"] = account["ground_dashpot"]
@@ -152,7 +153,7 @@ class Recorder:
             velocity=motion["velocity"],
             level=motion["level"],
             damage=self._body_damage(self.simulation.readings.damage()),
-            bound=self.state.bound.to_numpy(),
+            bound=values(self.simulation.state.bound, slice(self.model.body_count)),
             angular_momentum=motion["angular_momentum"],
         )
 
@@ -192,7 +193,8 @@ class Recorder:
 
     def broken_time(self) -> np.ndarray:
         """When each bond was released [s], (bond_count,); NaN while it holds."""
-        tick = self.state.broken_tick.to_numpy()[: self.model.bond_count]
+        bonds = slice(self.model.bond_count)
+        tick = values(self.simulation.state.broken_tick, bonds)
         seconds = tick * (self.simulation.method.dt0 / 2.0**MAX_LEVEL)
         return np.where(tick == NEVER, np.nan, seconds)
 

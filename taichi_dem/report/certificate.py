@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.audit import Audit
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.effect_usage import EffectUse
@@ -158,7 +159,7 @@ def certificate_of(simulation: Any, report: Any) -> Certificate:
     impulse, left_energy = _left_out(run, simulation.energy_balance, scales, energy)
     return Certificate(
         acting=report.effect_activity,
-        sleep=float(schedule.sleeping.share[None]),
+        sleep=float(values(schedule.sleeping.share)),
         asleep=float(awake.mean() / now) if now > 0.0 else 0.0,
         impulse=impulse,
         energy=left_energy,
@@ -194,11 +195,11 @@ def _not_served(simulation, scales, energy):
     motion, model = simulation.motion(), simulation.model
     moved = motion["position"] - simulation.first_motion["position"]
     speed = np.linalg.norm(motion["velocity"], axis=1)
-    touched = simulation.state.active_effects.to_numpy()[: model.body_count] & np.int64(CONTACT)
+    touched = values(simulation.state.active_effects, slice(model.body_count)) & np.int64(CONTACT)
     borne = scales.under((*model.supports, *model.ground)) | (scales.sum(touched) > 0)
     return estimates_after(scales, moved, speed, simulation.time_s, energy, borne)
 
 
 def _audits(audit, skipped):
-    audited, missed = int(audit.audited[None]), int(audit.misses[None])
+    audited, missed = int(values(audit.audited)), int(values(audit.misses))
     return (Audit(max(skipped, audited), audited, missed, "bonds asleep"),)

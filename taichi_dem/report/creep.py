@@ -9,6 +9,7 @@ that slide on as fast after many times as much are pushed by a load.
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.report.run import Kept, Run
 
 #: Share of its limit below which friction would hold; a contact near it may slide next.
@@ -44,7 +45,7 @@ class Creep(Kept):
         bodies, (force, bound, power) = self.run.readings.rubbing()
         slides = (force > 0.0) & (force < _HELD * bound)
         bodies, force, bound = bodies[slides], force[slides], bound[slides]
-        place = self.run.state.position.to_numpy()[:count]
+        place = values(self.run.state.position, slice(count))
         offset, speed = place[bodies[:, 1]] - place[bodies[:, 0]], power[slides] / force
         code, rest = bodies[:, 0].astype(np.int64) * count + bodies[:, 1], np.zeros_like(force)
         table = np.column_stack([force, speed, rest, rest, speed, rest + time_s, offset])

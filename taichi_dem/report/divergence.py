@@ -8,6 +8,7 @@ from typing import NamedTuple, Optional
 import numpy as np
 
 from taichi_dem.contact.contacts import FARTHEST
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.report.energy_balance import EnergyBalance, unexplained_share
 from taichi_dem.report.run import Run
@@ -75,14 +76,14 @@ class DivergenceCheck:
             self.last_spent = spent
 
     def _check_speed(self):
-        run, body = self.run, self.run.state.bad_body[None]
+        run, body = self.run, int(values(self.run.state.bad_body))
         if body >= run.model.body_count:
             return
         motion = run.state.motion()
         speed = math.hypot(*motion["velocity"][body])
         what = f"moves at {speed:.3g} m/s"
         # A speed that is no number is beyond every bound.
-        if run.contacts is None or not speed < run.state.max_speed2[None] ** 0.5:
+        if run.contacts is None or not speed < values(run.state.max_speed2) ** 0.5:
             raise self._error(body, what, partial(self._of_speed, speed))
         extent = float(run.model.spheres.extent[body])
         allowed = FARTHEST * extent / (speed + math.hypot(*motion["spin"][body]) * extent)
@@ -92,7 +93,7 @@ class DivergenceCheck:
 
     def _check_overlap(self):
         contacts = self.run.contacts
-        if contacts is None or not contacts.store.near_count[None]:
+        if contacts is None or not values(contacts.store.near_count):
             return
         bodies, _, deepest = contacts.store.near_table()
         pair = int(deepest.argmax())
@@ -131,15 +132,15 @@ class DivergenceCheck:
 
     def round_off(self) -> float:
         """Bound of the energy [J] that rounding of positions has put into the bonds so far."""
-        return max(1, int(self.run.schedule.evaluations[0])) * self.rounded_once
+        return max(1, int(values(self.run.schedule.evaluations)[0])) * self.rounded_once
 
     def _error(self, body, what, advise):
         """SimulationDiverged that says what is wrong with a body, and what to change.
 
         advise: gives the Remedy for the body and those that it is tied to or near, by number.
         """
-        schedule, level = self.run.schedule, int(self.run.state.level.to_numpy()[body])
-        time_s = self.run.state.tick[None] * schedule.tick_seconds
+        schedule, level = self.run.schedule, int(values(self.run.state.level)[body])
+        time_s = schedule.time_s
         remedy = advise([body, *self._beside(body)])
         error = SimulationDiverged(
             f"diverged at t = {time_s:.6g} s: body {body} {what}; its step was "
@@ -150,7 +151,7 @@ class DivergenceCheck:
 
     def _beside(self, body):
         """Bodies that a body is tied to or near."""
-        top, contacts, broken = self.run.model.topology, self.run.contacts, self.run.broken()
+        top, contacts, broken = self.run.model.topology, self.run.contacts, self.run.state.broken()
         own = [b for b in top.body_bond[body] if b >= 0 and not broken[b]]
         pairs = contacts.store.near_table()[0] if contacts is not None else np.zeros((0, 2), int)
         near = pairs[(pairs == body).any(axis=1)].sum(axis=1) - body
@@ -164,7 +165,7 @@ class DivergenceCheck:
 
     def _of_overlap(self, near):
         """For a body that has sunk too deep into one of those near it."""
-        if not self.run.state.tick[None]:
+        if not values(self.run.state.tick):
             return Remedy("and the scene begins like this: move the bodies apart", {})
         model = self.run.model
         stiffness = model.materials.of_contacts("contact_stiffness")
@@ -184,7 +185,7 @@ class DivergenceCheck:
         where the account of energy does not close.
         """
         schedule, limits = self.run.schedule, self._limits()
-        level = self.run.state.level.to_numpy()[near].max()
+        level = values(self.run.state.level)[near].max()
         taken = schedule.dt0 / 2.0 ** (int(level) if schedule.has_limits else 0)
         limit, cause, tight = min((limits[name][k], name, k) for name in limits for k in near)
         whose = f"its {cause}" if tight == near[0] else f"the {cause} of body {tight} beside it"

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.report.energy_balance import EnergyBalance, EnergyTables
@@ -65,15 +66,15 @@ def on_demand(run: Run) -> OnDemand:
     if activity is None:
         return OnDemand({}, 0, 0)
     n, bonds, seconds = model.body_count, model.bond_count, schedule.tick_seconds
-    begun = _times(activity.since.to_numpy()[:bonds], NEVER, seconds)
+    begun = _times(values(activity.since, slice(bonds)), NEVER, seconds)
     own = np.append(begun, [[np.nan, np.nan]], axis=0)[model.topology.body_bond]
     first = np.fmin.reduce(own, axis=1, initial=np.nan)
-    touched = _times(activity.touched.to_numpy()[:n], LATER, seconds)
-    awake = _times(schedule.sleeping.since.to_numpy()[:n], NEVER, seconds)
+    touched = _times(values(activity.touched, slice(n)), LATER, seconds)
+    awake = _times(values(schedule.sleeping.since, slice(n)), NEVER, seconds)
     laws = ("damage",) if model.by_role["bond"] else ("softening", "slip")
     times = dict(zip((*laws, "contact", "friction"), (*first.T[: len(laws)], *touched.T)))
-    evaluated = int(activity.evaluated.to_numpy()[:bonds].sum())
-    units = 3 * (int(schedule.evaluations[5]) + bonds)
+    evaluated = int(values(activity.evaluated, slice(bonds)).sum())
+    units = 3 * (int(values(schedule.evaluations)[5]) + bonds)
     return OnDemand({**times, "awake": awake}, evaluated, units - evaluated)
 
 
@@ -101,7 +102,7 @@ class _Uses:
     def __init__(self, run, balance, heat, account):
         self.run, self.account, self.works = run, account, balance.works()
         self.given = abs(account["load_work"]) + abs(account["support_work"]) + balance.start_energy
-        self.bits = run.state.active_effects.to_numpy()[: run.model.body_count]
+        self.bits = values(run.state.active_effects, slice(run.model.body_count))
         self.demand, marks = on_demand(run), run.readings.active_bonds()
         self.marks = {
             "bond": marks.any(axis=1),
@@ -162,7 +163,7 @@ class _Uses:
             column = place + 1 - len(model.supports)
             return "bodies braked", marks, np.abs(self.works[:, column]).sum(), kept
         done = np.where(marks != 0, np.abs(self.works[:, len(model.loads)]), 0.0).sum()
-        rounds = done <= int(self.run.schedule.evaluations[0]) * _EPSILON * self.given
+        rounds = done <= int(values(self.run.schedule.evaluations)[0]) * _EPSILON * self.given
         is_driven = not rounds and np.any(effect.travel())
         kept += _WITHOUT_WORK if rounds else ""
         return f"bodies {'driven' if is_driven else 'held'}", marks, done, kept

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.mesh.tetrahedra import penetration
 from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.report.creep import Creep
@@ -27,9 +28,9 @@ def bond_rounding(run: Run) -> np.ndarray:
     every substep rounding may thus put into the bond the energy of such an opening,
     A (k_n + k_s) (eps X)^2 / 2, which its dashpots then take.
     """
-    model, substeps = run.model, int(run.schedule.evaluations[0])
+    model, substeps = run.model, int(values(run.schedule.evaluations)[0])
     corners = np.abs(model.mesh.points[model.mesh.tetrahedra]).max(axis=(1, 2))
-    places = np.abs(run.state.position.to_numpy()[: model.body_count]).max(axis=1)
+    places = np.abs(values(run.state.position, slice(model.body_count))).max(axis=1)
     far = np.maximum(corners, places)
     reach = np.maximum(far[model.topology.master], far[model.topology.slave])
     area = 3.0 * model.bonds["area"]
@@ -151,12 +152,12 @@ class MissingEffects(Kept):
 
     def _pressed(self):
         """Released bonds whose bodies are within each other, by more than rounding."""
-        model, bonds = self.run.model, np.flatnonzero(self.run.broken())
+        model, bonds = self.run.model, np.flatnonzero(self.run.state.broken())
         if not len(bonds):
             return bonds
         ends = model.topology.master[bonds], model.topology.slave[bonds]
         depth = penetration(*map(self.volume.corners, ends))
-        place = self.run.state.position.to_numpy()[: model.body_count]
+        place = values(self.run.state.position, slice(model.body_count))
         reach = np.abs(place).max() + model.body_radius.max()
         return bonds[depth > _ROUNDINGS * _EPSILON * reach]
 
@@ -168,7 +169,7 @@ class MissingEffects(Kept):
         return pairs[:, 0]
 
     def _touching(self):
-        active = self.run.state.active_effects.to_numpy()[: self.run.model.body_count]
+        active = values(self.run.state.active_effects, slice(self.run.model.body_count))
         return np.flatnonzero(active & CONTACT)
 
     def findings(self, volume: SharedVolume) -> tuple[MissingEffect, ...]:
@@ -177,8 +178,8 @@ class MissingEffects(Kept):
         volume: a look at the end, which also finds bodies that have moved by little.
         """
         found, schedule, model = self.found.copy(), self.run.schedule, self.run.model
-        now_s = int(self.run.state.tick[None]) * schedule.tick_seconds
-        ticks = self.run.state.passed.to_numpy()[: model.bond_count]
+        now_s = schedule.time_s
+        ticks = values(self.run.state.passed, slice(model.bond_count))
         looks = {
             "bodies": (self._within(volume), now_s),
             "tension": _passed(ticks[:, 0], schedule),

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.report.missing_effects import MissingEffect, middle_of_bond
 from taichi_dem.report.run import Kept, Run
 from taichi_dem.state.timeline import MAX_LEVEL
@@ -86,7 +87,7 @@ class StepResolution(Kept):
             return
         if advance.limited and advance.has_dashpot and self.run.model.bond_count:
             readings.bond_shares(self.share)
-        if contacts is not None and contacts.store.near_count[None]:
+        if contacts is not None and values(contacts.store.near_count):
             if advance.limited:
                 self._note_partners(contacts)
             readings.contact_shares(self.pair_share, self.taken)
@@ -102,7 +103,9 @@ class StepResolution(Kept):
 
     def _note_partners(self, contacts):
         """Remember steps and light partners: few contacts last until a recording."""
-        step = self.run.schedule.dt0 / 2.0 ** self.run.state.level.to_numpy()
+        step = self.run.schedule.dt0 / 2.0 ** values(
+            self.run.state.level, slice(self.run.model.body_count)
+        )
         self.step, mass = np.minimum(self.step, step), self.run.model.body_mass
         pairs, _, _ = contacts.store.near_table()
         for one, other in (pairs.T, pairs.T[::-1]):
@@ -141,7 +144,7 @@ class StepResolution(Kept):
         )
 
     def _levels(self):
-        if not self.run.schedule.undivided[None]:
+        if not values(self.run.schedule.undivided):
             return ()
         least = self.run.schedule.dt0 / 2.0**MAX_LEVEL
         return (
@@ -158,13 +161,13 @@ class StepResolution(Kept):
         solver = self.run.advance.solver
         if solver is None:
             return 0, 0.0
-        return int(solver.unconverged[None]), float(solver.worst[None])
+        return int(values(solver.unconverged)), float(values(solver.worst))
 
     def _sweeps(self):
         (steps, worst), solver = self.unconverged, self.run.advance.solver
         if not steps:
             return ()
-        allowed = float(solver.tolerance[None])
+        allowed = float(values(solver.tolerance))
         return (
             f"the dashpots of {steps} steps were not solved: sweeps ended with changes of up to "
             f"{100 * worst:.2g} % of the largest speed, where {100 * allowed:.2g} % is asked; "
@@ -181,7 +184,8 @@ class StepResolution(Kept):
         damping = self.run.model.materials.of_contacts("contact_damping")
         if self.run.contacts is None or not self.run.advance.limited or not np.any(damping):
             return self.pair_share
-        acted = self.run.state.contact_heat.to_numpy()[:, :2].sum(axis=1) > 0.0
+        heat = values(self.run.state.contact_heat, slice(self.run.model.body_count))
+        acted = heat[:, :2].sum(axis=1) > 0.0
         x = 2.0 * damping * self.step / self.lightest
         return np.minimum(self.pair_share, np.where(acted, 1.0 / np.maximum(1.0, x), 1.0))
 
@@ -190,9 +194,9 @@ class StepResolution(Kept):
         model, units = self.run.model, self.run.state.fields().get("softening_unit")
         if units is None:
             return np.zeros(model.bond_count)
-        widest = units.to_numpy()[: 3 * model.bond_count, 0].reshape(-1, 3).max(axis=1)
+        widest = values(units, slice(3 * model.bond_count))[:, 0].reshape(-1, 3).max(axis=1)
         opening = model.of_bonds(lambda material: material.failure_opening)
-        return np.where(self.run.broken(), widest / opening, 0.0)
+        return np.where(self.run.state.broken(), widest / opening, 0.0)
 
 
 def _too_long(wrong, values, words):

@@ -10,7 +10,6 @@ from taichi_dem.mesh.tetrahedra import components
 from taichi_dem.report.readings import Readings
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
-from taichi_dem.state.timeline import NEVER
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.multirate.schedule import Schedule
 
@@ -25,14 +24,10 @@ class Run(NamedTuple):
     readings: Readings
     contacts: Optional[Contacts]
 
-    def broken(self) -> np.ndarray:
-        """Whether each bond has been released, (bond_count,)."""
-        return self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
-
     def pieces(self) -> np.ndarray:
         """Piece of each body, which bonds that hold keep together, (body_count,)."""
         top = self.model.topology
-        ends = np.column_stack([top.master, top.slave])[~self.broken()]
+        ends = np.column_stack([top.master, top.slave])[~self.state.broken()]
         return components(self.model.body_count, ends)
 
 

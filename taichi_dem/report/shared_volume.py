@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.tetrahedra import points_of_parts
 from taichi_dem.report.run import Kept, Run
@@ -107,7 +108,8 @@ class SharedVolume(Kept):
     def _now(self):
         """Positions [m] and rotations of the bodies."""
         state, count = self.run.state, self.run.model.body_count
-        return state.position.to_numpy()[:count], state.rotation.to_numpy()[:count]
+        here = slice(count)
+        return values(state.position, here), values(state.rotation, here)
 
     def corners(self, bodies: Any = slice(None)) -> np.ndarray:
         """Corners of some bodies at present [m], (n, 4, 3)."""
@@ -134,7 +136,7 @@ class SharedVolume(Kept):
         """Find all pairs and their shares; corners (n, 4, 3) [m]."""
         top = self.run.model.topology
         # Bond -1 stands for an outer face, which is as free as a broken one.
-        free = np.append(self.run.broken(), True)[top.body_bond]
+        free = np.append(self.run.state.broken(), True)[top.body_bond]
         surface = np.flatnonzero(free.any(axis=1))
         other = np.append(top.master + top.slave, 0)[top.body_bond]
         tied = np.where(free, -1, other - np.arange(len(free))[:, None]).astype(np.int32)

@@ -187,6 +187,11 @@ class State:
         """Bodies of the scene."""
         return int(values(self.tables.body_count))
 
+    def broken(self) -> np.ndarray:
+        """Whether each bond has been released, (bond_count,)."""
+        bonds = slice(int(values(self.tables.bond_count)))
+        return values(self.broken_tick, bonds) != NEVER
+
     def expose(self, topology: Topology, outer: bool) -> None:
         """Put contact spheres on faces without a bond from the start.
 

@@ -37,14 +37,14 @@ class Run:
             made.advance_to(int(self.late.late / method.dt0))
             self.before = acting(made)
         made.advance_to(round(self.late.until / method.dt0))
-        self.fields = {key: field.to_numpy() for key, field in made.state.fields().items()}
+        self.fields = {key: made.values(field) for key, field in made.state.fields().items()}
         self.acting, self.report = acting(made), made.report(brief=True)
         self.moved = self.fields["position"] - made.model.centre
         self.start_energy, self.evaluations = made.energy_balance.start_energy, made.evaluations()
         if word == "auto":
             activity = made.state.activity
-            self.since, self.evaluated = activity.since.to_numpy(), activity.evaluated.to_numpy()
-            self.misses = int(made.step.audit.misses[None])
+            self.since, self.evaluated = map(made.values, (activity.since, activity.evaluated))
+            self.misses = int(made.values(made.step.audit.misses))
 
     @property
     def way(self):

@@ -102,11 +102,11 @@ def test_outer_faces_wait_for_the_first_break_to_the_tick():
     run = Simulation(pulled(), METHOD)
     outer = 4 * run.model.topology.outer_body + run.model.topology.outer_face
     run.start()
-    assert (run.state.exposed_tick.to_numpy()[outer] == NEVER).all()
+    assert (run.values(run.state.exposed_tick)[outer] == NEVER).all()
     run.advance_to(round(UNTIL / METHOD.dt0))
-    broken = run.state.broken_tick.to_numpy()
+    broken = run.values(run.state.broken_tick)
     first = broken[broken != NEVER].min()
-    assert (run.state.exposed_tick.to_numpy()[outer] == first).all()
+    assert (run.values(run.state.exposed_tick)[outer] == first).all()
 
 
 def test_an_answer_is_reached_only_if_its_certificate_holds():

@@ -51,7 +51,7 @@ def ran(mesh, first, second=None, word="auto", **materials):
     run = simulation(late, scene)
     run.advance_to(round(UNTIL / METHOD.dt0))
     motion = np.hstack([run.motion()[key] for key in ("position", "velocity", "orientation")])
-    broken = run.state.broken_tick.to_numpy()[: run.model.bond_count]
+    broken = run.values(run.state.broken_tick)[: run.model.bond_count]
     return motion, broken, run.report(brief=True).certificate
 
 

@@ -6,6 +6,7 @@ import pytest
 from ca_damper import Automaton, Batch, Oscillator, SceneTable, SimulationDiverged
 from ca_damper.automaton.event_counts import PAIRS
 from ca_damper.plot import Box
+from taichi_dem.kit.allocation import assign, values
 from tests.paper import expected, paper
 
 MASS, WIDTH, GRAVITY, DT = 0.2e-3, 6e-3, 10.0, 1e-4
@@ -61,10 +62,10 @@ def test_energy_of_heavy_grains_never_grows():
     table = SceneTable(np.full(6, 12), np.arange(6) + 1, DT, 6.0, 0.0, 0.086, 1e-6, 0.0)
     batch = Batch(Automaton(gravity=0.0, particle_mass=0.86), table)
     batch.start()
-    cells = batch.device.cells.across.velocity.to_numpy()
-    kind = batch.device.cells.kind.to_numpy()
+    cells = values(batch.device.cells.across.velocity)
+    kind = values(batch.device.cells.kind)
     cells[kind < 6] = np.random.default_rng(3).normal(size=(kind < 6).sum())
-    batch.device.cells.across.velocity.from_numpy(cells)
+    assign(batch.device.cells.across.velocity, cells)
     total = []
     for _ in range(200):
         now = batch.sample()
@@ -98,9 +99,9 @@ def test_no_state_is_absorbing():
     batch.start()
     early = batch.run(150, 250).rms
     batch.run(1100, 0)
-    before = batch.device.event_counts.events.to_numpy()[:4, PAIRS]
+    before = values(batch.device.event_counts.events)[:4, PAIRS]
     late = batch.run(250, 250).rms
-    after = batch.device.event_counts.events.to_numpy()[:4, PAIRS]
+    after = values(batch.device.event_counts.events)[:4, PAIRS]
     assert np.all(after - before > 500)
     # The rows of the table leave 3 % to responses; the paper's rules fall by 20 %.
     assert late.mean() == pytest.approx(early.mean(), rel=0.03)

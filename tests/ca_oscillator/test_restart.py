@@ -65,14 +65,14 @@ def test_an_interrupted_batch_goes_on_to_the_same_bits(tmp_path):
 
 
 def larger():
-    """A batch with another number everywhere, which has run."""
+    """Engine of a batch with another number everywhere, which has run."""
     blows = {"restitution": 0.9, "wall_restitution": 0.6, "static_threshold": 3.0, "friction": 0.2}
     grain = {"particle_mass": 0.3e-3, "width": 7e-3, "gravity": 11.0, "v_max": 4.0}
     table = SceneTable([9] * 70, 5, 1.1e-3, 7.0, 2e-3, 0.1, 90.0, 0.05)
     made = Batch(Automaton(columns=20, rows=20, **blows, **grain), table, measured_cycles=40)
     made.start()
     made.run(1, 0)
-    return made
+    return made.engine
 
 
 def test_a_checkpoint_goes_on_in_an_engine_with_more_room(tmp_path, compiled_anew):
@@ -84,10 +84,11 @@ def test_a_checkpoint_goes_on_in_an_engine_with_more_room(tmp_path, compiled_ane
     with made.checkpointed(checkpoint, None, IDENTITY) as writer:
         writer.save()
         straight = made.run(0, 2).record
+    used = made.engine
     compiled_anew()
     large = larger()
     again = Batch(Automaton(), TABLE, measured_cycles=2)
-    assert again.loan.engine is large.loan.engine is not made.loan.engine
+    assert again.engine is large is not used
     again.start()
     with again.checkpointed(None, checkpoint.path, IDENTITY):
         again.going_on = False

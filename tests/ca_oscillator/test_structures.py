@@ -62,7 +62,7 @@ def test_a_second_batch_compiles_nothing_and_has_its_bits_as_alone(compilations,
     assert "advance" in compilations
 
 
-def test_batches_that_live_at_once_on_one_engine_have_their_bits_as_alone():
+def test_batches_that_live_at_once_have_an_engine_each_and_their_bits_as_alone():
     """Two batches in turns of 37 steps, the second made when the first is under way."""
     alone = []
     for seed in (1, 2):
@@ -76,8 +76,26 @@ def test_batches_that_live_at_once_on_one_engine_have_their_bits_as_alone():
         other.advance(37)
         if turn % 2:
             one.advance(37)
-    assert one.loan.engine is other.loan.engine
+    assert one.engine is not other.engine
     assert [digest(one), digest(other)] == alone
+
+
+def test_a_batch_goes_on_from_a_state_that_was_kept_aside_while_another_had_the_engine():
+    batch = some_batch(1)
+    engine = batch.engine
+    batch.advance(5 * 37)
+    aside = batch.aside()
+    batch.advance(5 * 37)
+    alone = digest(batch)
+    del batch
+    other = some_batch(2)
+    other.advance(37)
+    assert other.engine is engine
+    del other
+    again = some_batch(1)
+    again.take_up(aside)
+    again.advance(5 * 37)
+    assert digest(again) == alone and again.engine is engine
 
 
 def small_batch():

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Simulation, Uniform, effects
+from taichi_dem.kit.allocation import assign
 from taichi_dem.mesh.shapes import bar
 from tests.again import Again
 from tests.scenes import ROOT, brisk_scene
@@ -27,7 +28,7 @@ MOTION = (
 
 def fields_of(simulation):
     """All changing fields as arrays."""
-    return {name: field.to_numpy() for name, field in simulation.state.fields().items()}
+    return {name: simulation.values(field) for name, field in simulation.state.fields().items()}
 
 
 def state_after(driver="resident", **contact):
@@ -155,12 +156,12 @@ def test_skin_changes_no_bit_of_solved_dashpots(block):
     contacts, found = block.simulation.contacts, []
     for skin in (SKIN, 6e-4, 4e-3):
         block.restart(STEP)
-        contacts.skin.fill(skin)
+        assign(contacts.skin, skin)
         block.search_anew()
         before = block.simulation.searches
         block.run(3 * SOLVED)
         found.append((fields_of(block.simulation), block.simulation.searches - before))
-    contacts.skin.fill(SKIN)
+    assign(contacts.skin, SKIN)
     assert len({searches for _, searches in found}) == 3
     for fields, _ in found[1:]:
         assert differing(found[0][0], fields, MOTION) == []

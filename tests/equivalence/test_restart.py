@@ -9,6 +9,7 @@ import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, Checkpoint, InputError, Scene, Simulation, effects, simulate
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.checkpoint import read_checkpoint
 from taichi_dem.kit.field_memory import FieldMemory, fields_of
 from taichi_dem.mesh.face_groups import with_cut
@@ -125,7 +126,7 @@ def straight(run, tmp_path_factory):
     run.go_odd()
     run.saved.write(path)
     broken, ticks = run.simulation.report().broken_faces, run.simulation.state.tick[None]
-    lagging = (run.simulation.state.last_tick.to_numpy() < ticks).any()
+    lagging = (run.simulation.values(run.simulation.state.last_tick) < ticks).any()
     strain = run.simulation.energy_balance.account()["sphere_strain"]
     end = run.finish()
     return path, (broken, ticks, lagging, strain), end, differing(before, constant.read())
@@ -135,7 +136,7 @@ def test_the_checkpoint_falls_where_it_is_hard(run, straight):
     """Bodies touch, and where steps differ some wait for their time within a largest step."""
     _, (broken, ticks, lagging, strain), end, _ = straight
     assert strain > 0.0
-    assert 0 < broken < (run.simulation.state.broken_tick.to_numpy() >= 0).sum()
+    assert 0 < broken < (run.simulation.values(run.simulation.state.broken_tick) >= 0).sum()
     assert int(end["searches"].item()) > 5
     if run.simulation.method.name.startswith("multirate"):
         assert ticks % MACRO_TICKS
@@ -149,8 +150,8 @@ def test_constant_fields_do_not_change(straight):
 def test_a_resumed_run_has_the_bits_of_a_straight_one(run, straight):
     """Other values stand in all fields before, those of no use hereafter in the scratch ones."""
     path, _, end, _ = straight
-    for view in FieldMemory(run.simulation, "scratch").views.values():
-        view.fill(1)
+    for field in FieldMemory(run.simulation, "scratch").fields.values():
+        assign(field, 1)
     run.resume(path)
     assert differing(end, run.finish()) == []
 

@@ -4,6 +4,7 @@ The last file of its folder, as ``runtime.clear`` gives all engines of the sessi
 """
 
 import contextlib
+import gc
 import threading
 from dataclasses import replace
 
@@ -27,7 +28,6 @@ from taichi_dem.kit import allocation
 from taichi_dem.kit.types import vec3
 from taichi_dem.laws.base import Effect
 from taichi_dem.mesh.shapes import bar, single
-from taichi_dem.state.timeline import NEVER
 
 #: Largest steps of a run: bonds break at the left end, and what they held touches.
 STEPS = 60
@@ -67,7 +67,7 @@ def drawn(seed):
 def outcome(simulation):
     """Bits of a run: motion, fracture and account."""
     motion = simulation.state.motion()
-    broken = simulation.state.broken_tick.to_numpy()
+    broken = simulation.values(simulation.state.broken_tick)
     return [*motion.values(), broken, np.array(list(simulation.energy_balance.account().values()))]
 
 
@@ -96,8 +96,9 @@ def test_other_numbers_compile_nothing_and_leave_no_trace(alone, compilations):
     assert compilations == [] and ENGINES.count == engines
 
 
-def test_two_live_simulations_have_the_bits_of_each_alone(alone):
+def test_two_live_simulations_have_an_engine_each_and_the_bits_of_each_alone(alone):
     together = [Simulation(*drawn(seed), "resident") for seed in (1, 2)]
+    assert together[0].engine is not together[1].engine
     for step in range(0, STEPS + 1, 12):
         for simulation in together:
             simulation.advance_to(step)
@@ -133,20 +134,55 @@ def test_nothing_is_compiled_in_the_time_of_steps(compilations, compiled_anew, m
     simulation.start()
     started = len(compilations)
     simulation.advance_to(2 * STEPS)
-    assert (simulation.state.broken_tick.to_numpy() != NEVER).any()
+    assert simulation.state.broken().any()
     assert len(compilations) > started and set(counts) == {0}
     assert simulation.run_cpu_seconds > 0.0
 
 
-def test_a_view_keeps_to_its_simulation():
-    """Also one that was taken before another simulation came to the engine."""
-    first, second = (Simulation(Scene(single(), CONCRETE), Uniform()) for _ in range(2))
-    states, still = (first.state, second.state), [[1.0, 0.0, 0.0, 0.0]]
-    for k, state in enumerate(states):
-        state.set_motion([[k, 0.0, 0.0]], still)
-    assert [state.position.to_numpy()[0, 0] for state in states] == [0.0, 1.0]
-    field = states[0].position
-    assert states[1].position.to_numpy()[0, 0] == 1.0 and field.to_numpy()[0, 0] == 0.0
+def falling():
+    """A body at rest."""
+    return Simulation(Scene(single(), CONCRETE), Uniform())
+
+
+def test_an_engine_goes_on_to_the_next_when_its_simulation_is_gone_or_closed():
+    first = falling()
+    engine, count = first.engine, ENGINES.count
+    del first
+    second = falling()
+    assert second.engine is engine
+    second.close()
+    third = falling()
+    assert third.engine is engine and ENGINES.count == count
+    for call in (lambda: second.time_s, lambda: second.advance_to(1), second.close):
+        with pytest.raises(InputError, match="this simulation has been closed"):
+            call()
+
+
+def test_a_simulation_frees_its_engine_without_a_collection_of_garbage():
+    """Which takes longer than to load a scene."""
+    gc.disable()
+    try:
+        engine = falling().engine
+        simulation = ran(*drawn(1))
+        simulation.report()
+        engines = engine, simulation.engine
+        del simulation
+        assert all(one.is_idle for one in engines)
+    finally:
+        gc.enable()
+
+
+def test_a_simulation_that_an_exception_keeps_alive_frees_its_engine():
+    def failed():
+        simulation = falling()
+        error = ValueError("in a cycle with the frame that it was raised in")
+        try:
+            raise error
+        except ValueError:
+            return simulation.engine
+
+    engine = failed()
+    assert falling().engine is engine
 
 
 @ti.data_oriented
@@ -183,6 +219,7 @@ def test_a_number_that_a_kernel_read_as_a_constant_is_never_another_scenes():
         for simulation in [Simulation(scene, Uniform()) for scene in scenes]:
             simulation.advance_to(100)
             speeds.append(simulation.motion()["velocity"][0, 0] / 1e-6)
+        del simulation
     assert speeds == pytest.approx([1.0, 2.0, 2.0, 5.0], rel=1e-12)
     assert ENGINES.count == before + 3
 

@@ -44,8 +44,8 @@ def test_without_static_contact_the_same_grains_are_released_where_they_are():
 
 
 def kinds(frozen, state):
-    """Contents of the cells of its scenes in a state; an engine may hold those of others too."""
-    frozen._memory().write(frozen.states[state])
+    """Contents of the cells of its scenes in a state."""
+    frozen.memory.write(frozen.states[state])
     return frozen.batch.engine.table.in_use(frozen.batch.device.cells.kind)
 
 

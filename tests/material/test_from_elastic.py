@@ -44,7 +44,7 @@ def test_a_pair_swings_and_dies_away_at_the_damping_ratio():
     scene = Scene(mesh, rock(damping_ratio=ratio), listed, velocity=velocity)
     simulation = Simulation(scene, Uniform(step))
     simulation.advance_to(count)
-    place = simulation.state.position.to_numpy()[:2, 0] - model.centre[:, 0]
+    place = simulation.values(simulation.state.position)[:2, 0] - model.centre[:, 0]
     exact = speed / damped * np.exp(-ratio * omega * count * step) * np.sin(2.25 * np.pi)
     assert place[1] - place[0] == pytest.approx(exact, rel=2.0 * omega * step)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, needed_effects
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import pair
 from taichi_dem.report.resolution import MOST_SLIP
 
@@ -24,9 +25,9 @@ def slid(share):
 def write_slip(simulation, share):
     """Let the second unit of the bond have slipped by a share of an edge, oblique to the axes."""
     field = simulation.state.fields()["shear_slip"]
-    slip = field.to_numpy()
+    slip = values(field)
     slip[1, :2] = share * EDGE * np.array([0.6, -0.8])
-    field.from_numpy(slip)
+    assign(field, slip)
 
 
 def test_share_is_that_of_the_shortest_edge():

@@ -6,6 +6,7 @@ import taichi as ti
 
 from taichi_dem import CONCRETE, Scene, Uniform, effects
 from taichi_dem.contact.contacts import FARTHEST, STEPS
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar
 from tests.again import Again
 
@@ -38,27 +39,27 @@ def scattered(again, skin, spread):
     place = model.centre + spread * random.standard_normal((model.body_count, 3))
     state.set_motion(place, turn)
     broken = random.random(model.bond_count) < 0.5
-    state.broken_tick.from_numpy(np.where(broken, 0, -1).astype(np.int64))
+    assign(state.broken_tick, np.where(broken, 0, -1))
     exposed = np.full(4 * model.body_count, -1, dtype=np.int64)
-    exposed[simulation.tables.bond_slots.to_numpy()[broken].ravel()] = 0
-    state.exposed_tick.from_numpy(exposed)
+    exposed[simulation.values(simulation.tables.bond_slots)[broken].ravel()] = 0
+    assign(state.exposed_tick, exposed)
     # What has been broken from the start injects nothing.
     state.injected_tick[None] = 0
-    simulation.contacts.skin.fill(skin)
+    assign(simulation.contacts.skin, skin)
     again.search_anew()
     return simulation
 
 
 def near_slots(store):
     """Slots of the near pairs in the order in which they are visited."""
-    return store.near_slot.to_numpy()[: store.near_count[None]]
+    return values(store.near_slot, slice(int(values(store.near_count))))
 
 
 def listed(simulation):
     """Sphere pairs in the lists of the search."""
     store = simulation.contacts.store
-    spheres = store.sphere.to_numpy()
-    first, last = store.first.to_numpy(), store.last.to_numpy()
+    spheres = values(store.sphere)
+    first, last = values(store.first), values(store.last)
     parts = [spheres[first[p] : last[p]] for p in near_slots(store)]
     return [tuple(pair) for pair in np.concatenate(parts).tolist()]
 
@@ -71,12 +72,12 @@ def expected(simulation, skin):
     model, motion = simulation.model, simulation.state.motion()
     part = np.broadcast_to(0.5 * skin if np.ndim(skin) == 0 else skin, model.body_count)
     size = model.spheres.per_face
-    sphere = simulation.tables.sphere.to_numpy()
+    sphere = simulation.values(simulation.tables.sphere)
     body = np.arange(len(sphere)) // (4 * size)
     turned = np.einsum("nij,nj->ni", motion["rotation"][body], sphere[:, :3])
     place = turned + motion["position"][body]
-    shown = np.flatnonzero(simulation.state.exposed_tick.to_numpy().repeat(size) >= 0)
-    intact = simulation.state.broken_tick.to_numpy() < 0
+    shown = np.flatnonzero(simulation.values(simulation.state.exposed_tick).repeat(size) >= 0)
+    intact = simulation.values(simulation.state.broken_tick) < 0
     top = model.topology
     bonded = set(zip(top.master[intact].tolist(), top.slave[intact].tolist()))
     pairs = set()
@@ -101,7 +102,7 @@ def test_the_search_lists_all_near_spheres_and_no_others(again, skin, spread):
 def slot_of_pair(store):
     """Slots of the near pairs by their two bodies."""
     slots = near_slots(store)
-    bodies = store.body.to_numpy()[slots].tolist()
+    bodies = values(store.body, slots).tolist()
     return {tuple(pair): int(p) for pair, p in zip(bodies, slots)}
 
 
@@ -112,13 +113,13 @@ def test_waiting_impulses_survive_a_search(again):
     before, impulses = slot_of_pair(store), np.zeros((store.slots, 2, 6))
     for p in before.values():
         impulses[p] = np.random.default_rng(p).standard_normal((2, 6))
-    store.impulse.from_numpy(impulses.reshape(-1, 6))
-    store.waiting.from_numpy(impulses.any(axis=2).astype(np.int32))
+    assign(store.impulse, impulses.reshape(-1, 6))
+    assign(store.waiting, impulses.any(axis=2))
     motion = simulation.state.motion()
     motion["position"][::3] = np.roll(motion["position"][::3], 1, axis=0)
     simulation.state.set_motion(motion["position"], motion["orientation"])
     simulation.broad_phase.search()
-    after, found = slot_of_pair(store), store.impulse.to_numpy().reshape(-1, 2, 6)
+    after, found = slot_of_pair(store), values(store.impulse).reshape(-1, 2, 6)
     assert set(before) < set(after)
     for pair, p in after.items():
         wanted = impulses[p] if pair in before else np.zeros((2, 6))
@@ -129,8 +130,8 @@ def test_waiting_impulses_survive_a_search(again):
 def overlap_energy(simulation, born_after):
     """Elastic energy [J] of the overlaps of listed spheres of which one is younger than a tick."""
     model, motion = simulation.model, simulation.state.motion()
-    size, sphere = model.spheres.per_face, simulation.tables.sphere.to_numpy()
-    exposed, energy = simulation.state.exposed_tick.to_numpy(), 0.0
+    size, sphere = model.spheres.per_face, simulation.values(simulation.tables.sphere)
+    exposed, energy = simulation.values(simulation.state.exposed_tick), 0.0
     for pair in listed(simulation):
         body = [one // (4 * size) for one in pair]
         place = [
@@ -147,17 +148,17 @@ def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
     """Faces that break now bring k d^2 / 2 an overlap; a second search at the tick nothing."""
     simulation = scattered(again, 2e-4, 0.02)
     state, store = simulation.state, simulation.contacts.store
-    assert not store.heat.to_numpy()[near_slots(store)].any()
-    exposed = state.exposed_tick.to_numpy()
+    assert not values(store.heat, near_slots(store)).any()
+    exposed = simulation.values(state.exposed_tick)
     free = np.flatnonzero(exposed < 0)
     exposed[free[: len(free) // 2]] = 7
-    state.exposed_tick.from_numpy(exposed)
+    assign(state.exposed_tick, exposed)
     state.tick[None] = 7
     simulation.broad_phase.search()
     wanted = overlap_energy(simulation, 0)
     assert 0.0 < wanted < 0.9 * overlap_energy(simulation, -1)
     for _ in range(2):
-        injected = store.heat.to_numpy()[near_slots(store), 2].sum()
+        injected = values(store.heat, near_slots(store))[:, 2].sum()
         assert injected == pytest.approx(wanted, rel=1e-9)
         simulation.broad_phase.search()
 
@@ -175,7 +176,7 @@ def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(again)
     way = random.standard_normal(motion["position"].shape)
     way *= far * skin * random.random((len(way), 1)) / np.linalg.norm(way, axis=1, keepdims=True)
     spin = turn * random.standard_normal(motion["orientation"].shape)
-    extent = simulation.tables.extent.to_numpy()
+    extent = simulation.values(simulation.tables.extent)
     found, before = [], motion["orientation"]
     for step in range(1, 61):
         turned = motion["orientation"] + step * spin
@@ -183,8 +184,9 @@ def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(again)
         simulation.state.set_motion(motion["position"] + step * way, turned)
         angle = 2.0 * np.linalg.norm(turned - before, axis=1)
         before = turned
-        travel = contacts.travel.to_numpy() + np.linalg.norm(way, axis=1) + extent * angle
-        contacts.travel.from_numpy(np.where(contacts.exposed_faces.to_numpy() != 0, travel, 0.0))
+        travel = simulation.values(contacts.travel) + np.linalg.norm(way, axis=1) + extent * angle
+        shows = simulation.values(contacts.exposed_faces) != 0
+        assign(contacts.travel, np.where(shows, travel, 0.0))
         touching = expected(simulation, 0.0)
         assert touching <= set(listed(simulation))
         broad.search(everywhere=False)
@@ -202,7 +204,7 @@ def test_a_fast_body_has_a_skin_for_some_steps(again):
     simulation = scattered(again, skin, 0.03)
     contacts, model = simulation.contacts, simulation.model
     motion, horizon = simulation.state.motion(), STEPS * simulation.schedule.dt0
-    extent = simulation.tables.extent.to_numpy()
+    extent = simulation.values(simulation.tables.extent)
     velocity, spin = random.standard_normal((2, model.body_count, 3))
     velocity *= 10.0 ** random.uniform(4, 6.5, (model.body_count, 1))
     spin *= 10.0 ** random.uniform(4, 6.5, (model.body_count, 1))
@@ -210,8 +212,8 @@ def test_a_fast_body_has_a_skin_for_some_steps(again):
     simulation.broad_phase.search()
     speed = np.linalg.norm(velocity, axis=1) + np.linalg.norm(spin, axis=1) * extent
     wanted = np.maximum(0.5 * skin, np.minimum(horizon * speed, FARTHEST * extent))
-    exposed = contacts.exposed_faces.to_numpy() != 0
-    found = contacts.body_skin.to_numpy()
+    exposed = simulation.values(contacts.exposed_faces) != 0
+    found = simulation.values(contacts.body_skin)
     assert found[exposed] == pytest.approx(wanted[exposed], rel=1e-12)
     for low, high in [(0.0, 0.6 * skin), (0.6 * skin, 0.24 * extent), (0.24 * extent, np.inf)]:
         assert ((found >= low) & (found < high) & exposed).sum() > 10

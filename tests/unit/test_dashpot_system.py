@@ -65,7 +65,9 @@ def test_what_the_kernels_have_solved_is_a_solution(simulation):
     Nothing but what a step turns the branches: of them, and of spins near 50 / s, 2e-5.
     """
     system = DashpotSystem(simulation)
-    motion = simulation.advance.solver.velocities.twist.to_numpy()[: simulation.model.body_count]
+    motion = simulation.values(simulation.advance.solver.velocities.twist)[
+        : simulation.model.body_count
+    ]
     swept = after(system.gauss_seidel(motion, system.last), 0)
     assert np.abs(swept - motion).max() < 2e-5 * np.abs(motion).max()
     unsolved = after(system.gauss_seidel(motion, 0.5 * system.last), 0)

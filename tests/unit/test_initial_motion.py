@@ -109,6 +109,6 @@ def test_no_body_moves_further_than_the_distance_in_its_first_step(method):
     velocity = np.array([[1.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
     simulation = Simulation(Scene(pair(), CONCRETE, velocity=velocity), method)
     simulation.start()
-    step = 1e-6 / 2.0 ** simulation.state.level.to_numpy()
+    step = 1e-6 / 2.0 ** simulation.values(simulation.state.level)
     assert np.all(step * velocity[:, 0] <= 1e-8)
     assert np.all(2.0 * step.min() * velocity[0, 0] > 1e-8)

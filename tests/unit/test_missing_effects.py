@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.report.missing_effects import unserved
 from taichi_dem.state.model import Model
@@ -41,7 +42,7 @@ def missed(mesh, moved, *listed, broken=False):
     """
     simulation = Simulation(Scene(mesh, CONCRETE, listed), Uniform(STEP))
     if broken:
-        simulation.state.broken_tick.fill(0)
+        assign(simulation.state.broken_tick, 0)
     simulation.state.set_motion(moved(simulation.model.centre))
     simulation._open_balance()
     if broken:
@@ -74,7 +75,7 @@ def test_a_solid_in_one_piece_overlaps_nothing_and_a_broken_one_does():
 
 
 def passed(probe):
-    return [tick >= 0 for tick in probe.state.passed.to_numpy()[0]]
+    return [tick >= 0 for tick in values(probe.state.passed)[0]]
 
 
 @pytest.mark.parametrize(

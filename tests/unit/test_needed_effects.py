@@ -5,7 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Uniform, checked_mesh, effects, needed_effects, simulate
+from taichi_dem import (
+    CONCRETE,
+    Scene,
+    Simulation,
+    Uniform,
+    checked_mesh,
+    effects,
+    needed_effects,
+    simulate,
+)
+from taichi_dem.kit.allocation import assign
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.report.effects import effect_uses
@@ -52,11 +62,6 @@ def test_weight_of_all_is_all_the_work(gentle):
     assert use.energy_J == pytest.approx(0.5 * mass * (9.81 * UNTIL) ** 2, rel=1e-9)
 
 
-def column(values):
-    """A field of these values, to be read."""
-    return SimpleNamespace(to_numpy=lambda: np.asarray(values))
-
-
 def used(listed, bits=0, marked=0, heat=0.0, **account):
     """What is said of effects whose account holds these terms [J]; every effect by its name.
 
@@ -64,8 +69,10 @@ def used(listed, bits=0, marked=0, heat=0.0, **account):
     heat: in each bond [J].
     """
     model = Model(pair(), CONCRETE, listed)
-    fields = {"active_effects": column([bits, 0]), "position": column(model.centre)}
-    state, schedule = SimpleNamespace(**fields, activity=None), SimpleNamespace(evaluations=[100])
+    simulation = Simulation(Scene(pair(), CONCRETE), Uniform(STEP))
+    state, schedule = simulation.state, simulation.schedule
+    assign(state.active_effects, [bits, 0])
+    assign(schedule.evaluations, [100])
     tables = np.zeros((2, 6)), np.full((1, 5), heat), None
     balance = SimpleNamespace(start_energy=0.0, works=lambda: np.zeros((2, 4)))
     readings = SimpleNamespace(active_bonds=lambda: np.full((1, 2), marked > 0))

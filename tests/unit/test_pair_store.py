@@ -5,6 +5,7 @@ import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, Scene, Uniform
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar
 from tests.again import Again
 from tests.unit.test_broad_phase import Marked, near_slots, slot_of_pair
@@ -24,13 +25,13 @@ class Thrown:
         self.store, self.law = self.simulation.contacts.store, self.simulation.tables.contact
         self.fields = self.law.vector, self.law.of_spheres
         self.first_place = self.simulation.model.centre
-        self.simulation.contacts.skin.fill(SPREAD / 20)
+        assign(self.simulation.contacts.skin, SPREAD / 20)
 
     def start(self):
         """Break all bonds, let all faces carry spheres, and search anew."""
         self.again.restart(1e-9)
-        self.state.broken_tick.fill(0)
-        self.state.exposed_tick.fill(0)
+        assign(self.state.broken_tick, 0)
+        assign(self.state.exposed_tick, 0)
         self.state.injected_tick[None] = 0
         self.again.search_anew()
 
@@ -46,10 +47,10 @@ class Thrown:
 
     def spheres(self):
         """Places of the sphere pairs of the near pairs, by spheres."""
-        first, last = self.store.first.to_numpy(), self.store.last.to_numpy()
+        first, last = values(self.store.first), values(self.store.last)
         places = [k for p in near_slots(self.store) for k in range(first[p], last[p])]
         return {
-            tuple(pair): k for pair, k in zip(self.store.sphere.to_numpy()[places].tolist(), places)
+            tuple(pair): k for pair, k in zip(values(self.store.sphere, places).tolist(), places)
         }
 
     @ti.kernel
@@ -67,12 +68,12 @@ class Thrown:
         for (a, b), k in spheres.items():
             of_spheres[k] = 10000 * a + b
         for field, array in zip(self.fields, (vector, of_spheres)):
-            field.from_numpy(array)
+            assign(field, array)
         return pairs, spheres
 
     def columns(self):
         """The columns as arrays."""
-        return [field.to_numpy() for field in self.fields]
+        return [values(field) for field in self.fields]
 
 
 @pytest.fixture(scope="module")

@@ -30,7 +30,7 @@ said["same"] = runtime.start(threads=1) is first
 refused("other", lambda: runtime.start(threads=2))
 simulation = Simulation(Scene(pair(), CONCRETE), Uniform())
 damped = Scene(pair(), CONCRETE, [effects.BondDamping()])
-engine = weakref.ref(Simulation(damped, Uniform()).loan.engine)
+engine = weakref.ref(Simulation(damped, Uniform()).engine)
 gc.collect()
 said["kept"] = [engine() is not None]
 runtime.stop()

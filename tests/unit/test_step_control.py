@@ -76,7 +76,7 @@ def test_steps_obey_the_limits_and_what_binds_is_recorded_and_counted():
     simulation = controlled(block, dt0, 1.0, group="hole")
     simulation.start()
     limit = 0.8 * step_report(simulation.scene).step_s
-    step = dt0 / 2.0 ** simulation.state.level.to_numpy()[: block.body_count]
+    step = dt0 / 2.0 ** simulation.values(simulation.state.level)[: block.body_count]
     assert np.all(step <= limit) and np.all(2.0 * step > limit)
     assert len(np.unique(step)) > 1
     assert simulation.report().bound_by == {"bond_dashpot": block.body_count}
@@ -111,10 +111,10 @@ def test_load_criterion_looks_a_largest_step_ahead():
     simulation.start()
     model = simulation.model
     loaded = np.unique(faces_of_group(model.mesh, model.topology, "left")[0])
-    assert np.all(simulation.state.bound.to_numpy()[loaded] == CRITERIA.index("load"))
+    assert np.all(simulation.values(simulation.state.bound)[loaded] == CRITERIA.index("load"))
     force = peak * 0.1 * 0.1 / 2
     expected = np.sqrt(distance * model.body_mass[loaded] / force)
-    step = dt0 / 2.0 ** simulation.state.level.to_numpy()[loaded]
+    step = dt0 / 2.0 ** simulation.values(simulation.state.level)[loaded]
     assert np.all(step <= expected) and np.all(2.0 * step > expected)
 
 

@@ -87,7 +87,7 @@ def pulse(wave_speed):
     rows = []
     for step in steps.tolist():
         simulation.advance_to(step)
-        velocity = simulation.state.velocity.to_numpy()[:, 0]
+        velocity = simulation.values(simulation.state.velocity)[:, 0]
         rows.append([*velocity.reshape(-1, 6).mean(axis=1)[[10, 25]], velocity[end].mean()])
     return steps * STEP, np.array(rows)
 
@@ -149,8 +149,8 @@ def test_a_triangular_pulse_spalls_where_its_tension_first_suffices(wave_speed):
     broken, end = np.zeros(model.bond_count, dtype=bool), 0.0
     while not broken.any():
         simulation.advance_to(int(simulation.state.tick[None]) // 2**20 + 20)
-        broken = simulation.state.broken_tick.to_numpy() >= 0
-        end = max(end, simulation.state.velocity.to_numpy()[-6:, 0].mean())
+        broken = simulation.values(simulation.state.broken_tick) >= 0
+        end = max(end, simulation.values(simulation.state.velocity)[-6:, 0].mean())
         assert simulation.time_s < 2.0 * LENGTH / wave_speed
     arrived = CONCRETE.density * wave_speed * 0.5 * end
     expected = length * CONCRETE.tensile_strength / (2.0 * arrived)
@@ -160,7 +160,10 @@ def test_a_triangular_pulse_spalls_where_its_tension_first_suffices(wave_speed):
 
 
 def supported(method):
-    """A bar driven at its left, on rollers below, fixed and pushed at its right, after 2e-5 s."""
+    """A bar driven at its left, on rollers below, fixed and pushed at its right, after 2e-5 s.
+
+    Returns its model, motion and report.
+    """
     listed = [
         effects.BondDamping(),
         effects.Fixed("right"),
@@ -170,7 +173,7 @@ def supported(method):
     ]
     simulation = Simulation(Scene(bar(0.3, 0.1, (3, 1, 1)), CONCRETE, listed), method)
     simulation.advance_to(round(2e-5 / method.dt0))
-    return simulation
+    return simulation.model, simulation.state.motion(), simulation.report()
 
 
 @pytest.fixture(scope="module")
@@ -181,8 +184,7 @@ def held():
 
 def test_supports_hold_what_they_say(held):
     """Fixed: nothing moves. Roller: no velocity and only spin along the normal. Driven: v cos."""
-    simulation = held[0]
-    model, motion = simulation.model, simulation.state.motion()
+    model, motion, _ = held[0]
     groups = ("right", "bottom", "left")
     bodies = {name: faces_of_group(model.mesh, model.topology, name)[0] for name in groups}
     right = bodies["right"]
@@ -211,7 +213,7 @@ def test_work_and_impulse_of_supports_are_booked(held):
 
     What pushes on what is held still does no work.
     """
-    coarse, fine = (simulation.report() for simulation in held)
+    coarse, fine = (report for _, _, report in held)
     assert (
         abs(coarse.energy_balance["support_work"]) > 0.0
         and coarse.energy_balance["load_work"] == 0.0
@@ -230,11 +232,10 @@ def test_solved_dashpots_give_way_to_supports_as_explicit_ones_do(held):
 
     Solved ones are of second order: the square of w dt = 0.01 of the driving.
     """
-    coarse, fine = (simulation.motion()["position"] for simulation in held)
-    solved = supported(ImplicitDashpots(1e-7, sweeps=(2, 200), tolerance=1e-9))
-    moved = 2.0 * fine - coarse - solved.model.centre
-    error = solved.motion()["position"] - solved.model.centre - moved
+    coarse, fine = (motion["position"] for _, motion, _ in held)
+    model, motion, report = supported(ImplicitDashpots(1e-7, sweeps=(2, 200), tolerance=1e-9))
+    moved = 2.0 * fine - coarse - model.centre
+    error = motion["position"] - model.centre - moved
     assert np.abs(error).max() < 1e-3 * np.abs(moved).max()
-    report = solved.report()
     assert report.energy_balance["load_work"] == 0.0 < report.energy_balance["support_work"]
     assert max(report.linear_momentum_error, report.angular_momentum_error) < 1e-12

@@ -110,10 +110,10 @@ def test_a_rigidly_moved_block_feels_no_force():
         place, np.tile(turn, (count, 1)), velocity, np.tile(spin, (count, 1))
     )
     simulation.start()
-    area = 3.0 * simulation.tables.unit_area.to_numpy().max()
+    area = 3.0 * simulation.values(simulation.tables.unit_area).max()
     opening, rate = 8 * EPS * 0.3, 8 * EPS * 30.0
     force = area * (CONCRETE.normal_stiffness * opening + CONCRETE.normal_damping * rate)
-    impulse = simulation.state.slot.to_numpy()[:, :3] / 2e-8
+    impulse = simulation.values(simulation.state.slot)[:, :3] / 2e-8
     assert np.abs(impulse).max() < force
     # A tilt of 1e-6 rad of one body against the others is seen a thousand times over.
     assert CONCRETE.normal_stiffness * 1e-6 * 0.03 * area > 1000 * force

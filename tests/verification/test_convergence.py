@@ -14,6 +14,7 @@ from taichi_dem import (
     effects,
     quality_report,
 )
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.state.timeline import MAX_LEVEL
 from tests.scenes import brisk_scene
@@ -63,24 +64,24 @@ class MovingBar:
         state.set_motion(model.centre, turn, velocity, 10.0 * spin)
         self.mixed = random.integers(0, 4, model.body_count).astype(np.int32)
         self.fields = state.fields()
-        self.first = {name: field.to_numpy() for name, field in self.fields.items()}
+        self.first = {name: values(field) for name, field in self.fields.items()}
         self.simulation.start()
 
     def position_after(self, steps, levels, damped):
         """Positions at UNTIL [m]."""
         simulation, state = self.simulation, self.simulation.state
         for name, field in self.fields.items():
-            field.from_numpy(self.first[name])
-        state.level.from_numpy(levels)
+            assign(field, self.first[name])
+        assign(state.level, levels)
         damping = np.array([CONCRETE.normal_damping, CONCRETE.shear_damping])
-        coefficient = simulation.tables.dashpot.coefficient
-        coefficient.from_numpy(np.tile(damping * damped, (*coefficient.shape, 1)))
+        bonds = simulation.model.bond_count
+        assign(simulation.tables.dashpot.coefficient, np.tile(damping * damped, (bonds, 1)))
         dt0 = UNTIL / steps
         for k in range(MAX_LEVEL + 1):
             simulation.schedule.step_seconds[k] = dt0 / 2.0**k
         simulation.driver.begin()
         simulation.advance_to(steps)
-        assert np.array_equal(state.level.to_numpy(), levels)
+        assert np.array_equal(simulation.values(state.level), levels)
         return state.motion()["position"]
 
 
@@ -179,6 +180,7 @@ def test_solved_dashpots_are_of_second_order_before_anything_breaks():
         simulation = blown(ImplicitDashpots(step, sweeps=(2, 100), tolerance=1e-5), 8e-6)
         assert simulation.report().broken_faces == 0
         places.append(simulation.motion()["position"])
+        simulation.close()
     coarse, fine = (np.linalg.norm(a - b) for a, b in zip(places, places[1:]))
     moved = np.linalg.norm(places[-1] - simulation.model.centre)
     assert fine > 1e-5 * moved
@@ -198,11 +200,12 @@ def test_multirate_stays_within_the_error_of_its_steps():
     until = 2.5e-5
     simulation = blown(Uniform(1e-8, 2e-7), until)
     coarse, evaluated = simulation.motion()["position"], simulation.report().contact_evaluations
+    simulation.close()
     fine = blown(Uniform(5e-9, 1e-7), until).motion()["position"]
     error = 2.0 * np.linalg.norm(coarse - fine)
     several = blown(Multirate(1e-8, 2e-7), until)
     report = several.report()
-    assert len(np.unique(several.state.level.to_numpy())) >= 3
+    assert len(np.unique(several.values(several.state.level))) >= 3
     assert report.ideal_gain > 1.5
     assert error < 0.01 * np.linalg.norm(coarse - simulation.model.centre)
     away = np.linalg.norm(several.motion()["position"] - coarse)

@@ -23,7 +23,7 @@ EPS = np.finfo(float).eps
 LOSSLESS = replace(CONCRETE, contact_damping=0.0)
 
 
-@pytest.fixture(scope="module", params=[cracked, ring], ids=lambda make: make.__name__)
+@pytest.fixture(params=[cracked, ring], ids=lambda make: make.__name__)
 def at_a_block(request):
     """A tetrahedron that is put at a block, without bonds' dashpots."""
     return AtABlock(request.param(), LOSSLESS)
@@ -89,7 +89,7 @@ def test_the_force_is_the_gradient_of_the_energy_and_conserves_momentum(at_a_blo
         at_a_block.put(place, orientation)
         at_a_block.simulation.start()
         at_a_block.simulation.advance_to(1)
-        velocity, mass = at_a_block.state.velocity.to_numpy(), at_a_block.model.body_mass
+        velocity, mass = at_a_block.state.motion()["velocity"], at_a_block.model.body_mass
         own = mass[-1] * velocity[at_a_block.model.body_count - 1]
         # A run begins half a step back: the first kick is of half a step.
         count = at_a_block.simulation.contacts.store.sphere_count[None]
@@ -168,7 +168,7 @@ def braking(friction):
     dt, ends = simulation.method.dt0, []
     for part in (0.1, 1.0):
         simulation.advance_to(round(part * time / dt))
-        velocity = simulation.state.velocity.to_numpy()[simulation.model.body_count - 1]
+        velocity = simulation.values(simulation.state.velocity)[simulation.model.body_count - 1]
         ends.append((velocity @ way, velocity[1]))
     (first, up), (last, higher) = ends
     return (first - last) / (GRAVITY * 0.9 * time + higher - up), simulation

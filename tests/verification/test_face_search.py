@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Uniform, effects
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.tetrahedra import all_faces
 from tests.again import Again
@@ -22,15 +23,15 @@ def expected(simulation, skin):
     """Every exposed sphere and exposed face of two unbonded bodies nearer than the skin [m]."""
     model, motion = simulation.model, simulation.state.motion()
     size, count = model.spheres.per_face, model.body_count
-    sphere = simulation.tables.sphere.to_numpy()[: 4 * size * count]
+    sphere = simulation.values(simulation.tables.sphere)[: 4 * size * count]
     owner = np.arange(len(sphere)) // (4 * size)
     place = np.einsum("nij,nj->ni", motion["rotation"][owner], sphere[:, :3])
     place += motion["position"][owner]
-    free = simulation.state.exposed_tick.to_numpy()[: 4 * count] >= 0
+    free = simulation.values(simulation.state.exposed_tick)[: 4 * count] >= 0
     corners = model.mesh.points[all_faces(model.mesh.tetrahedra)].reshape(count, 12, 3)
     corners = np.einsum("nij,nkj->nki", motion["rotation"], corners - model.centre[:, None])
     corners = (corners + motion["position"][:, None]).reshape(-1, 3, 3)
-    intact = simulation.state.broken_tick.to_numpy()[: model.bond_count] < 0
+    intact = simulation.values(simulation.state.broken_tick)[: model.bond_count] < 0
     top = model.topology
     bonded = {frozenset(pair) for pair in zip(top.master[intact], top.slave[intact])}
     shown = np.flatnonzero(free.repeat(size))
@@ -57,16 +58,16 @@ def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
     simulation = scattered(again, 2e-4, 0.02)
     state, store = simulation.state, simulation.contacts.store
     simulation.start()
-    exposed = state.exposed_tick.to_numpy()
-    state.exposed_tick.fill(-1)
+    exposed = simulation.values(state.exposed_tick)
+    assign(state.exposed_tick, -1)
     again.search_anew()
     before = simulation.energy_balance.account()
     assert before["sphere_strain"] == 0.0
-    state.exposed_tick.from_numpy(np.where(exposed >= 0, 7, -1))
+    assign(state.exposed_tick, np.where(exposed >= 0, 7, -1))
     state.tick[None] = 7
     for _ in range(2):
         simulation.broad_phase.search()
         after = simulation.energy_balance.account()
         injected = after["injected"] - before["injected"]
         assert injected == pytest.approx(after["sphere_strain"], rel=1e-9)
-        assert store.heat.to_numpy()[near_slots(store), 2].sum() > 0.0
+        assert values(store.heat, near_slots(store))[:, 2].sum() > 0.0

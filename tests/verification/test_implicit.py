@@ -5,6 +5,7 @@ import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.elasticity.rates import dashpots_of, springs_of
+from taichi_dem.kit.allocation import assign
 from taichi_dem.mesh.shapes import pair
 from tests.verification.test_limits import Rig, bisected, pair_eigenvalue
 
@@ -37,7 +38,7 @@ def damped(rig, share):
     """
     law = share * np.array([CONCRETE.normal_damping, CONCRETE.shear_damping])
     coefficient = rig.simulation.tables.dashpot.coefficient
-    coefficient.from_numpy(np.tile(law, (*coefficient.shape, 1)))
+    assign(coefficient, np.tile(law, (rig.simulation.model.bond_count, 1)))
     per_mass = 2.0 * 3.0 * rig.simulation.tables.unit_area[0] / rig.simulation.model.body_mass[0]
     return CONCRETE.normal_stiffness * per_mass, law[0] * per_mass
 
@@ -163,7 +164,7 @@ def driven(velocity, step, steps, speed=0.0, frequency=0.0):
     centre = simulation.model.centre
     simulation.state.set_motion(centre, [1.0, 0.0, 0.0, 0.0], speed)
     simulation.advance_to(steps)
-    return simulation.state.position.to_numpy() - centre
+    return simulation.values(simulation.state.position) - centre
 
 
 def test_a_driven_body_gives_way_no_more_than_a_fixed_one():

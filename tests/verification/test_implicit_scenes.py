@@ -112,7 +112,7 @@ def ended(mesh, bodies, method):
     bonds[:, 1] -= first[:, 1]
     return {
         "moved": motion["position"] - place,
-        "broken_s": simulation.state.broken_tick.to_numpy() / MACRO_TICKS * method.dt0,
+        "broken_s": simulation.values(simulation.state.broken_tick) / MACRO_TICKS * method.dt0,
         "bonds": bonds,
         "account": simulation.energy_balance.account(),
         "velocity": motion["velocity"],

@@ -21,6 +21,7 @@ from taichi_dem.elasticity.rates import (
     dashpots_of,
     springs_of,
 )
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.mesh.topology import topology_of
@@ -43,15 +44,15 @@ class Rig:
         self.state, self.centre = self.simulation.state, self.simulation.model.centre
         if self.simulation.contacts is not None:
             # Spheres on the bases alone: those of other faces would touch there too.
-            self.state.exposed_tick.from_numpy(np.array([0, -1, -1, -1] * 2, dtype=np.int64))
+            assign(self.state.exposed_tick, [0, -1, -1, -1] * 2)
 
     def speeds(self, step, steps, position, velocity, spin):
         """Root of the sum of squared speeds after some steps of a length [s]."""
-        self.simulation.schedule.step_seconds.from_numpy(step / 2.0 ** np.arange(MAX_LEVEL + 1))
+        assign(self.simulation.schedule.step_seconds, step / 2.0 ** np.arange(MAX_LEVEL + 1))
         self.state.set_motion(position, STILL, velocity, spin)
-        self.state.slot.fill(0.0)
+        assign(self.state.slot, 0.0)
         self.state.tick[None] = 0
-        self.state.last_tick.fill(0)
+        assign(self.state.last_tick, 0)
         self.simulation.driver.begin()
         if self.simulation.contacts is not None:
             self.simulation.broad_phase.search()
@@ -269,11 +270,11 @@ def test_limited_dashpots_of_a_bond_are_stable_at_any_step():
     material = replace(CONCRETE, **soft)
     rig = Rig(pair(), [effects.BondDamping()], Uniform(1e-9, dashpot="limited"), material)
     table = rig.simulation.schedule.limits.dashpot_table
-    known, rate = table.to_numpy(), pair_eigenvalue(rig.simulation.model, dashpots_of(material))
+    known, rate = values(table), pair_eigenvalue(rig.simulation.model, dashpots_of(material))
     calm = grown(rig, 3)
 
     def wild(factor):
-        table.from_numpy(factor * known)
+        assign(table, factor * known)
         return not calm(20.0 / rate)
 
     exact = 0.5 * LIMITED * rate / (2.0 * known.max())

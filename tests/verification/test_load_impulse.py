@@ -17,6 +17,7 @@ from taichi_dem import (
     effects,
     simulate,
 )
+from taichi_dem.kit.allocation import assign
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.tetrahedra import area_vectors
 
@@ -42,7 +43,7 @@ def pulses():
 def body(load, method):
     """A free body that does not turn, so that the force keeps its direction."""
     made = Simulation(Scene(MESH, CONCRETE, [load]), method)
-    made.tables.inertia_inverse.fill(0.0)
+    assign(made.tables.inertia_inverse, 0.0)
     return made
 
 
@@ -53,9 +54,9 @@ def pushes(load, method):
     mass, found, levels = simulation.model.body_mass[0], [], set()
     for step in range(1, STEPS + 1):
         simulation.advance_to(step)
-        velocity = simulation.state.velocity.to_numpy()[0]
+        velocity = simulation.values(simulation.state.velocity)[0]
         found.append(mass * velocity @ push / (push @ push))
-        levels.add(int(simulation.state.level.to_numpy()[0]))
+        levels.add(int(simulation.values(simulation.state.level)[0]))
     account = simulation.energy_balance.account()
     assert account["load_work"] == pytest.approx(account["kinetic"], rel=1e3 * EPS)
     return np.array(found), levels
@@ -106,7 +107,7 @@ def test_a_prescribed_motion_goes_its_whole_way():
     drive = effects.PrescribedMotion("face", (3.0, 0.0, 0.0), history=shares)
     simulation = body(drive, METHODS["uniform"])
     simulation.advance_to(STEPS)
-    way = simulation.state.position.to_numpy()[0, 0] - simulation.model.centre[0, 0]
+    way = simulation.values(simulation.state.position)[0, 0] - simulation.model.centre[0, 0]
     assert way == pytest.approx(3.0 * 1e-8 * shares[1][1::3].sum(), abs=STEPS * EPS * 0.1)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Uniform, effects, simulate
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.shapes import pair as pair_mesh
 from tests.probe import BondProbe
@@ -30,7 +31,7 @@ def built():
 def bonded(built):
     """The same pair without history."""
     built.reset()
-    built.state.fields()["slip_weakening"].fill(0.0)
+    assign(built.state.fields()["slip_weakening"], 0.0)
     return built
 
 
@@ -114,7 +115,7 @@ def test_slip_to_and_fro_accumulates(bonded):
     bonded.open([-pressure / K_N, size + limit / K_S, 0.0])
     limit -= SLOPE * size
     bonded.open([-pressure / K_N, -limit / K_S, 0.0])
-    unit = bonded.state.fields()["slip_weakening"].to_numpy()
+    unit = bonded.simulation.values(bonded.state.fields()["slip_weakening"])
     assert np.abs(unit[:, 0]).max() < 99 * OPENING_ERROR
     assert unit[:, 2] == pytest.approx([2 * size] * 3, abs=99 * OPENING_ERROR)
 
@@ -142,7 +143,7 @@ def test_energy_stored_plus_spent_is_the_work_done_on_any_way(bonded):
     bonded.open([normal, 0.0, 0.0])
     work = bonded.stored()
     for sliding in way:
-        slip = unit.to_numpy()[0, :2]
+        slip = values(unit)[0, :2]
         before = bonded.stored()
         trial = 0.5 * K_S * ((sliding - slip) ** 2).sum() + 0.5 * K_N * normal**2
         work += bonded.area * trial - before

@@ -114,7 +114,6 @@ class Spring:
     def move(self, normal, way, bound):
         """Stretch by a way [m], slip to a bound [N]; force (3,) [N], stored and spent [J]."""
         found = np.zeros(5)
-        self.simulation.loan.activate()
         self._move(ti.Vector(list(normal)), ti.Vector(list(way)), bound, found)
         return found[:3], found[3], found[4]
 

@@ -5,6 +5,7 @@ import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation, StepControl, effects
+from taichi_dem.kit.allocation import assign
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.state.timeline import MACRO_TICKS
@@ -54,8 +55,8 @@ def woken():
 
 def test_neighbours_differ_by_no_more_than_the_level_limit(woken):
     """A jump of more than 2 lasts for no longer than a ring of neighbours needs to wake."""
-    top, level = woken.model.topology, woken.state.level.to_numpy()
-    holds = woken.state.broken_tick.to_numpy() < 0
+    top, level = woken.model.topology, woken.values(woken.state.level)
+    holds = woken.values(woken.state.broken_tick) < 0
     jumps = np.abs(level[top.master] - level[top.slave])[holds]
     assert jumps.max() == 2
 
@@ -110,10 +111,10 @@ class Sleepers:
         self.state.set_motion(place, velocity=velocity)
         self.simulation.start()
         # By hand from here on: the velocities are those before the first kick.
-        self.state.velocity.from_numpy(np.resize(velocity, (self.state.velocity.shape[0], 3)))
+        assign(self.state.velocity, velocity)
         self.mass = model.body_mass[0]
         self.force_per_opening = 3.0 * model.bonds["area"][0] * CONCRETE.normal_stiffness
-        assert self.state.level.to_numpy().tolist() == [0, 0, 2]
+        assert self.simulation.values(self.state.level).tolist() == [0, 0, 2]
 
     def quarters(self, count):
         """Run to a number of quarters of DT0; velocities along the normal of the pair [m/s]."""
@@ -147,7 +148,7 @@ def test_a_bond_applies_no_impulse_to_a_woken_body_twice():
         velocity = made.quarters(quarter)
         assert velocity[0] == pytest.approx(speed + gained, rel=ROUND)
         assert velocity[1] == 0.0
-    assert made.state.level.to_numpy().tolist() == [2, 0, 2]
+    assert made.simulation.values(made.state.level).tolist() == [2, 0, 2]
     velocity = made.quarters(4)
     assert velocity == pytest.approx([speed + gained, -gained], rel=ROUND)
     # A body takes a kick at the beginning of the step that it is brought over, here t = 0.

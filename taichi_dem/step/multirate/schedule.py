@@ -104,6 +104,11 @@ class Schedule:
         """Seconds of a tick."""
         return self.dt0 / MACRO_TICKS
 
+    @property
+    def time_s(self) -> float:
+        """Present time [s]."""
+        return int(values(self.state.tick)) * self.tick_seconds
+
     def members(self) -> np.ndarray:
         """How many bonds and pairs are evaluated at the step of each level, (MAX_LEVEL + 1,)."""
         ends = values(self.bonds.end) + values(self.pairs.end)
