@@ -73,6 +73,6 @@ def test_a_frozen_scene_goes_on_with_the_bits_of_its_run_as_often_as_it_is_asked
             assert frozen.seconds(k) > 0.0
             for name, values in run.state.motion().items():
                 assert np.array_equal(frozen.simulation.state.motion()[name], values), name
-            broken = run.state.broken_tick.to_numpy()
-            assert np.array_equal(frozen.simulation.state.broken_tick.to_numpy(), broken)
+            broken = run.state.broken()
+            assert np.array_equal(frozen.simulation.state.broken(), broken)
     assert run.report().broken_faces > 0
