@@ -4,22 +4,18 @@ An effect is said to be droppable only where a run without it has been made and 
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.kit.errors import InputError, SimulationDiverged
-from taichi_dem.kit.validation import fraction, instance, positive
+from taichi_dem.kit.validation import fraction
 from taichi_dem.laws.chosen import ChosenEffects
-from taichi_dem.mesh.parts import may_meet, parts_of
-from taichi_dem.report.estimates import Estimate, estimates_before
+from taichi_dem.mesh.parts import parts_of
 from taichi_dem.report.report import Report
 from taichi_dem.result import Result
-from taichi_dem.scene import Scene
 from taichi_dem.simulate import run_simulation
 from taichi_dem.simulation import Simulation
-from taichi_dem.state.model import Model
 
 #: Largest difference of two runs that rounding explains, as a share of what is recorded.
 ROUNDING = 1e-9
@@ -66,33 +62,6 @@ def needed_effects(result: object, tolerance: float = ROUNDING) -> Advice:
     return report.advice(tolerance)
 
 
-def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
-    """Estimates of which effects a scene needs, before a run.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene.
-    until : float
-        End of the run [s].
-
-    Returns
-    -------
-    tuple of Estimate
-        For each effect a dimensionless group that compares it with what it acts beside, and the
-        verdict negligible, needed or unclear. Print them.
-
-    Raises
-    ------
-    InputError
-        The argument is no Scene, or the time is not positive.
-    """
-    instance("scene", scene, Scene)
-    model = Model(scene.mesh, scene.body_materials, scene.effects)
-    until, velocity = positive("until", until), scene.initial_motion.get("velocity")
-    return estimates_before(model, until, velocity, may_meet(scene, parts_of(scene.mesh)))
-
-
 def _differences(result, names, tolerance):
     """Difference that each effect makes to a run, by name, as a share of what was recorded.
 
@@ -122,9 +91,8 @@ def _difference(result, names):
         simulation = Simulation(scene, result.method, result.report.driver.split("+")[0])
         if result.start is not None:
             simulation.state.set_motion(**result.start)
-        samples = len(result.history["time_s"]) - 1
-        options: dict[str, Any] = {"samples": samples, "progress": None}
-        again = run_simulation(simulation, until=result.report.until_s, **options)
+        until, samples = result.report.until_s, len(result.history["time_s"]) - 1
+        again = run_simulation(simulation, until=until, samples=samples, progress=None)
     except (InputError, SimulationDiverged):
         return np.inf
     return recorded_difference(result, again)

@@ -1,5 +1,6 @@
 """Certificate of a run with effects="auto": what acted, since when, and what was left out."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,9 +13,11 @@ from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.mesh.parts import parts_of
 from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.report.effects import on_demand
-from taichi_dem.report.estimates import Estimate, PartScales, estimates_after
+from taichi_dem.report.estimates import AIR, BENDS, WEIGHT, Estimate, PartScales
 from taichi_dem.report.missing_effects import MissingEffect, bond_rounding
 from taichi_dem.state.timeline import MACRO_TICKS
+
+_SHARE = "share of the energy put in, at most"
 
 
 @dataclass(frozen=True)
@@ -116,9 +119,16 @@ class Certificate:
     def left_out_lines(self) -> list[str]:
         """What was left out, in lines."""
         skipped = 100.0 * (1.0 - self.law_evaluations / max(1, self.all_law_evaluations))
+        asleep = "asleep: no body, as sleep is 0"
+        if self.sleep:
+            asleep = (
+                f"asleep: {100.0 * self.asleep:.3g} % of body-steps (left out: at most "
+                f"{self.impulse:.1g} of the impulse, {self.energy:.1g} of the energy of a part; "
+                f"{self.sleep:g} asked)"
+            )
         lines = [
             f"law of bonds: {skipped:.3g} % of its evaluations skipped",
-            self._sleep_line(),
+            asleep,
             *(f"left out: {estimate}" for estimate in self.left_out),
             *(f"audit: {audit}" for audit in self.audits if audit.skipped),
         ]
@@ -131,15 +141,6 @@ class Certificate:
         for use in self.acting:
             begun = f" from {1e3 * use.since_s:.3g} ms" if use.since_s is not None else ""
             yield f"{use.effect}: {'never' if use.idle else use.acted + begun}"
-
-    def _sleep_line(self):
-        if not self.sleep:
-            return "asleep: no body, as sleep is 0"
-        return (
-            f"asleep: {100.0 * self.asleep:.3g} % of body-steps (left out: at most "
-            f"{self.impulse:.1g} of the impulse, {self.energy:.1g} of the energy of a part; "
-            f"{self.sleep:g} asked)"
-        )
 
 
 def certificate_of(simulation: Any, report: Any) -> Certificate:
@@ -154,6 +155,8 @@ def certificate_of(simulation: Any, report: Any) -> Certificate:
     # Evaluations of bonds that sleep has spared, at the largest step.
     until = awake[links].max(axis=0, initial=0.0)
     asleep = int(until.sum() / (schedule.tick_seconds * MACRO_TICKS))
+    audit = simulation.step.audit
+    audited, missed = int(values(audit.audited)), int(values(audit.misses))
     scales = PartScales(run.model, parts_of(run.model.mesh))
     energy = _energy(run, simulation.energy_balance, scales)
     impulse, left_energy = _left_out(run, simulation.energy_balance, scales, energy)
@@ -163,7 +166,7 @@ def certificate_of(simulation: Any, report: Any) -> Certificate:
         asleep=float(awake.mean() / now) if now > 0.0 else 0.0,
         impulse=impulse,
         energy=left_energy,
-        audits=_audits(simulation.step.audit, asleep),
+        audits=(Audit(max(asleep, audited), audited, missed, "bonds asleep"),),
         left_out=_not_served(simulation, scales, energy),
         missing=report.missing_effects,
     )
@@ -191,15 +194,31 @@ def _left_out(run, balance, scales, energy):
 
 
 def _not_served(simulation, scales, energy):
-    """Estimates of what no law of the scene serves."""
-    motion, model = simulation.motion(), simulation.model
-    moved = motion["position"] - simulation.first_motion["position"]
+    """Estimates of what no law of the scene serves, from where the run has brought the bodies.
+
+    Shares of the energy that each part got, 0 where nothing moved it: work of the weight along the
+    way and its fall, and of the drag of air on balls of the bodies' size at their present speed.
+    Where a support, ground or contact bears a part, weight strains it too.
+    """
+    motion, model, until, found = simulation.motion(), simulation.model, simulation.time_s, []
+    way = np.linalg.norm(motion["position"] - simulation.first_motion["position"], axis=1)
     speed = np.linalg.norm(motion["velocity"], axis=1)
-    touched = values(simulation.state.active_effects, slice(model.body_count)) & np.int64(CONTACT)
-    borne = scales.under((*model.supports, *model.ground)) | (scales.sum(touched) > 0)
-    return estimates_after(scales, moved, speed, simulation.time_s, energy, borne)
+    if not any(effect.name == "gravity" for effect in model.loads):
+        active = values(simulation.state.active_effects, slice(model.body_count))
+        borne = scales.under((*model.supports, *model.ground))
+        borne |= scales.sum(active & np.int64(CONTACT)) > 0
+        fall = WEIGHT * until
+        work = model.body_mass * (WEIGHT * way + fall * speed + 0.5 * fall**2)
+        share = _share(scales.sum(work), energy)
+        # What is borne and not moved at all does not fall.
+        share = np.where(borne & (energy == 0.0), 0.0, share)
+        groups = (share, _SHARE), (scales.bent(until, borne), BENDS)
+        found.append(scales.worst("gravity", *groups))
+    drag = 0.5 * AIR * math.pi * model.body_radius**2 * speed**2
+    return (*found, scales.worst("air drag", (_share(scales.sum(drag * way), energy), _SHARE)))
 
 
-def _audits(audit, skipped):
-    audited, missed = int(values(audit.audited)), int(values(audit.misses))
-    return (Audit(max(skipped, audited), audited, missed, "bonds asleep"),)
+def _share(work, energy):
+    """Share of an energy; not known where there is none."""
+    none = np.where(work > 0.0, np.nan, 0.0)
+    return np.where(energy > 0.0, work / np.where(energy > 0.0, energy, 1.0), none)

@@ -2,8 +2,6 @@
 
 import math
 import time
-from functools import partial
-from typing import NamedTuple, Optional
 
 import numpy as np
 
@@ -33,13 +31,6 @@ SHARE = 0.02
 CLOSED = 0.1
 #: Factor by which a bound or a stiffness that is not the step's is raised at a time.
 RAISED = 10.0
-
-
-class Remedy(NamedTuple):
-    """The end of a sentence, and the same as numbers: see ``SimulationDiverged.advice``."""
-
-    words: str
-    advice: dict[str, float]
 
 
 class DivergenceCheck:
@@ -84,12 +75,14 @@ class DivergenceCheck:
         what = f"moves at {speed:.3g} m/s"
         # A speed that is no number is beyond every bound.
         if run.contacts is None or not speed < values(run.state.max_speed2) ** 0.5:
-            raise self._error(body, what, partial(self._of_speed, speed))
+            why = "the energy that it has was given to it"
+            faster = _to_try(why, "max_speed", RAISED * speed, "m/s")
+            raise self._error(body, what, self._shorter_step(body) or faster)
         extent = float(run.model.spheres.extent[body])
         allowed = FARTHEST * extent / (speed + math.hypot(*motion["spin"][body]) * extent)
-        remedy = _shorter_step(0.5 * allowed, f"contacts allow {allowed:.3g} s")
+        shorter = _to_try(f"contacts allow {allowed:.3g} s", "step", 0.5 * allowed, "s")
         what += ", too far in a step for its contacts to be followed"
-        raise self._error(body, what, lambda near: remedy)
+        raise self._error(body, what, shorter)
 
     def _check_overlap(self):
         contacts = self.run.contacts
@@ -103,8 +96,7 @@ class DivergenceCheck:
             if contacts.law.meets_faces:
                 inside, size = f"body {other}", "its radius"
             share = f"{100 * deepest[pair]:.0f} % of {size}"
-            what = f"has a contact sphere inside {inside} ({share})"
-            raise self._error(body, what, self._of_overlap)
+            raise self._too_deep(body, f"has a contact sphere inside {inside} ({share})")
 
     def check_shared(self, volume: SharedVolume) -> None:
         """Raise SimulationDiverged where contact of all faces has not kept two bodies apart."""
@@ -115,8 +107,7 @@ class DivergenceCheck:
         if volume.share[place] > DEEPEST_SHARE:
             body, other = volume.pairs[place].tolist()
             share = f"{100 * volume.share[place]:.0f} %"
-            what = f"shares {share} of its volume with body {other}"
-            raise self._error(body, what, self._of_overlap)
+            raise self._too_deep(body, f"shares {share} of its volume with body {other}")
 
     def _check_energy(self):
         account = self.energy_balance.account()
@@ -128,26 +119,35 @@ class DivergenceCheck:
             velocity = self.run.state.motion()["velocity"]
             body = int(np.linalg.norm(velocity, axis=1).argmax())
             what = f"is the fastest while {-account['residual']:.3g} J came from nowhere"
-            raise self._error(body, what, self._of_energy)
+            shorter = self._shorter_step(body, to_blame=True)
+            raise self._error(body, what, shorter or ("which nothing limits", {}))
 
     def round_off(self) -> float:
         """Bound of the energy [J] that rounding of positions has put into the bonds so far."""
         return max(1, int(values(self.run.schedule.evaluations)[0])) * self.rounded_once
 
-    def _error(self, body, what, advise):
+    def _error(self, body, what, remedy):
         """SimulationDiverged that says what is wrong with a body, and what to change.
 
-        advise: gives the Remedy for the body and those that it is tied to or near, by number.
+        remedy: the end of the sentence, and its numbers for ``SimulationDiverged.advice``.
         """
         schedule, level = self.run.schedule, int(values(self.run.state.level)[body])
-        time_s = schedule.time_s
-        remedy = advise([body, *self._beside(body)])
         error = SimulationDiverged(
-            f"diverged at t = {time_s:.6g} s: body {body} {what}; its step was "
-            f"{schedule.dt0 / 2.0**level:.3g} s (level {level}), {remedy.words}"
+            f"diverged at t = {schedule.time_s:.6g} s: body {body} {what}; its step was "
+            f"{schedule.dt0 / 2.0**level:.3g} s (level {level}), {remedy[0]}"
         )
-        error.advice = remedy.advice
+        error.advice = remedy[1]
         return error
+
+    def _too_deep(self, body, what):
+        """SimulationDiverged of a body that has sunk too deep into another."""
+        if not values(self.run.state.tick):
+            words = "and the scene begins like this: move the bodies apart"
+            return self._error(body, what, (words, {}))
+        stiffness = self.run.model.materials.of_contacts("contact_stiffness")
+        firm = RAISED * float(np.broadcast_to(stiffness, self.run.model.body_count)[body])
+        firmer = _to_try("its contacts are too soft", "contact_stiffness", firm, "N/m")
+        return self._error(body, what, self._shorter_step(body) or firmer)
 
     def _beside(self, body):
         """Bodies that a body is tied to or near."""
@@ -157,45 +157,25 @@ class DivergenceCheck:
         near = pairs[(pairs == body).any(axis=1)].sum(axis=1) - body
         return [*(top.master[own] + top.slave[own] - body).tolist(), *near.tolist()]
 
-    def _of_speed(self, speed, near):
-        """For a body at a speed [m/s] beyond the bound of the scene."""
-        bound = RAISED * speed
-        words = f"the energy that it has was given to it: try a max_speed of {bound:.2g} m/s"
-        return self._of_step(near) or Remedy(words, {"max_speed": float(f"{bound:.2g}")})
-
-    def _of_overlap(self, near):
-        """For a body that has sunk too deep into one of those near it."""
-        if not values(self.run.state.tick):
-            return Remedy("and the scene begins like this: move the bodies apart", {})
-        model = self.run.model
-        stiffness = model.materials.of_contacts("contact_stiffness")
-        firm = RAISED * float(np.broadcast_to(stiffness, model.body_count)[near[0]])
-        words = f"its contacts are too soft: try a contact_stiffness of {firm:.2g} N/m"
-        return self._of_step(near) or Remedy(words, {"contact_stiffness": float(f"{firm:.2g}")})
-
-    def _of_energy(self, near):
-        """For the fastest body of a run in which energy came from nowhere."""
-        return self._of_step(near, to_blame=True) or Remedy("which nothing limits", {})
-
-    def _of_step(self, near, to_blame=False) -> Optional[Remedy]:
-        """A shorter step, or None where the step is not to blame.
+    def _shorter_step(self, body, to_blame=False):
+        """A shorter step as a remedy, or None where the step is not to blame.
 
         Runaways are often thrown by a neighbour of a shorter step, so the tightest limit counts.
         Control keeps bodies below their limits: there, and below half of them, a shorter step helps
         where the account of energy does not close.
         """
-        schedule, limits = self.run.schedule, self._limits()
+        schedule, limits, near = self.run.schedule, self._limits(), [body, *self._beside(body)]
         level = values(self.run.state.level)[near].max()
         taken = schedule.dt0 / 2.0 ** (int(level) if schedule.has_limits else 0)
         limit, cause, tight = min((limits[name][k], name, k) for name in limits for k in near)
-        whose = f"its {cause}" if tight == near[0] else f"the {cause} of body {tight} beside it"
+        whose = f"its {cause}" if tight == body else f"the {cause} of body {tight} beside it"
         bounded = np.isfinite(limit)
         words = f"{whose} allow {limit:.3g} s" if bounded else "which nothing near it limits"
         if bounded and taken > 0.5 * limit:
-            return _shorter_step(0.5 * limit, words)
+            return _to_try(words, "step", 0.5 * limit, "s")
         if to_blame or unexplained_share(self.energy_balance.account()) > CLOSED:
             words += ", but the account does not close"
-            return _shorter_step(0.5 * min(taken, limit), words)
+            return _to_try(words, "step", 0.5 * min(taken, limit), "s")
         return None
 
     def _limits(self):
@@ -222,6 +202,6 @@ class DivergenceCheck:
         return limits
 
 
-def _shorter_step(step, why):
-    """To try a step [s]; why: what allows no more, in words."""
-    return Remedy(f"{why}: try a step of {step:.2g} s", {"step": float(f"{step:.2g}")})
+def _to_try(why, name, value, unit):
+    """To try a number, as the end of a sentence that says why, and by its name."""
+    return f"{why}: try a {name} of {value:.2g} {unit}", {name: float(f"{value:.2g}")}

@@ -17,31 +17,15 @@ from taichi_dem.state.timeline import NEVER
 _EPSILON = np.finfo(np.float64).eps
 #: Terms of the account that pass through bonds; dashpots are compared with their sum.
 _THROUGH_BONDS = ("bond_strain", "bond_dashpot", "softening", "release", "slip")
-#: Events of each law in words, and the terms of the account that it books, by role.
+#: By role of each law: its events in words, the terms of the account that it books, and the name
+#: of the times at which it began on bodies.
 _LAWS = {
-    "bond": ("bonds damaged", ("softening", "release", "slip")),
-    "tension": ("bonds softened", ("softening", "release")),
-    "shear": ("bonds slipped", ("slip",)),
-    "dashpot": ("bonds damped", ("bond_dashpot",)),
-    "contact": ("bodies touched", ("sphere_dashpot", "sphere_strain")),
-    "friction": ("bodies rubbed", ("friction",)),
-}
-#: Names of the times at which laws began on bodies, by role.
-_TIMES = {
-    "bond": "damage",
-    "tension": "softening",
-    "shear": "slip",
-    "contact": "contact",
-    "friction": "friction",
-}
-#: Roles judged by whether they acted: a crack, slip, wall or sticking contact can decide the
-#: outcome at little energy.
-_STEERING = ("bond", "tension", "shear", "contact", "friction", "support", "ground")
-#: Roles that define the problem, so that they are kept whatever work they did.
-_POSED = {
-    "load": "a load is part of the question",
-    "support": "a support is part of the question",
-    "ground": "the ground is part of the question",
+    "bond": ("bonds damaged", ("softening", "release", "slip"), "damage"),
+    "tension": ("bonds softened", ("softening", "release"), "softening"),
+    "shear": ("bonds slipped", ("slip",), "slip"),
+    "dashpot": ("bonds damped", ("bond_dashpot",), ""),
+    "contact": ("bodies touched", ("sphere_dashpot", "sphere_strain"), "contact"),
+    "friction": ("bodies rubbed", ("friction",), "friction"),
 }
 _WITHOUT_WORK = ", and holds without doing work"
 _OWN = "the account need not show what an effect of your own does"
@@ -115,7 +99,7 @@ class _Uses:
 
     def of(self, effect):
         """The use of one effect."""
-        find = self._drive if effect.role in _POSED else self._law
+        find = self._law if effect.role in _LAWS else self._drive
         what, marks, energy, kept = find(effect)
         whole, total, events = "the energy put in", self.given, int(np.count_nonzero(marks))
         if effect.role == "dashpot":
@@ -130,7 +114,8 @@ class _Uses:
             energy_J=float(energy),
             share=float(energy / total) if total > 0.0 else 0.0,
             whole=whole,
-            steers=effect.role in _STEERING,
+            # A crack, slip, wall or sticking contact can decide the outcome at little energy.
+            steers=effect.role not in ("dashpot", "load"),
             kept=kept,
             rounding=effect.role == "dashpot" and energy > 0.0 and not events,
             **self._demanded(effect.role, events),
@@ -141,7 +126,7 @@ class _Uses:
 
     def _law(self, effect):
         """Events in words, where they were, the energy booked, and why it is kept in any case."""
-        what, terms = _LAWS[effect.role]
+        what, terms, _ = _LAWS[effect.role]
         roles = {one.role for one in self.run.model.effects if one.name}
         if effect.role == "shear" and "tension" not in roles:
             # A shear law may release bonds where no law of tension is listed.
@@ -152,8 +137,9 @@ class _Uses:
         return what, self.marks[effect.role], self._sum(terms), kept
 
     def _drive(self, effect):
-        """The same of a load, support or ground."""
-        model, kept = self.run.model, _POSED[effect.role]
+        """The same of a load, support or ground, kept whatever work it did."""
+        model, article = self.run.model, "the" if effect.role == "ground" else "a"
+        kept = f"{article} {effect.role} is part of the question"
         drives = *model.loads, *model.supports, *model.ground
         place = drives.index(effect)
         marks = self.bits & np.int64(1 << place)
@@ -170,7 +156,8 @@ class _Uses:
 
     def _demanded(self, role, events):
         """When and where an effect that acted on demand began, and its evaluations."""
-        found, times = {}, self.demand.since.get(_TIMES.get(role, ""), np.zeros(0))
+        found, name = {}, _LAWS[role][2] if role in _LAWS else ""
+        times = self.demand.since.get(name, np.zeros(0))
         if events and np.isfinite(times).any():
             first = int(np.nanargmin(times))
             found = {"since_s": float(times[first]), "where": f"body {first}"}

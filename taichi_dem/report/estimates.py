@@ -10,11 +10,13 @@ would hide what moves or breaks a small or slow one.
 import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
-from taichi_dem.mesh.parts import part_boxes, parts_of, parts_under
+from taichi_dem.kit.validation import instance, positive
+from taichi_dem.mesh.parts import may_meet, part_boxes, parts_of, parts_under
+from taichi_dem.scene import Scene
 from taichi_dem.state.model import Model
 
 NEGLIGIBLE, NEEDED, UNCLEAR = "negligible", "needed", "unclear"
@@ -24,8 +26,7 @@ _LOW, _HIGH = 0.05, 2.0
 AIR, WEIGHT = 1.2, 9.80665
 #: Groups in words.
 _OPENS = "stress over strength, as contact needs free faces"
-_BENDS = "stress of the weight over tensile strength, at most"
-_SHARE = "share of the energy put in, at most"
+BENDS = "stress of the weight over tensile strength, at most"
 
 
 @dataclass(frozen=True)
@@ -192,21 +193,38 @@ def _arms(model, group):
     return model.centre - (_sums(group, mass * model.centre) / _sums(group, mass))[group]
 
 
-def estimates_before(
-    model: Model,
-    until: float,
-    velocity: Optional[np.ndarray] = None,
-    meet: bool = False,
-) -> tuple[Estimate, ...]:
-    """Estimates of all effects of a scene before a run, by dimensionless groups.
+def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
+    """Estimates of which effects a scene needs, before a run.
 
-    until: end of the run [s]. velocity: of the bodies at the start [m/s], (body_count, 3), None at
-    rest. meet: whether parts may meet. The stress is that of the loads and supports on a part
-    (``Effect.stress``) and of the motion at the start, of all parts where they may meet; the speed
-    is that of a wave of this stress, stress / (density wave speed), or the largest at the start, of
-    the part alone. Of several materials the least strengths and the largest friction count.
+    Parameters
+    ----------
+    scene : Scene
+        Scene.
+    until : float
+        End of the run [s].
+
+    Returns
+    -------
+    tuple of Estimate
+        For each effect a dimensionless group that compares it with what it acts beside, and the
+        verdict negligible, needed or unclear. Print them.
+
+    Raises
+    ------
+    InputError
+        The argument is no Scene, or the time is not positive.
+
+    Notes
+    -----
+    The stress is that of the loads and supports on a part (``Effect.stress``) and of the motion at
+    the start, of all parts where they may meet; the speed is that of a wave of this stress, stress
+    / (density wave speed), or the largest at the start, of the part alone. Of several materials the
+    least strengths and the largest friction count.
     """
-    part = parts_of(model.mesh)
+    instance("scene", scene, Scene)
+    until, part = positive("until", until), parts_of(scene.mesh)
+    model = Model(scene.mesh, scene.body_materials, scene.effects)
+    velocity, meet = scene.initial_motion.get("velocity"), may_meet(scene, part)
     scales = PartScales(model, part)
     beside, rim, fastest = _speeds(model, velocity, part)
     # An unknown load is NaN, and with it all that follows.
@@ -231,7 +249,7 @@ def estimates_before(
     borne = scales.under((*model.supports, *model.ground))
     fall = WEIGHT * until / np.maximum(speed, 1e-300)
     fall = np.where(speed == 0.0, np.where(borne, 0.0, np.nan if meet else fall), fall)
-    bends = scales.bent(until, borne | meet), _BENDS
+    bends = scales.bent(until, borne | meet), BENDS
     drag = AIR * speed * until / (scales.density * scales.spacing)
     return (
         worst("softening", (softening, "stress over tensile strength")),
@@ -264,37 +282,3 @@ def _speeds(model, velocity, group):
     # Rounding of a rigid motion strains nothing.
     found[0][found[0] <= 1e-9 * found[2]] = 0.0
     return found
-
-
-def estimates_after(
-    scales: PartScales,
-    displacement: np.ndarray,
-    speed: np.ndarray,
-    until: float,
-    energy: np.ndarray,
-    borne: np.ndarray,
-) -> tuple[Estimate, ...]:
-    """Estimates of what no law of a scene serves, from where a run has brought the bodies.
-
-    displacement (n, 3) [m], speed (n,) [m/s]: of the bodies. energy: that each part got [J], 0
-    where nothing moved it; borne: whether a support, ground or contact bears it. Shares of this
-    energy: work of the weight along the way and its fall, and of the drag of air on balls of the
-    bodies' size at their present speed. Where a part is borne, weight strains it too.
-    """
-    model, way, found = scales.model, np.linalg.norm(displacement, axis=1), []
-    if not any(effect.name == "gravity" for effect in model.loads):
-        fall = WEIGHT * until
-        work = model.body_mass * (WEIGHT * way + fall * speed + 0.5 * fall**2)
-        share = _share(scales.sum(work), energy)
-        # What is borne and not moved at all does not fall.
-        share = np.where(borne & (energy == 0.0), 0.0, share)
-        groups = (share, _SHARE), (scales.bent(until, borne), _BENDS)
-        found.append(scales.worst("gravity", *groups))
-    drag = 0.5 * AIR * math.pi * model.body_radius**2 * speed**2
-    return (*found, scales.worst("air drag", (_share(scales.sum(drag * way), energy), _SHARE)))
-
-
-def _share(work, energy):
-    """Share of an energy; not known where there is none."""
-    none = np.where(work > 0.0, np.nan, 0.0)
-    return np.where(energy > 0.0, work / np.where(energy > 0.0, energy, 1.0), none)

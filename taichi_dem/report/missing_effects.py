@@ -1,8 +1,6 @@
 """Effects that a scene left out and that would have acted in the run."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -134,11 +132,11 @@ class MissingEffects(Kept):
         self.volume.sample(time_s)
         if "dashpot" in self.needs and len(self.strain):
             self.strain = np.maximum(self.strain, self.run.readings.bonds()[:, 0])
-        looks: dict[str, Callable[[], np.ndarray]] = {
+        looks = {
             "contact": self._pressed,
             "friction": self._touching,
-            "creep": partial(self.creep.sample, time_s),
-            "bodies": partial(self._within, self.volume),
+            "creep": lambda: self.creep.sample(time_s),
+            "bodies": lambda: self._within(self.volume),
         }
         for name in looks.keys() & self.needs.keys():
             self._see(self.found, name, looks[name](), time_s)

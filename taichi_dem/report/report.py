@@ -212,50 +212,41 @@ class Report:
         figures["acted"] = figures.pop("effect_activity")
         figures["missed"] = figures.pop("missing_effects")
         figures["certificate"] = self.certificate and self.certificate.as_dict()
-        gains = "ideal_gain", "boundary_gain"
-        derived = ("contact_evaluations", *gains, "energy_residual_fraction", "needs")
-        return {**figures, **{name: getattr(self, name) for name in derived}}
-
-    def _gain(self):
-        """Gain from steps of different length, where there are any."""
-        if self.body_updates == self.body_count * self.substeps:
-            return
-        ideal, reached = f"{self.ideal_gain:.2f}", f"{self.boundary_gain:.2f}"
-        yield f"{ideal} ideal, {reached} with pairs at the finer step"
-
-    def _sweeps(self):
-        """Sweeps over all dashpots, for methods that solve them."""
-        if self.sweeps:
-            words = f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"
-            yield f"{words}, {self.unconverged_steps:,} substeps unconverged"
+        derived = "contact_evaluations ideal_gain boundary_gain energy_residual_fraction needs"
+        return {**figures, **{name: getattr(self, name) for name in derived.split()}}
 
     def _rows(self):
-        """Names, and the lines of each."""
+        """Names, and the lines of each; none for what there is nothing to say of."""
+        varies = self.body_updates != self.body_count * self.substeps
+        gain = f"{self.ideal_gain:.2f} ideal, {self.boundary_gain:.2f} with pairs at the finer step"
+        swept = f"{self.sweeps:,}, {self.sweeps / max(1, self.substeps):.2f} a substep"
+        unconverged = f"{self.unconverged_steps:,} substeps unconverged"
         bound = ((name.replace("_", " "), n) for name, n in self.bound_by.items())
         broken = f"{self.broken_faces} of {self.bond_count} bonds broken"
         counted = f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs"
         momentum = f"{self.linear_momentum_error:.1e} linear, {self.angular_momentum_error:.1e}"
         run = f"{self.run_seconds:.1f} s run ({self.run_cpu_seconds:.1f} s of CPU)"
+        left_out = self.certificate.left_out_lines() if self.certificate else ()
         return {
-            "method": [f"{self.method}, {self.driver} driver"],
-            "effects": [f"{use.effect}: {use}" for use in self.effect_activity] or ["none"],
-            "simulated": [f"{self.until_s:.4g} s, {broken}"],
-            "smallest step": [f"{self.smallest_step_s:.3g} s"],
-            "steps bound by": [", ".join(f"{name} ({n} bodies)" for name, n in bound)],
-            "substeps": [f"{self.substeps:,}"],
-            "evaluations": [f"{counted}, {self.body_updates:,} bodies"],
-            "largest bond slip": [slip.figure for slip in self.bond_slip],
-            "gain over uniform": self._gain(),
-            "sweeps": self._sweeps(),
-            "contact searches": [f"{self.searches:,}"],
-            "interpenetration": [str(self.interpenetration or "not looked for")],
-            "work put in": [f"{self.work_put_in:.6g} J"],
-            "energy residual": [self.unexplained],
-            "injected": [self.injected] if self.injected else (),
-            "known of the error": self.known_error.split("; ") if self.known_error else (),
-            "certificate": self.certificate.left_out_lines() if self.certificate else (),
-            "momentum error": [f"{momentum} angular"],
-            "time": [f"{self.compile_seconds:.1f} s before the first step, {run}"],
+            "method": f"{self.method}, {self.driver} driver",
+            "effects": "\n".join(f"{use.effect}: {use}" for use in self.effect_activity) or "none",
+            "simulated": f"{self.until_s:.4g} s, {broken}",
+            "smallest step": f"{self.smallest_step_s:.3g} s",
+            "steps bound by": ", ".join(f"{name} ({n} bodies)" for name, n in bound),
+            "substeps": f"{self.substeps:,}",
+            "evaluations": f"{counted}, {self.body_updates:,} bodies",
+            "largest bond slip": "\n".join(slip.figure for slip in self.bond_slip),
+            "gain over uniform": gain if varies else "",
+            "sweeps": f"{swept}, {unconverged}" if self.sweeps else "",
+            "contact searches": f"{self.searches:,}",
+            "interpenetration": str(self.interpenetration or "not looked for"),
+            "work put in": f"{self.work_put_in:.6g} J",
+            "energy residual": self.unexplained,
+            "injected": self.injected,
+            "known of the error": self.known_error.replace("; ", "\n"),
+            "certificate": "\n".join(left_out),
+            "momentum error": f"{momentum} angular",
+            "time": f"{self.compile_seconds:.1f} s before the first step, {run}",
         }
 
     def __str__(self):
@@ -263,7 +254,7 @@ class Report:
         lines = [
             f"{'' if k else name:18s} {text}"
             for name, texts in self._rows().items()
-            for k, text in enumerate(texts)
+            for k, text in enumerate(texts.splitlines())
         ]
         return "\n".join([*lines, *(f"warning: {need}" for need in self.needs)])
 

@@ -24,6 +24,19 @@ MOST_OPENING = 1.25
 #: Sphere dashpots of a pair take c n dt / m of the speed at which the bodies part or meet; above 1
 #: they reverse it, and throw apart bodies that the springs should part gently.
 MOST_TAKEN = 1.0
+#: Largest values for which the step is short enough, with their sentences: less shares of bonds,
+#: openings at failure, less shares of sphere dashpots, and parts of a speed that these take.
+_ALLOWED = -LEAST_SHARE, MOST_OPENING, -LEAST_SHARE, MOST_TAKEN
+_TOO_LONG = (
+    "the dashpots of {count} bonds, and limits them to less than half, bond {worst} to "
+    "{percent:.2g} %: these bonds give way too fast",
+    "{count} bonds that failed late, bond {worst} at {value:.2g} times its failure "
+    "opening: their dashpots took energy for too long",
+    "the sphere dashpots of {count} bodies, and limits them to less than half, those "
+    "of body {worst} to {percent:.2g} %: what is pressed together parts too fast",
+    "the sphere dashpots of {count} bodies: those of body {worst} take {value:.2g} of "
+    "a speed in one step, and throw bodies apart that they should stop",
+)
 
 
 @dataclass(frozen=True)
@@ -103,53 +116,26 @@ class StepResolution(Kept):
 
     def _note_partners(self, contacts):
         """Remember steps and light partners: few contacts last until a recording."""
-        step = self.run.schedule.dt0 / 2.0 ** values(
-            self.run.state.level, slice(self.run.model.body_count)
-        )
-        self.step, mass = np.minimum(self.step, step), self.run.model.body_mass
+        mass = self.run.model.body_mass
+        level = values(self.run.state.level, slice(len(mass)))
+        self.step = np.minimum(self.step, self.run.schedule.dt0 / 2.0**level)
         pairs, _, _ = contacts.store.near_table()
         for one, other in (pairs.T, pairs.T[::-1]):
             np.minimum.at(self.lightest, one, mass[other])
 
     def findings(self) -> tuple[str, ...]:
         """Sentences about dashpots and failures that the step did not resolve; may be empty."""
-        share, late, pair_share = self.share, self._openings_at_failure(), self._contact_shares()
-        return (
-            *_too_long(
-                share < LEAST_SHARE,
-                -share,
-                "the dashpots of {count} bonds, and limits them to less than half, bond {worst} to "
-                "{percent:.2g} %: these bonds give way too fast",
-            ),
-            *_too_long(
-                late > MOST_OPENING,
-                late,
-                "{count} bonds that failed late, bond {worst} at {value:.2g} times its failure "
-                "opening: their dashpots took energy for too long",
-            ),
-            *_too_long(
-                pair_share < LEAST_SHARE,
-                -pair_share,
-                "the sphere dashpots of {count} bodies, and limits them to less than half, those "
-                "of body {worst} to {percent:.2g} %: what is pressed together parts too fast",
-            ),
-            *_too_long(
-                self.taken > MOST_TAKEN,
-                self.taken,
-                "the sphere dashpots of {count} bodies: those of body {worst} take {value:.2g} of "
-                "a speed in one step, and throw bodies apart that they should stop",
-            ),
-            *self._sweeps(),
-            *self._levels(),
-        )
+        worse = -self.share, self._openings_at_failure(), -self._contact_shares(), self.taken
+        found = (_too_long(*look) for look in zip(worse, _ALLOWED, _TOO_LONG))
+        return tuple(filter(None, (*found, self._sweeps(), self._levels())))
 
     def _levels(self):
         if not values(self.run.schedule.undivided):
-            return ()
+            return ""
         least = self.run.schedule.dt0 / 2.0**MAX_LEVEL
         return (
             f"the shortest step of all, {least:.3g} s or 2^-{MAX_LEVEL} of the largest, was "
-            "reached: steps are not divided further; take a shorter largest step",
+            "reached: steps are not divided further; take a shorter largest step"
         )
 
     @property
@@ -166,12 +152,12 @@ class StepResolution(Kept):
     def _sweeps(self):
         (steps, worst), solver = self.unconverged, self.run.advance.solver
         if not steps:
-            return ()
+            return ""
         allowed = float(values(solver.tolerance))
         return (
             f"the dashpots of {steps} steps were not solved: sweeps ended with changes of up to "
             f"{100 * worst:.2g} % of the largest speed, where {100 * allowed:.2g} % is asked; "
-            f"allow more sweeps than {int(solver.bounds[1])}, or take a shorter step",
+            f"allow more sweeps than {int(solver.bounds[1])}, or take a shorter step"
         )
 
     def _contact_shares(self):
@@ -199,11 +185,11 @@ class StepResolution(Kept):
         return np.where(self.run.state.broken(), widest / opening, 0.0)
 
 
-def _too_long(wrong, values, words):
-    """Sentence about the places where a step is too long, with the worst; or none."""
-    if not wrong.any():
-        return ()
+def _too_long(values, allowed, words):
+    """Sentence about the places where values are beyond what is allowed, with the worst; or ""."""
+    count = (values > allowed).sum()
+    if not count:
+        return ""
     worst = int(np.argmax(values))
     figures = {"value": abs(values[worst]), "percent": 100 * abs(values[worst])}
-    told = words.format(count=wrong.sum(), worst=worst, **figures)
-    return (f"the step is too long for {told}",)
+    return f"the step is too long for {words.format(count=count, worst=worst, **figures)}"

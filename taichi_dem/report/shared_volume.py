@@ -83,10 +83,10 @@ class SharedVolume(Kept):
         share, first, second, time_s, deep = self.figures.tolist()
         return Interpenetration(share, (int(first), int(second)), time_s, int(deep))
 
-    def sample(self, time_s: float, finished: bool = False) -> bool:
-        """Compare the bodies where one has moved, or at the end; whether they were compared."""
+    def sample(self, time_s: float, finished: bool = False) -> None:
+        """Compare the bodies where one has moved, or at the end."""
         if self._way() <= (0.0 if finished else MOVED):
-            return False
+            return
         self.place, self.turn = self._now()
         self._compare(self.corners())
         share = self.share.max(initial=0.0)
@@ -95,7 +95,6 @@ class SharedVolume(Kept):
             figures[:4] = share, *self.pairs[self.share.argmax()], time_s
         figures[4] = max(figures[4], (self.share > DEEP).sum())
         self.figures = figures
-        return True
 
     def _way(self):
         """Longest way of a body since the last look, as a share of its radius."""
@@ -107,8 +106,7 @@ class SharedVolume(Kept):
 
     def _now(self):
         """Positions [m] and rotations of the bodies."""
-        state, count = self.run.state, self.run.model.body_count
-        here = slice(count)
+        state, here = self.run.state, slice(self.run.model.body_count)
         return values(state.position, here), values(state.rotation, here)
 
     def corners(self, bodies: Any = slice(None)) -> np.ndarray:
@@ -139,20 +137,22 @@ class SharedVolume(Kept):
         free = np.append(self.run.state.broken(), True)[top.body_bond]
         surface = np.flatnonzero(free.any(axis=1))
         other = np.append(top.master + top.slave, 0)[top.body_bond]
-        tied = np.where(free, -1, other - np.arange(len(free))[:, None]).astype(np.int32)
+        tied = np.where(free, -1, other - np.arange(len(free))[:, None])
         order, last = _in_rows(corners[surface])
         body = surface[order].astype(np.int32)
         own = np.ascontiguousarray(corners[body])
-        box = np.concatenate([own.min(axis=1), own.max(axis=1)], axis=1)
+        box = np.stack([own.min(axis=1), own.max(axis=1)], axis=1)
         mass, count = np.ascontiguousarray(self.run.model.body_mass[body]), np.ones(1, np.int32)
         found = np.zeros((0, 3))
         while count[0] > len(found):
             found, count = np.zeros((max(_ROOM, count[0]), 3)), np.zeros(1, np.int32)
-            _find_pairs(last, box, own, body, tied[body], mass, *self.points, found, count)
+            _find_pairs(last, box, own, mass, *self.points, found, count)
         found = found[: count[0]]
-        found = found[np.lexsort(found[:, [1, 0]].T)]
-        self.pairs = np.sort(body[found[:, :2].astype(np.int32)], axis=1)
-        self.share = found[:, 2]
+        pairs = body[found[:, :2].astype(np.int32)]
+        strangers = (tied[pairs[:, 0]] != pairs[:, 1:]).all(axis=1)
+        order = np.lexsort(found[strangers][:, [1, 0]].T)
+        self.pairs = np.sort(pairs[strangers][order], axis=1)
+        self.share = found[strangers][order, 2]
 
 
 def _in_rows(corners):
@@ -166,10 +166,8 @@ def _in_rows(corners):
 @ti.kernel
 def _find_pairs(
     last: ti.types.ndarray(dtype=ti.i32, ndim=1),
-    box: ti.types.ndarray(dtype=ti.f64, ndim=2),
-    corners: ti.types.ndarray(dtype=ti.f64, ndim=3),
-    body: ti.types.ndarray(dtype=ti.i32, ndim=1),
-    tied: ti.types.ndarray(dtype=ti.i32, ndim=2),
+    box: ti.types.ndarray(dtype=vec3, ndim=2),
+    corners: ti.types.ndarray(dtype=vec3, ndim=2),
     mass: ti.types.ndarray(dtype=ti.f64, ndim=1),
     few: ti.types.ndarray(dtype=ti.f64, ndim=2),
     many: ti.types.ndarray(dtype=ti.f64, ndim=2),
@@ -179,7 +177,7 @@ def _find_pairs(
     """Count and write pairs of bodies that share volume, as far as there is room, in any order."""
     for i in range(last.shape[0]):
         for j in range(i + 1, last[i]):
-            if _boxes_meet(box, i, j) == 1 and _strangers(tied, body, i, j) == 1:
+            if (box[i, 0] < box[j, 1]).all() and (box[j, 0] < box[i, 1]).all():
                 small, large = i, j
                 if mass[i] > mass[j]:
                     small, large = j, i
@@ -193,40 +191,14 @@ def _find_pairs(
 
 
 @ti.func
-def _boxes_meet(box: ti.template(), i, j):
-    """1 where the boxes around two bodies overlap."""
-    meet = 1
-    for k in ti.static(range(3)):
-        meet *= ti.cast(box[i, k] < box[j, 3 + k] and box[j, k] < box[i, 3 + k], ti.i32)
-    return meet
-
-
-@ti.func
-def _strangers(tied: ti.template(), body: ti.template(), i, j):
-    """1 for bodies that no bond holds together."""
-    strangers = 1
-    for f in ti.static(range(4)):
-        strangers *= ti.cast(tied[i, f] != body[j], ti.i32)
-    return strangers
-
-
-@ti.func
-def _corner(corners: ti.template(), i, c):
-    return vec3(corners[i, c, 0], corners[i, c, 1], corners[i, c, 2])
-
-
-@ti.func
 def _planes(corners: ti.template(), i):
     """Planes of the faces, each opposite a corner: inward normal, 1 at the corner, and offset."""
     planes = ti.Matrix.zero(ti.f64, 4, 4)
     for f in ti.static(range(4)):
-        base = _corner(corners, i, (f + 1) % 4)
-        second, third = _corner(corners, i, (f + 2) % 4), _corner(corners, i, (f + 3) % 4)
-        normal = (second - base).cross(third - base)
-        normal /= normal.dot(_corner(corners, i, f) - base)
-        for k in ti.static(range(3)):
-            planes[f, k] = normal[k]
-        planes[f, 3] = -normal.dot(base)
+        base = corners[i, (f + 1) % 4]
+        normal = (corners[i, (f + 2) % 4] - base).cross(corners[i, (f + 3) % 4] - base)
+        normal /= normal.dot(corners[i, f] - base)
+        planes[f, :3], planes[f, 3] = normal, -normal.dot(base)
     return planes
 
 
@@ -237,9 +209,8 @@ def _share(planes: ti.template(), corners: ti.template(), i, points: ti.template
     for m in range(points.shape[0]):
         point, inside = vec3(0.0), 1
         for c in ti.static(range(4)):
-            point += points[m, c] * _corner(corners, i, c)
+            point += points[m, c] * corners[i, c]
         for f in ti.static(range(4)):
-            height = vec3(planes[f, 0], planes[f, 1], planes[f, 2]).dot(point) + planes[f, 3]
-            inside &= ti.cast(height > 0.0, ti.i32)
+            inside &= ti.cast(planes[f, :3].dot(point) + planes[f, 3] > 0.0, ti.i32)
         count += inside
     return count / ti.cast(points.shape[0], ti.f64)
