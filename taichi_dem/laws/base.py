@@ -11,7 +11,7 @@ contact spheres, loads push bodies, supports hold them, ground drags on them. Ro
 import copy
 import re
 from collections.abc import Sequence
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -234,16 +234,15 @@ class Effect(Sealed):
         """
         return (-np.inf,) * 3, (np.inf,) * 3
 
-    def stand_for(self, given: Optional["Effect"]) -> None:
+    def stand_for(self, given: "Effect") -> None:
         """Take the attributes of this bound effect from an effect of a scene.
 
         Parameters
         ----------
-        given : 'Effect' or None
-            Effect of the scene; None changes nothing.
+        given : Effect
+            Effect of the scene.
         """
-        if given is not None:
-            self.__dict__["_given"] = vars(given)
+        self.__dict__["_given"] = vars(given)
 
     @property
     def stands_silent(self) -> bool:
@@ -264,7 +263,7 @@ class Effect(Sealed):
             assign(self.law, _numbers_of(self, model.materials))
         self.load(model)
 
-    def accepts(self, given: Optional["Effect"]) -> bool:
+    def accepts(self, given: "Effect") -> bool:
         """Whether kernels compiled for this effect are valid for an effect of a scene.
 
         They are, unless they contain an attribute of it, read in a kernel, that has another value,
@@ -272,7 +271,7 @@ class Effect(Sealed):
 
         Parameters
         ----------
-        given : 'Effect' or None
+        given : Effect
             Effect of the scene.
 
         Returns
@@ -280,8 +279,6 @@ class Effect(Sealed):
         bool
             True where they are valid.
         """
-        if given is None:
-            return True
         same = (_same(vars(given).get(name), value) for name, value in self._frozen.items())
         return _count_of(given) == self._count and all(same)
 
@@ -461,13 +458,3 @@ ABSENT: dict[str, Any] = {
     "dashpot": NoDashpot,
     "friction": NoFriction,
 }
-
-__all__ = [
-    "ABSENT",
-    "HARMLESS",
-    "NEAR",
-    "Effect",
-    "Travel",
-    "along",
-    "bound",
-]

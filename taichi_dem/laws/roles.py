@@ -358,17 +358,15 @@ def check_effect(effect: Any) -> None:
         raise InputError(
             f"role of effect {kind} must be one of {', '.join(CONTRACTS)}, got {effect.role!r}"
         )
-    wanted = members_of(CONTRACTS[effect.role])
-    for name, contract in FURTHER.items():
-        if getattr(effect, name, False):
-            wanted += members_of(contract)
+    further = [contract for name, contract in FURTHER.items() if getattr(effect, name, False)]
+    contracts = CONTRACTS[effect.role], *further
+    wanted = [name for contract in contracts for name in members_of(contract)]
     missing = [name for name in wanted if not hasattr(type(effect), name)]
     if missing:
         raise InputError(
             f"effect {kind} must have a member {missing[0]}, as its role {effect.role} asks for "
             f"{', '.join(wanted)}"
         )
-    further = [contract for name, contract in FURTHER.items() if getattr(effect, name, False)]
-    for contract in (CONTRACTS[effect.role], *further):
+    for contract in contracts:
         for name in members_of(contract):
             _check_parameters(type(effect), contract, name)

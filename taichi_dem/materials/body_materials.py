@@ -161,10 +161,6 @@ class BodyMaterials:
         """Whether contacts of every material with friction have dashpots."""
         return all(each.has_contact_damping for each in self.materials if each.friction > 0.0)
 
-    def least(self, name: str) -> float:
-        """Least value of a strength or of the fracture energy, by the name of the constant."""
-        return min(getattr(material, name) for material in self.materials)
-
     def of_links(self, bodies: np.ndarray, value: Callable[[Material], float]) -> Any:
         """A number of what joins two bodies, for pairs of them (n, 2): an array (n,).
 
@@ -283,8 +279,3 @@ def _without_unused(mesh, kinds, of_body):
     place = np.full(len(kinds), -1, dtype=np.int32)
     place[used] = np.arange(len(used))
     return BodyMaterials(mesh, tuple(kinds[k] for k in used), place[of_body])
-
-
-def laid_out(mesh: Mesh, material: AnyMaterial) -> BodyMaterials:
-    """Materials of the bodies of a mesh, from one for all of them or as they are."""
-    return material if isinstance(material, BodyMaterials) else body_materials(mesh, material)

@@ -129,12 +129,9 @@ class Tables:
         return MOST * self.material[i] + self.material[j]
 
     def matched(self, model: Model) -> list[tuple[Any, Any]]:
-        """Pairs of an effect bound here and the corresponding one of a model.
-
-        The latter is None for a null object.
-        """
-        listed = {role: iter(effects) for role, effects in model.by_role.items()}
-        return [(effect, next(listed[effect.role], None)) for effect in self.effects]
+        """Pairs of an effect bound here and the corresponding one of a model; no null objects."""
+        bound = {role: iter([e for e in self.effects if e.role == role]) for role in ROLES}
+        return [(next(bound[given.role]), given) for given in model.effects]
 
     def _load_bonds(self, model):
         bonds = model.bonds
