@@ -1,7 +1,6 @@
 """The engine of a blast: all fields and kernels of one structure, which runs any scene of it."""
 
 from collections.abc import Iterable
-from functools import partial
 
 import numpy as np
 import taichi as ti
@@ -61,8 +60,8 @@ class BlastEngine(Engine):
         capacity = Capacity(*self.capacity)
         capacity.check()
         method = self.structure.method
-        bind = partial(bound_by_role, self.structure.effects)
-        self.tables = Tables(capacity, bind, self.structure.on_demand)
+        self.tables = Tables(capacity, self.structure.on_demand)
+        self.tables.take(*bound_by_role(self.structure.effects, self.tables))
         self.state = State(self.tables)
         self.contacts = Contacts(self.tables, self.state) if self.tables.has_contact else None
         self.schedule = self._schedule(method)

@@ -161,9 +161,6 @@ class _Explicit:
             positive("distance", self.distance)
         choice("neighbour", self.neighbour, NEIGHBOURS)
         choice("dashpot", self.dashpot, DASHPOTS)
-        self._check_control()
-
-    def _check_control(self):
         rule = self.control
         if rule is not None and not isinstance(rule, StepControl):
             raise InputError(f"control must be a StepControl or None, got {shown(rule)}")

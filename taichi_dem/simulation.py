@@ -112,7 +112,8 @@ class Simulation(Uncopied):
         structure = Structure(scene.effects, method, scene.on_demand)
         self._engine = ENGINES.borrow(structure, capacity_of(self.model), self.model, self)
         self._load()
-        self.driver = self._driver(name)
+        drivers = self.engine.drivers
+        self.driver = AutoDriver(self.step, drivers) if name == MEASURED else drivers[name]
         self.compile_seconds = time.perf_counter() - started
 
     def __repr__(self):
@@ -173,20 +174,6 @@ class Simulation(Uncopied):
         yield
         self.cut_short = ""
 
-    def _check_whole(self):
-        """Raise InputError where something was interrupted that cannot be gone on with."""
-        self._engine.check(self)
-        if self.cut_short:
-            raise InputError(
-                f"this simulation was interrupted while {self.cut_short}, and cannot be gone on "
-                "with: reset it, or make a new one"
-            )
-
-    def _driver(self, name):
-        """Driver of the engine, or one that measures both."""
-        drivers = self.engine.drivers
-        return AutoDriver(self.step, drivers) if name == MEASURED else drivers[name]
-
     def reset(self, scene: Optional[Scene] = None, method: Optional[Method] = None) -> None:
         """Begin again at time zero as the scene says, optionally with another scene or method.
 
@@ -240,8 +227,13 @@ class Simulation(Uncopied):
         InputError
             The simulation was interrupted before.
         """
-        self._check_whole()
-        if self.energy_balance is not None:
+        opened = self.energy_balance is not None
+        if self.cut_short:
+            raise InputError(
+                f"this simulation was interrupted while {self.cut_short}, and cannot be gone on "
+                "with: reset it, or make a new one"
+            )
+        if opened:
             return
         started = time.perf_counter()
         compiling("time step", 0.2)

@@ -52,7 +52,13 @@ class BondLaw(Protocol):
 
 
 class TensionLaw(Protocol):
-    """Normal law of a bond's contact units, for itself; role "tension"."""
+    """Normal law of a bond's contact units, for itself; role "tension".
+
+    For effects="auto" it also says in words when it acts, ``activation``, as laws of contact,
+    friction and damping do, and by ``begins(m, stiffness, opening)`` where a unit that it never
+    changed comes near its limit: below, the traction must be stiffness times opening, and nothing
+    else may happen. A shear law has ``begins(m, stiffness, sliding, pressure)``.
+    """
 
     def traction(self, m: int, stiffness: float, u: int, opening: float) -> float:
         """Traction [Pa] at a normal opening [m]."""
@@ -245,21 +251,6 @@ class Ground(Protocol):
         """Force [N] and moment [N m] by which the ground resists velocity and spin, a ``Block``.
 
         World axes, about the centre, positive semidefinite.
-        """
-
-
-class Activation(Protocol):
-    """Rule by which effects="auto" knows where a law of bonds need not be evaluated.
-
-    Kept by laws of the roles tension and shear, beside ``activation``, the rule in words, which
-    laws of contact, friction and damping have too.
-    """
-
-    def begins(self, m: int, stiffness: float, *state: Any) -> int:
-        """Nonzero where a unit that the law never changed comes near its limit.
-
-        Below, the traction must be stiffness times opening, and nothing else may happen. state: of
-        a normal law the opening [m], of a shear law the sliding [m] and the pressure [Pa].
         """
 
 

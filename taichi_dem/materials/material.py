@@ -31,8 +31,8 @@ _QUANTITIES = {
 _MAY_BE_ZERO = frozenset(
     {"normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"}
 )
-#: Kind of rule that may stand for a number, by field.
-_RULES: dict[str, type] = {
+#: Kind of rule that may stand for a number, by field; what joins two materials is in series there.
+RULES: dict[str, type] = {
     **dict.fromkeys(
         ("normal_stiffness", "shear_stiffness", "normal_damping", "shear_damping"), BondRule
     ),
@@ -101,7 +101,7 @@ class Material:
         plain_fields(self)
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if not isinstance(value, _RULES.get(field.name, ())):
+            if not isinstance(value, RULES.get(field.name, ())):
                 _check_number(field.name, value)
             if field.name in _QUANTITIES:
                 in_unit(field.name, value, _QUANTITIES[field.name])

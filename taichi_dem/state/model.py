@@ -61,14 +61,22 @@ class Model:
     def harmless(self, effect: Any) -> "Model":
         """A copy with the materials with which an effect never acts."""
         made = copy.copy(self)
-        made.materials = self.materials.changed(effect.harmless)
+        laid = self.materials
+        changed = tuple(map(effect.harmless, laid.materials))
+        made.materials = BodyMaterials(laid.mesh, changed, laid.of_body)
         made.material = made.materials.pairs[0][0]
         return made
 
     def of_bonds(self, value: Callable[[Material], float]) -> Any:
-        """A number of what joins the bodies of each bond, an array (n,), or one for all."""
-        links = np.stack([self.topology.master, self.topology.slave], axis=1)
-        return self.materials.of_links(links, value)
+        """A number of what joins the bodies of each bond, an array (n,), or one for all.
+
+        value: of a material, as ``lambda material: material.cohesion``.
+        """
+        if self.materials.is_one:
+            return value(self.material)
+        table = np.array([[value(pair) for pair in row] for row in self.materials.pairs])
+        kinds, top = self.materials.of_body, self.topology
+        return table[kinds[top.master], kinds[top.slave]]
 
     @property
     def effects(self) -> tuple:
