@@ -192,9 +192,8 @@ class Simulation(Uncopied):
         scene = self.scene if scene is None else instance("scene", scene, Scene)
         method = self.method if method is None else method
         check_method(method)
-        model = self.model
-        if scene is not self.scene:
-            model = Model(scene.mesh, scene.body_materials, scene.effects)
+        same = scene is self.scene
+        model = self.model if same else Model(scene.mesh, scene.body_materials, scene.effects)
         self._check_reset(scene, method, model)
         self.scene, self.method, self.model = scene, method, model
         self._load()

@@ -13,6 +13,7 @@ from taichi_dem.kit.fixed_order import length, product, transposed
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import AnyMaterial, BodyMaterials, body_materials
 from taichi_dem.materials.bond_rules import per_bond
+from taichi_dem.materials.material import harmless
 from taichi_dem.mesh.colouring import edge_colours
 from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh
@@ -58,11 +59,11 @@ class Model:
         bodies, bonds = counted(self.body_count, "body"), counted(self.bond_count, "bond")
         return in_brief(self, bodies, bonds, *(effect.name for effect in self.effects))
 
-    def harmless(self, effect: Any) -> "Model":
-        """A copy with the materials with which an effect never acts."""
+    def harmless(self) -> "Model":
+        """A copy with the materials with which silent effects never act."""
         made = copy.copy(self)
         laid = self.materials
-        changed = tuple(map(effect.harmless, laid.materials))
+        changed = tuple(map(harmless, laid.materials))
         made.materials = BodyMaterials(laid.mesh, changed, laid.of_body)
         made.material = made.materials.pairs[0][0]
         return made
@@ -91,8 +92,8 @@ class Model:
     @cached_property
     def dashpot_rates(self) -> np.ndarray:
         """Rate of the dashpots of every body for each subset of its bonds [1/s], (n, 16)."""
-        silent = [effect for effect in self.by_role["dashpot"] if effect.is_silent]
-        acting = self.harmless(silent[0]) if silent else self
+        silent = any(effect.is_silent for effect in self.by_role["dashpot"])
+        acting = self.harmless() if silent else self
         return self._subset_rates(dashpots_of(acting.materials))
 
     @cached_property
