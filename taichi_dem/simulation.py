@@ -39,7 +39,7 @@ from taichi_dem.step.advance import Advance
 from taichi_dem.step.auto_driver import MEASURED, AutoDriver, driver_name
 from taichi_dem.step.drivers import DRIVERS, Step
 from taichi_dem.step.multirate.schedule import Schedule
-from taichi_dem.step_control import counted_criteria
+from taichi_dem.step_control import CRITERIA
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
@@ -427,6 +427,7 @@ class Simulation(Uncopied):
         linear, angular = self.energy_balance.momentum_errors()
         tables = self.energy_balance.tables()
         account = self.energy_balance.account(tables)
+        bound = np.bincount(values(self.state.bound, here), minlength=len(CRITERIA))
         unconverged, worst = self.step_resolution.unconverged
         report = Report(
             method=self.method.name,
@@ -460,7 +461,7 @@ class Simulation(Uncopied):
                 *open_account(account, self.divergence_check.round_off()),
             ),
             interpenetration=shared_volume.worst,
-            bound_by=counted_criteria(values(self.state.bound, here)),
+            bound_by={name: n for name, n in zip(CRITERIA, bound.tolist()) if n},
             bond_slip=self.step_resolution.bond_slip(),
             round_off_J=self.divergence_check.round_off(),
         )

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, Optional
 
 import numpy as np
@@ -86,10 +86,9 @@ class Search:
             np.array(values), clusters, range(len(values)), self._step().error, 1.0
         )
         words = sentence(branches, made.unit, "run", "that differ by one rounding came to {} ends")
-        given = {field.name: getattr(made, field.name) for field in fields(made)}
         parts = replace(made.parts, chance=branches[0].error)
-        given.update(value=branches[0].value, parts=parts, shortfall=words)
-        return BranchedAnswer(**given, branches=branches)
+        given = {"value": branches[0].value, "parts": parts, "shortfall": words}
+        return BranchedAnswer(**{**vars(made), **given}, branches=branches)
 
     def _begin(self):
         """Find the longest step that is stable, and go on to half of it."""

@@ -225,8 +225,8 @@ def body_materials(mesh: Mesh, material: Any, by_group: Any = _NONE) -> BodyMate
         bodies = mesh.group_bodies(name)
         if given not in kinds:
             kinds.append(given)
-        number, before = kinds.index(given), giver.copy()
-        for other in (other for other in before if before[other] != number):
+        number = kinds.index(given)
+        for other in (other for other, its in giver.items() if its != number):
             both = np.intersect1d(bodies, mesh.body_groups[other])
             if len(both):
                 raise InputError(
@@ -236,12 +236,6 @@ def body_materials(mesh: Mesh, material: Any, by_group: Any = _NONE) -> BodyMate
         giver[name], of_body[bodies] = number, number
     if len(kinds) > MOST:
         raise InputError(f"materials must be at most {MOST} different ones, got {len(kinds)}")
-    return _without_unused(mesh, kinds, of_body)
-
-
-def _without_unused(mesh, kinds, of_body):
-    """Materials that a body has, the default first where one is left with it."""
-    used = np.unique(of_body)
-    place = np.full(len(kinds), -1, dtype=np.int32)
-    place[used] = np.arange(len(used))
-    return BodyMaterials(mesh, tuple(kinds[k] for k in used), place[of_body])
+    # Only materials that a body has; the default comes first where one is left with it.
+    used, place = np.unique(of_body, return_inverse=True)
+    return BodyMaterials(mesh, tuple(kinds[k] for k in used), place.reshape(-1).astype(np.int32))
