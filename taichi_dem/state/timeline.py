@@ -16,13 +16,13 @@ NEVER = -1
 
 
 @ti.func
-def device_ticks_of(level):
+def ticks_of(level):
     """Ticks in a step of a level."""
     return ti.cast(1, ti.i64) << (MAX_LEVEL - level)
 
 
 @ti.func
-def device_coarsest_active(tick):
+def coarsest_active(tick):
     """Lowest level active at a tick; all finer levels are active too."""
     rest = ti.cast(tick & (MACRO_TICKS - 1), ti.i32)
     level = 0
