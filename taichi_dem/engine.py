@@ -1,7 +1,6 @@
 """The engine of a blast: all fields and kernels of one structure, which runs any scene of it."""
 
 from collections.abc import Iterable
-from functools import partial
 
 import numpy as np
 import taichi as ti
@@ -10,13 +9,13 @@ from taichi_dem.contact.contacts import Contacts
 from taichi_dem.contact.search import BroadPhase
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.engine_pool import Engine, EnginePool
-from taichi_dem.laws.base import Effect
-from taichi_dem.laws.bound import bound_by_role
+from taichi_dem.laws.base import ABSENT, PARTS_OF_BOND, Effect, bound
+from taichi_dem.laws.bond import Separable
 from taichi_dem.methods import Method, structure_of
 from taichi_dem.report.readings import Readings
 from taichi_dem.stability.body_limits import StabilityLimits
 from taichi_dem.state.capacity import LEAST, Capacity
-from taichi_dem.state.model import Model
+from taichi_dem.state.model import ROLES, Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.advance import Advance
@@ -61,8 +60,8 @@ class BlastEngine(Engine):
         capacity = Capacity(*self.capacity)
         capacity.check()
         method = self.structure.method
-        bind = partial(bound_by_role, self.structure.effects)
-        self.tables = Tables(capacity, bind, self.structure.on_demand)
+        self.tables = Tables(capacity, self.structure.on_demand)
+        self.tables.take(*_bound_by_role(self.structure.effects, self.tables))
         self.state = State(self.tables)
         self.contacts = Contacts(self.tables, self.state) if self.tables.has_contact else None
         self.schedule = self._schedule(method)
@@ -126,6 +125,18 @@ class BlastEngine(Engine):
         """Copy of the entries of a field that the scene uses."""
         length = self.lengths.get(field.shape[0]) if field.shape else None
         return values(field) if length is None else values(field, slice(length))
+
+
+def _bound_by_role(effects, tables):
+    """Bound copies of effects by role, null objects where none is listed; the law of bonds."""
+    listed = {role: [e for e in effects if e.role == role] for role in ROLES}
+    for role, absent in ABSENT.items():
+        if not listed[role] and not (listed["bond"] and role in PARTS_OF_BOND):
+            listed[role] = [absent()]
+    by_role = {role: [bound(effect, tables) for effect in listed[role]] for role in ROLES}
+    if by_role["bond"]:
+        return by_role, by_role["bond"][0]
+    return by_role, Separable(by_role["tension"][0], by_role["shear"][0])
 
 
 #: Engines of the session.

@@ -40,8 +40,9 @@ def initial_motion(mesh: Mesh, velocity: Any, spin: Any) -> dict[str, np.ndarray
     moves, _ = _rows("velocity", velocity, mesh, centre)
     turns, shared = _rows("spin", spin, mesh, centre)
     for bodies, turn in shared:
-        arms = centre[bodies] - _middle(mesh, centre, bodies)
-        moves[bodies] = moves[bodies] + np.cross(turn, arms)
+        volume = volumes(mesh)[bodies]
+        middle = (volume[:, None] * centre[bodies]).sum(axis=0) / volume.sum()
+        moves[bodies] = moves[bodies] + np.cross(turn, centre[bodies] - middle)
     if not (moves.any() or turns.any()):
         return {}
     return {"velocity": moves, "spin": turns}
@@ -71,7 +72,12 @@ def _by_group(name, given, mesh):
     rows, shared = np.zeros((mesh.body_count, 3)), []
     taken: dict[int, str] = {}
     for group, value in given.items():
-        bodies = _bodies_of(name, given, group, mesh)
+        try:
+            bodies = mesh.group_bodies(group)
+        except InputError as error:
+            raise InputError(
+                f"{name} must have names of body groups, got {shown(given)}: {error}"
+            ) from None
         vector = np.array(direction(f"{name}[{group!r}]", value))
         for body in bodies.tolist():
             if body in taken:
@@ -83,19 +89,3 @@ def _by_group(name, given, mesh):
         rows[bodies] = vector
         shared.append((bodies, vector))
     return rows, shared
-
-
-def _bodies_of(name, given, group, mesh):
-    """Bodies of a group; InputError that names the option where there is none."""
-    try:
-        return mesh.group_bodies(group)
-    except InputError as error:
-        raise InputError(
-            f"{name} must have names of body groups, got {shown(given)}: {error}"
-        ) from None
-
-
-def _middle(mesh, centre, bodies):
-    """Centre of the volume of some bodies [m], (3,)."""
-    volume = volumes(mesh)[bodies]
-    return (volume[:, None] * centre[bodies]).sum(axis=0) / volume.sum()

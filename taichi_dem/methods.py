@@ -161,9 +161,6 @@ class _Explicit:
             positive("distance", self.distance)
         choice("neighbour", self.neighbour, NEIGHBOURS)
         choice("dashpot", self.dashpot, DASHPOTS)
-        self._check_control()
-
-    def _check_control(self):
         rule = self.control
         if rule is not None and not isinstance(rule, StepControl):
             raise InputError(f"control must be a StepControl or None, got {shown(rule)}")
@@ -354,7 +351,12 @@ class ImplicitDashpots:
         positive("tolerance", self.tolerance)
         positive("refresh", self.refresh)
         between("theta", self.theta, 0.5, 1.0)
-        _check_sweeps(self.sweeps)
+        whole = isinstance(self.sweeps, tuple) and all(type(s) is int for s in self.sweeps)
+        if not (whole and len(self.sweeps) == 2 and 1 <= self.sweeps[0] <= self.sweeps[1] <= 1000):
+            raise InputError(
+                "sweeps must be two whole numbers, fewest and most, from 1 to 1000, "
+                f"got {shown(self.sweeps)}"
+            )
 
     @property
     def dt0(self) -> float:
@@ -381,12 +383,3 @@ class ImplicitDashpots:
     def criterion(self) -> FixedStep:
         """Step rule for the schedule."""
         return FixedStep()
-
-
-def _check_sweeps(sweeps):
-    whole = isinstance(sweeps, tuple) and all(type(s) is int for s in sweeps)
-    if not (whole and len(sweeps) == 2 and 1 <= sweeps[0] <= sweeps[1] <= 1000):
-        raise InputError(
-            "sweeps must be two whole numbers, fewest and most, from 1 to 1000, "
-            f"got {shown(sweeps)}"
-        )

@@ -108,7 +108,7 @@ def _without(effects, names, may_be_silent):
     for effect in effects:
         if effect.name not in names:
             kept.append(effect)
-        elif may_be_silent and "harmless" in vars(type(effect)):
+        elif may_be_silent and vars(type(effect)).get("may_be_silent"):
             kept.append(effect.silent())
     if any(effect.role == "contact" for effect in kept):
         return kept

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Callable, Optional, Union
+from typing import Callable, NamedTuple, Optional, Union
 
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError
@@ -16,7 +16,6 @@ from taichi_dem.output.record import Recorder
 from taichi_dem.scene import Scene
 from taichi_dem.simulation import MOST_STEPS, Simulation
 
-Call = Callable[[RunView], object]
 #: Progress is reported this often [s].
 _REPORT_SECONDS = 0.2
 #: Most samples or frames of a run: each reads all bodies.
@@ -54,6 +53,14 @@ class RunProgress(Progress):
         return f"{passed}, {prefixed(self.evaluations / seconds, 'evaluations/s')}"
 
 
+class Call(NamedTuple):
+    """A function to call with a view at some of the largest steps, and whenever its pace says."""
+
+    observe: Callable[[RunView], object]
+    steps: set[int]
+    pace: Optional[Pace] = None
+
+
 def progress_of(simulation: Simulation, until: float) -> RunProgress:
     """RunProgress of a simulation towards a time [s]."""
     done, seconds = simulation.evaluations(), simulation.run_seconds
@@ -84,8 +91,7 @@ class RunPlan:
         progress_option("progress", progress)
         self.samples, self.frames = samples, frames
         self.observed = [
-            (one.observe, one.when.marks(self.last, self.dt0, samples), one.when.wall_s)
-            for one in _checked(observers)
+            (one, one.when.marks(self.last, self.dt0, samples)) for one in _checked(observers)
         ]
         for one in observers:
             if hasattr(one, "check_scene"):
@@ -94,7 +100,7 @@ class RunPlan:
 
     def calls(
         self, simulation: Simulation, recorder: Recorder, report_progress: Optional[Listener]
-    ) -> "Calls":
+    ) -> list[Call]:
         """Calls of a run: samples and frames come before the user's observers."""
 
         def sample(_):
@@ -102,45 +108,19 @@ class RunPlan:
                 simulation.sample()
                 recorder.sample()
 
-        made = Calls()
-        made.add(sample, self._evenly(self.samples))
+        made = [Call(sample, self._evenly(self.samples))]
         if self.frames:
-            made.add(lambda _: recorder.snapshot(), self._evenly(self.frames))
-        for observed in self.observed:
-            made.add(*observed)
+            made.append(Call(lambda _: recorder.snapshot(), self._evenly(self.frames)))
+        for one, steps in self.observed:
+            wall_s = one.when.wall_s
+            made.append(Call(one.observe, steps, None if wall_s is None else Pace(wall_s)))
         if report_progress is not None:
-            tell, until = report_progress, self.last * self.dt0
-            made.add(lambda _: tell(progress_of(simulation, until)), {self.last}, _REPORT_SECONDS)
+            tell, until, pace = report_progress, self.last * self.dt0, Pace(_REPORT_SECONDS)
+            made.append(Call(lambda _: tell(progress_of(simulation, until)), {self.last}, pace))
         return made
 
     def _evenly(self, count):
         return Every(samples=1).marks(self.last, self.dt0, count)
-
-
-class Calls:
-    """What is called with a view at which of the largest steps, and what by the clock; in order."""
-
-    def __init__(self) -> None:
-        self.at: dict[int, list[Call]] = {}
-        self.paced: list[tuple[Call, Pace]] = []
-
-    def add(self, call: Call, steps: set[int], wall_s: Optional[float] = None) -> None:
-        """Add a call at steps, and every so much wall time [s]."""
-        for step in steps:
-            self.at.setdefault(step, []).append(call)
-        if wall_s is not None:
-            self.paced.append((call, Pace(wall_s)))
-
-    def at_step(self, step: int, view: RunView) -> None:
-        """Make the calls of a step."""
-        for call in self.at.get(step, ()):
-            call(view)
-
-    def by_clock(self, view: RunView) -> None:
-        """Make the calls whose wall time has passed."""
-        for call, pace in self.paced:
-            if pace.should_report():
-                call(view)
 
 
 def macro_steps(until: float, dt0: float) -> int:

@@ -34,8 +34,6 @@ from taichi_dem.state.model import MANY
 
 #: Share of an opening at which a law begins, and of a mean speed, at which no body wakes others.
 SLEEP = 1e-6
-#: Option that lets bodies touch at outer faces.
-REMEDY = "SphereContact(outer_faces=True)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,20 +325,19 @@ def scene_warnings(scene: Any) -> tuple[str, ...]:
 
 def _friction_warnings(scene):
     """Friction without springs is a drag up to its limit, so without a dashpot it is none."""
-    rubs = [effect for effect in scene.effects if effect.role == "friction"]
-    material = scene.body_materials
-    if not rubs or rubs[0].remembers or material.friction_has_dashpots:
+    friction, material = scene.effect("friction"), scene.body_materials
+    if friction is None or friction.remembers or material.friction_has_dashpots:
         return ()
     never = "never acts on bodies of a material" if material.has_contact_damping else "never acts"
     return (
-        f"{rubs[0].name} {never}: it is at most contact_damping times the sliding speed, and "
+        f"{friction.name} {never}: it is at most contact_damping times the sliding speed, and "
         "contact_damping of the material is 0; StickingFriction acts by springs instead",
     )
 
 
 def remedy(contact: Any) -> str:
     """How bodies touch at their outer faces; contact: the effect of a scene, None without."""
-    return f"{type(contact).__name__}(outer_faces=True)" if contact else REMEDY
+    return f"{type(contact).__name__ if contact else 'SphereContact'}(outer_faces=True)"
 
 
 def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
@@ -353,7 +350,7 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     (``Mesh.keep_coincident``, ``Scene.unbonded``) meet in a solid of one piece too; unbonded ones
     have spheres with any contact.
     """
-    contact = next((effect for effect in scene.effects if effect.role == "contact"), None)
+    contact = scene.effect("contact")
     if contact and contact.outer_faces:
         return ()
     part = parts_of(scene.mesh)

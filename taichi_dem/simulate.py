@@ -265,19 +265,23 @@ def _run(simulation, recorder, writer, plan, calls):
     """
     view = RunView(simulation, recorder)
     seen = int(values(simulation.state.tick)) if recorder.rows else -1
-    marks = sorted({*calls.at, *writer.marks(plan.last, plan.dt0)})
+    marks = sorted(writer.marks(plan.last, plan.dt0).union(*(call.steps for call in calls)))
     for step in (mark for mark in marks if mark * MACRO_TICKS > seen):
 
         def between(end=step * MACRO_TICKS):
             """Observe by the clock, and save if due; at a mark its observers come first."""
             tick = int(values(simulation.state.tick))
             if tick < plan.last * MACRO_TICKS:
-                calls.by_clock(view)
+                for call in calls:
+                    if call.pace is not None and call.pace.should_report():
+                        call.observe(view)
             if tick < end:
                 writer.save_if_needed()
 
         simulation.advance_to(step, between)
-        calls.at_step(step, view)
+        for call in calls:
+            if step in call.steps:
+                call.observe(view)
         writer.save_if_needed()
     writer.save()
 

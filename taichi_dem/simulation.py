@@ -39,7 +39,7 @@ from taichi_dem.step.advance import Advance
 from taichi_dem.step.auto_driver import MEASURED, AutoDriver, driver_name
 from taichi_dem.step.drivers import DRIVERS, Step
 from taichi_dem.step.multirate.schedule import Schedule
-from taichi_dem.step_control import counted_criteria
+from taichi_dem.step_control import CRITERIA
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
@@ -112,7 +112,8 @@ class Simulation(Uncopied):
         structure = Structure(scene.effects, method, scene.on_demand)
         self._engine = ENGINES.borrow(structure, capacity_of(self.model), self.model, self)
         self._load()
-        self.driver = self._driver(name)
+        drivers = self.engine.drivers
+        self.driver = AutoDriver(self.step, drivers) if name == MEASURED else drivers[name]
         self.compile_seconds = time.perf_counter() - started
 
     def __repr__(self):
@@ -173,20 +174,6 @@ class Simulation(Uncopied):
         yield
         self.cut_short = ""
 
-    def _check_whole(self):
-        """Raise InputError where something was interrupted that cannot be gone on with."""
-        self._engine.check(self)
-        if self.cut_short:
-            raise InputError(
-                f"this simulation was interrupted while {self.cut_short}, and cannot be gone on "
-                "with: reset it, or make a new one"
-            )
-
-    def _driver(self, name):
-        """Driver of the engine, or one that measures both."""
-        drivers = self.engine.drivers
-        return AutoDriver(self.step, drivers) if name == MEASURED else drivers[name]
-
     def reset(self, scene: Optional[Scene] = None, method: Optional[Method] = None) -> None:
         """Begin again at time zero as the scene says, optionally with another scene or method.
 
@@ -205,9 +192,8 @@ class Simulation(Uncopied):
         scene = self.scene if scene is None else instance("scene", scene, Scene)
         method = self.method if method is None else method
         check_method(method)
-        model = self.model
-        if scene is not self.scene:
-            model = Model(scene.mesh, scene.body_materials, scene.effects)
+        same = scene is self.scene
+        model = self.model if same else Model(scene.mesh, scene.body_materials, scene.effects)
         self._check_reset(scene, method, model)
         self.scene, self.method, self.model = scene, method, model
         self._load()
@@ -240,8 +226,13 @@ class Simulation(Uncopied):
         InputError
             The simulation was interrupted before.
         """
-        self._check_whole()
-        if self.energy_balance is not None:
+        opened = self.energy_balance is not None
+        if self.cut_short:
+            raise InputError(
+                f"this simulation was interrupted while {self.cut_short}, and cannot be gone on "
+                "with: reset it, or make a new one"
+            )
+        if opened:
             return
         started = time.perf_counter()
         compiling("time step", 0.2)
@@ -436,6 +427,7 @@ class Simulation(Uncopied):
         linear, angular = self.energy_balance.momentum_errors()
         tables = self.energy_balance.tables()
         account = self.energy_balance.account(tables)
+        bound = np.bincount(values(self.state.bound, here), minlength=len(CRITERIA))
         unconverged, worst = self.step_resolution.unconverged
         report = Report(
             method=self.method.name,
@@ -469,7 +461,7 @@ class Simulation(Uncopied):
                 *open_account(account, self.divergence_check.round_off()),
             ),
             interpenetration=shared_volume.worst,
-            bound_by=counted_criteria(values(self.state.bound, here)),
+            bound_by={name: n for name, n in zip(CRITERIA, bound.tolist()) if n},
             bond_slip=self.step_resolution.bond_slip(),
             round_off_J=self.divergence_check.round_off(),
         )

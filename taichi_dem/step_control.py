@@ -80,15 +80,6 @@ class StepControl:
             whole("level_jump", self.level_jump, 0, MAX_LEVEL)
 
 
-def counted_criteria(bound: np.ndarray) -> dict[str, int]:
-    """Number of bodies by the criterion that bounds their step, for those that occur.
-
-    bound: places in CRITERIA, shape (body_count,).
-    """
-    counts = np.bincount(bound, minlength=len(CRITERIA))
-    return {name: int(n) for name, n in zip(CRITERIA, counts) if n}
-
-
 @ti.data_oriented
 class FixedStep:
     """Every body keeps the largest step."""

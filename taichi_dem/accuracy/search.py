@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, Optional
 
 import numpy as np
@@ -58,7 +58,7 @@ class Search:
             self._reduce(parts)
             parts = self._parts()
         job, last = self.job, self.levels[-1]
-        parting = self._parting(parts.chance)
+        parting = self.runs.parting(self.twins_at) if parts.chance > self._allowed else math.inf
         words, spent = self.methods.in_words(last), self.runs.seconds - pilot_s
         made = Answer(
             goal=job.goal.name,
@@ -86,10 +86,9 @@ class Search:
             np.array(values), clusters, range(len(values)), self._step().error, 1.0
         )
         words = sentence(branches, made.unit, "run", "that differ by one rounding came to {} ends")
-        given = {field.name: getattr(made, field.name) for field in fields(made)}
         parts = replace(made.parts, chance=branches[0].error)
-        given.update(value=branches[0].value, parts=parts, shortfall=words)
-        return BranchedAnswer(**given, branches=branches)
+        given = {"value": branches[0].value, "parts": parts, "shortfall": words}
+        return BranchedAnswer(**{**vars(made), **given}, branches=branches)
 
     def _begin(self):
         """Find the longest step that is stable, and go on to half of it."""
@@ -189,15 +188,11 @@ class Search:
         report = self.runs.results[self.levels[-1]].report
         return report.broken_faces > 0 or report.pair_evaluations > 0 or bool(report.bond_slip)
 
-    def _parting(self, chance):
-        """Time from which twins differ by more than the tolerance [s], where chance tells."""
-        return self.runs.parting(self.twins_at) if chance > self._allowed else math.inf
-
     def _reduce(self, parts):
         """Make the runs that narrow the largest part, or say why there are none."""
         averaged = self.job.goal.averaged
         if not averaged and len(self.levels) > 2 and parts.chance > self._allowed:
-            self._give_up(self._chaotic())
+            self.why = self._chaotic()
         elif averaged and parts.chance > 0.5 * parts.total:
             self._add_twins(parts)
         else:
@@ -221,7 +216,7 @@ class Search:
 
     def _add_twins(self, parts):
         if self.count + 1 >= _MANY:
-            self._give_up(f"the mean of {self.count + 1} runs has {self._percent(parts.total)}")
+            self.why = f"the mean of {self.count + 1} runs has {self._percent(parts.total)}"
         elif self._affords((self.count + 1) * len(self.levels), self.levels[0]):
             self.count = min(_MANY - 1, 2 * self.count + 1)
 
@@ -229,7 +224,7 @@ class Search:
         """Go on to half the step, or to the one that the order of a smooth run calls for."""
         last, more = self.levels[-1], 1
         if last - self.levels[0] >= _MOST_FINE:
-            self._give_up(f"half of a step of {self.methods.at(last).dt0:.2g} s changes as much")
+            self.why = f"half of a step of {self.methods.at(last).dt0:.2g} s changes as much"
             return
         if not self._eventful:
             wanted = _halvings(parts.total, self._allowed, self.methods.declared)
@@ -238,7 +233,7 @@ class Search:
             more, self.why = more - 1, ""
         if self._affords(2.0**more * (self.count + 1 if self.job.goal.averaged else 1), last):
             if self._single(last + more) is None:
-                self._give_up(f"a smaller step diverged: {self.runs.failure}")
+                self.why = f"a smaller step diverged: {self.runs.failure}"
             else:
                 self.levels.append(last + more)
                 if not self.job.goal.averaged and parts.chance > self._allowed:
@@ -249,11 +244,8 @@ class Search:
         """Whether the budget lets some runs as long as that at a level be made."""
         needed = runs * self.runs.cost[level]
         if self.runs.seconds + needed > self.budget:
-            self._give_up(f"the budget is spent: the next runs would take {needed:.2g} s")
+            self.why = f"the budget is spent: the next runs would take {needed:.2g} s"
         return not self.why
-
-    def _give_up(self, why):
-        self.why = why
 
     def _percent(self, error):
         size = abs(self._value(self.levels[-1]))

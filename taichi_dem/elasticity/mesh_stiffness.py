@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from taichi_dem.elasticity.rates import springs_of
 from taichi_dem.elasticity.statics import BondStatics
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.kit.terminal import aligned
 from taichi_dem.kit.validation import instance, shown
+from taichi_dem.materials.body_materials import AnyMaterial
 from taichi_dem.materials.bond_rules import BondGeometry, evaluated, per_bond
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.tetrahedra import area_vectors
@@ -22,9 +23,6 @@ from taichi_dem.mesh.topology import (
     mean_density,
     topology_of,
 )
-
-if TYPE_CHECKING:
-    from taichi_dem.materials.body_materials import AnyMaterial
 
 #: Components of stress and strain, in Voigt's order; strains yz, zx and xy are twice the tensor's.
 VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))
@@ -149,8 +147,7 @@ def mesh_stiffness(mesh: Mesh, material: AnyMaterial) -> MeshStiffness:
     topology = topology_of(instance("mesh", mesh, Mesh))
     if not hasattr(material, "normal_stiffness"):
         raise InputError(f"material must be a Material or BodyMaterials, got {shown(material)}")
-    constants = material.normal_stiffness, material.shear_stiffness
-    springs = per_bond(mesh, topology, material.density, constants)
+    springs = per_bond(mesh, topology, material.density, springs_of(material))
     statics = BondStatics(mesh, topology, springs)
     outer = _OuterFaces(mesh, material)
     loads = np.stack([outer.wrenches(stress) for stress in _unit_stresses()], axis=2)
@@ -186,8 +183,7 @@ class _OuterFaces:
         distance = 2.0 * dot(self.arm, self.vector) / self.area
         halves, both = np.full(len(self.body), 0.5), np.stack([self.body, self.body], axis=1)
         mirrored = BondGeometry(distance, self.area, 0.5 * mass[self.body], halves, both)
-        constants = material.normal_stiffness, material.shear_stiffness
-        self.springs = 2.0 * evaluated(constants, mirrored)
+        self.springs = 2.0 * evaluated(springs_of(material), mirrored)
 
     def wrenches(self, stress):
         """Forces and moments of the tractions of a uniform stress on the bodies, (bodies, 6)."""

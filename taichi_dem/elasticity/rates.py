@@ -62,7 +62,10 @@ def subset_rates(
     body, face = np.nonzero(topology.body_bond >= 0)
     laws = per_bond(mesh, topology, density, coefficients)[topology.body_bond[body, face]]
     blocks = np.zeros((mesh.body_count, 4, 6, 6))
-    blocks[body, face] = _face_blocks(mesh, body, face, centre[body], laws)
+    vertices = face_vertices(mesh, body, face)
+    area, law = face_laws(mesh.points, vertices, laws)
+    arms = mesh.points[vertices] - centre[body][:, None]
+    blocks[body, face] = area[:, None, None] / 3.0 * point_blocks(arms, law)
     root = inverse_root(mass, inertia)
     rates = np.zeros((mesh.body_count, len(subsets)))
     for part in parts_in_cache(mesh.body_count):
@@ -79,14 +82,6 @@ def _sum_of(blocks, subset):
         if subset >> face & 1:
             total += blocks[:, face]
     return total
-
-
-def _face_blocks(mesh, body, face, centre, coefficients):
-    """The block G of single faces, shape (n, 6, 6); coefficients: of each, (n, 2)."""
-    vertices = face_vertices(mesh, body, face)
-    area, law = face_laws(mesh.points, vertices, coefficients)
-    arms = mesh.points[vertices] - centre[:, None]
-    return area[:, None, None] / 3.0 * point_blocks(arms, law)
 
 
 def face_laws(

@@ -11,7 +11,7 @@ contact spheres, loads push bodies, supports hold them, ground drags on them. Ro
 import copy
 import re
 from collections.abc import Sequence
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -33,8 +33,6 @@ from taichi_dem.state.tables import Tables
 
 #: Lowest and highest displacement along x, y and z [m].
 Travel = tuple[tuple[float, ...], tuple[float, ...]]
-#: Times its strength that no bond reaches; a power of two, so that no digit changes.
-HARMLESS = 2.0**40
 #: Share of a limit from which on a law is evaluated: rounding is far below the rest.
 NEAR = 1.0 - 1e-9
 
@@ -70,7 +68,8 @@ class Effect(Sealed):
     activation = ""
     #: Whether it stands for no effect, which no report lists.
     is_null = False
-    #: Whether it is compiled and never acts (``silent``).
+    #: Whether it never acts with a harmless material, as ``silent`` needs, and is such a copy.
+    may_be_silent = False
     is_silent = False
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -98,26 +97,11 @@ class Effect(Sealed):
         InputError
             The effect cannot be silent.
         """
-        if type(self).harmless is Effect.harmless:
+        if not self.may_be_silent:
             raise InputError(f"effect {self.name} cannot be silent: leave it out of the scene")
         made = copy.copy(self)
         vars(made).update(name="", is_silent=True)
         return made
-
-    def harmless(self, material: Material) -> Material:
-        """Return the material with which the effect never acts, as ``silent`` needs it.
-
-        Parameters
-        ----------
-        material : Material
-            Material of the scene.
-
-        Returns
-        -------
-        Material
-            The changed material.
-        """
-        return material
 
     def check_material(self, material: Material) -> None:
         """Refuse a material that the effect cannot act with; a scene asks.
@@ -234,16 +218,15 @@ class Effect(Sealed):
         """
         return (-np.inf,) * 3, (np.inf,) * 3
 
-    def stand_for(self, given: Optional["Effect"]) -> None:
+    def stand_for(self, given: "Effect") -> None:
         """Take the attributes of this bound effect from an effect of a scene.
 
         Parameters
         ----------
-        given : 'Effect' or None
-            Effect of the scene; None changes nothing.
+        given : Effect
+            Effect of the scene.
         """
-        if given is not None:
-            self.__dict__["_given"] = vars(given)
+        self.__dict__["_given"] = vars(given)
 
     @property
     def stands_silent(self) -> bool:
@@ -259,12 +242,12 @@ class Effect(Sealed):
             Arrays of the scene.
         """
         if self.stands_silent:
-            model = model.harmless(self)
+            model = model.harmless()
         if self._count:
             assign(self.law, _numbers_of(self, model.materials))
         self.load(model)
 
-    def accepts(self, given: Optional["Effect"]) -> bool:
+    def accepts(self, given: "Effect") -> bool:
         """Whether kernels compiled for this effect are valid for an effect of a scene.
 
         They are, unless they contain an attribute of it, read in a kernel, that has another value,
@@ -272,7 +255,7 @@ class Effect(Sealed):
 
         Parameters
         ----------
-        given : 'Effect' or None
+        given : Effect
             Effect of the scene.
 
         Returns
@@ -280,8 +263,6 @@ class Effect(Sealed):
         bool
             True where they are valid.
         """
-        if given is None:
-            return True
         same = (_same(vars(given).get(name), value) for name, value in self._frozen.items())
         return _count_of(given) == self._count and all(same)
 
@@ -362,6 +343,25 @@ def _same(first, second):
         return bool(np.array_equal(first, second))
     except (TypeError, ValueError):
         return first is second
+
+
+def check_sliding_energy(effect: Effect, option: str, material: Material) -> None:
+    """Raise InputError for a material without cohesion, or too soft for a fracture energy G_II.
+
+    option: name of the energy of an effect that degrades the cohesion.
+    """
+    if not material.cohesion > 0.0:
+        raise InputError(
+            f"cohesion of the material must be more than 0 Pa with the effect {effect.name}, "
+            "which degrades it, got 0"
+        )
+    energy = getattr(effect, option)
+    least = material.cohesion**2 / (2.0 * float(material.shear_stiffness))
+    if not energy > least:
+        raise InputError(
+            f"{option} of {effect.name} must be larger than cohesion^2 / (2 shear_stiffness) = "
+            f"{least:.6g} J/m2, or a bond would fail at once, got {energy}"
+        )
 
 
 def along(direction: Sequence[float]) -> Travel:
@@ -456,18 +456,5 @@ class NoFriction(Effect):
 PARTS_OF_BOND = ("tension", "shear")
 #: Classes of the null objects by role.
 ABSENT: dict[str, Any] = {
-    "tension": ElasticTension,
-    "shear": ElasticShear,
-    "dashpot": NoDashpot,
-    "friction": NoFriction,
+    kind.role: kind for kind in (ElasticTension, ElasticShear, NoDashpot, NoFriction)
 }
-
-__all__ = [
-    "ABSENT",
-    "HARMLESS",
-    "NEAR",
-    "Effect",
-    "Travel",
-    "along",
-    "bound",
-]

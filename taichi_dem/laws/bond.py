@@ -3,7 +3,6 @@
 Source: Konno et al., section 2.1, eq. 1 and 2, Fig. 2 to 4.
 """
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import taichi as ti
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.products import dot, squared
 from taichi_dem.kit.types import vec2, vec3
-from taichi_dem.laws.base import HARMLESS, NEAR, Effect
+from taichi_dem.laws.base import NEAR, Effect
 from taichi_dem.materials import Material
 from taichi_dem.physics.fracture import (
     coulomb_limit,
@@ -45,18 +44,11 @@ class Softening(Effect):
     role = "tension"
     name = "softening"
     activation = "a unit is opened to its tensile strength"
+    may_be_silent = True
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Tensile strength [Pa] and opening at failure [m]."""
         return material.tensile_strength, material.failure_opening
-
-    def harmless(self, material: Material) -> Material:
-        """Stronger than any load, by a power of two."""
-        strength, energy = (
-            HARMLESS * material.tensile_strength,
-            HARMLESS**2 * material.fracture_energy,
-        )
-        return replace(material, tensile_strength=strength, fracture_energy=energy)
 
     def declare(self, capacity: Capacity) -> None:
         """Elastic limit and secant stiffness of every contact unit."""
@@ -144,15 +136,12 @@ class ShearSlip(Effect):
     role = "shear"
     name = "shear_slip"
     activation = "a unit is sheared to its Coulomb limit"
+    may_be_silent = True
     remembers_slip = True
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Cohesion [Pa] and friction coefficient."""
         return material.cohesion, material.friction
-
-    def harmless(self, material: Material) -> Material:
-        """Cohesion beyond any load."""
-        return replace(material, cohesion=HARMLESS * material.tensile_strength)
 
     def declare(self, capacity: Capacity) -> None:
         """Residual slip of every contact unit."""

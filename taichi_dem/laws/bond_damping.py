@@ -1,13 +1,10 @@
 """Dashpots of bonds (Konno et al., 2.1, end; Table 1)."""
 
-from dataclasses import replace
-
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.laws.base import Effect
-from taichi_dem.materials import Material
 from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import Model
 
@@ -24,10 +21,7 @@ class BondDamping(Effect):
     role = "dashpot"
     name = "bond_damping"
     activation = "bonds are strained at a rate"
-
-    def harmless(self, material: Material) -> Material:
-        """No damping."""
-        return replace(material, normal_damping=0.0, shear_damping=0.0)
+    may_be_silent = True
 
     def declare(self, capacity: Capacity) -> None:
         """Normal and tangential coefficient of every bond per area [Pa s/m]."""

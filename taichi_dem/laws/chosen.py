@@ -74,13 +74,9 @@ def _laws(mesh, material, taken):
         laws.append(BondDamping())
     if "contact" not in taken:
         # Nothing meets a solid of one piece at its outer faces before something has come loose.
-        laws.append(SphereContact(outer_faces=True if _may_meet(mesh) else ONCE_BROKEN))
+        meets = parts_of(mesh).max() > 0 or mesh.has_open_faces
+        laws.append(SphereContact(outer_faces=True if meets else ONCE_BROKEN))
     if material.friction > 0.0:
         # Friction without springs is a dashpot's force up to its limit: none without a dashpot.
         laws.append(Friction() if material.friction_has_dashpots else StickingFriction())
     return laws
-
-
-def _may_meet(mesh):
-    """Whether outer faces of a mesh may meet before anything breaks."""
-    return bool(parts_of(mesh).max() > 0 or mesh.has_open_faces)

@@ -1,7 +1,5 @@
 """Sliding friction between contact spheres (Konno et al., 2.2)."""
 
-from dataclasses import replace
-
 import taichi as ti
 
 from taichi_dem.laws.base import Effect
@@ -21,14 +19,11 @@ class Friction(Effect):
     role = "friction"
     name = "friction"
     activation = "spheres that touch slide"
+    may_be_silent = True
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Friction coefficient."""
         return (material.friction,)
-
-    def harmless(self, material: Material) -> Material:
-        """No friction."""
-        return replace(material, friction=0.0)
 
     @ti.func
     def limit(self, m, force_normal):

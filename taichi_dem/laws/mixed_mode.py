@@ -1,14 +1,12 @@
 """Cohesive law of bonds in which opening and sliding damage together (Benzeggagh and Kenane)."""
 
-from dataclasses import replace
-
 import taichi as ti
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.products import squared
 from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.kit.validation import positive, shown
-from taichi_dem.laws.base import HARMLESS, NEAR, Effect
+from taichi_dem.laws.base import NEAR, Effect, check_sliding_energy
 from taichi_dem.materials import Material
 from taichi_dem.state.capacity import Capacity
 
@@ -59,6 +57,7 @@ class MixedMode(Effect):
     role = "bond"
     name = "mixed_mode"
     activation = "a unit is opened and sheared to its limit"
+    may_be_silent = True
 
     def __init__(self, shear_energy: float, exponent: float = 2.0):
         self.shear_energy = positive("shear_energy", shear_energy)
@@ -71,30 +70,13 @@ class MixedMode(Effect):
 
     def check_material(self, material: Material) -> None:
         """Raise InputError for a material without cohesion, or too soft for the energy."""
-        if not material.cohesion > 0.0:
-            raise InputError(
-                "cohesion of the material must be more than 0 Pa with the effect mixed_mode, whose "
-                "strength in sliding it is, got 0"
-            )
-        least = material.cohesion**2 / (2.0 * float(material.shear_stiffness))
-        if not self.shear_energy > least:
-            raise InputError(
-                "shear_energy of mixed_mode must be larger than cohesion^2 / (2 shear_stiffness) = "
-                f"{least:.6g} J/m2, or a bond would fail before it reaches its strength, got "
-                f"{self.shear_energy}"
-            )
+        check_sliding_energy(self, "shear_energy", material)
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Squares of both strengths [Pa^2], twice both energies [J/m^2], quarters of exponent."""
         strengths = material.tensile_strength**2, material.cohesion**2
         energies = 2.0 * material.fracture_energy, 2.0 * self.shear_energy
         return (*strengths, *energies, self.exponent / _QUARTER)
-
-    def harmless(self, material: Material) -> Material:
-        """Stronger than any load."""
-        strong = {"tensile_strength": HARMLESS * material.tensile_strength}
-        strong["cohesion"] = HARMLESS * material.cohesion
-        return replace(material, fracture_energy=HARMLESS**2 * material.fracture_energy, **strong)
 
     def declare(self, capacity: Capacity) -> None:
         """Damage and spent energy of every contact unit."""

@@ -52,7 +52,13 @@ class BondLaw(Protocol):
 
 
 class TensionLaw(Protocol):
-    """Normal law of a bond's contact units, for itself; role "tension"."""
+    """Normal law of a bond's contact units, for itself; role "tension".
+
+    For effects="auto" it also says in words when it acts, ``activation``, as laws of contact,
+    friction and damping do, and by ``begins(m, stiffness, opening)`` where a unit that it never
+    changed comes near its limit: below, the traction must be stiffness times opening, and nothing
+    else may happen. A shear law has ``begins(m, stiffness, sliding, pressure)``.
+    """
 
     def traction(self, m: int, stiffness: float, u: int, opening: float) -> float:
         """Traction [Pa] at a normal opening [m]."""
@@ -248,21 +254,6 @@ class Ground(Protocol):
         """
 
 
-class Activation(Protocol):
-    """Rule by which effects="auto" knows where a law of bonds need not be evaluated.
-
-    Kept by laws of the roles tension and shear, beside ``activation``, the rule in words, which
-    laws of contact, friction and damping have too.
-    """
-
-    def begins(self, m: int, stiffness: float, *state: Any) -> int:
-        """Nonzero where a unit that the law never changed comes near its limit.
-
-        Below, the traction must be stiffness times opening, and nothing else may happen. state: of
-        a normal law the opening [m], of a shear law the sliding [m] and the pressure [Pa].
-        """
-
-
 #: Contract of each role.
 CONTRACTS = {
     "bond": BondLaw,
@@ -358,17 +349,15 @@ def check_effect(effect: Any) -> None:
         raise InputError(
             f"role of effect {kind} must be one of {', '.join(CONTRACTS)}, got {effect.role!r}"
         )
-    wanted = members_of(CONTRACTS[effect.role])
-    for name, contract in FURTHER.items():
-        if getattr(effect, name, False):
-            wanted += members_of(contract)
+    further = [contract for name, contract in FURTHER.items() if getattr(effect, name, False)]
+    contracts = CONTRACTS[effect.role], *further
+    wanted = [name for contract in contracts for name in members_of(contract)]
     missing = [name for name in wanted if not hasattr(type(effect), name)]
     if missing:
         raise InputError(
             f"effect {kind} must have a member {missing[0]}, as its role {effect.role} asks for "
             f"{', '.join(wanted)}"
         )
-    further = [contract for name, contract in FURTHER.items() if getattr(effect, name, False)]
-    for contract in (CONTRACTS[effect.role], *further):
+    for contract in contracts:
         for name in members_of(contract):
             _check_parameters(type(effect), contract, name)

@@ -1,21 +1,19 @@
 """Coulomb slip of bonds whose cohesion falls with the slip (linear slip weakening)."""
 
-from dataclasses import replace
-
 import taichi as ti
 
-from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.products import dot, norm, squared
+from taichi_dem.kit.products import dot, norm
 from taichi_dem.kit.types import vec2
 from taichi_dem.kit.validation import positive
-from taichi_dem.laws.base import HARMLESS, NEAR, Effect
+from taichi_dem.laws.base import check_sliding_energy
+from taichi_dem.laws.bond import ShearSlip
 from taichi_dem.materials import Material
 from taichi_dem.physics.fracture import coulomb_limit, weakening_slip
 from taichi_dem.state.capacity import Capacity
 
 
 @ti.data_oriented
-class SlipWeakening(Effect):
+class SlipWeakening(ShearSlip):
     """Coulomb slip of bonds whose cohesion falls linearly with the accumulated slip, to zero.
 
     Takes the place of ``ShearSlip``, by which cohesion does not degrade.
@@ -49,38 +47,24 @@ class SlipWeakening(Effect):
     500.0
     """
 
-    role = "shear"
     name = "slip_weakening"
-    activation = "a unit is sheared to its Coulomb limit"
-    remembers_slip = True
     releases = True
+    # It begins where ShearSlip does, as it says itself of its other traction.
+    activation = ShearSlip.activation
+    begins = ShearSlip.begins
+    may_be_silent = True
 
     def __init__(self, fracture_energy: float):
         self.fracture_energy = positive("fracture_energy", fracture_energy)
 
     def check_material(self, material: Material) -> None:
         """Raise InputError for a material without cohesion, or too stiff for the energy."""
-        if not material.cohesion > 0.0:
-            raise InputError(
-                "cohesion of the material must be more than 0 Pa with the effect slip_weakening, "
-                "which degrades it, got 0"
-            )
-        least = material.cohesion**2 / (2.0 * float(material.shear_stiffness))
-        if not self.fracture_energy > least:
-            raise InputError(
-                "fracture_energy of slip_weakening must be larger than cohesion^2 / (2 "
-                f"shear_stiffness) = {least:.6g} J/m2, or a bond would lose its cohesion in one "
-                f"step, got {self.fracture_energy}"
-            )
+        check_sliding_energy(self, "fracture_energy", material)
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Cohesion [Pa], friction coefficient, critical slip [m], loss of cohesion [Pa/m]."""
         critical = 2.0 * self.fracture_energy / material.cohesion
         return material.cohesion, material.friction, critical, material.cohesion / critical
-
-    def harmless(self, material: Material) -> Material:
-        """Cohesion beyond any load."""
-        return replace(material, cohesion=HARMLESS * material.tensile_strength)
 
     def declare(self, capacity: Capacity) -> None:
         """Residual and accumulated slip of every contact unit."""
@@ -89,12 +73,6 @@ class SlipWeakening(Effect):
     def state(self) -> dict[str, ti.Field]:
         """Residual slip in the face frame, two components, and accumulated slip of units [m]."""
         return {"slip_weakening": self.unit}
-
-    @ti.func
-    def begins(self, m, stiffness, sliding, pressure):
-        """1 where a unit that never slipped comes near its limit at a pressure [Pa], else 0."""
-        limit = NEAR * coulomb_limit(self.law[m, 0], self.law[m, 1], pressure)
-        return ti.cast(stiffness * stiffness * squared(sliding) > limit * limit, ti.i32)
 
     @ti.func
     def traction(self, m, stiffness, u, sliding, pressure):

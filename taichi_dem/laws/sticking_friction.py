@@ -5,7 +5,6 @@ import taichi as ti
 from taichi_dem.kit.products import dot, norm, squared
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import between
-from taichi_dem.laws.base import Effect
 from taichi_dem.laws.friction import Friction
 from taichi_dem.materials import Material
 from taichi_dem.state.pair_store import PairStore
@@ -46,12 +45,11 @@ class StickingFriction(Friction):
     name = "sticking_friction"
     activation = "spheres that touch slide"
     remembers = True
+    #: Its springs let bodies that touch remember: without a limit they would still slip.
+    may_be_silent = False
 
     def __init__(self, stiffness_ratio: float = 0.8):
         self.stiffness_ratio = between("stiffness_ratio", stiffness_ratio, 1e-6, 1.0)
-
-    #: Its springs let bodies that touch remember: without a limit they would still slip.
-    harmless = Effect.harmless
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Friction coefficient, and stiffness of the spring [N/m]."""

@@ -37,10 +37,6 @@ def shortest_piece(times: tuple[float, ...], values: tuple[float, ...]) -> float
     return min((end - begin for begin, end, one, other in pieces if one != other), default=inf)
 
 
-def _varies(values):
-    return any(value != values[0] for value in values)
-
-
 def unresolved_histories(effects: Any, step: float) -> tuple[str, ...]:
     """A sentence about each load or support that changes within less than a step [s]."""
     times = ((effect, effect.change_time()) for effect in effects)
@@ -90,7 +86,7 @@ class History:
         """Take over points of ``history_points``; one that never changes needs none."""
         t, v = np.array(times), np.array(values)
         areas = 0.5 * (v[1:] + v[:-1]) * np.diff(t)
-        assign(self.count, len(t) if _varies(values) else 0)
+        assign(self.count, len(t) if (v != v[0]).any() else 0)
         assign(self.times, t)
         assign(self.values, v)
         assign(self.integral, np.array([0.0, *np.cumsum(areas)]))

@@ -1,6 +1,5 @@
 """Pressure on a group of outer faces, and its history."""
 
-from abc import abstractmethod
 from typing import Any
 
 import numpy as np
@@ -25,29 +24,13 @@ from taichi_dem.state.model import Model
 class FacePressure(Effect):
     """Base of loads that push on the faces of a group along their current normal.
 
-    A derived class has ``mean_pressure(since, until)``, in Pa, and ``changes(since, until)``,
-    nonzero where it changes between two times [s]. The area stays the mesh's.
+    A derived class has ``mean_pressure(since, until)``, the mean [Pa] from a time to a later one
+    [s], and ``changes(since, until)``, nonzero where it changes between two times. The area stays
+    the mesh's.
     """
 
     role = "load"
     varies = True
-
-    @abstractmethod
-    def mean_pressure(self, since: Any, until: Any) -> Any:
-        """Mean pressure from a time to a later one; a ti.func.
-
-        Parameters
-        ----------
-        since : float
-            Time [s].
-        until : float
-            Later time [s].
-
-        Returns
-        -------
-        float
-            Pressure [Pa].
-        """
 
     def declare(self, capacity: Capacity) -> None:
         """Loaded faces of every body: area vectors [m^2] and arms from the centre [m]."""

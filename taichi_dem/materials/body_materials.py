@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, Callable, Union
+from typing import Any, Union
 
 import numpy as np
 
@@ -19,14 +19,13 @@ from taichi_dem.kit.validation import instance, shown
 from taichi_dem.materials.bond_rules import (
     BondRule,
     ByMaterials,
-    Constant,
     ContactRule,
     Density,
     bond_geometry,
     joined_constants,
     per_bond,
 )
-from taichi_dem.materials.material import Material, check_energy, unchecked
+from taichi_dem.materials.material import RULES, Material, check_energy, unchecked
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import topology_of
 
@@ -35,11 +34,6 @@ MOST = 16
 _NONE: Mapping[str, Material] = MappingProxyType({})
 #: Constants of which a bond or contact between two materials has the lesser one.
 _LEAST = ("tensile_strength", "cohesion", "friction", "fracture_energy")
-#: Constants that act in series.
-_SERIES = (
-    *("normal_stiffness", "shear_stiffness", "normal_damping", "shear_damping"),
-    *("contact_stiffness", "contact_damping"),
-)
 
 
 def joined(first: Material, second: Material) -> Material:
@@ -50,11 +44,21 @@ def joined(first: Material, second: Material) -> Material:
     first: of the master. Whether the fracture energy suffices is checked by a scene, bond by bond.
     """
     least = {name: min(getattr(first, name), getattr(second, name)) for name in _LEAST}
-    series = {
-        name: joined_constants(getattr(first, name), getattr(second, name)) for name in _SERIES
-    }
+    series = {name: joined_constants(getattr(first, name), getattr(second, name)) for name in RULES}
     density = 0.5 * (first.density + second.density)
     return unchecked(first, density=density, **least, **series)
+
+
+def _of_bonds(name) -> Any:
+    """A constant of bonds per area, a number or a rule, as a property."""
+
+    def found(laid):
+        if laid.is_one:
+            return getattr(laid.materials[0], name)
+        rows = tuple(tuple(getattr(pair, name) for pair in row) for row in laid.pairs)
+        return ByMaterials(rows, laid.of_body)
+
+    return property(found)
 
 
 class BodyMaterials:
@@ -96,17 +100,12 @@ class BodyMaterials:
         """Material k with the numbers that contacts of its bodies have."""
         material, bodies = self.materials[k], np.flatnonzero(self.of_body == k)
         chosen: Any = slice(None) if self.is_one or not len(bodies) else bodies
-        given = {name: getattr(material, name) for name in ("contact_stiffness", "contact_damping")}
         numbers = {
             name: rule.of_mesh(self.mesh, material.density, chosen)
-            for name, rule in given.items()
+            for name, rule in vars(material).items()
             if isinstance(rule, ContactRule)
         }
         return replace(material, **numbers) if numbers else material
-
-    def changed(self, change: Callable[[Material], Material]) -> BodyMaterials:
-        """The same bodies with each material changed by a function."""
-        return BodyMaterials(self.mesh, tuple(map(change, self.materials)), self.of_body)
 
     @property
     def density(self) -> Density:
@@ -115,31 +114,10 @@ class BodyMaterials:
             return self.materials[0].density
         return np.array([material.density for material in self.materials])[self.of_body]
 
-    @property
-    def normal_stiffness(self) -> Constant:
-        """Normal stiffness of bonds per area [Pa/m]: a number or a rule."""
-        return self._constant("normal_stiffness")
-
-    @property
-    def shear_stiffness(self) -> Constant:
-        """Tangential stiffness of bonds per area [Pa/m]: a number or a rule."""
-        return self._constant("shear_stiffness")
-
-    @property
-    def normal_damping(self) -> Constant:
-        """Normal dashpot of bonds per area [Pa s/m]: a number or a rule."""
-        return self._constant("normal_damping")
-
-    @property
-    def shear_damping(self) -> Constant:
-        """Tangential dashpot of bonds per area [Pa s/m]: a number or a rule."""
-        return self._constant("shear_damping")
-
-    def _constant(self, name):
-        if self.is_one:
-            return getattr(self.materials[0], name)
-        rows = tuple(tuple(getattr(pair, name) for pair in row) for row in self.pairs)
-        return ByMaterials(rows, self.of_body)
+    normal_stiffness = _of_bonds("normal_stiffness")
+    shear_stiffness = _of_bonds("shear_stiffness")
+    normal_damping = _of_bonds("normal_damping")
+    shear_damping = _of_bonds("shear_damping")
 
     @property
     def has_bond_damping(self) -> bool:
@@ -160,22 +138,6 @@ class BodyMaterials:
     def friction_has_dashpots(self) -> bool:
         """Whether contacts of every material with friction have dashpots."""
         return all(each.has_contact_damping for each in self.materials if each.friction > 0.0)
-
-    def least(self, name: str) -> float:
-        """Least value of a strength or of the fracture energy, by the name of the constant."""
-        return min(getattr(material, name) for material in self.materials)
-
-    def of_links(self, bodies: np.ndarray, value: Callable[[Material], float]) -> Any:
-        """A number of what joins two bodies, for pairs of them (n, 2): an array (n,).
-
-        value: of a material, as ``lambda material: material.cohesion``. One number for all where
-        all bodies have the same material.
-        """
-        if self.is_one:
-            return value(self.pairs[0][0])
-        table = np.array([[value(pair) for pair in row] for row in self.pairs])
-        kinds = self.of_body[bodies]
-        return table[kinds[:, 0], kinds[:, 1]]
 
     def of_contacts(self, name: str) -> Any:
         """Largest constant of the contacts that a body can have [N/m, N s/m], (body_count,).
@@ -263,8 +225,8 @@ def body_materials(mesh: Mesh, material: Any, by_group: Any = _NONE) -> BodyMate
         bodies = mesh.group_bodies(name)
         if given not in kinds:
             kinds.append(given)
-        number, before = kinds.index(given), giver.copy()
-        for other in (other for other in before if before[other] != number):
+        number = kinds.index(given)
+        for other in (other for other, its in giver.items() if its != number):
             both = np.intersect1d(bodies, mesh.body_groups[other])
             if len(both):
                 raise InputError(
@@ -274,17 +236,6 @@ def body_materials(mesh: Mesh, material: Any, by_group: Any = _NONE) -> BodyMate
         giver[name], of_body[bodies] = number, number
     if len(kinds) > MOST:
         raise InputError(f"materials must be at most {MOST} different ones, got {len(kinds)}")
-    return _without_unused(mesh, kinds, of_body)
-
-
-def _without_unused(mesh, kinds, of_body):
-    """Materials that a body has, the default first where one is left with it."""
-    used = np.unique(of_body)
-    place = np.full(len(kinds), -1, dtype=np.int32)
-    place[used] = np.arange(len(used))
-    return BodyMaterials(mesh, tuple(kinds[k] for k in used), place[of_body])
-
-
-def laid_out(mesh: Mesh, material: AnyMaterial) -> BodyMaterials:
-    """Materials of the bodies of a mesh, from one for all of them or as they are."""
-    return material if isinstance(material, BodyMaterials) else body_materials(mesh, material)
+    # Only materials that a body has; the default comes first where one is left with it.
+    used, place = np.unique(of_body, return_inverse=True)
+    return BodyMaterials(mesh, tuple(kinds[k] for k in used), place.reshape(-1).astype(np.int32))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import ANGLE, DENSITY, MODULUS, STRENGTH, in_unit
-from taichi_dem.kit.validation import LARGEST, SMALLEST, finite, plain_fields, positive, shown
+from taichi_dem.kit.validation import finite, plain_fields, positive, shown
 from taichi_dem.materials.bond_rules import (
     BondRule,
     Constant,
@@ -31,13 +31,16 @@ _QUANTITIES = {
 _MAY_BE_ZERO = frozenset(
     {"normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"}
 )
-#: Kind of rule that may stand for a number, by field.
-_RULES: dict[str, type] = {
+#: Kind of rule that may stand for a number, by field; what joins two materials is in series there.
+RULES: dict[str, type] = {
     **dict.fromkeys(
         ("normal_stiffness", "shear_stiffness", "normal_damping", "shear_damping"), BondRule
     ),
     **dict.fromkeys(("contact_stiffness", "contact_damping"), ContactRule),
 }
+
+#: Times its strength that no bond reaches; a power of two, so that no digit changes.
+_BEYOND = 2.0**40
 
 
 @dataclass(frozen=True)
@@ -101,8 +104,8 @@ class Material:
         plain_fields(self)
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if not isinstance(value, _RULES.get(field.name, ())):
-                _check_number(field.name, value)
+            if not isinstance(value, RULES.get(field.name, ())):
+                positive(field.name, value, zero_allowed=field.name in _MAY_BE_ZERO)
             if field.name in _QUANTITIES:
                 in_unit(field.name, value, _QUANTITIES[field.name])
         if not isinstance(self.normal_stiffness, BondRule):
@@ -234,6 +237,19 @@ def unchecked(material: Material, **values: Any) -> Material:
     return made
 
 
+def harmless(material: Material) -> Material:
+    """Material whose bonds no load breaks or shears, without dashpots of bonds and friction."""
+    return replace(
+        material,
+        tensile_strength=_BEYOND * material.tensile_strength,
+        cohesion=_BEYOND * material.tensile_strength,
+        fracture_energy=_BEYOND**2 * material.fracture_energy,
+        normal_damping=0.0,
+        shear_damping=0.0,
+        friction=0.0,
+    )
+
+
 def _checked_angle(angle: Any) -> float:
     """Angle of friction [degrees]; InputError unless it is a number from 0 and below 90."""
     if not finite(angle) or not 0.0 <= float(angle) < 90.0:
@@ -241,18 +257,6 @@ def _checked_angle(angle: Any) -> float:
             f"friction_angle must be a number from 0 to below 90 degrees, got {shown(angle)}"
         )
     return in_unit("friction_angle", float(angle), ANGLE)
-
-
-def _check_number(name, value):
-    """Raise InputError unless ``value`` is a finite number in the range of the field ``name``."""
-    zero_allowed = name in _MAY_BE_ZERO
-    inside = finite(value) and (SMALLEST <= value <= LARGEST or (value == 0.0 and zero_allowed))
-    if not inside:
-        allowed = "at least 0" if zero_allowed else "positive"
-        raise InputError(
-            f"{name} must be a finite number, {allowed} and, where it is not 0, from {SMALLEST:g} "
-            f"to {LARGEST:g}, got {shown(value)}"
-        )
 
 
 #: Concrete of Konno et al., Table 1; the adhesive stress is both tensile strength and cohesion.

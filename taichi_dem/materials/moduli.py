@@ -17,12 +17,11 @@ equilibrium with every tetrahedron, a lower bound of the stiffness. What they ca
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import finite, positive, shown, told_apart
+from taichi_dem.kit.validation import between, positive, told_apart
 
 #: E_t / E_n, then 3 K / E_n and G over that of uniform tractions: means over five periodic Delaunay
 #: meshes of 990 to 1900 tetrahedra about points that repel each other, which differ among each
@@ -54,7 +53,7 @@ def bond_moduli(young: float, poisson: float) -> tuple[float, float]:
 
     Raises InputError for a modulus that is not positive, or a Poisson's ratio out of reach.
     """
-    young, poisson = positive("young", young), checked_poisson(poisson)
+    young, poisson = positive("young", young), between("poisson", poisson, *POISSON)
     ratio = _ratio_of(poisson)
     normal = young / _young_at(ratio)
     return normal, ratio * normal
@@ -84,19 +83,6 @@ def _bulk_and_shear(ratio):
     place = np.log(_MEASURED[:, 0])
     bulk, shear = (float(np.interp(np.log(ratio), place, _MEASURED[:, k])) for k in (1, 2))
     return bulk / 3.0, shear / (0.8 + 1.2 / ratio)
-
-
-def checked_poisson(poisson: Any) -> float:
-    """Poisson's ratio; InputError unless a solid may have it and bonds can give it."""
-    if not finite(poisson) or not -1.0 < float(poisson) < 0.5:
-        raise InputError(f"poisson must be a number above -1 and below 0.5, got {shown(poisson)}")
-    least, most = POISSON
-    if not least <= float(poisson) <= most:
-        raise InputError(
-            f"poisson must be a number from {least:g} to {most:g}, which bonds of tetrahedra can "
-            f"give, got {shown(poisson)}"
-        )
-    return float(poisson)
 
 
 def _poisson_at(ratio):

@@ -114,12 +114,14 @@ def quality_report(mesh: Mesh, material: AnyMaterial) -> QualityReport:
     instance("material", material, (Material, BodyMaterials))
     topology = topology_of(mesh)
     mass, _, _ = body_properties(mesh, material.density)
-    altitude = smallest_altitudes(mesh)
+    vectors = geometry.area_vectors(mesh.points, geometry.all_faces(mesh.tetrahedra))
+    volume = geometry.signed_volumes(mesh.points, mesh.tetrahedra)
+    altitude = 3.0 * volume / np.linalg.norm(vectors, axis=1).reshape(-1, 4).max(axis=1)
     longest = geometry.edge_lengths(mesh.points, mesh.tetrahedra).max(axis=1)
     return QualityReport(
         limits=bond_steps(mesh, material),
         warnings=(),
-        volume_m3=geometry.signed_volumes(mesh.points, mesh.tetrahedra),
+        volume_m3=volume,
         mass_kg=mass,
         aspect_ratio=longest / altitude,
         smallest_altitude_m=altitude,
@@ -127,10 +129,3 @@ def quality_report(mesh: Mesh, material: AnyMaterial) -> QualityReport:
         bond_count=topology.bond_count,
         outer_count=topology.outer_count,
     )
-
-
-def smallest_altitudes(mesh: Mesh) -> np.ndarray:
-    """Smallest distance of a vertex from the opposite face, 3 V / A [m], shape (body_count,)."""
-    vectors = geometry.area_vectors(mesh.points, geometry.all_faces(mesh.tetrahedra))
-    area = np.linalg.norm(vectors, axis=1).reshape(-1, 4).max(axis=1)
-    return 3.0 * geometry.signed_volumes(mesh.points, mesh.tetrahedra) / area

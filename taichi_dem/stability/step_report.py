@@ -126,22 +126,6 @@ class StepReport:
         gained = steps[1 : whole("count", count, 0, 2**31 - 1) + 1]
         return gained / steps[0] if np.isfinite(steps[0]) else np.ones_like(gained)
 
-    def work_share(self, count: int = WORST) -> float:
-        """Share of the body updates, each at its own step, that the worst bodies take.
-
-        Parameters
-        ----------
-        count : int, default WORST
-            How many.
-
-        Returns
-        -------
-        float
-            Share, from 0 to 1.
-        """
-        updates = 1.0 / self.step_s
-        return float(updates[self.worst(count)].sum() / max(updates.sum(), 1e-300))
-
     def __repr__(self):
         worst = self.worst(1)[0]
         step = f"smallest step {self.step_s[worst]:.3g} s by {self.binding[worst]}"
@@ -174,7 +158,9 @@ class StepReport:
     def _prices(self):
         """Cost of the worst bodies, where the step of others is limited too."""
         price = self.price()[-1]
-        share = f"{100 * self.work_share():.3g} % of the updates"
+        updates = 1.0 / self.step_s
+        taken = float(updates[self.worst()].sum() / max(updates.sum(), 1e-300))
+        share = f"{100 * taken:.3g} % of the updates"
         words = f"without the worst {WORST} the step of all would be {price:.3g} times as long"
         return [f"{words}; with steps of their own they take {share}"] if price < np.inf else []
 

@@ -11,8 +11,9 @@ from taichi_dem.elasticity.rates import dashpots_of, springs_of, subset_rates
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.fixed_order import length, product, transposed
 from taichi_dem.materials import Material
-from taichi_dem.materials.body_materials import AnyMaterial, BodyMaterials, laid_out
+from taichi_dem.materials.body_materials import AnyMaterial, BodyMaterials, body_materials
 from taichi_dem.materials.bond_rules import per_bond
+from taichi_dem.materials.material import harmless
 from taichi_dem.mesh.colouring import edge_colours
 from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh
@@ -32,13 +33,15 @@ class Model:
     mesh: of the scene. materials: of its bodies, a ``BodyMaterials``. material: the first of them,
     with the numbers that its contacts have in the mesh.
     topology: its faces and bonds. body_mass [kg], centre [m] and body_inertia [kg m^2], body_radius
-    [m] (of the ball around a body): an entry a body. by_role: lists of effects. contact: the effect
-    of this role, None without.
+    [m] (of the ball around a body): an entry a body. by_role: lists of effects; loads, supports and
+    ground: those of these roles. contact: the effect of this role, None without.
     Source: Konno et al., section 2.
     """
 
     def __init__(self, mesh: Mesh, material: AnyMaterial, effects: Iterable[Any]):
-        self.mesh, self.materials = mesh, laid_out(mesh, material)
+        if not isinstance(material, BodyMaterials):
+            material = body_materials(mesh, material)
+        self.mesh, self.materials = mesh, material
         self.material = self.materials.pairs[0][0]
         self.topology = topology_of(mesh)
         self.body_count, self.bond_count = mesh.body_count, self.topology.bond_count
@@ -48,6 +51,7 @@ class Model:
         corners = mesh.points[mesh.tetrahedra] - self.centre[:, None]
         self.body_radius = length(corners).max(axis=1)
         self.by_role = {role: [e for e in effects if e.role == role] for role in ROLES}
+        self.loads, self.supports, self.ground = (tuple(self.by_role[role]) for role in MANY)
         self.contact: Any = next(iter(self.by_role["contact"]), None)
         self.has_contact = self.contact is not None
 
@@ -55,42 +59,30 @@ class Model:
         bodies, bonds = counted(self.body_count, "body"), counted(self.bond_count, "bond")
         return in_brief(self, bodies, bonds, *(effect.name for effect in self.effects))
 
-    @property
-    def body_materials(self) -> BodyMaterials:
-        """The same as ``materials``, under the name that a scene has for them."""
-        return self.materials
-
-    def harmless(self, effect: Any) -> "Model":
-        """A copy with the materials with which an effect never acts."""
+    def harmless(self) -> "Model":
+        """A copy with the materials with which silent effects never act."""
         made = copy.copy(self)
-        made.materials = self.materials.changed(effect.harmless)
+        laid = self.materials
+        changed = tuple(map(harmless, laid.materials))
+        made.materials = BodyMaterials(laid.mesh, changed, laid.of_body)
         made.material = made.materials.pairs[0][0]
         return made
 
     def of_bonds(self, value: Callable[[Material], float]) -> Any:
-        """A number of what joins the bodies of each bond, an array (n,), or one for all."""
-        links = np.stack([self.topology.master, self.topology.slave], axis=1)
-        return self.materials.of_links(links, value)
+        """A number of what joins the bodies of each bond, an array (n,), or one for all.
+
+        value: of a material, as ``lambda material: material.cohesion``.
+        """
+        if self.materials.is_one:
+            return value(self.material)
+        table = np.array([[value(pair) for pair in row] for row in self.materials.pairs])
+        kinds, top = self.materials.of_body, self.topology
+        return table[kinds[top.master], kinds[top.slave]]
 
     @property
     def effects(self) -> tuple:
         """All effects in the order of roles; those of one role in that of the scene."""
         return tuple(effect for role in ROLES for effect in self.by_role[role])
-
-    @property
-    def loads(self) -> tuple:
-        """Effects of the role load, in the order of the scene."""
-        return tuple(self.by_role["load"])
-
-    @property
-    def supports(self) -> tuple:
-        """Effects of the role support, in the order of the scene."""
-        return tuple(self.by_role["support"])
-
-    @property
-    def ground(self) -> tuple:
-        """Effects of the role ground, in the order of the scene."""
-        return tuple(self.by_role["ground"])
 
     @cached_property
     def spheres(self) -> ContactSpheres:
@@ -100,8 +92,8 @@ class Model:
     @cached_property
     def dashpot_rates(self) -> np.ndarray:
         """Rate of the dashpots of every body for each subset of its bonds [1/s], (n, 16)."""
-        silent = [effect for effect in self.by_role["dashpot"] if effect.is_silent]
-        acting = self.harmless(silent[0]) if silent else self
+        silent = any(effect.is_silent for effect in self.by_role["dashpot"])
+        acting = self.harmless() if silent else self
         return self._subset_rates(dashpots_of(acting.materials))
 
     @cached_property

@@ -1,6 +1,5 @@
 """Constant tables of the scene that an engine holds, as fields, and the effects bound to them."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,6 @@ from taichi_dem.kit.types import real
 from taichi_dem.materials.body_materials import MOST
 from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import MANY, ROLES, Model
-
-#: Binds the effects of a structure to its tables; gives them by role, and the law of bonds.
-Bind = Callable[["Tables"], tuple[dict[str, list[Any]], Any]]
 
 
 @ti.data_oriented
@@ -49,17 +45,14 @@ class Tables:
     friction: Any
     contact: Any
 
-    def __init__(self, capacity: Capacity, bind: Bind, on_demand: bool = False):
+    def __init__(self, capacity: Capacity, on_demand: bool = False):
         self.capacity, self.on_demand = capacity, on_demand
         self.body_count, self.bond_count = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
         self._declare_bodies(capacity.bodies)
         self._declare_bonds(capacity)
-        self._take(*bind(self))
-        if self.has_contact:
-            self._declare_spheres(capacity)
 
-    def _take(self, by_role, bond):
-        """Take the bound effects by role, and the law of bonds."""
+    def take(self, by_role: dict[str, list[Any]], bond: Any) -> None:
+        """Take the effects that were bound to the tables, by role, and the law of bonds."""
         self.bond = bond
         self.dashpot, self.friction = by_role["dashpot"][0], by_role["friction"][0]
         self.contact = by_role["contact"][0] if by_role["contact"] else None
@@ -68,6 +61,8 @@ class Tables:
         self.drives = self._drives()
         self.has_contact = self.contact is not None
         self.has_bond_heat = bool(self.dashpot.name) or not bond.is_null
+        if self.has_contact:
+            self._declare_spheres(self.capacity)
 
     def _drives(self):
         """Loads and ground with the row of their impulse, account of work, and bit of activity."""
@@ -129,12 +124,9 @@ class Tables:
         return MOST * self.material[i] + self.material[j]
 
     def matched(self, model: Model) -> list[tuple[Any, Any]]:
-        """Pairs of an effect bound here and the corresponding one of a model.
-
-        The latter is None for a null object.
-        """
-        listed = {role: iter(effects) for role, effects in model.by_role.items()}
-        return [(effect, next(listed[effect.role], None)) for effect in self.effects]
+        """Pairs of an effect bound here and the corresponding one of a model; no null objects."""
+        bound = {role: iter([e for e in self.effects if e.role == role]) for role in ROLES}
+        return [(next(bound[given.role]), given) for given in model.effects]
 
     def _load_bonds(self, model):
         bonds = model.bonds

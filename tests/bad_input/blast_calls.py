@@ -209,5 +209,4 @@ def _results():
     quality, step = quality_report(BAR, CONCRETE), step_report(ALONE)
     for name in ("worst", "price"):
         yield f"stability.quality.QualityReport.{name}", getattr(quality, name), {}
-    for name in ("worst", "price", "work_share"):
         yield f"stability.step_report.StepReport.{name}", getattr(step, name), {}

@@ -8,7 +8,7 @@ from taichi_dem.contact.contacts import Contacts
 from taichi_dem.stability.body_limits import CLOSE, StabilityLimits
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
-from taichi_dem.state.timeline import device_ticks_of
+from taichi_dem.state.timeline import ticks_of
 
 
 @ti.data_oriented
@@ -139,4 +139,4 @@ class AppliedUntil:
     def _until(self, i, j):
         """Tick at which a pair of bodies is evaluated again."""
         finer = ti.max(self.state.level[i], self.state.level[j])
-        return self.state.tick[None] + device_ticks_of(finer)
+        return self.state.tick[None] + ticks_of(finer)

@@ -20,8 +20,8 @@ from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import (
     MACRO_TICKS,
     MAX_LEVEL,
-    device_coarsest_active,
-    device_ticks_of,
+    coarsest_active,
+    ticks_of,
 )
 from taichi_dem.step.multirate.lists import ActiveList, first_key, itself
 from taichi_dem.step.multirate.neighbours import AppliedUntil, LevelLimit
@@ -141,8 +141,8 @@ class Schedule:
         if ti.static(self.has_contact):
             self.evaluations[3] = self.evaluations[3] + self.pairs.end[self.low[None]]
             self.evaluations[4] = self.evaluations[4] + self.pairs.end[0]
-        self.state.tick[None] = self.state.tick[None] + device_ticks_of(self.finest[None])
-        self.low[None] = device_coarsest_active(self.state.tick[None])
+        self.state.tick[None] = self.state.tick[None] + ticks_of(self.finest[None])
+        self.low[None] = coarsest_active(self.state.tick[None])
         self.wanted[None] = 0
 
     @ti.func
