@@ -7,14 +7,13 @@ end, and of faces and bodies in groups of one name a reader loses the faces.
 import os
 import re
 import tempfile
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import shown
 
 _ENDS = re.compile(rb"^\$((?:End)?(?:Nodes|Elements))[ \t\r]*$", re.MULTILINE)
 _WHOLE = [b"Nodes", b"EndNodes", b"Elements", b"EndElements"]
@@ -145,19 +144,3 @@ def keyed_by_dimension(raw: Any, names: Mapping[str, str]) -> Any:
     raw.field_data = {keys[key]: raw.field_data[key] for key in keys}
     raw.cell_sets = {keys.get(key, key): members for key, members in raw.cell_sets.items()}
     return raw
-
-
-def physical_names(raw: Any, dimension: int) -> dict[int, str]:
-    """Names of the physical groups of a dimension in a file of meshio's, by their numbers."""
-    return {key.tag: key.name for key in raw.field_data if key.dimension == dimension}
-
-
-def made_name(name: str, value: int, taken: Collection[Any]) -> str:
-    """The name "NAME_VALUE" of a group that has only a number; InputError where another has it."""
-    made = f"{name}_{value}"
-    if made in taken:
-        raise InputError(
-            f"the group of number {value} must have a name, as {shown(made)}, which stands for it, "
-            "must be that of one group only, got another group of this name"
-        )
-    return made
