@@ -43,7 +43,7 @@ from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.process_memory import peak_memory_mb
 from taichi_dem.mesh.gmsh import block_with_hole
-from taichi_dem.mesh.reorder import in_space_order
+from taichi_dem.mesh.joined import in_space_order
 from taichi_dem.output.attenuation import Attenuation
 from taichi_dem.output.hole_monitor import HoleMonitor
 from taichi_dem.output.progress_lines import ProgressLines

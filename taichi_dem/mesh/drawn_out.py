@@ -53,9 +53,8 @@ def drawn_out(
     rank = np.random.default_rng(len(flat)).permutation(len(flat))
     layered = [_prisms(triangles, rank, k, len(flat)) for k in range(layers)]
     tetrahedra = np.vstack(layered)
-    faces = geometry.all_faces(tetrahedra)
-    outer = faces[geometry.outer_rows(faces)]
-    return checked_mesh(points, tetrahedra, _groups(points, outer, depth, sides))
+    groups = _groups(points, geometry.outer_faces(tetrahedra), depth, sides)
+    return checked_mesh(points, tetrahedra, groups)
 
 
 def _prisms(triangles, rank, layer, count):
@@ -79,9 +78,7 @@ def _groups(points, outer, depth, sides):
     return {name: outer[chosen] for name, chosen in ends.items()}
 
 
-def triangulated(
-    loops: Sequence[np.ndarray], element: float, seed: int = 1
-) -> tuple[np.ndarray, np.ndarray]:
+def triangulated(loops: Sequence[np.ndarray], element: float) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 2) and triangles (m, 3), anticlockwise; the points of the loops come first.
 
     Parameters
@@ -99,7 +96,7 @@ def triangulated(
     """
     starts = np.vstack(loops)
     ends = np.vstack([np.roll(loop, -1, axis=0) for loop in loops])
-    draw = np.random.default_rng(seed)
+    draw = np.random.default_rng(1)
     points = np.vstack([starts, _inner_points(starts, ends, element)])
     for _ in range(_ROUNDS):
         found = _inner_triangles(points, starts, ends, element, draw)

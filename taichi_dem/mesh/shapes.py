@@ -94,18 +94,13 @@ def placed_together(parts: dict, keep_coincident: bool = False) -> Mesh:
 def _bodies_together(parts):
     """Body groups of ``placed_together``."""
     groups: dict[str, np.ndarray] = {}
-    first = 0
-    for name, mesh in parts.items():
+    firsts = np.cumsum([0, *(mesh.body_count for mesh in parts.values())])
+    for (name, mesh), first in zip(parts.items(), firsts):
         for group, bodies in mesh.body_groups.items():
             for key in (group, f"{name}_{group}"):
                 groups[key] = np.append(groups.get(key, bodies[:0]), bodies + first)
-        first += mesh.body_count
     # The name of a part stands for all of it, whatever groups are called.
-    first = 0
-    for name, mesh in parts.items():
-        groups[name] = np.arange(first, first + mesh.body_count)
-        first += mesh.body_count
-    return groups
+    return {**groups, **dict(zip(parts, np.split(np.arange(firsts[-1]), firsts[1:-1])))}
 
 
 def _base(edge, height):

@@ -5,8 +5,8 @@ import pytest
 
 from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, effects, read_mesh
 from taichi_dem.mesh.files import write_mesh
+from taichi_dem.mesh.joined import in_space_order
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
-from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.mesh.shapes import bar, placed_together, single
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.scene import outer_faces_warnings
