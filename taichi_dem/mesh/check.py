@@ -27,7 +27,10 @@ def checked_arrays(
     """
     places = checked_points(points)
     corners = _checked_indices("tetrahedra", tetrahedra, 4, len(places))
-    faces = _checked_groups(groups, len(places))
+    faces = {
+        name: _checked_indices(f"group {name!r}", group, 3, len(places))
+        for name, group in _by_name("group", groups, "faces").items()
+    }
     label = weld_labels(places, corners, tolerance, notes)
     corners, faces = label[corners], {name: label[faces[name]] for name in faces}
     places, corners, faces = _without_loose_points(places, corners, faces, notes)
@@ -114,12 +117,17 @@ def weld_labels(
 
 def checked_body_groups(groups: Any, body_count: int) -> dict[str, np.ndarray]:
     """Numbers of bodies by name, each once and in rising order, or InputError."""
+    named = _by_name("body group", groups, "bodies")
+    return {name: _checked_bodies(name, bodies, body_count) for name, bodies in named.items()}
+
+
+def _by_name(what, groups, members):
+    """The groups, whose names are words."""
     if not isinstance(groups, Mapping):
-        raise InputError(f"body_groups must be a dict of name to bodies, got {shown(groups)}")
-    return {
-        word("name of a body group", name): _checked_bodies(name, bodies, body_count)
-        for name, bodies in groups.items()
-    }
+        raise InputError(
+            f"{what.replace(' ', '_')}s must be a dict of name to {members}, got {shown(groups)}"
+        )
+    return {word(f"name of a {what}", name): group for name, group in groups.items()}
 
 
 def _checked_bodies(name, bodies, body_count):
@@ -141,15 +149,6 @@ def refuse_outside(what: str, of: str, rows: np.ndarray, count: int) -> None:
             f"{what}: {of} numbers must lie in [0, {count - 1}], but row {bad[0]} is "
             f"{rows[bad[0]].tolist()}"
         )
-
-
-def _checked_groups(groups, point_count):
-    if not isinstance(groups, Mapping):
-        raise InputError(f"groups must be a dict of name to faces, got {shown(groups)}")
-    return {
-        word("name of a group", name): _checked_indices(f"group {name!r}", faces, 3, point_count)
-        for name, faces in groups.items()
-    }
 
 
 def _checked_indices(what, indices, width, point_count):
@@ -203,13 +202,7 @@ def _positive(points, tetrahedra, notes):
 
 
 def _refuse_bad_sharing(tetrahedra):
-    """Refuse repeated bodies, faces of three bodies and bodies that lie in each other."""
-    points = np.sort(tetrahedra, axis=1)
-    _, number, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
-    repeated = np.flatnonzero(count > 1)
-    if len(repeated):
-        twins = np.flatnonzero(number.reshape(-1) == repeated[0])
-        raise InputError(f"tetrahedra {_listed(twins)} have the same four points")
+    """Refuse faces of three bodies, and bodies that lie in each other, also repeated ones."""
     face = geometry.face_numbers(geometry.all_faces(tetrahedra))
     crowded = np.flatnonzero(np.bincount(face) > 2)
     if len(crowded):

@@ -1,4 +1,4 @@
-"""Mesh files: read all that meshio can, write Gmsh, VTU and PVD; the only importer of meshio."""
+"""Mesh files: read all that meshio can, write Gmsh, VTU and PVD."""
 
 import contextlib
 import io
@@ -29,7 +29,7 @@ from taichi_dem.mesh.cells import (
     volumes_of,
 )
 from taichi_dem.mesh.check import checked_points, unbonded_places, weld_labels
-from taichi_dem.mesh.gmsh_files import keyed_by_dimension, refuse_bad_gmsh, with_own_keys
+from taichi_dem.mesh.gmsh_files import keyed_by_dimension, read_gmsh
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
 from taichi_dem.mesh.tetrahedra import edge_lengths
 
@@ -187,8 +187,6 @@ def _read_raw(path):
     seconds = _PATIENCE_S + os.path.getsize(path) / _SLOWEST_BYTES_PER_S
     sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
     try:
-        if path.lower().endswith(".msh"):
-            refuse_bad_gmsh(path)
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             return run_with_timeout(seconds, lambda: _meshio_read(path), sentence), said.getvalue()
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
@@ -198,10 +196,9 @@ def _read_raw(path):
 
 def _meshio_read(path):
     with np.errstate(over="ignore"):  # an STL's text, tried as if it were binary
-        if not path.lower().endswith(".msh"):
-            return keyed_by_dimension(meshio.read(path), {})
-        with with_own_keys(path) as (copy, names):
-            return keyed_by_dimension(meshio.read(copy), names)
+        if path.lower().endswith(".msh"):
+            return read_gmsh(path)
+        return keyed_by_dimension(meshio.read(path), {})
 
 
 def _reason_of(error, printed):

@@ -66,7 +66,7 @@ def test_a_mesh_made_directly_read_and_ordered_keeps_them(tmp_path):
 
 def test_a_body_inside_another_is_refused_though_points_are_kept_apart():
     parts = {"a": (single(), (0, 0, 0)), "b": (single(), (0, 0, 0))}
-    with pytest.raises(InputError, match="0 and 1 have the same four points"):
+    with pytest.raises(InputError, match="0 and 1 lie on the same side"):
         placed_together(parts, True)
 
 
