@@ -38,9 +38,9 @@ def checked_arrays(
     if extent < _LEAST_EXTENT:
         got, least = told_apart(extent, _LEAST_EXTENT)
         raise InputError(f"points must span at least {least} m, got {got} m")
-    pairs = _coincident(places)
+    pairs = geometry.close_pairs(places, COINCIDENT * extent)
     if len(pairs) and not coincident:
-        _refuse_coincident(places, pairs)
+        _refuse_coincident(places, pairs, extent)
     corners = _positive(places, corners, notes)
     _refuse_bad_sharing(corners)
     if coincident and tolerance:
@@ -168,19 +168,14 @@ def _without_loose_points(points, tetrahedra, groups, notes):
     return points[used], new[tetrahedra], {name: new[faces] for name, faces in groups.items()}
 
 
-def _coincident(points):
-    """Pairs of points at one place, (n, 2)."""
-    return geometry.close_pairs(points, COINCIDENT * np.ptp(points, axis=0).max())
-
-
-def _refuse_coincident(points, pairs):
+def _refuse_coincident(points, pairs, extent):
     """Refuse coincident points: bodies that seem joined there would not be bonded."""
     first = points[pairs[0, 0]]
-    wide = 2.0 * COINCIDENT * np.ptp(points, axis=0).max()
     raise InputError(
         f"{len(np.unique(pairs[:, 1]))} points coincide with another, the first at "
-        f"({first[0]:g}, {first[1]:g}, {first[2]:g}) m; pass weld_tolerance={wide:.1e} to join "
-        "them, or keep_coincident=True to keep the faces on them apart"
+        f"({first[0]:g}, {first[1]:g}, {first[2]:g}) m; pass "
+        f"weld_tolerance={2.0 * COINCIDENT * extent:.1e} to join them, or "
+        "keep_coincident=True to keep the faces on them apart"
     )
 
 
@@ -265,8 +260,7 @@ def joined_bodies(tetrahedra: np.ndarray) -> np.ndarray:
 def unbonded_places(points: np.ndarray, tetrahedra: np.ndarray) -> str:
     """A sentence on bodies that meet without a common face although their points are the same.
 
-    "" where there are none. points (n, 3) [m], tetrahedra (m, 4) of positive volume, at most two
-    at a face.
+    "" where there are none. points (n, 3) [m], tetrahedra (m, 4), two at most at a face.
     """
     crossed = _crossed_quadrangles(points, tetrahedra)
     if len(crossed):
@@ -288,16 +282,13 @@ def unbonded_places(points: np.ndarray, tetrahedra: np.ndarray) -> str:
 
 
 def _crossed_quadrangles(points, tetrahedra):
-    """Quadrangles that outer faces cut by both diagonals, their four points, a list.
-
-    Two outer faces of different bodies with a common edge make up a quadrangle where they look the
-    same way; a hole of the shape of one tetrahedron has none, as its faces look at each other.
-    """
+    """Quadrangles that outer faces cut by both diagonals, their four points, a list."""
     faces = geometry.all_faces(tetrahedra)
     outer = geometry.outer_rows(faces)
     faces, body = faces[outer], outer // 4
     normal = geometry.area_vectors(points, faces)
     first, second = geometry.pairs_at_edges(faces)
+    # In a hole of the shape of one tetrahedron, faces look at each other.
     alike = np.einsum("ij,ij->i", normal[first], normal[second]) > 0.0
     chosen = alike & (body[first] != body[second])
     cut = set()

@@ -180,9 +180,7 @@ def _read_raw(path):
     Whatever goes wrong inside becomes one InputError.
     """
     if not os.path.isfile(path):
-        problem = "is no file" if os.path.lexists(path) else "does not exist"
-        problem = "is a folder" if os.path.isdir(path) else problem
-        raise InputError(f"mesh file {path} {problem}")
+        raise InputError(f"mesh file {path} does not exist, or is no file")
     said = io.StringIO()
     seconds = _PATIENCE_S + os.path.getsize(path) / _SLOWEST_BYTES_PER_S
     sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"

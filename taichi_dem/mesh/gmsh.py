@@ -1,7 +1,4 @@
-"""Meshes made with Gmsh, a block with a hole and what STL and STEP files draw the surface of.
-
-The only importer of gmsh, which nothing else needs.
-"""
+"""Meshes made with Gmsh: a block with a hole, and drawn solids; the only importer of gmsh."""
 
 from __future__ import annotations
 
@@ -216,10 +213,8 @@ def _drawn_volume(gmsh, drawn):
     """Volume inside the surface, in units of the file."""
     if drawn:
         return sum(gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3))
-    tags, places, _ = gmsh.model.mesh.getNodes()
-    place = dict(zip(tags.tolist(), places.reshape(-1, 3)))
-    _, nodes = gmsh.model.mesh.getElementsByType(2)
-    corners = np.array([place[node] for node in nodes.tolist()]).reshape(-1, 3, 3)
+    points, triangles = _places_and_rows(gmsh, 2)
+    corners = points[triangles]
     return abs(float(np.linalg.det(corners - corners[:1, :1]).sum())) / 6.0
 
 
@@ -264,26 +259,30 @@ def _refuse_open(gmsh, name):
 
 def _mesh_of(gmsh, scale, name, drawn):
     """The mesh that Gmsh has made; a group for each surface."""
-    tags, places, _ = gmsh.model.mesh.getNodes()
-    number = np.zeros(int(tags.max()) + 1, dtype=np.int64)
-    number[tags.astype(np.int64)] = np.arange(len(tags))
-    _, bodies = gmsh.model.mesh.getElementsByType(4)
-    if not len(bodies):
+    points, tetrahedra = _places_and_rows(gmsh, 4)
+    if not len(tetrahedra):
         raise InputError(f"surface file {name} must enclose a solid, but Gmsh filled none")
-    points = scale * places.reshape(-1, 3)
-    tetrahedra = number[bodies.astype(np.int64)].reshape(-1, 4)
-    groups = _drawn_groups(gmsh, number) if drawn else _smooth_parts(points, tetrahedra)
+    points *= scale
+    groups = _drawn_groups(gmsh) if drawn else _smooth_parts(points, tetrahedra)
     return checked_mesh(points, tetrahedra, groups, source=name)
 
 
-def _drawn_groups(gmsh, number):
+def _places_and_rows(gmsh, kind, tag=-1):
+    """Points (n, 3), and corners of triangles (kind 2) or tetrahedra (4) of an entity or all."""
+    tags, places, _ = gmsh.model.mesh.getNodes()
+    number = np.zeros(int(tags.max()) + 1, dtype=np.int64)
+    number[tags.astype(np.int64)] = np.arange(len(tags))
+    _, nodes = gmsh.model.mesh.getElementsByType(kind, tag)
+    return places.reshape(-1, 3), number[nodes.astype(np.int64)].reshape(-1, {2: 3, 4: 4}[kind])
+
+
+def _drawn_groups(gmsh):
     """Faces of each surface of a CAD file, by the last part of its name there, else its number."""
     groups: dict[str, np.ndarray] = {}
     for _, tag in gmsh.model.getEntities(2):
         given = gmsh.model.getEntityName(2, tag).rsplit("/", 1)[-1].replace('"', "").strip()
         key = given if given.isprintable() and given else f"surface_{tag}"
-        _, corners = gmsh.model.mesh.getElementsByType(2, tag)
-        faces = number[corners.astype(np.int64)].reshape(-1, 3)
+        _, faces = _places_and_rows(gmsh, 2, tag)
         groups[key] = np.vstack([groups.get(key, faces[:0]), faces])
     return {name: faces for name, faces in groups.items() if len(faces)}
 

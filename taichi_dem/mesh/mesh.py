@@ -1,7 +1,4 @@
-"""Mesh of tetrahedra with named groups of faces, checked once at the border.
-
-x points to the right, y up, z towards the viewer.
-"""
+"""Mesh of tetrahedra with named groups; x points to the right, y up, z towards the viewer."""
 
 import os
 from collections.abc import Mapping

@@ -23,9 +23,6 @@ _SIDES = {
 #: Boxes of a bar: ten million tetrahedra take some ten GiB to check.
 _MOST_BOXES = 1_666_666
 
-#: Orders in which a path may step along the axes; every second one winds the other way round.
-_EVEN_ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-
 
 def single(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
     """One tetrahedron: equilateral base of ``edge`` [m] in the plane x = 0, apex at x = -height.
@@ -129,15 +126,12 @@ def _checked_cells(length, width, cells):
 
 def _kuhn(index):
     """Six tetrahedra a box: one for every path of axis steps from its low to its high corner."""
-    paths = []
+    axes, paths = np.eye(3, dtype=int), []
     for order in itertools.permutations(range(3)):
-        corner = np.zeros(3, dtype=int)
-        path = [corner.copy()]
-        for axis in order:
-            corner[axis] += 1
-            path.append(corner.copy())
-        if order not in _EVEN_ORDERS:
-            path[2:] = path[:1:-1]
+        steps = axes[list(order)]
+        path = np.vstack([np.zeros(3, dtype=int), np.cumsum(steps, axis=0)])
+        if np.linalg.det(steps) < 0.0:  # it winds the other way round
+            path[2:] = path[[3, 2]]
         paths.append(np.stack([_corner(index, step) for step in path], axis=-1))
     return np.stack(paths, axis=1).reshape(-1, 4)
 
