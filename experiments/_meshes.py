@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from taichi_dem import Mesh, checked_mesh
 from taichi_dem.kit.validation import positive, whole
 from taichi_dem.mesh.shapes import single
+from taichi_dem.mesh.tetrahedra import area_vectors
 
 
 def with_neighbours(edge: float, heights: Mapping[int, float]) -> tuple[Mesh, np.ndarray]:
@@ -67,3 +68,9 @@ def mirrored_copies(mesh: Mesh, copies: int) -> Mesh:
     bodies = {name: (shifts + group).ravel() for name, group in mesh.body_groups.items()}
     tetrahedra = place[:, mesh.tetrahedra].reshape(-1, 4)
     return checked_mesh(points, tetrahedra, groups, body_groups=bodies)
+
+
+def group_area(mesh: Mesh, name: str) -> float:
+    """Area of the faces of a group [m2]."""
+    vectors = area_vectors(mesh.points, mesh.group_faces(name))
+    return float(np.linalg.norm(vectors, axis=1).sum())

@@ -225,12 +225,6 @@ def volumes(mesh: Mesh) -> np.ndarray:
     return geometry.signed_volumes(mesh.points, mesh.tetrahedra)
 
 
-def group_area(mesh: Mesh, name: str) -> float:
-    """Area of the faces of a group [m2]."""
-    vectors = geometry.area_vectors(mesh.points, mesh.group_faces(name))
-    return float(np.linalg.norm(vectors, axis=1).sum())
-
-
 def checked_mesh(
     points: ArrayLike,
     tetrahedra: ArrayLike,
