@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from _meshes import with_moved_nodes
 from taichi_dem.effects import (
     BondDamping,
     Friction,
@@ -23,7 +24,7 @@ from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
-from taichi_dem.mesh.shapes import bar, with_moved_nodes
+from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors, shared_faces
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.scene import Scene

@@ -36,14 +36,14 @@ from _blast import (
     print_quality,
     run_options,
 )
+from _meshes import mirrored_copies
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, plot, read_mesh, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.process_memory import peak_memory_mb
 from taichi_dem.mesh.gmsh import block_with_hole
-from taichi_dem.mesh.reorder import in_space_order
-from taichi_dem.mesh.shapes import mirrored_copies
+from taichi_dem.mesh.joined import in_space_order
 from taichi_dem.output.attenuation import Attenuation
 from taichi_dem.output.hole_monitor import HoleMonitor
 from taichi_dem.output.progress_lines import ProgressLines

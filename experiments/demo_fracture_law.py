@@ -19,10 +19,10 @@ from functools import partial
 import numpy as np
 
 from _fracture_law import PRESSURES, PULLED, TABLE, Bench, caption, figures_of, write
+from _meshes import group_area
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.kit import study
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.mesh.mesh import group_area
 from taichi_dem.mesh.shapes import pair, placed_together, single
 from taichi_dem.simulate import run_simulation
 

@@ -35,9 +35,8 @@ from taichi_dem.kit.version import __version__
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh.face_groups import with_body_group
 from taichi_dem.mesh.files import read_mesh
-from taichi_dem.mesh.joined import join
+from taichi_dem.mesh.joined import in_space_order, join
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
-from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects

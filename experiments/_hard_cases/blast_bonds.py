@@ -9,10 +9,11 @@ from scipy.linalg import expm
 
 from _closed_forms import LinearBonds, damped_opening
 from _hard_cases._blast_run import ACCURACY, AREA, EPS, FREE, TOUCHING, Run
+from _meshes import with_neighbours
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
 from taichi_dem.kit.study.cases import Cases
 from taichi_dem.mesh.mesh import checked_mesh
-from taichi_dem.mesh.shapes import bar, pair, placed_together, single, with_neighbours
+from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.mesh.topology import faces_of_group, topology_of
 
 case = CASES = Cases("blast")

@@ -5,11 +5,11 @@ from functools import partial
 import numpy as np
 
 from _blast import BLOCK_STEP, FROM_RADII, HOLE_RADIUS, paper_effects
+from _meshes import mirrored_copies, with_moved_nodes
 from _trust.number import Number
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.kit.plot_style import BLACK, GREY, RED
-from taichi_dem.mesh.reorder import in_space_order
-from taichi_dem.mesh.shapes import mirrored_copies, with_moved_nodes
+from taichi_dem.mesh.joined import in_space_order
 from taichi_dem.mesh.tetrahedra import all_faces, outer_rows
 from taichi_dem.output.attenuation import Attenuation
 

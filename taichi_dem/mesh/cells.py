@@ -1,4 +1,4 @@
-"""Solid cells of mesh files cut into tetrahedra, faces into triangles, by meshio's names of cells.
+"""Cells of mesh files, as meshio gives them, cut into tetrahedra and triangles; their groups.
 
 Every quadrangle is cut by the diagonal through its corner of lowest number, whoever it belongs to:
 so cells that share one agree, and faces of groups fit the cells they lie on.
@@ -9,13 +9,16 @@ A cell with a corner named twice, such as a prism written as a hexahedron, gives
 Weld points before cells are cut: two numbers of one point would make two sides disagree.
 """
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.mesh.check import FLAT, refuse_outside
-from taichi_dem.mesh.tetrahedra import LOCAL_EDGES, edge_lengths, signed_volumes
+from taichi_dem.kit.validation import shown
+from taichi_dem.mesh.check import refuse_outside
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.tetrahedra import LOCAL_EDGES, signed_volumes
 
 #: Corners of a cell by its shape; further nodes, on edges and faces, follow them.
 _SOLIDS = {"tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
@@ -30,10 +33,8 @@ _SIDES = {
     "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
     "pyramid": ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
 }
-_FOLDED = (
-    "folds over itself when it is cut into tetrahedra: it is strongly twisted, or its corners are "
-    "not in the order of the file's format"
-)
+#: Between the names of groups in that of a physical volume whose cells are in all of them.
+_BOTH = "|"
 
 
 class Bodies(NamedTuple):
@@ -93,39 +94,15 @@ def triangles_in(faces: np.ndarray) -> np.ndarray:
     return round_it[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
 
 
-def fault_of_cells(raw: Any, points: np.ndarray) -> str:
-    """A sentence on the first cell that folds over itself or is partly flat once cut, or ""."""
-    cut = [block for _, block in blocks_of(raw, 3) if shape_of(block.type) != "tetra"]
-    for block in cut:
-        cells = corners_of(block, len(points))
-        tetrahedra, owner = _cones(block, cells)
-        volume = signed_volumes(points, tetrahedra)
-        longest = edge_lengths(points, tetrahedra).max(axis=1, initial=0.0)
-        sign = np.where(np.abs(volume) <= FLAT * longest**3, 0.0, np.sign(volume))
-        flat, folded, other = (
-            np.bincount(owner[sign == one], minlength=len(cells)) > 0 for one in (0.0, 1.0, -1.0)
-        )
-        if (folded & other).any():
-            return f"{_named(block, cells, folded & other)} {_FOLDED}"
-        if flat.any():
-            return f"{_named(block, cells, flat)} gives tetrahedra without volume"
-    return "tetrahedra are numbered after cells have been cut" if cut else ""
-
-
 def _cut(block, points):
     """Tetrahedra of positive volume in a block of other solids, and the cell of each."""
     cells = corners_of(block, len(points))
     tetrahedra, owner = _cones(block, cells)
     empty = np.bincount(owner, minlength=len(cells)) == 0
     if empty.any():
-        raise InputError(f"{_named(block, cells, empty)} has no volume")
+        raise InputError(f"{block.type} {np.argmax(empty)} has no volume")
     negative = signed_volumes(points, tetrahedra) < 0.0
     return np.where(negative[:, None], tetrahedra[:, [0, 1, 3, 2]], tetrahedra), owner
-
-
-def _named(block, cells, bad):
-    first = int(np.argmax(bad))
-    return f"{block.type} {first}, with the points {cells[first].tolist()},"
 
 
 def _cones(block, corners):
@@ -148,3 +125,134 @@ def _cones(block, corners):
     ends = tetrahedra[:, LOCAL_EDGES]
     whole = (ends[..., 0] != ends[..., 1]).all(axis=1)
     return tetrahedra[whole], owner[whole]
+
+
+def face_groups_in(raw: Any) -> dict[str, np.ndarray]:
+    """Triangles (n, 3) by the names of physical surfaces, or as "data name_value" in other formats.
+
+    A physical surface without a name is "physical_TAG".
+    """
+    groups = {}
+    for name, members in _groups_in(raw, 2).items():
+        corners = [corners_of(raw.cells[k], len(raw.points))[on] for k, on in members.items()]
+        groups[name] = np.vstack([triangles_in(rows) for rows in corners])
+    return groups
+
+
+def body_groups_in(raw: Any, bodies: Bodies) -> dict[str, np.ndarray]:
+    """Numbers of bodies by the names of physical volumes; in other formats, sets of solid cells.
+
+    There, integers on solid cells give groups too, as "data name_value".
+    """
+    groups = {}
+    for name, members in _groups_in(raw, 3).items():
+        on = np.zeros(len(bodies.block), dtype=bool)
+        for k, chosen in members.items():
+            mine = bodies.block == k
+            on[mine] = chosen[bodies.cell[mine]]
+        if on.any():
+            groups[name] = np.flatnonzero(on)
+    return groups
+
+
+def volumes_of(mesh: Mesh, first: int) -> tuple[list[str], np.ndarray]:
+    """Names of physical volumes, which have numbers from ``first`` on, and that of every body.
+
+    Bodies in no group have the number 0; without any group one volume holds them all. Raises
+    InputError for the name of a group that stands for two.
+    """
+    if not mesh.body_groups:
+        return ["bodies"], np.full(mesh.body_count, first)
+    for name in mesh.body_groups:
+        if _BOTH in name:
+            raise InputError(
+                f"a body group must have a name without {_BOTH!r} in a file, got {name!r}"
+            )
+    member = np.zeros((mesh.body_count, len(mesh.body_groups)), dtype=bool)
+    for k, bodies in enumerate(mesh.body_groups.values()):
+        member[bodies, k] = True
+    kinds, kind = np.unique(member, axis=0, return_inverse=True)
+    names = [_BOTH.join(np.array(list(mesh.body_groups))[row]) for row in kinds]
+    tags = np.cumsum([bool(name) for name in names]) * [bool(name) for name in names]
+    return [name for name in names if name], np.where(tags, tags + first - 1, 0)[kind.reshape(-1)]
+
+
+def unread_groups(raw: Any, mesh: Mesh) -> tuple[str, ...]:
+    """Names of the groups of a file that are neither of faces nor of bodies."""
+    named = [key.name for key in raw.field_data]
+    named += [key for key in raw.cell_sets if key not in raw.field_data]
+    known = {*mesh.groups, *mesh.body_groups, "gmsh:bounding_entities"}
+    unread = (one for one in (*named, *raw.point_sets) if known.isdisjoint(one.split(_BOTH)))
+    return tuple(dict.fromkeys(unread))
+
+
+def _groups_in(raw, dimension):
+    """Groups of faces (2) or solid cells (3): name to number of a block to its members, (n,)."""
+    groups: dict[str, dict[int, np.ndarray]] = {}
+    # A solid is in each of the groups that ``write_mesh`` has joined.
+    several = dimension == 3 and "gmsh:physical" in raw.cell_data
+    for name, k, chosen in _marked(raw, dimension):
+        for one in name.split(_BOTH) if several else [name]:
+            members = groups.setdefault(one, {})
+            members[k] = chosen | members.get(k, False)
+    return groups
+
+
+def _marked(raw, dimension) -> Iterator[tuple[str, int, np.ndarray]]:
+    """Name of a group, number of a block, and which of its cells are in the group."""
+    if "gmsh:physical" in raw.cell_data:
+        names = {key.tag: key.name for key in raw.field_data if key.dimension == dimension}
+        for value, k, chosen in _values(raw, "gmsh:physical", dimension):
+            if value > 0:  # 0: in no physical group
+                name = names.get(value) or _made_name("physical", value, names.values())
+                yield name, k, chosen
+        # What is in two groups: Gmsh 4.1 keeps one number a cell, but the sets know of both.
+        for key in raw.field_data:
+            for k, chosen in _of_set(raw, key, dimension):
+                yield key.name, k, chosen
+        return
+    sets = raw.cell_sets if dimension == 3 else {}
+    for name in sets:
+        yield from ((name, k, chosen) for k, chosen in _of_set(raw, name, dimension))
+    for name in raw.cell_data:
+        # Those of Gmsh are numbers of drawn entities, no choice of the user.
+        if not name.startswith("gmsh:") and (dimension == 2 or _tells_parts(raw, name)):
+            for value, k, chosen in _values(raw, name, dimension):
+                yield _made_name(name, value, sets), k, chosen
+
+
+def _values(raw, name, dimension):
+    """An integer on cells, number of a block, and which of its cells have it."""
+    for k, _ in blocks_of(raw, dimension):
+        data = np.asarray(raw.cell_data[name][k])
+        if data.ndim == 1 and data.dtype.kind in "iu":
+            yield from ((value, k, data == value) for value in np.unique(data).tolist())
+
+
+def _of_set(raw, key, dimension):
+    """Number of a block, and which of its cells are in a set; those that hold some."""
+    for k, block in blocks_of(raw, dimension) if key in raw.cell_sets else ():
+        members = raw.cell_sets[key][k]
+        if members is not None and len(members):
+            yield k, np.isin(np.arange(len(block)), members)
+
+
+def _tells_parts(raw, name):
+    """Whether solid cells carry different whole numbers of a name, as they do for materials.
+
+    Numbers of which each cell has its own are numbers of the cells, not of materials.
+    """
+    chosen = list(_values(raw, name, 3))
+    cells = sum(int(members.sum()) for _, _, members in chosen)
+    return 1 < len({value for value, _, _ in chosen}) < max(cells, 3)
+
+
+def _made_name(name, value, taken):
+    """The name "NAME_VALUE" of a group that has only a number; InputError where another has it."""
+    made = f"{name}_{value}"
+    if made in taken:
+        raise InputError(
+            f"the group of number {value} must have a name, as {shown(made)}, which stands for it, "
+            "must be that of one group only, got another group of this name"
+        )
+    return made

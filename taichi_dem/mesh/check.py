@@ -27,7 +27,10 @@ def checked_arrays(
     """
     places = checked_points(points)
     corners = _checked_indices("tetrahedra", tetrahedra, 4, len(places))
-    faces = _checked_groups(groups, len(places))
+    faces = {
+        name: _checked_indices(f"group {name!r}", group, 3, len(places))
+        for name, group in _by_name("group", groups, "faces").items()
+    }
     label = weld_labels(places, corners, tolerance, notes)
     corners, faces = label[corners], {name: label[faces[name]] for name in faces}
     places, corners, faces = _without_loose_points(places, corners, faces, notes)
@@ -35,9 +38,9 @@ def checked_arrays(
     if extent < _LEAST_EXTENT:
         got, least = told_apart(extent, _LEAST_EXTENT)
         raise InputError(f"points must span at least {least} m, got {got} m")
-    pairs = _coincident(places)
+    pairs = geometry.close_pairs(places, COINCIDENT * extent)
     if len(pairs) and not coincident:
-        _refuse_coincident(places, pairs)
+        _refuse_coincident(places, pairs, extent)
     corners = _positive(places, corners, notes)
     _refuse_bad_sharing(corners)
     if coincident and tolerance:
@@ -114,12 +117,17 @@ def weld_labels(
 
 def checked_body_groups(groups: Any, body_count: int) -> dict[str, np.ndarray]:
     """Numbers of bodies by name, each once and in rising order, or InputError."""
+    named = _by_name("body group", groups, "bodies")
+    return {name: _checked_bodies(name, bodies, body_count) for name, bodies in named.items()}
+
+
+def _by_name(what, groups, members):
+    """The groups, whose names are words."""
     if not isinstance(groups, Mapping):
-        raise InputError(f"body_groups must be a dict of name to bodies, got {shown(groups)}")
-    return {
-        word("name of a body group", name): _checked_bodies(name, bodies, body_count)
-        for name, bodies in groups.items()
-    }
+        raise InputError(
+            f"{what.replace(' ', '_')}s must be a dict of name to {members}, got {shown(groups)}"
+        )
+    return {word(f"name of a {what}", name): group for name, group in groups.items()}
 
 
 def _checked_bodies(name, bodies, body_count):
@@ -143,15 +151,6 @@ def refuse_outside(what: str, of: str, rows: np.ndarray, count: int) -> None:
         )
 
 
-def _checked_groups(groups, point_count):
-    if not isinstance(groups, Mapping):
-        raise InputError(f"groups must be a dict of name to faces, got {shown(groups)}")
-    return {
-        word("name of a group", name): _checked_indices(f"group {name!r}", faces, 3, point_count)
-        for name, faces in groups.items()
-    }
-
-
 def _checked_indices(what, indices, width, point_count):
     """Copy as (n, width) int32 with all values in range, or InputError."""
     found = _rows(what, indices, width, "iu", "integer point numbers")
@@ -169,19 +168,14 @@ def _without_loose_points(points, tetrahedra, groups, notes):
     return points[used], new[tetrahedra], {name: new[faces] for name, faces in groups.items()}
 
 
-def _coincident(points):
-    """Pairs of points at one place, (n, 2)."""
-    return geometry.close_pairs(points, COINCIDENT * np.ptp(points, axis=0).max())
-
-
-def _refuse_coincident(points, pairs):
+def _refuse_coincident(points, pairs, extent):
     """Refuse coincident points: bodies that seem joined there would not be bonded."""
     first = points[pairs[0, 0]]
-    wide = 2.0 * COINCIDENT * np.ptp(points, axis=0).max()
     raise InputError(
         f"{len(np.unique(pairs[:, 1]))} points coincide with another, the first at "
-        f"({first[0]:g}, {first[1]:g}, {first[2]:g}) m; pass weld_tolerance={wide:.1e} to join "
-        "them, or keep_coincident=True to keep the faces on them apart"
+        f"({first[0]:g}, {first[1]:g}, {first[2]:g}) m; pass "
+        f"weld_tolerance={2.0 * COINCIDENT * extent:.1e} to join them, or "
+        "keep_coincident=True to keep the faces on them apart"
     )
 
 
@@ -203,13 +197,7 @@ def _positive(points, tetrahedra, notes):
 
 
 def _refuse_bad_sharing(tetrahedra):
-    """Refuse repeated bodies, faces of three bodies and bodies that lie in each other."""
-    points = np.sort(tetrahedra, axis=1)
-    _, number, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
-    repeated = np.flatnonzero(count > 1)
-    if len(repeated):
-        twins = np.flatnonzero(number.reshape(-1) == repeated[0])
-        raise InputError(f"tetrahedra {_listed(twins)} have the same four points")
+    """Refuse faces of three bodies, and bodies that lie in each other, also repeated ones."""
     face = geometry.face_numbers(geometry.all_faces(tetrahedra))
     crowded = np.flatnonzero(np.bincount(face) > 2)
     if len(crowded):
@@ -272,8 +260,7 @@ def joined_bodies(tetrahedra: np.ndarray) -> np.ndarray:
 def unbonded_places(points: np.ndarray, tetrahedra: np.ndarray) -> str:
     """A sentence on bodies that meet without a common face although their points are the same.
 
-    "" where there are none. points (n, 3) [m], tetrahedra (m, 4) of positive volume, at most two
-    at a face.
+    "" where there are none. points (n, 3) [m], tetrahedra (m, 4), two at most at a face.
     """
     crossed = _crossed_quadrangles(points, tetrahedra)
     if len(crossed):
@@ -295,16 +282,13 @@ def unbonded_places(points: np.ndarray, tetrahedra: np.ndarray) -> str:
 
 
 def _crossed_quadrangles(points, tetrahedra):
-    """Quadrangles that outer faces cut by both diagonals, their four points, a list.
-
-    Two outer faces of different bodies with a common edge make up a quadrangle where they look the
-    same way; a hole of the shape of one tetrahedron has none, as its faces look at each other.
-    """
+    """Quadrangles that outer faces cut by both diagonals, their four points, a list."""
     faces = geometry.all_faces(tetrahedra)
     outer = geometry.outer_rows(faces)
     faces, body = faces[outer], outer // 4
     normal = geometry.area_vectors(points, faces)
     first, second = geometry.pairs_at_edges(faces)
+    # In a hole of the shape of one tetrahedron, faces look at each other.
     alike = np.einsum("ij,ij->i", normal[first], normal[second]) > 0.0
     chosen = alike & (body[first] != body[second])
     cut = set()

@@ -28,8 +28,6 @@ _RADII = 0.95, 1.6
 _ROUNDS, _MOVES = 3, 4
 #: Points whose triangles are found at a time.
 _CHUNK = 128
-#: Place of what stands for no point, and of centres of circles through points on a line [m].
-_FAR = 1e30
 #: Share of the area that may be missing.
 _AREA = 1e-9
 
@@ -55,9 +53,8 @@ def drawn_out(
     rank = np.random.default_rng(len(flat)).permutation(len(flat))
     layered = [_prisms(triangles, rank, k, len(flat)) for k in range(layers)]
     tetrahedra = np.vstack(layered)
-    faces = geometry.all_faces(tetrahedra)
-    outer = faces[geometry.outer_rows(faces)]
-    return checked_mesh(points, tetrahedra, _groups(points, outer, depth, sides))
+    groups = _groups(points, geometry.outer_faces(tetrahedra), depth, sides)
+    return checked_mesh(points, tetrahedra, groups)
 
 
 def _prisms(triangles, rank, layer, count):
@@ -81,9 +78,7 @@ def _groups(points, outer, depth, sides):
     return {name: outer[chosen] for name, chosen in ends.items()}
 
 
-def triangulated(
-    loops: Sequence[np.ndarray], element: float, seed: int = 1
-) -> tuple[np.ndarray, np.ndarray]:
+def triangulated(loops: Sequence[np.ndarray], element: float) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 2) and triangles (m, 3), anticlockwise; the points of the loops come first.
 
     Parameters
@@ -101,7 +96,7 @@ def triangulated(
     """
     starts = np.vstack(loops)
     ends = np.vstack([np.roll(loop, -1, axis=0) for loop in loops])
-    draw = np.random.default_rng(seed)
+    draw = np.random.default_rng(1)
     points = np.vstack([starts, _inner_points(starts, ends, element)])
     for _ in range(_ROUNDS):
         found = _inner_triangles(points, starts, ends, element, draw)
@@ -165,63 +160,18 @@ def _is_inside(points, starts, ends):
 
 def _delaunay(points, radius, shift, draw):
     """Triangles of points whose circles hold no other point, each once, anticlockwise."""
+    # Imported here, so that matplotlib loads only where a solid is made.
+    from matplotlib.tri import Triangulation
+
     # Of points on one circle any triangulation is right, and all triangles must choose the same.
     moved = points + shift * draw.uniform(-1.0, 1.0, points.shape)
-    near = _neighbours(moved, 2.0 * radius)
-    far = np.vstack([moved, np.full(2, _FAR)])
-    width = near.shape[1]
-    one, other = np.triu_indices(width, 1)
-    found = []
-    for first in range(0, len(points), _CHUNK):
-        rows = near[first : first + _CHUNK]
-        centre, radius2 = _circles(moved[first : first + _CHUNK], far[rows], one, other)
-        away = centre[:, :, None] - far[rows][:, None]
-        inside = (away**2).sum(axis=3) < radius2[:, :, None] * (1.0 - 1e-12)
-        inside[:, np.arange(len(one)), one] = inside[:, np.arange(len(one)), other] = False
-        valid = ~inside.any(axis=2) & (radius2 < radius**2)
-        point, pair = np.nonzero(valid & (rows[:, one] >= 0) & (rows[:, other] >= 0))
-        found.append(np.stack([first + point, rows[point, one[pair]], rows[point, other[pair]]]).T)
-    triangles = np.unique(np.sort(np.vstack(found), axis=1), axis=0)
+    found = np.sort(Triangulation(*moved.T).triangles, axis=1)
+    a, b, c = (moved[found[:, k]] for k in range(3))
+    sides = dot(a - b, a - b) * dot(b - c, b - c) * dot(c - a, c - a)
+    # The product of the sides is four times the radius times the area.
+    small = sides < (4.0 * radius * _areas(moved, found)) ** 2
+    triangles = np.unique(found[small], axis=0)
     return np.where((_areas(points, triangles) < 0.0)[:, None], triangles[:, ::-1], triangles)
-
-
-def _neighbours(points, radius):
-    """Points within a radius of each, (n, most), filled up with -1, which is far from all."""
-    cell = np.floor((points - points.min(axis=0)) / radius).astype(np.int64)
-    width = int(cell[:, 1].max()) + 3
-    key = (cell[:, 0] + 1) * width + cell[:, 1] + 1
-    order = np.argsort(key, kind="stable")
-    pairs = []
-    for dx in (-1, 0, 1):
-        for dy in (-1, 0, 1):
-            wanted = key + dx * width + dy
-            low = np.searchsorted(key[order], wanted)
-            count = np.searchsorted(key[order], wanted, side="right") - low
-            start = np.repeat(low - np.append(0, np.cumsum(count)[:-1]), count)
-            place = order[start + np.arange(count.sum())]
-            pairs.append(np.stack([np.repeat(np.arange(len(points)), count), place], axis=1))
-    pair = np.vstack(pairs)
-    away = points[pair[:, 0]] - points[pair[:, 1]]
-    pair = pair[(dot(away, away) < radius**2) & (pair[:, 0] != pair[:, 1])]
-    pair = pair[np.lexsort((pair[:, 1], pair[:, 0]))]
-    count = np.bincount(pair[:, 0], minlength=len(points))
-    near = np.full((len(points), max(2, count.max())), -1)
-    near[pair[:, 0], np.arange(len(pair)) - np.repeat(np.cumsum(count) - count, count)] = pair[:, 1]
-    return near
-
-
-def _circles(points, neighbours, one, other):
-    """Centres (c, pairs, 2) and squared radii of the circles through points and two neighbours."""
-    arms = neighbours - points[:, None]
-    a, b = arms[:, one], arms[:, other]
-    twice = 2.0 * (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-    size = np.stack([dot(a, a), dot(b, b)], axis=-1)
-    x = b[..., 1] * size[..., 0] - a[..., 1] * size[..., 1]
-    y = a[..., 0] * size[..., 1] - b[..., 0] * size[..., 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        centre = np.stack([x, y], axis=-1) / twice[..., None]
-    centre = np.where(np.isfinite(centre), centre, _FAR)
-    return points[:, None] + centre, dot(centre, centre)
 
 
 def _areas(points, triangles):

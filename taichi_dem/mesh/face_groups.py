@@ -9,7 +9,7 @@ from taichi_dem.kit.fixed_order import dot
 from taichi_dem.kit.validation import direction, instance, unit_vector
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.mesh_methods import Choice, choose, with_faces
+from taichi_dem.mesh.mesh_methods import Choice, choose, with_group
 
 
 def with_outer_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
@@ -56,7 +56,7 @@ def with_inner_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
     ``Mesh.group``.
     """
     inner = _inner_faces(mesh)[0]
-    return with_faces(mesh, name, inner[choose(mesh, inner, chosen)])
+    return with_group(mesh, "groups", name, inner[choose(mesh, inner, chosen)])
 
 
 def with_cut(
@@ -80,7 +80,7 @@ def with_cut(
     faces = inner[before[bodies[:, 0]] != before[bodies[:, 1]]]
     if chosen is not None:
         faces = faces[choose(mesh, faces, chosen)]
-    return with_faces(mesh, name, faces)
+    return with_group(mesh, "groups", name, faces)
 
 
 def _inner_faces(mesh):

@@ -1,4 +1,4 @@
-"""Mesh files: read all that meshio can, write Gmsh, VTU and PVD; the only importer of meshio."""
+"""Mesh files: read all that meshio can, write Gmsh, VTU and PVD."""
 
 import contextlib
 import io
@@ -13,16 +13,23 @@ from xml.sax.saxutils import quoteattr
 import meshio
 import numpy as np
 
-from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done, write_text
 from taichi_dem.kit.likely_units import EDGE, in_unit
 from taichi_dem.kit.timeout import run_with_timeout
 from taichi_dem.kit.validation import FileName, path_name, positive
-from taichi_dem.mesh.cells import blocks_of, bodies_in, corners_of, fault_of_cells, shape_of
+from taichi_dem.mesh.cells import (
+    blocks_of,
+    bodies_in,
+    body_groups_in,
+    corners_of,
+    face_groups_in,
+    shape_of,
+    unread_groups,
+    volumes_of,
+)
 from taichi_dem.mesh.check import checked_points, unbonded_places, weld_labels
-from taichi_dem.mesh.file_groups import body_groups_in, face_groups_in, unread_groups, volumes_of
-from taichi_dem.mesh.gmsh_files import keyed_by_dimension, refuse_bad_gmsh, with_own_keys
+from taichi_dem.mesh.gmsh_files import keyed_by_dimension, read_gmsh
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
 from taichi_dem.mesh.tetrahedra import edge_lengths
 
@@ -32,6 +39,10 @@ _PATIENCE_S = 20.0
 _SLOWEST_BYTES_PER_S = 1e5
 _SPLIT = "split them into tetrahedra, for example by ParaView's filter Tetrahedralize"
 _UNKNOWN = "holds cells of a type that meshio does not know, such as voxels"
+_FOLDED = (
+    "tetrahedra are numbered after cells have been cut, and a cell folds over itself if it is "
+    "strongly twisted, or its corners are not in the order of the file's format"
+)
 _NEEDED = (
     "loads and supports need groups of faces (physical surfaces in Gmsh), materials groups of "
     "solid cells"
@@ -169,15 +180,11 @@ def _read_raw(path):
     Whatever goes wrong inside becomes one InputError.
     """
     if not os.path.isfile(path):
-        problem = "is no file" if os.path.lexists(path) else "does not exist"
-        problem = "is a folder" if os.path.isdir(path) else problem
-        raise InputError(f"mesh file {path} {problem}")
+        raise InputError(f"mesh file {path} does not exist, or is no file")
     said = io.StringIO()
     seconds = _PATIENCE_S + os.path.getsize(path) / _SLOWEST_BYTES_PER_S
     sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
     try:
-        if path.lower().endswith(".msh"):
-            refuse_bad_gmsh(path)
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             return run_with_timeout(seconds, lambda: _meshio_read(path), sentence), said.getvalue()
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
@@ -187,10 +194,9 @@ def _read_raw(path):
 
 def _meshio_read(path):
     with np.errstate(over="ignore"):  # an STL's text, tried as if it were binary
-        if not path.lower().endswith(".msh"):
-            return keyed_by_dimension(meshio.read(path), {})
-        with with_own_keys(path) as (copy, names):
-            return keyed_by_dimension(meshio.read(copy), names)
+        if path.lower().endswith(".msh"):
+            return read_gmsh(path)
+        return keyed_by_dimension(meshio.read(path), {})
 
 
 def _reason_of(error, printed):
@@ -236,24 +242,11 @@ def _mesh(raw, scale, weld_tolerance, keep_coincident):
             corners = corners_of(block, len(points))
             block.data = np.hstack([label[corners], block.data[:, corners.shape[1] :]])
         bodies = bodies_in(raw, points)
-    kept = {"keep_coincident": keep_coincident}
+    kept = {"keep_coincident": keep_coincident, "body_groups": body_groups_in(raw, bodies)}
     try:
         mesh = checked_mesh(points, bodies.tetrahedra, face_groups_in(raw), **kept)
     except InputError as error:
-        fault = fault_of_cells(raw, points) if "tetrahedra " in str(error) else ""
-        raise InputError(f"{error}; {fault}" if fault else str(error)) from None
-    groups = body_groups_in(raw, bodies)
-    notes = list(_cuts(raw, bodies))
-    if len(groups) > 1:
-        notes.append(f"bodies are in the groups {', '.join(groups)}, for materials of their own")
-    return replace(mesh, body_groups=groups, notes=(*notes, *welding, *mesh.notes))
-
-
-def _cuts(raw, bodies):
-    """Notes on cells that are read as linear tetrahedra."""
-    for k, block in blocks_of(raw, 3):
-        made = int((bodies.block == k).sum())
-        if shape_of(block.type) != "tetra":
-            yield f"cut {counted(len(block), f'{block.type} cell')} into {made} tetrahedra"
-        elif block.data.shape[1] > 4:
-            yield f"read {made} {block.type} elements of higher order as linear ones"
+        is_cut = any(shape_of(block.type) != "tetra" for _, block in blocks_of(raw, 3))
+        fault = f"; {_FOLDED}" if is_cut and "tetrahedra " in str(error) else ""
+        raise InputError(f"{error}{fault}") from None
+    return replace(mesh, notes=(*welding, *mesh.notes))

@@ -1,17 +1,28 @@
-"""Meshes made with Gmsh; the only importer of gmsh, which nothing else needs.
-
-``mesh.filled`` fills drawn surfaces by the same session.
-"""
+"""Meshes made with Gmsh: a block with a hole, and drawn solids; the only importer of gmsh."""
 
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done
-from taichi_dem.kit.validation import FileName, finite, path_name, positive, shown, whole
+from taichi_dem.kit.fixed_order import dot, length
+from taichi_dem.kit.validation import (
+    FileName,
+    finite,
+    path_name,
+    positive,
+    shown,
+    told_apart,
+    whole,
+)
+from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.mesh import Mesh, checked_mesh
 
 #: Options that could make two runs of the same Gmsh differ, or change the elements.
 _OPTIONS = {
@@ -31,10 +42,16 @@ _OPTIONS = {
     "Mesh.MshFileVersion": 4.1,
     "Mesh.Binary": 0,
 }
-
-
 #: Chords around the hole.
 _MOST_SEGMENTS = 10000
+#: Angle between triangles of an STL from which on an edge parts two surfaces [degrees].
+_EDGE_DEG = 40.0
+#: Most elements of a mesh: ten million tetrahedra take some ten GiB to check.
+_MOST_BODIES = 10_000_000
+#: Tetrahedra in a cube of an element; Gmsh makes 8.5.
+_PER_CUBE = 8.7
+#: Endings of files, by how they are read.
+_DRAWN, _TRIANGLES = (".step", ".stp"), (".stl",)
 
 
 def block_with_hole(
@@ -164,3 +181,119 @@ def _add_sizes(field, hole, radius, near, far, distance):
     tag = field.add("MathEval")
     field.setString(tag, "F", f"Min(Max({near!r}+{growth!r}*{away}, {low!r}), {high!r})")
     field.setAsBackgroundMesh(tag)
+
+
+def filled_surface(path: FileName, element: float, scale: float = 1.0) -> Mesh:
+    """The solid inside a drawn surface, see ``shapes.from_surface``."""
+    name = path_name("path", path)
+    element, scale = positive("element", element), positive("scale", scale)
+    if not name.lower().endswith((*_DRAWN, *_TRIANGLES)):
+        raise InputError(f"path must end in .stl, .step or .stp, got {name}")
+    if not os.path.isfile(name):
+        raise InputError(f"surface file {name} does not exist")
+    with session("filled") as gmsh:
+        drawn = name.lower().endswith(_DRAWN)
+        if drawn:
+            gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+            gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
+            gmsh.model.occ.importShapes(name)
+            gmsh.model.occ.synchronize()
+            if not gmsh.model.getEntities(3):
+                raise InputError(f"surface file {name} must hold a closed surface, got none")
+        else:
+            _draw_triangles(gmsh, name)
+        refuse_too_many(element, _drawn_volume(gmsh, drawn) * scale**3)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", element / scale)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", element / scale)
+        gmsh.model.mesh.generate(3)
+        return _mesh_of(gmsh, scale, name, drawn)
+
+
+def _drawn_volume(gmsh, drawn):
+    """Volume inside the surface, in units of the file."""
+    if drawn:
+        return sum(gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3))
+    points, triangles = _places_and_rows(gmsh, 2)
+    corners = points[triangles]
+    return abs(float(np.linalg.det(corners - corners[:1, :1]).sum())) / 6.0
+
+
+def refuse_too_many(element: float, volume: float) -> None:
+    """Raise InputError for more tetrahedra in a volume [m3] than there is memory for."""
+    least = (_PER_CUBE * volume / _MOST_BODIES) ** (1.0 / 3.0)
+    if element < least:
+        got, bound = told_apart(element, least)
+        raise InputError(
+            f"element must be at least {bound} m, for {_MOST_BODIES} tetrahedra at most in "
+            f"{volume:.3g} m3, got {got}"
+        )
+
+
+def _draw_triangles(gmsh: Any, name: str) -> None:
+    """Read triangles, part them at their edges, and make a volume of what they enclose."""
+    gmsh.merge(name)
+    gmsh.model.mesh.removeDuplicateNodes()
+    _refuse_open(gmsh, name)
+    angle = np.radians(_EDGE_DEG)
+    gmsh.model.mesh.classifySurfaces(angle, True, True, np.pi)
+    gmsh.model.mesh.createGeometry()
+    surfaces = [tag for _, tag in gmsh.model.getEntities(2)]
+    gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(surfaces)])
+    gmsh.model.geo.synchronize()
+
+
+def _refuse_open(gmsh, name):
+    """Raise InputError unless every edge of the triangles belongs to two of them."""
+    _, nodes = gmsh.model.mesh.getElementsByType(2)
+    if not len(nodes):
+        raise InputError(f"surface file {name} must hold triangles, got none")
+    corners = nodes.reshape(-1, 3)[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
+    count = np.unique(np.sort(corners, axis=1), axis=0, return_counts=True)[1]
+    wrong = int((count != 2).sum())
+    if wrong:
+        raise InputError(
+            f"surface file {name} must be closed, each edge between two triangles, but {wrong} of "
+            f"its {len(count)} edges are not: close its holes, or join its points"
+        )
+
+
+def _mesh_of(gmsh, scale, name, drawn):
+    """The mesh that Gmsh has made; a group for each surface."""
+    points, tetrahedra = _places_and_rows(gmsh, 4)
+    if not len(tetrahedra):
+        raise InputError(f"surface file {name} must enclose a solid, but Gmsh filled none")
+    points *= scale
+    groups = _drawn_groups(gmsh) if drawn else _smooth_parts(points, tetrahedra)
+    return checked_mesh(points, tetrahedra, groups, source=name)
+
+
+def _places_and_rows(gmsh, kind, tag=-1):
+    """Points (n, 3), and corners of triangles (kind 2) or tetrahedra (4) of an entity or all."""
+    tags, places, _ = gmsh.model.mesh.getNodes()
+    number = np.zeros(int(tags.max()) + 1, dtype=np.int64)
+    number[tags.astype(np.int64)] = np.arange(len(tags))
+    _, nodes = gmsh.model.mesh.getElementsByType(kind, tag)
+    return places.reshape(-1, 3), number[nodes.astype(np.int64)].reshape(-1, {2: 3, 4: 4}[kind])
+
+
+def _drawn_groups(gmsh):
+    """Faces of each surface of a CAD file, by the last part of its name there, else its number."""
+    groups: dict[str, np.ndarray] = {}
+    for _, tag in gmsh.model.getEntities(2):
+        given = gmsh.model.getEntityName(2, tag).rsplit("/", 1)[-1].replace('"', "").strip()
+        key = given if given.isprintable() and given else f"surface_{tag}"
+        _, faces = _places_and_rows(gmsh, 2, tag)
+        groups[key] = np.vstack([groups.get(key, faces[:0]), faces])
+    return {name: faces for name, faces in groups.items() if len(faces)}
+
+
+def _smooth_parts(points, tetrahedra):
+    """Outer faces in groups that end at sharp edges: Gmsh cuts smooth surfaces into patches."""
+    outer = geometry.outer_faces(tetrahedra)
+    normal = geometry.area_vectors(points, outer)
+    normal /= length(normal)[:, None]
+    first, second = geometry.pairs_at_edges(outer)
+    smooth = dot(normal[first], normal[second]) > np.cos(np.radians(_EDGE_DEG))
+    label = geometry.components(len(outer), np.stack([first[smooth], second[smooth]], axis=1))
+    parts = (outer[label == first] for first in np.unique(label))
+    return {f"surface_{k}": part for k, part in enumerate(parts, 1)}

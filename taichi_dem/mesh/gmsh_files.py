@@ -7,19 +7,18 @@ end, and of faces and bodies in groups of one name a reader loses the faces.
 import os
 import re
 import tempfile
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import meshio
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import shown
 
 _ENDS = re.compile(rb"^\$((?:End)?(?:Nodes|Elements))[ \t\r]*$", re.MULTILINE)
 _WHOLE = [b"Nodes", b"EndNodes", b"Elements", b"EndElements"]
 _NAMES = re.compile(rb"^\$PhysicalNames\s*\n(.*?)^\$EndPhysicalNames", re.MULTILINE | re.DOTALL)
-_NAME = re.compile(r'\s*(\d+)\s+(\d+)\s+("?)(.*?)\3\s*')
+_NAME = re.compile(rb'^([ \t]*\d+[ \t]+\d+[ \t]+)("?)(.*?)\2[ \t\r]*$', re.MULTILINE)
 
 
 class PhysicalName(NamedTuple):
@@ -33,14 +32,27 @@ class PhysicalName(NamedTuple):
     name: str
 
 
-def refuse_bad_gmsh(path: str) -> None:
-    """Raise InputError for a Gmsh file that is cut off, or whose numbers do not fit each other.
+def read_gmsh(path: str) -> Any:
+    """A Gmsh file of meshio's with groups by PhysicalName; InputError for a bad one."""
+    with open(path, "rb") as file:
+        content = file.read()
+    _refuse_bad(content)
+    keyed, names = _with_own_keys(content)
+    if not names:
+        return keyed_by_dimension(meshio.read(path), {})
+    with tempfile.TemporaryDirectory() as folder:
+        copy = os.path.join(folder, "keyed.msh")
+        with open(copy, "wb") as file:
+            file.write(keyed)
+        return keyed_by_dimension(meshio.read(copy), names)
+
+
+def _refuse_bad(content):
+    """Refuse a Gmsh file that is cut off, or whose numbers do not fit each other.
 
     Text of the versions 2.2 and 4.1 is checked by its rows, other files by the ends of sections.
     Files that do not begin like one of Gmsh's are left to other readers.
     """
-    with open(path, "rb") as file:
-        content = file.read()
     if not content.startswith(b"$MeshFormat"):
         return
     marks = list(_ENDS.finditer(content))
@@ -110,33 +122,27 @@ def _require(right):
         raise ValueError
 
 
-@contextmanager
-def with_own_keys(path: str) -> Iterator[tuple[str, Mapping[str, str]]]:
+def _with_own_keys(content):
     """A file in which each physical group has a name of its own, and its true name by that.
 
-    It is the file itself, or a copy where names repeat or hold what a reader takes for an escape.
+    As names repeat, or hold what a reader takes for an escape.
     """
-    with open(path, "rb") as file:
-        content = file.read()
+    names: dict[str, str] = {}
+
+    def keyed(row):
+        key = str(len(names))
+        names[key] = row[3].decode("utf-8")
+        return row[1] + key.encode()
+
     section = _NAMES.search(content)
-    rows = section[1].decode("utf-8").splitlines()[1:] if section else []
-    found = [m.group(1, 2, 4) for m in map(_NAME.fullmatch, rows) if m]
-    names = [name for _, _, name in found]
-    clear = len({*names}) == len(names) and not any("\\" in name for name in names)
-    if section is None or clear or len(found) < len(rows):
-        yield path, {}
-        return
-    lines = [f'{dimension} {tag} "{k}"\n' for k, (dimension, tag, _) in enumerate(found)]
+    if section is None:
+        return content, names
     start, end = section.span(1)
-    with tempfile.TemporaryDirectory() as folder:
-        copy = os.path.join(folder, "keyed.msh")
-        with open(copy, "wb") as file:
-            file.write(content[:start] + f"{len(lines)}\n{''.join(lines)}".encode() + content[end:])
-        yield copy, {str(k): name for k, name in enumerate(names)}
+    return content[:start] + _NAME.sub(keyed, content[start:end]) + content[end:], names
 
 
 def keyed_by_dimension(raw: Any, names: Mapping[str, str]) -> Any:
-    """A file of meshio's with groups by PhysicalName; names: the true ones of ``with_own_keys``."""
+    """A file of meshio's with groups by PhysicalName; names: the true ones, by keys."""
     keys = {
         key: PhysicalName(int(value[1]), int(value[0]), names.get(key, key))
         for key, value in raw.field_data.items()
@@ -145,19 +151,3 @@ def keyed_by_dimension(raw: Any, names: Mapping[str, str]) -> Any:
     raw.field_data = {keys[key]: raw.field_data[key] for key in keys}
     raw.cell_sets = {keys.get(key, key): members for key, members in raw.cell_sets.items()}
     return raw
-
-
-def physical_names(raw: Any, dimension: int) -> dict[int, str]:
-    """Names of the physical groups of a dimension in a file of meshio's, by their numbers."""
-    return {key.tag: key.name for key in raw.field_data if key.dimension == dimension}
-
-
-def made_name(name: str, value: int, taken: Collection[Any]) -> str:
-    """The name "NAME_VALUE" of a group that has only a number; InputError where another has it."""
-    made = f"{name}_{value}"
-    if made in taken:
-        raise InputError(
-            f"the group of number {value} must have a name, as {shown(made)}, which stands for it, "
-            "must be that of one group only, got another group of this name"
-        )
-    return made

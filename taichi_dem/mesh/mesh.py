@@ -1,7 +1,4 @@
-"""Mesh of tetrahedra with named groups of faces, checked once at the border.
-
-x points to the right, y up, z towards the viewer.
-"""
+"""Mesh of tetrahedra with named groups; x points to the right, y up, z towards the viewer."""
 
 import os
 from collections.abc import Mapping
@@ -226,12 +223,6 @@ class Mesh(MeshMethods):
 def volumes(mesh: Mesh) -> np.ndarray:
     """Volumes of the bodies [m3], shape (body_count,)."""
     return geometry.signed_volumes(mesh.points, mesh.tetrahedra)
-
-
-def group_area(mesh: Mesh, name: str) -> float:
-    """Area of the faces of a group [m2]."""
-    vectors = geometry.area_vectors(mesh.points, mesh.group_faces(name))
-    return float(np.linalg.norm(vectors, axis=1).sum())
 
 
 def checked_mesh(

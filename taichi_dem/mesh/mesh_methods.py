@@ -50,9 +50,8 @@ class MeshMethods:
         True
         """
         mesh: Any = self
-        faces = geometry.all_faces(mesh.tetrahedra)
-        outer = faces[geometry.outer_rows(faces)]
-        return with_faces(mesh, name, outer[choose(mesh, outer, chosen)])
+        outer = geometry.outer_faces(mesh.tetrahedra)
+        return with_group(mesh, "groups", name, outer[choose(mesh, outer, chosen)])
 
     def body_group(self: Made, name: str, chosen: Choice) -> Made:
         """Return the mesh with one more group of bodies, chosen by their centres.
@@ -75,12 +74,8 @@ class MeshMethods:
             The name is taken, no body is chosen, or other values are returned.
         """
         mesh: Any = self
-        if word("name", name) in mesh.body_groups:
-            raise InputError(f"name must be that of a new group, got {shown(name)}, which is there")
         bodies = np.flatnonzero(choose(mesh, mesh.tetrahedra, chosen, "bodies"))
-        if not len(bodies):
-            raise InputError(f"group {name} must have at least one body, but none was chosen")
-        return replace(mesh, body_groups={**mesh.body_groups, name: bodies})
+        return with_group(mesh, "body_groups", name, bodies)
 
     def moved(
         self: Made,
@@ -165,10 +160,11 @@ def choose(mesh: Any, corners: np.ndarray, chosen: Choice, what: str = "faces") 
     return found
 
 
-def with_faces(mesh: Any, name: str, faces: np.ndarray) -> Any:
-    """The mesh with one more group of faces, given by their corners."""
-    if word("name", name) in mesh.groups:
+def with_group(mesh: Any, kind: str, name: str, members: np.ndarray) -> Any:
+    """The mesh with one more of its "groups" of faces or "body_groups"."""
+    groups = getattr(mesh, kind)
+    if word("name", name) in groups:
         raise InputError(f"name must be that of a new group, got {shown(name)}, which is there")
-    if not len(faces):
-        raise InputError(f"group {name} must have at least one face, but none was chosen")
-    return replace(mesh, groups={**mesh.groups, name: faces})
+    if not len(members):
+        raise InputError(f"group {name} must have at least one member, but none was chosen")
+    return replace(mesh, **{kind: {**groups, name: members}})

@@ -36,21 +36,17 @@ def part_boxes(corners: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.nd
 def any_overlap(low: np.ndarray, high: np.ndarray) -> bool:
     """Whether two boxes overlap; touching is not enough.
 
-    Sorted by where they begin along an axis, a box that begins behind the end of another is
-    followed by none that overlaps it; the axis is the one with the fewest candidates.
+    Sorted by where they begin along an axis, a box is compared with those that begin before its
+    end; the axis is the one with the fewest of them.
     """
-    begun = [np.searchsorted(np.sort(low[:, axis]), high[:, axis]).sum() for axis in range(3)]
-    axis = int(np.argmin(begun))
+    begun = [np.searchsorted(np.sort(low[:, axis]), high[:, axis]) for axis in range(3)]
+    axis = int(np.argmin([count.sum() for count in begun]))
     order = np.argsort(low[:, axis], kind="stable")
-    low, high = low[order], high[order]
-    for k in range(1, len(low)):
-        first, later = slice(None, -k), slice(k, None)
-        if not (low[later, axis] < high[first, axis]).any():
-            return False
-        meet = (low[later] < high[first]) & (low[first] < high[later])
-        if meet.all(axis=1).any():
-            return True
-    return False
+    low, high, ends = low[order], high[order], begun[axis][order]
+    return any(
+        ((low[k + 1 : end] < high[k]) & (low[k] < high[k + 1 : end])).all(axis=1).any()
+        for k, end in enumerate(ends.tolist())
+    )
 
 
 def may_meet(scene: Any, part: np.ndarray) -> bool:

@@ -1,14 +1,13 @@
 """Small meshes of known shape, built without a mesh generator: for tests, demos, wave bars."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Optional
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import positive, shown, whole
+from taichi_dem.kit.validation import positive, shown
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
 
 #: Groups of a bar: name -> (axis, 0 low or 1 high end).
@@ -23,9 +22,6 @@ _SIDES = {
 
 #: Boxes of a bar: ten million tetrahedra take some ten GiB to check.
 _MOST_BOXES = 1_666_666
-
-#: Orders in which a path may step along the axes; every second one winds the other way round.
-_EVEN_ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 
 
 def single(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
@@ -54,25 +50,6 @@ def pair(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
     return checked_mesh(points, [[3, 0, 1, 2], [4, 0, 2, 1]], groups)
 
 
-def with_neighbours(edge: float, heights: Mapping[int, float]) -> tuple[Mesh, np.ndarray]:
-    """A regular tetrahedron with a neighbour on some of its faces, bodies in the order of the dict.
-
-    edge: [m]. heights: of the neighbours over that of a regular one, by the corner opposite to the
-    face. Returns the mesh and the unit vectors (n, 3) from body 0 towards the neighbours.
-    """
-    alone = single(edge)
-    corners = alone.points[alone.tetrahedra[0]]
-    points, bodies, outward = [*corners], [[0, 1, 2, 3]], []
-    for k, height in heights.items():
-        positive("height of a neighbour", height)
-        face = [j for j in range(4) if j != k]
-        bodies.append([*face, len(points)])
-        away = corners[face].mean(axis=0) - corners[k]
-        points.append(corners[face].mean(axis=0) + height * away)
-        outward.append(away / np.linalg.norm(away))
-    return checked_mesh(points, bodies, {}), np.array(outward)
-
-
 def bar(length: float, width: float, cells: Sequence[int]) -> Mesh:
     """Square bar along x from the origin, regular boxes cut into six tetrahedra each.
 
@@ -87,20 +64,6 @@ def bar(length: float, width: float, cells: Sequence[int]) -> Mesh:
     points = grid.reshape(-1, 3) / boxes * np.array([length, width, width], dtype=float)
     tetrahedra = _kuhn(index)
     return checked_mesh(points, tetrahedra, _sides(grid.reshape(-1, 3), boxes, tetrahedra))
-
-
-def with_moved_nodes(mesh: Mesh, most: ArrayLike, seed: int) -> Mesh:
-    """The mesh with its nodes moved at random by up to ``most`` [m] along each axis.
-
-    most: for all nodes, or (nodes, 1), for each. Nodes in a plane that bounds the mesh across an
-    axis stay in it, so that a bar keeps its form.
-    """
-    low, extent = mesh.points.min(axis=0), np.ptp(mesh.points, axis=0)
-    moved = np.asarray(most) * np.random.default_rng(seed).uniform(-1.0, 1.0, mesh.points.shape)
-    near = 1e-9 * extent
-    moved[(mesh.points < low + near) | (mesh.points > low + extent - near)] = 0.0
-    points, groups = mesh.points + moved, dict(mesh.groups)
-    return checked_mesh(points, mesh.tetrahedra, groups, body_groups=mesh.body_groups)
 
 
 def placed_together(parts: dict, keep_coincident: bool = False) -> Mesh:
@@ -128,44 +91,13 @@ def placed_together(parts: dict, keep_coincident: bool = False) -> Mesh:
 def _bodies_together(parts):
     """Body groups of ``placed_together``."""
     groups: dict[str, np.ndarray] = {}
-    first = 0
-    for name, mesh in parts.items():
+    firsts = np.cumsum([0, *(mesh.body_count for mesh in parts.values())])
+    for (name, mesh), first in zip(parts.items(), firsts):
         for group, bodies in mesh.body_groups.items():
             for key in (group, f"{name}_{group}"):
                 groups[key] = np.append(groups.get(key, bodies[:0]), bodies + first)
-        first += mesh.body_count
     # The name of a part stands for all of it, whatever groups are called.
-    first = 0
-    for name, mesh in parts.items():
-        groups[name] = np.arange(first, first + mesh.body_count)
-        first += mesh.body_count
-    return groups
-
-
-def mirrored_copies(mesh: Mesh, copies: int) -> Mesh:
-    """Copies of a block one behind the other along z, each the mirror image of the one before.
-
-    mesh: fills 0 to its depth along z, with flat ends in the groups back (z = 0) and front; as
-    mirror images meet, the faces of both match and bond. Groups, of faces and bodies: as in the
-    mesh; back and front are those of the ends. Raises InputError as ``checked_mesh``.
-    """
-    copies = whole("copies", copies, 1, _MOST_BOXES)
-    depth = float(mesh.points[:, 2].max())
-    points = np.tile(mesh.points, (copies, 1, 1))
-    points[1::2, :, 2] = depth - points[1::2, :, 2]
-    points[:, :, 2] += depth * np.arange(copies)[:, None]
-    # Mirrored points differ from their originals in the last bit.
-    unit = 2.0 ** np.ceil(np.log2(np.ptp(mesh.points, axis=0).max()))
-    rounded = unit * np.round(points.reshape(-1, 3) / unit, 12)
-    points, place = np.unique(rounded, axis=0, return_inverse=True)
-    place = place.reshape(copies, -1)
-    groups = {name: place[:, faces].reshape(-1, 3) for name, faces in mesh.groups.items()}
-    groups["back"] = place[0][mesh.groups["back"]]
-    groups["front"] = place[-1][mesh.groups["front" if copies % 2 else "back"]]
-    shifts = mesh.body_count * np.arange(copies)[:, None]
-    bodies = {name: (shifts + group).ravel() for name, group in mesh.body_groups.items()}
-    tetrahedra = place[:, mesh.tetrahedra].reshape(-1, 4)
-    return checked_mesh(points, tetrahedra, groups, body_groups=bodies)
+    return {**groups, **dict(zip(parts, np.split(np.arange(firsts[-1]), firsts[1:-1])))}
 
 
 def _base(edge, height):
@@ -194,15 +126,12 @@ def _checked_cells(length, width, cells):
 
 def _kuhn(index):
     """Six tetrahedra a box: one for every path of axis steps from its low to its high corner."""
-    paths = []
+    axes, paths = np.eye(3, dtype=int), []
     for order in itertools.permutations(range(3)):
-        corner = np.zeros(3, dtype=int)
-        path = [corner.copy()]
-        for axis in order:
-            corner[axis] += 1
-            path.append(corner.copy())
-        if order not in _EVEN_ORDERS:
-            path[2:] = path[:1:-1]
+        steps = axes[list(order)]
+        path = np.vstack([np.zeros(3, dtype=int), np.cumsum(steps, axis=0)])
+        if np.linalg.det(steps) < 0.0:  # it winds the other way round
+            path[2:] = path[[3, 2]]
         paths.append(np.stack([_corner(index, step) for step in path], axis=-1))
     return np.stack(paths, axis=1).reshape(-1, 4)
 

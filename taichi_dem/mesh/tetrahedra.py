@@ -72,6 +72,12 @@ def outer_rows(faces: np.ndarray) -> np.ndarray:
     return np.flatnonzero(np.bincount(number)[number] == 1)
 
 
+def outer_faces(tetrahedra: np.ndarray) -> np.ndarray:
+    """Faces of one body only, outward order, (n, 3)."""
+    faces = all_faces(tetrahedra)
+    return faces[outer_rows(faces)]
+
+
 def shared_faces(tetrahedra: np.ndarray) -> np.ndarray:
     """Rows of ``all_faces`` that are one face of two bodies, shape (n, 2), smaller row first.
 

@@ -10,7 +10,7 @@ from taichi_dem.kit.display import by_fields, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.validation import FileName, direction, instance, shown, word
-from taichi_dem.mesh.locate import body_at
+from taichi_dem.mesh.topology import body_at
 from taichi_dem.observers import At, Every, RunView
 from taichi_dem.scene import Scene
 

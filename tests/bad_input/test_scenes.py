@@ -38,7 +38,7 @@ CUT = with_inner_group(PAIR, "notch", lambda x: x[:, 0] < 1.0)
 POINTS, BODIES, GROUPS = PAIR.points, PAIR.tetrahedra, PAIR.groups
 FACES = {"left": [[0, 1, 2], *GROUPS["left"]]}
 MESHES = {
-    "a body twice": (lambda: checked_mesh(POINTS, [*BODIES, BODIES[0]], {}), "same four points"),
+    "a body twice": (lambda: checked_mesh(POINTS, [*BODIES, BODIES[0]], {}), "share one face"),
     "a flat body": (lambda: checked_mesh(POINTS * [0, 1, 1], BODIES, {}), "coincide"),
     "a number that wraps around": (
         lambda: checked_mesh(POINTS, BODIES.astype(np.int64) + 2**32, {}),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from _closed_forms import _carried
+from _meshes import with_moved_nodes
 from taichi_dem import (
     CONCRETE,
     ImplicitDashpots,
@@ -15,7 +16,7 @@ from taichi_dem import (
     effects,
 )
 from taichi_dem.elasticity.wave_moduli import wave_moduli
-from taichi_dem.mesh.shapes import bar, single, with_moved_nodes
+from taichi_dem.mesh.shapes import bar, single
 
 #: Concrete whose bonds have no dashpots, so that no wave fades.
 UNDAMPED = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from _meshes import with_neighbours
 from taichi_dem import (
     CONCRETE,
     ImplicitDashpots,
@@ -16,7 +17,7 @@ from taichi_dem import (
     effects,
     quality_report,
 )
-from taichi_dem.mesh.shapes import bar, pair, placed_together, single, with_neighbours
+from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from tests.fuzz.draws import Draws
 
 

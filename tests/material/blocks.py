@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from _meshes import with_moved_nodes
 from taichi_dem import CONCRETE, Material, checked_mesh
-from taichi_dem.mesh.shapes import bar, with_moved_nodes
+from taichi_dem.mesh.shapes import bar
 
 E, NU, DENSITY = 32e9, 0.2, 2450.0
 #: A firm, heavy ore with weak bonds.

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from _meshes import mirrored_copies
 from taichi_dem import read_mesh, with_body_group
 from taichi_dem.mesh.face_groups import with_cut
 from taichi_dem.mesh.files import write_mesh
-from taichi_dem.mesh.reorder import in_space_order
-from taichi_dem.mesh.shapes import bar, mirrored_copies, placed_together
+from taichi_dem.mesh.joined import in_space_order
+from taichi_dem.mesh.shapes import bar, placed_together
 
 ORE = ("ore", lambda x: x[:, 0] > 0.5)
 LOW = ("low", lambda x: x[:, 1] < 0.15)

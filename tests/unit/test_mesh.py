@@ -5,11 +5,12 @@ import itertools
 import numpy as np
 import pytest
 
+from _meshes import group_area, with_neighbours
 from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, join, read_mesh
 from taichi_dem.mesh import tetrahedra as geometry
-from taichi_dem.mesh.mesh import Mesh, group_area, volumes
-from taichi_dem.mesh.reorder import in_space_order
-from taichi_dem.mesh.shapes import bar, pair, single, with_neighbours
+from taichi_dem.mesh.joined import in_space_order
+from taichi_dem.mesh.mesh import Mesh, volumes
+from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.mesh.topology import topology_of
 from tests.turns import matrix, quaternion
 

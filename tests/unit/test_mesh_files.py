@@ -6,10 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from _meshes import group_area
 from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, read_mesh, shapes
 from taichi_dem.mesh.files import write_mesh, write_vtu
 from taichi_dem.mesh.gmsh import block_with_hole
-from taichi_dem.mesh.mesh import group_area, volumes
+from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.shapes import bar
 from tests.bad_input.refusals import assert_refused, steady
 

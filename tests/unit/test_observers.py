@@ -18,8 +18,8 @@ from taichi_dem import (
     Uniform,
     simulate,
 )
-from taichi_dem.mesh.locate import body_at
 from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.topology import body_at
 from taichi_dem.output.profile import Profile
 from taichi_dem.output.run_costs import RunCosts
 

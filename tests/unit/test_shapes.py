@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from _meshes import group_area
 from taichi_dem import shapes
-from taichi_dem.mesh.mesh import group_area, volumes
+from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.parts import parts_of
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors, edge_lengths, outer_rows
 
