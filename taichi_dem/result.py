@@ -244,7 +244,7 @@ class Result(RunTables):
         >>> result.show("blast.html")  # doctest: +SKIP
         """
         # Imported here, so that matplotlib loads only where something is shown.
-        from taichi_dem.viewer import show_block
+        from taichi_dem.viewer.block import show_block
 
         if not self.frames:
             raise InputError("frames must be at least 1 to show a run: simulate(..., frames=20)")

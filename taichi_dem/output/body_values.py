@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from taichi_dem.kit.validation import choice
-from taichi_dem.output.fragments import broken_by, fragment_of_body
+from taichi_dem.output.fragments import fragment_of_body
 from taichi_dem.output.record import Frame
 from taichi_dem.state.model import Model
 
@@ -35,7 +35,7 @@ def body_values(bodies: Bodies, colour: str) -> np.ndarray:
     """Value of every body, (body_count,); InputError unless colour is one of COLOURS."""
     model, frame, broken_time, peak_speed = bodies
     if choice("colour", colour, COLOURS) == "fragment":
-        return fragment_of_body(model, broken_by(broken_time, frame.time_s))
+        return fragment_of_body(model, broken_time <= frame.time_s)
     if colour == "peak_speed":
         return peak_speed
     if colour == "displacement":

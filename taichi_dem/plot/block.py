@@ -15,7 +15,6 @@ from taichi_dem.plot.bodies import (
     ALONG_Z,
     JOINT,
     STONE,
-    break_times,
     displaced,
     draw_bodies,
     draw_lines,
@@ -139,7 +138,7 @@ def plot_steps(
     model: Model,
     frames: Sequence[Frame],
     dt0: float,
-    broken_time: Optional[np.ndarray] = None,
+    broken_time: np.ndarray,
     axis: Sequence[float] = ALONG_Z,
 ) -> None:
     """Step of every body at several times (Konno et al., Fig 13).
@@ -148,7 +147,7 @@ def plot_steps(
     broken_time: (bond_count,) [s], NaN while a bond holds; lets one see into open cracks. axis:
     towards the viewer.
     """
-    view, broken_time = View(axis), break_times(model, broken_time)
+    view = View(axis)
     if len(frames) > 6:
         picked = np.linspace(0, len(frames), 7).round().astype(int)[1:] - 1
         frames = [frames[k] for k in picked]

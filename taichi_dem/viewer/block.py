@@ -10,7 +10,7 @@ from taichi_dem.kit.display import counted
 from taichi_dem.kit.validation import FileName
 from taichi_dem.kit.viewer import WebPage, pack, quantise, select_frames, show_page, time_unit
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
-from taichi_dem.output.export.rigid_motion import quaternions_of
+from taichi_dem.output.fragments import quaternions_of
 from taichi_dem.output.record import Frame
 from taichi_dem.plot.view import edge_keys, first_breaks, skin
 from taichi_dem.state.model import Model
@@ -126,10 +126,10 @@ def _shape(model: Model, bodies: np.ndarray) -> Any:
 def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
     """Axis times angle [rad] of rotation matrices (n, 3, 3), (n, 3), angles up to pi."""
     quaternion = quaternions_of(rotation)
-    quaternion *= np.where(quaternion[:, :1] < 0.0, -1.0, 1.0)
-    sine = np.linalg.norm(quaternion[:, 1:], axis=1, keepdims=True)
-    angle = 2.0 * np.arctan2(sine, quaternion[:, :1])
-    return quaternion[:, 1:] * (angle / np.where(sine > 0.0, sine, 1.0))
+    quaternion *= np.where(quaternion[:, 3:] < 0.0, -1.0, 1.0)
+    sine = np.linalg.norm(quaternion[:, :3], axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, quaternion[:, 3:])
+    return quaternion[:, :3] * (angle / np.where(sine > 0.0, sine, 1.0))
 
 
 def _magnification(model: Model, frame: Frame) -> float:

@@ -11,8 +11,12 @@ from taichi_dem.kit.files import write_bytes
 from taichi_dem.kit.validation import FileName, positive
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
 from taichi_dem.mesh.topology import skin
-from taichi_dem.output.export.rigid_motion import quaternions_of, rigid_motion
-from taichi_dem.output.fragments import broken_by, centres, fragment_of_body
+from taichi_dem.output.fragments import (
+    centres,
+    fragment_of_body,
+    quaternions_of,
+    rigid_motion,
+)
 from taichi_dem.output.record import Frame
 from taichi_dem.state.model import Model
 
@@ -64,7 +68,7 @@ def write_gltf(
     Format: Khronos glTF 2.0. Lengths in m, axes as in the run: y is up in most viewers.
     """
     seconds = positive("seconds", seconds)
-    broken = broken_by(broken_time, frames[-1].time_s)
+    broken = broken_time <= frames[-1].time_s
     of_body = fragment_of_body(model, broken)
     file = _GlbFile()
     for number, surface in enumerate(_surfaces(model, broken, of_body, values)):
@@ -97,17 +101,12 @@ def _colours(values):
 
 def _motions(model: Model, frames: Sequence[Frame], of_body: np.ndarray) -> Any:
     """Translations (frames, fragments, 3) and quaternions x, y, z, w (frames, fragments, 4)."""
-    places: list[np.ndarray] = []
-    turns: list[np.ndarray] = []
-    for frame in frames:
-        centre, rotation = rigid_motion(model, frame, of_body)
-        turn = np.roll(quaternions_of(rotation), -1, axis=1)
-        if turns:
-            # q and -q are one rotation; between two frames the shorter way is meant.
-            turn = turn * np.where((turn * turns[-1]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
-        places.append(centre)
-        turns.append(turn)
-    return np.array(places), np.array(turns)
+    places, rotations = zip(*(rigid_motion(model, frame, of_body) for frame in frames))
+    turns = np.array(list(map(quaternions_of, rotations)))
+    # q and -q are one rotation; between two frames the shorter way is meant.
+    for before, turn in zip(turns, turns[1:]):
+        turn *= np.where((turn * before).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
+    return np.array(places), turns
 
 
 class _GlbFile:
@@ -151,14 +150,15 @@ class _GlbFile:
         clock = times.astype(np.float32)
         bounds = {"min": [float(clock[0])], "max": [float(clock[-1])]}
         given = self._accessor(clock[:, None], vertices=False, **bounds)
-        samplers: list[dict] = []
-        channels: list[dict] = []
-        for path, values in (("translation", places), ("rotation", turns)):
-            for node in range(places.shape[1]):
-                ways = self._accessor(values[:, node].astype(np.float32), vertices=False)
-                target = {"node": node, "path": path}
-                channels.append({"sampler": len(samplers), "target": target})
-                samplers.append({"input": given, "output": ways})
+        ways = [
+            ({"node": node, "path": path}, values[:, node].astype(np.float32))
+            for path, values in (("translation", places), ("rotation", turns))
+            for node in range(places.shape[1])
+        ]
+        channels = [{"sampler": k, "target": target} for k, (target, _) in enumerate(ways)]
+        samplers = [
+            {"input": given, "output": self._accessor(values, vertices=False)} for _, values in ways
+        ]
         self._add("animations", {"samplers": samplers, "channels": channels})
 
     def content(self, extras):

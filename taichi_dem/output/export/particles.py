@@ -7,8 +7,12 @@ import numpy as np
 from taichi_dem.kit.extended_xyz import XyzFrame, write_extended_xyz
 from taichi_dem.kit.validation import FileName, choice
 from taichi_dem.mesh.tetrahedra import signed_volumes
-from taichi_dem.output.export.rigid_motion import quaternions_of, rigid_motion
-from taichi_dem.output.fragments import broken_by, fragment_of_body, fragments_of
+from taichi_dem.output.fragments import (
+    fragment_of_body,
+    fragments_of,
+    quaternions_of,
+    rigid_motion,
+)
 from taichi_dem.output.record import Frame
 from taichi_dem.state.model import Model
 
@@ -45,8 +49,8 @@ def write_particles(
     quaternion x, y, z, w, from the shape at rest), mass [kg], fragment (by falling mass).
     """
     kinds = {"bodies": _bodies, "fragments": _fragments}
-    columns_of = kinds[choice("of", of, kinds)]
-    tables = [columns_of(model, frame, broken_time) for frame in frames]
+    particles_of = kinds[choice("of", of, kinds)]
+    tables = [_table(*particles_of(model, frame, broken_time)) for frame in frames]
     margin = max(table["radius"].max() for table in tables)
     low = np.min([table["pos"].min(axis=0) for table in tables], axis=0) - margin
     high = np.max([table["pos"].max(axis=0) for table in tables], axis=0) + margin
@@ -54,27 +58,21 @@ def write_particles(
     write_extended_xyz(path, shots)
 
 
+def _table(place, radius, velocity, rotation, mass, fragment):
+    """Columns of the particles in a frame, by name."""
+    turns = {"orientation": quaternions_of(rotation), "mass": mass, "fragment": fragment}
+    return {"pos": place, "radius": radius, "velo": velocity, **turns}
+
+
 def _bodies(model, frame, broken_time):
     volume = signed_volumes(model.mesh.points, model.mesh.tetrahedra)
-    of_body = fragment_of_body(model, broken_by(broken_time, frame.time_s))
-    return {
-        "pos": frame.position,
-        "radius": np.cbrt(0.75 * volume / np.pi),
-        "velo": frame.velocity,
-        "orientation": np.roll(quaternions_of(frame.rotation), -1, axis=1),
-        "mass": model.body_mass,
-        "fragment": of_body,
-    }
+    of_body = fragment_of_body(model, broken_time <= frame.time_s)
+    radius = np.cbrt(0.75 * volume / np.pi)
+    return frame.position, radius, frame.velocity, frame.rotation, model.body_mass, of_body
 
 
 def _fragments(model, frame, broken_time):
     found = fragments_of(model, frame, broken_time)
     centre, rotation = rigid_motion(model, frame, found.of_body)
-    return {
-        "pos": centre,
-        "radius": 0.5 * found["diameter_m"],
-        "velo": found.vectors("velocity"),
-        "orientation": np.roll(quaternions_of(rotation), -1, axis=1),
-        "mass": found["mass_kg"],
-        "fragment": found["fragment"],
-    }
+    radius, velocity = 0.5 * found["diameter_m"], found.vectors("velocity")
+    return centre, radius, velocity, rotation, found["mass_kg"], found["fragment"]

@@ -14,7 +14,7 @@ from taichi_dem.kit.units import without_unit
 from taichi_dem.kit.validation import FileName, choices
 from taichi_dem.output.body_values import COLOURS, Bodies, body_values, scale_end
 from taichi_dem.output.cracks import Rose
-from taichi_dem.output.fragments import Fragments, broken_by
+from taichi_dem.output.fragments import Fragments
 from taichi_dem.plot.bodies import ALONG_Z, JOINT, draw_bodies, frame_block
 from taichi_dem.plot.series import ENERGY_TERMS
 from taichi_dem.plot.summary import scale
@@ -61,7 +61,7 @@ def _draw(axes, time, table, names, unit):
 
 
 def plot_energy_shares(path: Optional[FileName], shares: Mapping[str, np.ndarray]) -> Figure:
-    """Stack the shares of ``output.energy_shares``; what is missing to 100 % is unexplained."""
+    """Stack the shares of ``Result.energy_shares``; what is missing to 100 % is unexplained."""
     factor, unit = scale(float(shares["time_s"].max(initial=0.0)), "s")
     looks = {key.replace("_J", "_share"): look for key, look in ENERGY_TERMS.items()}
     terms = {name: look for name, look in looks.items() if name in shares and shares[name].any()}
@@ -185,7 +185,7 @@ def plot_block(
     """
     values, view = body_values(bodies, colour), View(axis)
     model, frame, broken_time, _ = bodies
-    broken = broken_by(broken_time, frame.time_s)
+    broken = broken_time <= frame.time_s
     options: dict[str, Any] = {"magnify": magnify, "axis": axis, "broken": broken}
     with picture(path, size=(6.2, 4.8)) as (figure, axes):
         if colour == "fragment":
