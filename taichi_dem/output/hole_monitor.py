@@ -50,11 +50,9 @@ class HoleMonitor:
 
     def _nearest_to_free_face(self, model, hole_body, hole_face):
         mesh, topology = model.mesh, model.topology
-        on_hole = set(zip(hole_body.tolist(), hole_face.tolist()))
-        pairs = zip(topology.outer_body.tolist(), topology.outer_face.tolist())
-        others = [pair for pair in pairs if pair not in on_hole]
-        free = np.array(others, dtype=np.int32).reshape(-1, 2)
-        corners = face_vertices(mesh, free[:, 0], free[:, 1])
+        outer = 4 * topology.outer_body + topology.outer_face
+        free = ~np.isin(outer, 4 * hole_body + hole_face)
+        corners = face_vertices(mesh, topology.outer_body[free], topology.outer_face[free])
         normal = area_vectors(mesh.points, corners)
         normal /= length(normal)[:, None]
         distance = dot(mesh.points[corners[:, 0]] - self.axis_point, normal)

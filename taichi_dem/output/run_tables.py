@@ -8,7 +8,7 @@ from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, whole
 from taichi_dem.output.attenuation import Attenuation
-from taichi_dem.output.body_values import Bodies, shares_of_scale
+from taichi_dem.output.body_values import shares_of_scale
 from taichi_dem.output.cracks import Rose, cracks_of, rose_of
 from taichi_dem.output.export.gltf import write_gltf
 from taichi_dem.output.export.particles import write_particles
@@ -175,25 +175,6 @@ class RunTables:
             )
         return Attenuation.of(self.model, self.peak_speed, radius, group)
 
-    def bodies(self, frame: int = -1) -> Bodies:
-        """Collect what bodies are coloured by in a frame.
-
-        Parameters
-        ----------
-        frame : int
-            Number of the frame, the last by default.
-
-        Returns
-        -------
-        Bodies
-
-        Raises
-        ------
-        InputError
-            Where there is no such frame.
-        """
-        return Bodies(self.model, self.frame(frame), self.broken_time, self.peak_speed)
-
     def write_vtkhdf(self, path: FileName) -> None:
         """Write all frames as one VTKHDF file for ParaView, with the data of the PVD series.
 
@@ -246,5 +227,5 @@ class RunTables:
         InputError
             Where there are no frames, or the file cannot be written.
         """
-        shares = shares_of_scale(self.bodies(-1), colour)
+        shares = shares_of_scale(self, self.frame(), colour)
         write_gltf(path, self.model, self.frames, self.broken_time, shares, seconds)

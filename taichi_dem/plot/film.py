@@ -33,7 +33,6 @@ def save_animation(
     broken_time: np.ndarray,
     magnify: float = 5.0,
     axis: Sequence[float] = ALONG_Z,
-    milliseconds: float = 100,
 ) -> None:
     """Write the deforming block, coloured by speed, as a GIF below a megabyte.
 
@@ -64,7 +63,7 @@ def save_animation(
             cracks.set_segments(view.project(corners[lips[now, None], ends[now]]))
             axes.set_title(f"t = {1e3 * frame.time_s:.3f} ms, {text}", fontsize=9)
             shoot()
-    write_gif(path, images, milliseconds, colours=32)
+    write_gif(path, images, 100, colours=32)
 
 
 def speed_edges(frames: Sequence[Frame]) -> np.ndarray:
