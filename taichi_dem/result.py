@@ -94,12 +94,10 @@ class Result(RunTables):
         # Imported here, so that matplotlib loads only where a picture is shown.
         from taichi_dem.plot.summary import picture_of_run
 
-        png = picture_of_run(
-            self.model, self.history, self.frames, self.broken_time, self.peak_speed
-        )
+        words = "The block, its energy and what happened in it over time"
         return titled(
             f"Result: {self.report.outcome}",
-            embedded(png, "The block, its energy and what happened in it over time"),
+            embedded(picture_of_run(self), words),
             table(self._figures()),
             unfolded("All figures of the run", str(self.report)),
             warning=self.diverged,

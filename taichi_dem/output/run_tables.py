@@ -8,7 +8,6 @@ from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, whole
 from taichi_dem.output.attenuation import Attenuation
-from taichi_dem.output.body_values import shares_of_scale
 from taichi_dem.output.cracks import Rose, cracks_of, rose_of
 from taichi_dem.output.export.gltf import write_gltf
 from taichi_dem.output.export.particles import write_particles
@@ -189,7 +188,7 @@ class RunTables:
             Where there are no frames, h5py is not installed, or the file cannot be written.
         """
         self.frame()
-        write_vtkhdf(path, self.model, self.frames, self.acting_since)
+        write_vtkhdf(path, self)
 
     def write_xyz(self, path: FileName, of: str = "bodies") -> None:
         """Write all frames as an extended XYZ file for OVITO.
@@ -207,7 +206,7 @@ class RunTables:
             Where there are no frames, or the file cannot be written.
         """
         self.frame()
-        write_particles(path, self.model, self.frames, self.broken_time, of)
+        write_particles(path, self, of)
 
     def write_gltf(self, path: FileName, colour: str = "peak_speed", seconds: float = 10.0) -> None:
         """Write an animation for browsers and Blender; every fragment moves as a rigid piece.
@@ -227,5 +226,5 @@ class RunTables:
         InputError
             Where there are no frames, or the file cannot be written.
         """
-        shares = shares_of_scale(self, self.frame(), colour)
-        write_gltf(path, self.model, self.frames, self.broken_time, shares, seconds)
+        self.frame()
+        write_gltf(path, self, colour, seconds)

@@ -1,6 +1,6 @@
 """Bodies or fragments over time as particles, in extended XYZ for OVITO."""
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,28 +13,17 @@ from taichi_dem.output.fragments import (
     quaternions_of,
     rigid_motion,
 )
-from taichi_dem.output.record import Frame
-from taichi_dem.state.model import Model
 
 
-def write_particles(
-    path: FileName,
-    model: Model,
-    frames: Sequence[Frame],
-    broken_time: np.ndarray,
-    of: str = "bodies",
-) -> None:
-    """Write frames as an extended XYZ file.
+def write_particles(path: FileName, result: Any, of: str) -> None:
+    """Write the frames of a ``Result`` as an extended XYZ file.
 
     Parameters
     ----------
     path : str or path
         Name of the file, such as ``"run.xyz"``.
-    model : Model
-    frames : sequence of Frame
-        At least one.
-    broken_time : ndarray, shape (bond_count,)
-        When each bond broke [s], NaN while it holds.
+    result : Result
+        With a frame at least.
     of : {"bodies", "fragments"}
         What a particle is. Fragments are those of each frame, so that their number grows.
 
@@ -50,11 +39,11 @@ def write_particles(
     """
     kinds = {"bodies": _bodies, "fragments": _fragments}
     particles_of = kinds[choice("of", of, kinds)]
-    tables = [_table(*particles_of(model, frame, broken_time)) for frame in frames]
+    tables = [_table(*particles_of(result, frame)) for frame in result.frames]
     margin = max(table["radius"].max() for table in tables)
     low = np.min([table["pos"].min(axis=0) for table in tables], axis=0) - margin
     high = np.max([table["pos"].max(axis=0) for table in tables], axis=0) + margin
-    shots = [XyzFrame(f.time_s, table, low, high - low) for f, table in zip(frames, tables)]
+    shots = [XyzFrame(f.time_s, table, low, high - low) for f, table in zip(result.frames, tables)]
     write_extended_xyz(path, shots)
 
 
@@ -64,15 +53,16 @@ def _table(place, radius, velocity, rotation, mass, fragment):
     return {"pos": place, "radius": radius, "velo": velocity, **turns}
 
 
-def _bodies(model, frame, broken_time):
+def _bodies(result, frame):
+    model = result.model
     volume = signed_volumes(model.mesh.points, model.mesh.tetrahedra)
-    of_body = fragment_of_body(model, broken_time <= frame.time_s)
+    of_body = fragment_of_body(model, result.broken_time <= frame.time_s)
     radius = np.cbrt(0.75 * volume / np.pi)
     return frame.position, radius, frame.velocity, frame.rotation, model.body_mass, of_body
 
 
-def _fragments(model, frame, broken_time):
-    found = fragments_of(model, frame, broken_time)
-    centre, rotation = rigid_motion(model, frame, found.of_body)
+def _fragments(result, frame):
+    found = fragments_of(result.model, frame, result.broken_time)
+    centre, rotation = rigid_motion(result.model, frame, found.of_body)
     radius, velocity = 0.5 * found["diameter_m"], found.vectors("velocity")
     return centre, radius, velocity, rotation, found["mass_kg"], found["fragment"]
