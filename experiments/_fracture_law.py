@@ -3,11 +3,11 @@
 import numpy as np
 
 from _closed_forms import bond_shear, bond_tension
+from _films import moving_picture
 from taichi_dem import CONCRETE, Every, effects
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, picture
 from taichi_dem.kit.study import Table
-from taichi_dem.plot.film import moving_picture
 
 #: Way of the specimen in tension [m]: beyond the strength, back into compression, to the break.
 PULLED = (22e-6, -4e-6, 32e-6)

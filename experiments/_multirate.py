@@ -2,13 +2,18 @@
 
 import numpy as np
 
+from _films import FilmedRun, film_runs
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import GREY, line_key, picture, styles_of
 from taichi_dem.kit.study import Table
 from taichi_dem.mesh.topology import faces_of_group
-from taichi_dem.output.run_costs import level_columns, level_shares
-from taichi_dem.plot.film import FilmedRun, film_runs
-from taichi_dem.plot.series import draw_level_shares, level_look, level_names
+from taichi_dem.plot.series import (
+    draw_level_shares,
+    level_columns,
+    level_look,
+    level_names,
+    level_shares,
+)
 
 TABLE = Table(
     method=("name", "method"),

@@ -4,10 +4,10 @@ import textwrap
 
 import numpy as np
 
+from _films import FilmedRun, film_runs
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, GREEN, GREY, ORANGE, RED, picture, seconds
 from taichi_dem.kit.study import Table, write_rows
-from taichi_dem.plot.film import FilmedRun, film_runs
 from taichi_dem.plot.series import positive
 
 TABLE = Table(

@@ -2,13 +2,12 @@
 
 import numpy as np
 
+from _bars import Profile, draw_breaks, draw_space_time, film_bar, travel_time
 from taichi_dem import CONCRETE, Every
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import BLACK, GREY, RED, picture
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, RED, picture
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.study import write_rows
-from taichi_dem.output.profile import Profile, travel_time
-from taichi_dem.plot.bars import draw_breaks, draw_space_time, film_bar, picture_wave
 from taichi_dem.simulate import run_simulation
 
 #: Length of a bar [m], its bodies a cell; time step [s], steps between looks.
@@ -102,8 +101,7 @@ def write(wave, made, rows, at):
     stress = made.stress(CONCRETE.density * wave.speed**2, made.cell)
     picture_spall(at("spall.png"), made, 1e-6 * stress, rows)
     shown = int(np.argmin([abs(row["ratio"] - 1.5) for row in rows]))
-    look = {"length": LENGTH, "strength_pa": CONCRETE.tensile_strength}
-    film_bar(at("spall.gif"), made, stress, bar=shown, **look)
+    film_bar(at("spall.gif"), made, stress, shown, LENGTH, CONCRETE.tensile_strength)
     return shown
 
 
@@ -113,13 +111,26 @@ def show_wave(wave, at):
     names = [*(f"at_{wave.place[k]:g}_m" for k in wave.gates), "free_end"]
     write_csv(at("wave.csv"), {"time_s": wave.time, **dict(zip(names, velocity[:, cells].T))})
     words = [*(f"at {wave.place[k]:.2f} m" for k in wave.gates), "free end"]
-    picture_wave(
-        *(at("wave.png"), wave.place, wave.time, 1e3 * velocity),
-        cells=dict(zip(words, cells)),
-        label="velocity [mm/s]",
-        titles=("it runs, comes back, runs again", "the free end doubles it"),
-        level=("twice the wave's peak", 2e3 * velocity[:, wave.gates[1]].max()),
-    )
+    picture_wave(at("wave.png"), wave, dict(zip(words, cells)))
+
+
+def picture_wave(path, wave, cells):
+    """Velocity over place and time, and over time in some cells, name -> number."""
+    velocity, label = 1e3 * wave.velocity[:, 0], "velocity [mm/s]"
+    with picture(path, 1, 2, size=(9.0, 3.8)) as (figure, (along, over)):
+        drawn = draw_space_time(along, wave.place, wave.time, velocity, np.abs(velocity).max())
+        figure.colorbar(drawn, ax=along, label=label)
+        looks = zip((BLUE, GREEN, RED), ("-", "--", "-."))
+        for (name, cell), (colour, dashes) in zip(cells.items(), looks):
+            look = {"color": colour, "ls": dashes, "label": name}
+            over.plot(1e3 * wave.time, velocity[:, cell], **look)
+            along.axvline(wave.place[cell], lw=1.2, **look)
+        along.set_title("it runs, comes back, runs again")
+        along.legend(loc="lower left", bbox_to_anchor=(0.0, 1.08), ncols=4, columnspacing=1.0)
+        top = 2.0 * velocity[:, wave.gates[1]].max()
+        over.axhline(top, color=GREY, ls=":", label="twice the wave's peak")
+        over.set(xlabel="time [ms]", ylabel=label, title="the free end doubles it")
+        over.legend(loc="upper left")
 
 
 def picture_spall(path, made, stress, rows):
@@ -128,7 +139,7 @@ def picture_spall(path, made, stress, rows):
     top = np.abs(stress[:, :count]).max()
     with picture(path, 1, 1 + count, size=(3.05 * (1 + count), 3.6)) as (figure, (*panels, last)):
         for k, (row, axes) in enumerate(zip(rows, panels)):
-            drawn = draw_space_time(axes, joint, made.time, stress[:, k], top=top)
+            drawn = draw_space_time(axes, joint, made.time, stress[:, k], top)
             draw_breaks(axes, joint, made.time, made.joints[:, k])
             look = {"color": BLACK, "ls": ":", "lw": 1.0, "label": "first break by the formula"}
             axes.axvline(LENGTH - row["formula_m"], **look)

@@ -36,17 +36,27 @@ from _blast import (
     print_quality,
     run_options,
 )
+from _crack_sections import plot_deep_cracks
 from _meshes import mirrored_copies
-from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, plot, read_mesh, simulate
+from taichi_dem import (
+    CONCRETE,
+    PAPER_BLOCK,
+    Every,
+    ImplicitDashpots,
+    Scene,
+    plot,
+    read_mesh,
+    simulate,
+)
 from taichi_dem.kit import study
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.process_memory import peak_memory_mb
+from taichi_dem.kit.progress.progress import time_left
 from taichi_dem.mesh.gmsh import block_with_hole
 from taichi_dem.mesh.joined import in_space_order
 from taichi_dem.output.attenuation import Attenuation
 from taichi_dem.output.hole_monitor import HoleMonitor
-from taichi_dem.output.progress_lines import ProgressLines
 
 NAME = "blast_block"
 SETTINGS = {
@@ -111,6 +121,27 @@ def figures_of(result, exponent):
     }
 
 
+class ProgressLines:
+    """Observer that prints a line every tenth of the way: time per step, time left, memory.
+
+    until: simulated time at the end of the run [s].
+    """
+
+    def __init__(self, until):
+        self.until, self.when = until, Every(time_s=until / 10)
+        self._before = 0, 0.0
+
+    def observe(self, view):
+        """Print the line; none at the start of the run."""
+        (step, seconds), self._before = self._before, (view.step, view.wall_seconds)
+        if view.step > step:
+            step_s = (view.wall_seconds - seconds) / (view.step - step)
+            left = time_left(step_s * max(0.0, self.until - view.time_s) / view.method.dt0)
+            words = f"t = {1e3 * view.time_s:.3f} ms, {1e3 * step_s:.3g} ms a step, {left}"
+            fields = f"{1e-6 * field_bytes():.0f} MB of fields"
+            print(f"{words}, {fields}, {peak_memory_mb():.0f} MB in all", flush=True)
+
+
 def run(options):
     """Run, picture, print."""
     scene = Scene(mesh_of(options), CONCRETE, paper_effects())
@@ -128,9 +159,7 @@ def run(options):
 
 def draw(result, fall, at):
     """Draw and write everything that is plotted."""
-    model, time_s, hole = result.model, result.frames[-1].time_s, HoleMonitor(result.model, "hole")
-    broken = model.mesh, model.topology, result.broken_time
-    plot.plot_deep_cracks(at("cracks.png"), *broken, time_s, hole.axis_point)
+    plot_deep_cracks(at("cracks.png"), result, HoleMonitor(result.model, "hole").axis_point)
     plot.plot_attenuation(at("peaks.png"), fall, FROM_RADII)
     plot.plot_energy(at("energy.png"), result.history)
     peaks = {"distance_radii": fall.distance, "peak_speed_m_s": fall.speed}

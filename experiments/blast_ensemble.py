@@ -24,7 +24,8 @@ import numpy as np
 
 from _blast import blast_parser
 from _blast_ensemble import blast, draw_displacement, hole_moves, over_time
-from taichi_dem import CONCRETE, InputError, plot, read_mesh, sweep
+from _crack_sections import plot_crack_probability
+from taichi_dem import CONCRETE, InputError, read_mesh, sweep
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.state.model import Model
@@ -60,7 +61,7 @@ def run(options):
     moves = hole_moves(table, ended)
     columns = over_time(moves, options.until, options.samples)
     write(at, table, model, broken, columns)
-    plot.plot_crack_probability(at("probability.png"), model, broken.mean(axis=0))
+    plot_crack_probability(at("probability.png"), model, broken.mean(axis=0))
     draw_displacement(at("displacement.png"), columns, moves[-1])
     figures = figures_of(broken, moves[-1])
     figures["failed_members"] = (int((~ended).sum()), "1")

@@ -25,11 +25,12 @@ from types import SimpleNamespace
 import numpy as np
 
 from _blast import METHODS, blast_parser, paper_scene, run_options
+from _method_costs import RunCosts, plot_methods
 from taichi_dem import ImplicitDashpots, ProgressBar, SimulationDiverged, plot, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.validation import choice
-from taichi_dem.output.run_costs import RunCosts, level_shares
+from taichi_dem.plot.series import level_shares
 
 NAME = "blast_methods"
 REFERENCE = "reference", partial(ImplicitDashpots, sweeps=(6, 40)), 2.5e-8
@@ -108,7 +109,7 @@ def run(options):
         one.stable = largest_stable_step(scene, one, reference.series, options)
     rows, best = TABLE.rows(runs), reference.report
     study.write_rows(at("methods.csv"), rows)
-    plot.plot_methods(at("methods.png"), {r.name: r.series for r in (reference, *runs)}, MOVED)
+    plot_methods(at("methods.png"), {r.name: r.series for r in (reference, *runs)}, MOVED)
     figures = {
         "reference_displacement_mm": (reference.moved, "mm"),
         "reference_broken_faces": (best.broken_faces, "1"),

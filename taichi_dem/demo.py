@@ -27,7 +27,7 @@ from taichi_dem.mesh.files import read_mesh
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.output.record import write_bodies
-from taichi_dem.output.run_costs import level_columns, level_shares
+from taichi_dem.plot.series import level_columns, level_shares
 from taichi_dem.report.certificate import Certificate
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene

@@ -94,12 +94,10 @@ class Result(RunTables):
         # Imported here, so that matplotlib loads only where a picture is shown.
         from taichi_dem.plot.summary import picture_of_run
 
-        png = picture_of_run(
-            self.model, self.history, self.frames, self.broken_time, self.peak_speed
-        )
+        words = "The block, its energy and what happened in it over time"
         return titled(
             f"Result: {self.report.outcome}",
-            embedded(png, "The block, its energy and what happened in it over time"),
+            embedded(picture_of_run(self), words),
             table(self._figures()),
             unfolded("All figures of the run", str(self.report)),
             warning=self.diverged,
@@ -244,7 +242,7 @@ class Result(RunTables):
         >>> result.show("blast.html")  # doctest: +SKIP
         """
         # Imported here, so that matplotlib loads only where something is shown.
-        from taichi_dem.viewer import show_block
+        from taichi_dem.viewer.block import show_block
 
         if not self.frames:
             raise InputError("frames must be at least 1 to show a run: simulate(..., frames=20)")

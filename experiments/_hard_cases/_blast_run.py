@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from _motion_record import MotionRecord
 from taichi_dem import CONCRETE, Scene, Simulation, StepControl, effects
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
-from taichi_dem.output.motion_record import MotionRecord
 from taichi_dem.simulate import run_simulation
 
 EPS = np.finfo(float).eps

@@ -1,13 +1,12 @@
 """Values by which bodies are coloured, by name."""
 
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from taichi_dem.kit.validation import choice
-from taichi_dem.output.fragments import broken_by, fragment_of_body
+from taichi_dem.output.fragments import fragment_of_body
 from taichi_dem.output.record import Frame
-from taichi_dem.state.model import Model
 
 #: Multiples of the golden ratio, less whole numbers, lie far apart.
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
@@ -22,22 +21,12 @@ COLOURS = {
 }
 
 
-class Bodies(NamedTuple):
-    """Bodies of a run in one frame: what they are coloured by is read off these."""
-
-    model: Model
-    frame: Frame
-    broken_time: np.ndarray
-    peak_speed: np.ndarray
-
-
-def body_values(bodies: Bodies, colour: str) -> np.ndarray:
-    """Value of every body, (body_count,); InputError unless colour is one of COLOURS."""
-    model, frame, broken_time, peak_speed = bodies
+def body_values(result: Any, frame: Frame, colour: str) -> np.ndarray:
+    """Value of every body of a ``Result`` in a frame, (body_count,); colour: one of COLOURS."""
     if choice("colour", colour, COLOURS) == "fragment":
-        return fragment_of_body(model, broken_by(broken_time, frame.time_s))
+        return fragment_of_body(result.model, result.broken_time <= frame.time_s)
     if colour == "peak_speed":
-        return peak_speed
+        return result.peak_speed
     if colour == "displacement":
         return np.linalg.norm(frame.displacement, axis=1)
     return getattr(frame, colour)
@@ -48,13 +37,13 @@ def scale_end(values: np.ndarray) -> float:
     return float(np.percentile(values, 98.0) or values.max())
 
 
-def shares_of_scale(bodies: Bodies, colour: str) -> np.ndarray:
+def shares_of_scale(result: Any, frame: Frame, colour: str) -> np.ndarray:
     """Values of bodies as shares of a scale from 0 to 1, (body_count,).
 
     1 is what a fiftieth of the bodies exceed. Fragments are spread over the scale, so that
     neighbours differ.
     """
-    values = body_values(bodies, colour)
+    values = body_values(result, frame, colour)
     if colour == "fragment":
         return values * _GOLDEN % 1.0
     top = scale_end(values)

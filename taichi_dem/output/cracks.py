@@ -106,28 +106,6 @@ def strike_and_dip(normal: np.ndarray) -> Any:
     return np.where(flat, 0.0, (toward - 90.0) % 360.0), dip
 
 
-def crack_area_at(model: Model, broken_time: np.ndarray, times_s: np.ndarray) -> Table:
-    """Tabulate the area of all cracks over time.
-
-    Parameters
-    ----------
-    model : Model
-    broken_time : ndarray, shape (bond_count,)
-        When each bond broke [s], NaN while it holds.
-    times_s : ndarray, shape (n,)
-        Times of the rows [s].
-
-    Returns
-    -------
-    Table
-        ``time_s`` and ``crack_area_m2``; one side of a crack counts.
-    """
-    made = cracks_of(model, broken_time)
-    area = np.concatenate([[0.0], made["crack_area_m2"]])
-    upto = np.searchsorted(made["time_s"], times_s, side="right")
-    return Table({"time_s": times_s, "crack_area_m2": area[upto]}, index="time_s")
-
-
 def rose_of(
     model: Model, broken: np.ndarray, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36
 ) -> Rose:

@@ -4,7 +4,6 @@ import numpy as np
 
 from taichi_dem.kit.data_table import Table
 from taichi_dem.mesh.tetrahedra import components, signed_volumes
-from taichi_dem.output.motion_record import body_spins
 from taichi_dem.output.record import Frame
 from taichi_dem.state.model import Model
 
@@ -72,12 +71,6 @@ def fragment_of_body(model: Model, broken: np.ndarray) -> np.ndarray:
     return rank[number.reshape(-1)]
 
 
-def broken_by(broken_time: np.ndarray, time_s: float) -> np.ndarray:
-    """Whether each bond has broken by a time [s], (bond_count,) bool."""
-    # Bonds that hold have no time, and NaN compares as false.
-    return broken_time <= time_s
-
-
 def fragments_of(model: Model, frame: Frame, broken_time: np.ndarray) -> Fragments:
     """Tabulate the fragments in a frame.
 
@@ -92,7 +85,7 @@ def fragments_of(model: Model, frame: Frame, broken_time: np.ndarray) -> Fragmen
     -------
     Fragments
     """
-    of_body = fragment_of_body(model, broken_by(broken_time, frame.time_s))
+    of_body = fragment_of_body(model, broken_time <= frame.time_s)
     mass = sums(of_body, model.body_mass)
     volume = sums(of_body, signed_volumes(model.mesh.points, model.mesh.tetrahedra))
     columns = {
@@ -146,6 +139,18 @@ def _motion(model, frame, of_body, mass):
     }
 
 
+def body_spins(
+    inertia: np.ndarray, rotation: np.ndarray, angular_momentum: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Angular momenta [kg m^2/s] and spins [rad/s] of bodies in their own axes, (..., n, 3) each.
+
+    inertia: in body axes, (n, 3, 3). rotation: body to world, (..., n, 3, 3). angular_momentum: in
+    world axes, (..., n, 3).
+    """
+    local = np.einsum("...nji,...nj->...ni", rotation, angular_momentum)
+    return local, np.einsum("nij,...nj->...ni", np.linalg.inv(inertia), local)
+
+
 def _middle_edges(model, of_body, mass):
     """Middle edges [m] of the cuboids with the fragments' inertia at rest."""
     arm = model.centre - centres(of_body, model.body_mass, model.centre)[of_body]
@@ -159,3 +164,59 @@ def _steiner(mass, arm):
     """Inertia of masses (n,) at the ends of arms (n, 3), (n, 3, 3) [kg m^2]."""
     square = (arm**2).sum(axis=1)[:, None, None] * np.eye(3)
     return mass[:, None, None] * (square - arm[:, :, None] * arm[:, None, :])
+
+
+def rigid_motion(model: Model, frame: Frame, of_body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Place and rotation of fragments in a frame.
+
+    Parameters
+    ----------
+    model : Model
+    frame : Frame
+    of_body : ndarray of int, shape (body_count,)
+        Fragment of each body.
+
+    Returns
+    -------
+    centre : ndarray, shape (fragments, 3)
+        Of mass [m].
+    rotation : ndarray, shape (fragments, 3, 3)
+        From the shape at rest; of least squares over all points of the bodies, weighted by mass.
+
+    Notes
+    -----
+    The rotation nearest to the moment matrix of places now and at rest (W. Kabsch, Acta Cryst. A32,
+    1976, 922-923); each body adds its own second moment, so that one alone has its own rotation.
+    """
+    mass = model.body_mass
+    rest = model.centre - centres(of_body, mass, model.centre)[of_body]
+    centre = centres(of_body, mass, frame.position)
+    arm = frame.position - centre[of_body]
+    trace = np.trace(model.body_inertia, axis1=1, axis2=2)
+    second = 0.5 * trace[:, None, None] * np.eye(3) - model.body_inertia
+    moved = mass[:, None, None] * arm[:, :, None] * rest[:, None, :]
+    left, _, right = np.linalg.svd(sums(of_body, moved + frame.rotation @ second))
+    # A reflection that fits better is no rotation: its weakest axis is turned round.
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    return centre, left @ right
+
+
+def quaternions_of(rotation: np.ndarray) -> np.ndarray:
+    """Unit quaternions x, y, z, w of rotation matrices (n, 3, 3); (n, 4).
+
+    Four formulas differ in the component that they divide by; the largest is taken (S. W. Shepperd,
+    J. Guidance and Control 1, 1978, 223-224).
+    """
+    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(rotation, 0, -1)
+    x, y, z = h - f, c - g, d - b
+    candidates = np.array(
+        [
+            (1.0 + a + e + i, x, y, z),
+            (x, 1.0 + a - e - i, b + d, c + g),
+            (y, b + d, 1.0 - a + e - i, f + h),
+            (z, c + g, f + h, 1.0 - a - e + i),
+        ]
+    )
+    best = np.einsum("kkn->kn", candidates).argmax(axis=0)
+    found = candidates[best, :, np.arange(len(best))]
+    return np.roll(found / np.linalg.norm(found, axis=1)[:, None], -1, axis=1)

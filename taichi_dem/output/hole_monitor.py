@@ -1,7 +1,5 @@
 """Monitoring of a block with a hole: the displacement of the bodies at its wall."""
 
-from typing import Optional
-
 import numpy as np
 
 from taichi_dem.kit.fixed_order import dot, length, weakest_direction
@@ -19,17 +17,12 @@ def watched_groups(scene: Scene) -> tuple[str, ...]:
     return tuple(dict.fromkeys(groups))
 
 
-def watched_group(scene: Scene) -> Optional[str]:
-    """The first of ``watched_groups``, None without."""
-    return next(iter(watched_groups(scene)), None)
-
-
 class HoleMonitor:
     """Displacement at the wall of a hole.
 
     axis_point (3,) [m] and axis (3,): of the hole. bodies: those with a face on it. outward
-    (n, 3): in-plane unit direction from the axis to each body's first centre. monitored_body: the
-    one of these that is nearest to the closest free face, at mid depth, or at mid depth alone
+    (n, 3): in-plane unit direction from the axis to each body's first centre. monitored: place in
+    bodies of the one that is nearest to the closest free face, at mid depth, or at mid depth alone
     where no face along the axis is free.
     """
 
@@ -50,28 +43,25 @@ class HoleMonitor:
         # A body in the middle of what is loaded, where that is no hole, has no way outward.
         way = length(away)[:, None]
         self.outward = np.divide(away, way, out=np.zeros_like(away), where=way > 0.0)
-        self.monitored_body = self._nearest_to_free_face(model, body, face)
+        self.monitored = self._nearest_to_free_face(model, body, face)
 
     def _in_plane(self, vectors):
         return vectors - dot(vectors, self.axis)[:, None] * self.axis
 
     def _nearest_to_free_face(self, model, hole_body, hole_face):
         mesh, topology = model.mesh, model.topology
-        on_hole = set(zip(hole_body.tolist(), hole_face.tolist()))
-        pairs = zip(topology.outer_body.tolist(), topology.outer_face.tolist())
-        others = [pair for pair in pairs if pair not in on_hole]
-        free = np.array(others, dtype=np.int32).reshape(-1, 2)
-        corners = face_vertices(mesh, free[:, 0], free[:, 1])
+        outer = 4 * topology.outer_body + topology.outer_face
+        free = ~np.isin(outer, 4 * hole_body + hole_face)
+        corners = face_vertices(mesh, topology.outer_body[free], topology.outer_face[free])
         normal = area_vectors(mesh.points, corners)
         normal /= length(normal)[:, None]
         distance = dot(mesh.points[corners[:, 0]] - self.axis_point, normal)
         distance[np.abs(dot(normal, self.axis)) > 0.5] = np.inf
         depth = np.abs(dot(self.first - self.axis_point, self.axis))
         if not np.isfinite(distance).any():
-            return int(self.bodies[depth.argmin()])
+            return int(depth.argmin())
         toward = normal[distance.argmin()]
-        score = dot(self.first - self.axis_point, toward) - depth
-        return int(self.bodies[score.argmax()])
+        return int((dot(self.first - self.axis_point, toward) - depth).argmax())
 
     @property
     def radius(self) -> float:
@@ -85,5 +75,4 @@ class HoleMonitor:
 
     def monitored_displacement(self, position: np.ndarray) -> float:
         """Displacement of the monitored body [m]."""
-        row = int(np.flatnonzero(self.bodies == self.monitored_body)[0])
-        return float(length(position[self.monitored_body] - self.first[row]))
+        return float(length(position[self.bodies[self.monitored]] - self.first[self.monitored]))

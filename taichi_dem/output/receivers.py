@@ -84,7 +84,7 @@ class Receivers:
         }
         self.when = Every(samples=1) if when is None else instance("when", when, (Every, At))
         self._bodies = np.zeros(0, dtype=np.int64)
-        self._rows: list[tuple[float, np.ndarray, np.ndarray]] = []
+        self._rows: list[tuple[float, np.ndarray]] = []
 
     def __repr__(self) -> str:
         return in_brief(self, ", ".join(self.points), repr(self.when))
@@ -120,7 +120,7 @@ class Receivers:
         turned = (motion["rotation"][bodies] * arm[:, None, :]).sum(axis=2)
         moved = (motion["position"][bodies] - centre) + (turned - arm)
         velocity = motion["velocity"][bodies] + np.cross(motion["spin"][bodies], turned)
-        self._rows.append((view.time_s, moved, velocity))
+        self._rows.append((view.time_s, np.stack([moved, velocity])))
 
     def received(self) -> dict[str, Received]:
         """Return what was kept so far.
@@ -130,17 +130,12 @@ class Receivers:
         dict
             A ``Received`` by the name of its receiver.
         """
-        shape = len(self._rows), len(self.points), 3
-        times = np.array([time_s for time_s, _, _ in self._rows])
-        moved = np.array([moved for _, moved, _ in self._rows]).reshape(shape)
-        velocity = np.array([velocity for _, _, velocity in self._rows]).reshape(shape)
+        times = np.array([time_s for time_s, _ in self._rows])
+        motion = np.array([motion for _, motion in self._rows]).reshape(-1, 2, len(self.points), 3)
         return {
-            name: Received(at, int(self._bodies[k]), times, moved[:, k], velocity[:, k])
+            name: Received(at, int(self._bodies[k]), times, motion[:, 0, k], motion[:, 1, k])
             for k, (name, at) in enumerate(self.points.items())
         }
-
-    def __getitem__(self, name: str) -> Received:
-        return self.received()[name]
 
 
 def write_receivers(path: FileName, receivers: Mapping[str, Received]) -> None:

@@ -123,10 +123,9 @@ class Recorder:
         account["gas_work"] = sum(map(sim.energy_balance.load_work, self.gas))
         row = {"time_s": sim.time_s}
         for group, hole in self.holes.items():
-            moved = hole.radial_displacement(motion["position"])
-            monitored = hole.monitored_displacement(motion["position"])
-            for name, way in zip(hole_columns(group, len(self.holes)), (moved, monitored)):
-                row[name] = 1e3 * way
+            outward, way = hole_columns(group, len(self.holes))
+            row[outward] = 1e3 * hole.radial_displacement(motion["position"])
+            row[way] = 1e3 * hole.monitored_displacement(motion["position"])
         row["broken_faces"] = int(sim.state.broken().sum())
         row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})
         if self.model.ground:

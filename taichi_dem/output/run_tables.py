@@ -8,17 +8,20 @@ from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, whole
 from taichi_dem.output.attenuation import Attenuation
-from taichi_dem.output.body_values import Bodies, shares_of_scale
-from taichi_dem.output.cracks import Rose, crack_area_at, cracks_of, rose_of
-from taichi_dem.output.energy_shares import energy_shares
+from taichi_dem.output.cracks import Rose, cracks_of, rose_of
 from taichi_dem.output.export.gltf import write_gltf
 from taichi_dem.output.export.particles import write_particles
 from taichi_dem.output.export.vtkhdf import write_vtkhdf
 from taichi_dem.output.fragments import Fragments, fragments_of
-from taichi_dem.output.hole_monitor import watched_group
+from taichi_dem.output.hole_monitor import watched_groups
 from taichi_dem.output.record import Frame
+from taichi_dem.report.energy_balance import TERMS
 from taichi_dem.scene import Scene
 from taichi_dem.state.model import Model
+
+#: Terms of the energy balance that are given; and of which some may be there at the start.
+_GIVEN = ("load_work", "support_work", "injected")
+_HELD = ("kinetic", "bond_strain", "sphere_strain")
 
 
 class RunTables:
@@ -99,8 +102,12 @@ class RunTables:
         Returns
         -------
         Table
+            ``time_s`` and ``crack_area_m2``; one side of a crack counts.
         """
-        return crack_area_at(self.model, self.broken_time, self.history["time_s"])
+        made, times_s = self.cracks(), self.history["time_s"]
+        area = np.concatenate([[0.0], made["crack_area_m2"]])
+        upto = np.searchsorted(made["time_s"], times_s, side="right")
+        return Table({"time_s": times_s, "crack_area_m2": area[upto]}, index="time_s")
 
     def rose(self, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36) -> Rose:
         """Tabulate crack area by the direction of the cracks in a plane.
@@ -125,8 +132,18 @@ class RunTables:
         Returns
         -------
         Table
+            ``time_s``; ``given_J``: work of loads and supports, energy injected at releases and
+            held at the start; and a column ``NAME_share`` of each other term, ``residual_share`` of
+            what is unexplained. Shares add up to 1 by the balance; where nothing is given they are
+            NaN.
         """
-        return energy_shares(self.history)
+        history, time_s = self.history, self.history["time_s"]
+        held = sum(history[f"{name}_J"][:1].sum() for name in _HELD)
+        given = sum((history[f"{name}_J"] for name in _GIVEN), np.full(len(time_s), held))
+        safe = np.where(given > 0.0, given, np.nan)
+        terms = [n for n in TERMS if n not in _GIVEN and f"{n}_J" in history]
+        shares = {f"{name}_share": history[f"{name}_J"] / safe for name in terms}
+        return Table({"time_s": time_s, "given_J": given, **shares}, index="time_s")
 
     def attenuation(
         self, group: Optional[str] = None, radius: Optional[float] = None
@@ -150,31 +167,12 @@ class RunTables:
         InputError
             Where the mesh has no such group.
         """
-        group = watched_group(self.scene) if group is None else group
+        group = next(iter(watched_groups(self.scene)), None) if group is None else group
         if group is None:
             raise InputError(
                 "group must name the wall of a hole, as this scene has no gas pressure"
             )
         return Attenuation.of(self.model, self.peak_speed, radius, group)
-
-    def bodies(self, frame: int = -1) -> Bodies:
-        """Collect what bodies are coloured by in a frame.
-
-        Parameters
-        ----------
-        frame : int
-            Number of the frame, the last by default.
-
-        Returns
-        -------
-        Bodies
-
-        Raises
-        ------
-        InputError
-            Where there is no such frame.
-        """
-        return Bodies(self.model, self.frame(frame), self.broken_time, self.peak_speed)
 
     def write_vtkhdf(self, path: FileName) -> None:
         """Write all frames as one VTKHDF file for ParaView, with the data of the PVD series.
@@ -190,7 +188,7 @@ class RunTables:
             Where there are no frames, h5py is not installed, or the file cannot be written.
         """
         self.frame()
-        write_vtkhdf(path, self.model, self.frames, self.acting_since)
+        write_vtkhdf(path, self)
 
     def write_xyz(self, path: FileName, of: str = "bodies") -> None:
         """Write all frames as an extended XYZ file for OVITO.
@@ -208,7 +206,7 @@ class RunTables:
             Where there are no frames, or the file cannot be written.
         """
         self.frame()
-        write_particles(path, self.model, self.frames, self.broken_time, of)
+        write_particles(path, self, of)
 
     def write_gltf(self, path: FileName, colour: str = "peak_speed", seconds: float = 10.0) -> None:
         """Write an animation for browsers and Blender; every fragment moves as a rigid piece.
@@ -228,5 +226,5 @@ class RunTables:
         InputError
             Where there are no frames, or the file cannot be written.
         """
-        shares = shares_of_scale(self.bodies(-1), colour)
-        write_gltf(path, self.model, self.frames, self.broken_time, shares, seconds)
+        self.frame()
+        write_gltf(path, self, colour, seconds)

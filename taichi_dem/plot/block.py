@@ -15,7 +15,6 @@ from taichi_dem.plot.bodies import (
     ALONG_Z,
     JOINT,
     STONE,
-    break_times,
     displaced,
     draw_bodies,
     draw_lines,
@@ -111,12 +110,12 @@ def _close_up(axes, view, model, frame, broken_time):
 
 
 @contextlib.contextmanager
-def _panels(path, view, model, columns, rows, extra, names) -> Iterator[Any]:
+def _panels(path, view, model, columns, extra, names) -> Iterator[Any]:
     """A panel of the whole block for each name, which is its title; labels at the outer ones.
 
     extra: room around them [inch].
     """
-    extent = np.ptp(view.project(model.mesh.points), axis=0)
+    extent, rows = np.ptp(view.project(model.mesh.points), axis=0), -(-len(names) // columns)
     height = 2.6 * float(np.clip(extent[1] / extent[0], 0.15, 2.0)) + extra[0]
     size = 2.6 * columns + extra[1], height * rows + extra[2]
     options = {"squeeze": False, "sharex": True, "sharey": True}
@@ -139,7 +138,7 @@ def plot_steps(
     model: Model,
     frames: Sequence[Frame],
     dt0: float,
-    broken_time: Optional[np.ndarray] = None,
+    broken_time: np.ndarray,
     axis: Sequence[float] = ALONG_Z,
 ) -> None:
     """Step of every body at several times (Konno et al., Fig 13).
@@ -148,19 +147,18 @@ def plot_steps(
     broken_time: (bond_count,) [s], NaN while a bond holds; lets one see into open cracks. axis:
     towards the viewer.
     """
-    view, broken_time = View(axis), break_times(model, broken_time)
+    view = View(axis)
     if len(frames) > 6:
         picked = np.linspace(0, len(frames), 7).round().astype(int)[1:] - 1
         frames = [frames[k] for k in picked]
-    rows = 1 if len(frames) <= 3 else 2
     top = max(1, *(int(frame.level.max()) for frame in frames))
     look = {"edgecolor": _EDGE, "axis": axis, **level_look(top + 1)}
     names = [
         f"t = {1e3 * frame.time_s:.3g} ms, finest level {int(frame.level.max())}"
         for frame in frames
     ]
-    shape = -(-len(frames) // rows), rows, (0.1, 1.2, 0.6)
-    with _panels(path, view, model, *shape, names) as (figure, panels):
+    columns = len(frames) if len(frames) <= 3 else -(-len(frames) // 2)
+    with _panels(path, view, model, columns, (0.1, 1.2, 0.6), names) as (figure, panels):
         figure.get_layout_engine().set(h_pad=0.08)
         for axes, frame in zip(panels.flat, frames):
             seen = broken_time <= frame.time_s
@@ -187,7 +185,6 @@ def plot_acting(
     view, names = View(axis), [name for name in TITLES if name in acting_since]
     extent = np.ptp(view.project(model.mesh.points), axis=0)
     columns = min(3, len(names)) if extent[1] > 0.3 * extent[0] else 1
-    shape = columns, -(-len(names) // columns), (0.5, 1.4, 0.7)
     titles = [
         f"{TITLES[name]}\n{np.isfinite(acting_since[name]).sum():,} of {model.body_count:,} bodies"
         for name in names
@@ -195,7 +192,7 @@ def plot_acting(
     colours = shades("plasma", 0.0, 0.92)
     colours.set_bad(STONE)
     look = {"cmap": colours, "clim": (0.0, 1e3 * until), "edgecolor": _EDGE, "axis": axis}
-    with _panels(path, view, model, *shape, titles) as (figure, panels):
+    with _panels(path, view, model, columns, (0.5, 1.4, 0.7), titles) as (figure, panels):
         for axes, name in zip(panels.flat, names):
             times = np.ma.masked_invalid(1e3 * acting_since[name])
             drawn = draw_bodies(axes, model, None, times, **look)

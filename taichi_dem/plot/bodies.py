@@ -28,11 +28,6 @@ def displaced(model: Model, frame: Frame, magnify: float) -> np.ndarray:
     return rest + magnify * (body_corners(model, frame) - rest)
 
 
-def break_times(model: Model, broken_time: Optional[np.ndarray]) -> np.ndarray:
-    """The times of breaking [s], (bond_count,); all NaN, unbroken, where none are given."""
-    return np.full(model.bond_count, np.nan) if broken_time is None else broken_time
-
-
 def frame_block(axes: Any, view: View, model: Model, margin: float = 0.05) -> None:
     """Limits, equal scales and labels of a view of the whole block; margin: share of its size."""
     flat = view.project(model.mesh.points)

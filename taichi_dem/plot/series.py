@@ -1,13 +1,13 @@
 """Curves over time: pressure (Konno et al., Fig 11), motion, energy, levels."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Optional
 
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
-from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, seconds, styles_of
+from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, seconds
 from taichi_dem.kit.validation import FileName
 from taichi_dem.output.record import outward_columns
 from taichi_dem.plot.bodies import shades
@@ -183,6 +183,21 @@ def draw_level_shares(
     owner.legend(areas[::-1], names[::-1], title="step", loc=loc)
 
 
+def level_shares(levels: Iterable[np.ndarray]) -> np.ndarray:
+    """Share of bodies on each level: rows (sample, level) that sum to 1.
+
+    levels: of all bodies, (body_count,) each.
+    """
+    rows = [*levels]
+    count = max(int(level.max()) for level in rows) + 1
+    return np.array([np.bincount(level, minlength=count) / len(level) for level in rows])
+
+
+def level_columns(shares: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of a table, by name, of the result of ``level_shares``."""
+    return {f"level_{k}": share for k, share in enumerate(shares.T)}
+
+
 def plot_levels(path: FileName, time_s: np.ndarray, shares: np.ndarray, dt0: float) -> None:
     """Share of bodies on each level over time, the coarsest at the bottom.
 
@@ -193,46 +208,3 @@ def plot_levels(path: FileName, time_s: np.ndarray, shares: np.ndarray, dt0: flo
         draw_level_shares(figure, axes, time, shares, dt0)
         axes.set(xlabel="time [ms]")
         _span(axes, time)
-
-
-#: Displacements that methods may be compared by, and how they are called.
-_COMPARED = {"hole_radial_displacement_mm": "hole", "monitor_displacement_mm": "body watched"}
-
-
-def plot_methods(
-    path: FileName, series: Mapping[str, Mapping[str, np.ndarray]], column: str
-) -> None:
-    """What methods cost over time, and how far their displacement lies apart.
-
-    series: method -> columns time_s, cpu_s, evaluations and the one compared, a displacement of the
-    hole or of the body watched; the first is the one the others are compared with.
-    """
-    with picture(path, 2, 2, size=(9.0, 6.4)) as (_, ((cost, work), (moved, words))):
-        first = next(iter(series.values()))
-        styles = styles_of(series)
-        for name, made in series.items():
-            style = styles[name]
-            look = {"color": style.colour, "linestyle": style.line, "label": style.label}
-            time = 1e3 * np.asarray(made["time_s"])
-            cost.plot(time, made["cpu_s"], **look)
-            work.plot(time, 1e-6 * np.asarray(made["evaluations"]), **look)
-            here = np.asarray(made[column])
-            # Largest steps differ, and with them the times of the samples.
-            there = np.interp(time, 1e3 * first["time_s"], first[column])
-            there = np.where(there > 1e-3 * there.max(), there, np.nan)
-            moved.plot(time, 100.0 * (here / there - 1.0), **look)
-        cost.set(ylabel="CPU time of stepping [s]")
-        work.set(ylabel="evaluations of bonds\nand contact pairs [10⁶]")
-        for axes, name, unit in ((cost, "cpu_s", 1.0), (work, "evaluations", 1e6)):
-            last = [made[name][-1] / unit for made in series.values()]
-            # A run begins with nothing done, where a logarithm has no end.
-            log = max(last) > 20.0 * min(last)
-            axes.set_yscale("log" if log else "linear")
-            axes.set_ylim(0.01 * min(last) if log else 0.0, None)
-        words_of = f"displacement of the {_COMPARED[column]},\ndifference from\n{{}} [%]"
-        moved.set(ylabel=words_of.format(next(iter(styles.values())).label))
-        for axes in (cost, work, moved):
-            axes.set(xlabel="time [ms]")
-            _span(axes, time)
-        words.set_axis_off()
-        words.legend(*moved.get_legend_handles_labels(), loc="center left", handlelength=4.0)

@@ -1,18 +1,17 @@
 """One picture of a run for a notebook: the block, and energy and events over time."""
 
 import math
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from taichi_dem.kit.plot_style import BLACK, BLUE, png_of, styled
-from taichi_dem.output.record import Frame, outward_columns
+from taichi_dem.output.record import outward_columns
+from taichi_dem.output.run_tables import RunTables
 from taichi_dem.plot.block import draw_breaks
 from taichi_dem.plot.bodies import draw_bodies, frame_block
 from taichi_dem.plot.view import View
-from taichi_dem.state.model import Model
 
 #: From this ratio of its sides on, a block lies above the curves and not beside them.
 _LONG = 2.2
@@ -32,28 +31,20 @@ _ENERGIES: dict[str, Any] = {
     "kinetic": (("kinetic",), {"color": "#08306B"}),
     "strain": (("bond_strain", "sphere_strain"), {"color": "#3A87C2"}),
     "dissipated": (
-        (
-            *("bond_dashpot", "softening", "release", "slip"),
-            *("sphere_dashpot", "friction", "ground_dashpot"),
-        ),
+        "bond_dashpot softening release slip sphere_dashpot friction ground_dashpot".split(),
         {"color": "#E6700F"},
     ),
 }
 
 
-def picture_of_run(
-    model: Model,
-    history: Mapping[str, np.ndarray],
-    frames: Sequence[Frame],
-    broken_time: np.ndarray,
-    peak_speed: np.ndarray,
-) -> Any:
+def picture_of_run(result: RunTables) -> Any:
     """PNG, in bytes: the block beside energy and broken bonds over time.
 
-    history, frames, broken_time, peak_speed: as in ``Result``. Where no bond broke, the block shows
-    the displacement in the last frame, or the largest speeds where there is none that can be drawn;
-    the curve of broken bonds gives way to that of the hole or of the largest speed.
+    Where no bond broke, the block shows the displacement in the last frame, or the largest speeds
+    where there is none that can be drawn; the curve of broken bonds gives way to that of the hole
+    or of the largest speed.
     """
+    model = result.model
     view = View(viewed_along(model.mesh.points))
     sides = np.ptp(view.project(model.mesh.points), axis=0)
     long = sides[0] > _LONG * sides[1]
@@ -63,9 +54,9 @@ def picture_of_run(
         if not long:
             places = [["block", "energy"], ["block", "events"]]
         panels = figure.subplot_mosaic(places, height_ratios=(1.0, 1.3) if long else (1.0, 1.0))
-        drawn, label = _draw_block(panels["block"], view, model, frames, broken_time, peak_speed)
+        drawn, label = _draw_block(panels["block"], view, result)
         figure.colorbar(drawn, ax=panels["block"], label=label, aspect=25)
-        _draw_curves(panels, history)
+        _draw_curves(panels, result.history)
         return png_of(figure)
 
 
@@ -75,8 +66,9 @@ def viewed_along(points: np.ndarray) -> Any:
     return np.eye(3)[int(sides.argmin()) if sides[2] > _DEEP * sides.min() else 2]
 
 
-def _draw_block(axes, view, model, frames, broken_time, peak_speed):
+def _draw_block(axes, view, result):
     """Draw what happened to the block; returns the coloured collection and the scale's label."""
+    model, frames, broken_time = result.model, result.frames, result.broken_time
     frame_block(axes, view, model)
     axes.set(xlabel=view.labels()[0], ylabel=view.labels()[1])
     count = int(np.isfinite(broken_time).sum())
@@ -93,10 +85,10 @@ def _draw_block(axes, view, model, frames, broken_time, peak_speed):
     look = {"cmap": "viridis", "axis": view.toward}
     # What flew off, or fell as a whole, would leave the picture.
     if not moved.max() < extent:
-        factor, unit = scale(_largest(peak_speed), "m/s")
-        look["clim"] = 0.0, factor * _largest(peak_speed) or 1.0
+        factor, unit = scale(_largest(result.peak_speed), "m/s")
+        look["clim"] = 0.0, factor * _largest(result.peak_speed) or 1.0
         axes.set_title("no broken bonds, block undeformed")
-        speeds = factor * np.ma.masked_invalid(peak_speed)
+        speeds = factor * np.ma.masked_invalid(result.peak_speed)
         return draw_bodies(axes, model, None, speeds, **look), f"largest speed [{unit}]"
     magnify = 1.0
     if _ROUND_OFF < moved.max() / extent < _VISIBLE:

@@ -69,20 +69,28 @@ def traces(mesh: Mesh, topology: Topology, view: View, broken_time: np.ndarray) 
     seen = view.facing(mesh.points[mesh.tetrahedra[body[:, None], LOCAL_FACES[face]]])
     body = np.repeat(body[seen], 3)
     ends = _edges(LOCAL_FACES[face[seen]])
-    keys, first = first_breaks(mesh, topology, broken_time)
-    wanted = edge_keys(np.take_along_axis(mesh.tetrahedra[body], ends, axis=1), mesh.point_count)
-    hit = np.isin(wanted, keys)
-    return body[hit], ends[hit], first[np.searchsorted(keys, wanted[hit])]
+    points = np.take_along_axis(mesh.tetrahedra[body], ends, axis=1)
+    first = first_breaks(mesh, topology, broken_time, points)
+    hit = ~np.isnan(first)
+    return body[hit], ends[hit], first[hit]
 
 
-def first_breaks(mesh: Mesh, topology: Topology, broken_time: np.ndarray) -> Any:
-    """Edges of broken faces, as sorted ``edge_keys``, and the first break [s] at each, (n,)."""
+def first_breaks(
+    mesh: Mesh, topology: Topology, broken_time: np.ndarray, edges: np.ndarray
+) -> np.ndarray:
+    """First break [s] of a face that ends at each edge, given by its points (n, 2); (n,), or NaN.
+
+    broken_time: (bond_count,) [s], NaN while a bond holds.
+    """
     broken = ~np.isnan(broken_time)
-    cracked = edge_keys(_edges(topology.vertices[broken]), mesh.point_count)
+    cracked = _edge_keys(_edges(topology.vertices[broken]), mesh.point_count)
     times = np.repeat(broken_time[broken], 3)
     order = np.lexsort((times, cracked))
     keys, first = np.unique(cracked[order], return_index=True)
-    return keys, times[order[first]]
+    wanted, found = _edge_keys(edges, mesh.point_count), np.full(len(edges), np.nan)
+    hit = np.isin(wanted, keys)
+    found[hit] = times[order[first[np.searchsorted(keys, wanted[hit])]]]
+    return found
 
 
 def _edges(triangles):
@@ -90,6 +98,6 @@ def _edges(triangles):
     return triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
 
 
-def edge_keys(edges: np.ndarray, point_count: int) -> np.ndarray:
+def _edge_keys(edges, point_count):
     """One number for every edge (n, 2), whichever way round it is given."""
     return edges.min(axis=1).astype(np.int64) * point_count + edges.max(axis=1)

@@ -7,14 +7,17 @@ from typing import Any, Optional
 import numpy as np
 
 from taichi_dem.kit.display import counted
+from taichi_dem.kit.plot_style import colour_table, table_of
 from taichi_dem.kit.validation import FileName
 from taichi_dem.kit.viewer import WebPage, pack, quantise, select_frames, show_page, time_unit
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
-from taichi_dem.output.export.rigid_motion import quaternions_of
+from taichi_dem.output.fragments import quaternions_of
 from taichi_dem.output.record import Frame
-from taichi_dem.plot.view import edge_keys, first_breaks, skin
+from taichi_dem.plot.block import TITLES
+from taichi_dem.plot.film import speed_edges
+from taichi_dem.plot.series import level_names, level_shades
+from taichi_dem.plot.view import first_breaks, skin
 from taichi_dem.state.model import Model
-from taichi_dem.viewer.modes import colour_modes
 
 _HERE = Path(__file__).resolve().parent
 _SCRIPTS = (_HERE / "block.js", _HERE / "controls.js")
@@ -22,6 +25,8 @@ _SCRIPTS = (_HERE / "block.js", _HERE / "controls.js")
 _FRAME_BYTES, _BODY_BYTES = 17, 300
 #: Time of a face that never breaks, and of one that was always free.
 _NEVER, _ALWAYS = 3e38, -1.0
+#: Colours of bodies on which an effect does not act and of outer faces; and of cracks.
+_PLAIN, _CRACK = (228, 224, 214), {"label": "cracks", "colour": (20, 20, 23)}
 
 
 def show_block(result: Any, path: Optional[FileName], open_browser: Optional[bool]) -> WebPage:
@@ -41,7 +46,7 @@ def show_block(result: Any, path: Optional[FileName], open_browser: Optional[boo
         "faceBreaks": pack(_in_unit(breaks, time), "float32"),
         "edgeBreaks": pack(_in_unit(edges, time), "float32"),
         "magnify": _magnification(model, frames[-1]),
-        "modes": colour_modes(frames, bodies, result.method.dt0, result.acting_since, time),
+        "modes": _colour_modes(frames, bodies, result.method.dt0, result.acting_since, time),
         **_broken_curve(result.broken_time, frames, time),
     }
     title = f"Block of {counted(model.body_count, 'body')}"
@@ -76,10 +81,7 @@ def visible_faces(model: Model, broken_time: np.ndarray) -> Any:
     breaks = np.concatenate([outer, broken_time[broken], broken_time[broken]])
     corners = mesh.tetrahedra[body[:, None], LOCAL_FACES[face]]
     pairs = corners[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
-    keys, first = first_breaks(mesh, model.topology, broken_time)
-    wanted = edge_keys(pairs, mesh.point_count)
-    edges, hit = np.full(len(wanted), np.nan), np.isin(wanted, keys)
-    edges[hit] = first[np.searchsorted(keys, wanted[hit])]
+    edges = first_breaks(mesh, model.topology, broken_time, pairs)
     return body, face, breaks, edges.reshape(-1, 3)
 
 
@@ -126,10 +128,10 @@ def _shape(model: Model, bodies: np.ndarray) -> Any:
 def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
     """Axis times angle [rad] of rotation matrices (n, 3, 3), (n, 3), angles up to pi."""
     quaternion = quaternions_of(rotation)
-    quaternion *= np.where(quaternion[:, :1] < 0.0, -1.0, 1.0)
-    sine = np.linalg.norm(quaternion[:, 1:], axis=1, keepdims=True)
-    angle = 2.0 * np.arctan2(sine, quaternion[:, :1])
-    return quaternion[:, 1:] * (angle / np.where(sine > 0.0, sine, 1.0))
+    quaternion *= np.where(quaternion[:, 3:] < 0.0, -1.0, 1.0)
+    sine = np.linalg.norm(quaternion[:, :3], axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, quaternion[:, 3:])
+    return quaternion[:, :3] * (angle / np.where(sine > 0.0, sine, 1.0))
 
 
 def _magnification(model: Model, frame: Frame) -> float:
@@ -145,3 +147,66 @@ def _broken_curve(broken_time: np.ndarray, frames: Sequence[Frame], time: Any) -
     times = [time[1] * frame.time_s for frame in frames]
     curve = {"name": "", "colour": "", "times": times, "values": counts}
     return {"curves": [curve], "curveLabel": "broken faces"}
+
+
+def _colour_modes(frames, bodies, dt0, acting_since, time):
+    """Colourings that a page offers, dicts: kind, values, scale from low to high, colours."""
+    effects = [
+        _since_mode(TITLES.get(name, name.replace("_", " ")), since[bodies], frames, time)
+        for name, since in acting_since.items()
+    ]
+    own = [_speed_mode(frames, bodies), _level_mode(frames, bodies, dt0)]
+    return [*own, _damage_mode(frames, bodies), _break_mode(frames, bodies, time), *effects]
+
+
+def _speed_mode(frames, bodies):
+    edges = speed_edges(frames)
+    return {
+        **{"name": "speed", "label": "speed [m/s]", "kind": "frames", "scaled": True},
+        **{"low": float(edges[0]), "high": float(edges[-1]), "log": True},
+        "values": quantise([frame.speed[bodies] for frame in frames]),
+        "table": pack(colour_table("magma_r", 0.04, 0.9), "uint8"),
+        "keys": [_CRACK],
+    }
+
+
+def _level_mode(frames, bodies, dt0):
+    count = max(int(frame.level.max()) for frame in frames) + 1
+    return {
+        **{"name": "level of the step", "label": "step of a body", "kind": "levels"},
+        **{"low": -0.5, "high": count - 0.5, "names": level_names(dt0, count)},
+        "values": pack([frame.level[bodies] for frame in frames], "uint8"),
+        "table": pack(table_of(level_shades(count)[:count]), "uint8"),
+        "keys": [_CRACK],
+    }
+
+
+def _damage_mode(frames, bodies):
+    return {
+        **{"name": "damage", "label": "damage, mean of a body's bonds [1]", "kind": "frames"},
+        **{"scaled": True, "low": 0.0, "high": 1.0},
+        "values": quantise([frame.damage[bodies] for frame in frames]),
+        "table": pack(colour_table("Blues", 0.08, 1.0), "uint8"),
+        "keys": [_CRACK],
+    }
+
+
+def _break_mode(frames, bodies, time):
+    keys = [{"label": "outer faces", "colour": _PLAIN}]
+    own = {"name": "time of breaking", "label": f"face broke at [{time[0]}]", "kind": "faces"}
+    return {**own, **_time_scale(frames, np.zeros(len(bodies)), time), "keys": keys}
+
+
+def _since_mode(title, since, frames, time):
+    keys = [{"label": "not yet, or never", "colour": _PLAIN}, _CRACK]
+    own = {"name": f"since when: {title}", "label": f"{title}: since [{time[0]}]", "kind": "since"}
+    return {**own, **_time_scale(frames, since, time), "keys": keys}
+
+
+def _time_scale(frames, values, time):
+    """Values [s] on a scale from zero to the last frame, both in the unit of the page."""
+    return {
+        **{"low": 0.0, "high": time[1] * frames[-1].time_s or 1.0},
+        "values": pack(time[1] * values, "float32"),
+        "table": pack(colour_table("plasma", 0.0, 0.88), "uint8"),
+    }

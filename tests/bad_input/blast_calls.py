@@ -199,7 +199,7 @@ def _results():
     yield f"{where}.show", run(frames=1).show, page
     yield f"{where}.write_xyz", done.write_xyz, {"path": path("v.xyz")}
     yield f"{where}.write_gltf", done.write_gltf, {"path": path("v.glb")}
-    for name in ("frame", "fragments", "bodies"):
+    for name in ("frame", "fragments"):
         key = "number" if name == "frame" else "frame"
         yield f"{where}.{name}", getattr(done, name), {key: 1}
     yield f"{where}.rose", done.rose, {"axis": (0.0, 0.0, 1.0)}

@@ -7,8 +7,7 @@ import pytest
 
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.tetrahedra import signed_volumes
-from taichi_dem.output.export.rigid_motion import quaternions_of, rigid_motion
-from taichi_dem.output.fragments import fragment_of_body
+from taichi_dem.output.fragments import fragment_of_body, quaternions_of, rigid_motion
 from tests.made_result import made_result, moved_rigidly, turned
 
 SEED = 2
@@ -89,6 +88,6 @@ def test_quaternions_are_those_of_their_rotations():
     axis = np.concatenate([rng.normal(size=(200, 3)), np.eye(3), [[1, 1, 0]], [[0, 0, 1]]])
     angle = np.concatenate([rng.uniform(0.0, np.pi, 200), [np.pi] * 4, [0.0]])
     unit = axis / np.linalg.norm(axis, axis=1)[:, None]
-    wanted = np.column_stack([np.cos(0.5 * angle), np.sin(0.5 * angle)[:, None] * unit])
+    wanted = np.column_stack([np.sin(0.5 * angle)[:, None] * unit, np.cos(0.5 * angle)])
     found = quaternions_of(turned(axis, angle))
     assert np.abs((found * wanted).sum(axis=1)) == pytest.approx(1.0, abs=1e-12)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from _motion_record import MotionRecord
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform
 from taichi_dem.mesh.shapes import placed_together, single
-from taichi_dem.output.motion_record import MotionRecord
 from taichi_dem.simulate import run_simulation
 
 

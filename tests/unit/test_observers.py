@@ -6,6 +6,8 @@ import os
 import numpy as np
 import pytest
 
+from _bars import Profile
+from _method_costs import RunCosts
 from taichi_dem import (
     CONCRETE,
     At,
@@ -20,8 +22,6 @@ from taichi_dem import (
 )
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import body_at
-from taichi_dem.output.profile import Profile
-from taichi_dem.output.run_costs import RunCosts
 
 BAR = bar(0.2, 0.1, (2, 1, 1))
 V, W, STEP = np.array([0.5, -0.2, 0.1]), np.array([0.0, 0.0, 400.0]), 1e-7

@@ -2,7 +2,6 @@
 
 import json
 import struct
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,13 @@ from taichi_dem.kit.files import write_bytes
 from taichi_dem.kit.validation import FileName, positive
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
 from taichi_dem.mesh.topology import skin
-from taichi_dem.output.export.rigid_motion import quaternions_of, rigid_motion
-from taichi_dem.output.fragments import broken_by, centres, fragment_of_body
-from taichi_dem.output.record import Frame
-from taichi_dem.state.model import Model
+from taichi_dem.output.body_values import shares_of_scale
+from taichi_dem.output.fragments import (
+    centres,
+    fragment_of_body,
+    quaternions_of,
+    rigid_motion,
+)
 
 #: Colours from low to high, viridis in nine steps, and that of crack faces; sRGB.
 _SCALE = np.array(
@@ -28,34 +30,24 @@ _FLOAT, _BYTE, _VERTICES = 5126, 5121, 34962
 _TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 
 
-def write_gltf(
-    path: FileName,
-    model: Model,
-    frames: Sequence[Frame],
-    broken_time: np.ndarray,
-    values: np.ndarray,
-    seconds: float = 10.0,
-) -> None:
-    """Write frames as an animation in a binary glTF file.
+def write_gltf(path: FileName, result: Any, colour: str, seconds: float) -> None:
+    """Write the frames of a ``Result`` as an animation in a binary glTF file.
 
     Parameters
     ----------
     path : str or path
         Name of the file, such as ``"run.glb"``.
-    model : Model
-    frames : sequence of Frame
-        At least one.
-    broken_time : ndarray, shape (bond_count,)
-        When each bond broke [s], NaN while it holds.
-    values : ndarray, shape (body_count,)
-        In [0, 1]: colour of the outer faces of each body, from violet to yellow.
+    result : Result
+        With a frame at least.
+    colour : str
+        One of ``body_values.COLOURS``: of the outer faces of each body, from violet to yellow.
     seconds : float
         How long the animation lasts [s]; the run is stretched to it.
 
     Raises
     ------
     InputError
-        Where the file cannot be written.
+        For another colour or no time, or where the file cannot be written.
 
     Notes
     -----
@@ -63,15 +55,15 @@ def write_gltf(
     about its centre of mass. It moves as ``rigid_motion`` says; what a fragment bends is not shown.
     Format: Khronos glTF 2.0. Lengths in m, axes as in the run: y is up in most viewers.
     """
-    seconds = positive("seconds", seconds)
-    broken = broken_by(broken_time, frames[-1].time_s)
+    model, frames = result.model, result.frames
+    values, seconds = shares_of_scale(result, frames[-1], colour), positive("seconds", seconds)
+    broken = result.broken_time <= frames[-1].time_s
     of_body = fragment_of_body(model, broken)
     file = _GlbFile()
     for number, surface in enumerate(_surfaces(model, broken, of_body, values)):
         file.add_piece(f"fragment {number}", *surface)
     times = np.array([frame.time_s for frame in frames])
-    motion = _motions(model, frames, of_body)
-    last = times[-1] - times[0]
+    last, motion = times[-1] - times[0], _motions(model, frames, of_body)
     file.move((times - times[0]) * (seconds / last if last > 0.0 else 0.0), *motion)
     extras = {"from_s": times[0], "to_s": times[-1], "animation_s": seconds}
     write_bytes(path, file.content(extras))
@@ -95,19 +87,14 @@ def _colours(values):
     return np.stack([np.interp(values, places, channel) for channel in _SCALE.T], axis=1)
 
 
-def _motions(model: Model, frames: Sequence[Frame], of_body: np.ndarray) -> Any:
+def _motions(model, frames, of_body):
     """Translations (frames, fragments, 3) and quaternions x, y, z, w (frames, fragments, 4)."""
-    places: list[np.ndarray] = []
-    turns: list[np.ndarray] = []
-    for frame in frames:
-        centre, rotation = rigid_motion(model, frame, of_body)
-        turn = np.roll(quaternions_of(rotation), -1, axis=1)
-        if turns:
-            # q and -q are one rotation; between two frames the shorter way is meant.
-            turn = turn * np.where((turn * turns[-1]).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
-        places.append(centre)
-        turns.append(turn)
-    return np.array(places), np.array(turns)
+    places, rotations = zip(*(rigid_motion(model, frame, of_body) for frame in frames))
+    turns = np.array(list(map(quaternions_of, rotations)))
+    # q and -q are one rotation; between two frames the shorter way is meant.
+    for before, turn in zip(turns, turns[1:]):
+        turn *= np.where((turn * before).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
+    return np.array(places), turns
 
 
 class _GlbFile:
@@ -151,14 +138,15 @@ class _GlbFile:
         clock = times.astype(np.float32)
         bounds = {"min": [float(clock[0])], "max": [float(clock[-1])]}
         given = self._accessor(clock[:, None], vertices=False, **bounds)
-        samplers: list[dict] = []
-        channels: list[dict] = []
-        for path, values in (("translation", places), ("rotation", turns)):
-            for node in range(places.shape[1]):
-                ways = self._accessor(values[:, node].astype(np.float32), vertices=False)
-                target = {"node": node, "path": path}
-                channels.append({"sampler": len(samplers), "target": target})
-                samplers.append({"input": given, "output": ways})
+        ways = [
+            ({"node": node, "path": path}, values[:, node].astype(np.float32))
+            for path, values in (("translation", places), ("rotation", turns))
+            for node in range(places.shape[1])
+        ]
+        channels = [{"sampler": k, "target": target} for k, (target, _) in enumerate(ways)]
+        samplers = [
+            {"input": given, "output": self._accessor(values, vertices=False)} for _, values in ways
+        ]
         self._add("animations", {"samplers": samplers, "channels": channels})
 
     def content(self, extras):

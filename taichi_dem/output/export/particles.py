@@ -1,36 +1,29 @@
 """Bodies or fragments over time as particles, in extended XYZ for OVITO."""
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from taichi_dem.kit.extended_xyz import XyzFrame, write_extended_xyz
 from taichi_dem.kit.validation import FileName, choice
 from taichi_dem.mesh.tetrahedra import signed_volumes
-from taichi_dem.output.export.rigid_motion import quaternions_of, rigid_motion
-from taichi_dem.output.fragments import broken_by, fragment_of_body, fragments_of
-from taichi_dem.output.record import Frame
-from taichi_dem.state.model import Model
+from taichi_dem.output.fragments import (
+    fragment_of_body,
+    fragments_of,
+    quaternions_of,
+    rigid_motion,
+)
 
 
-def write_particles(
-    path: FileName,
-    model: Model,
-    frames: Sequence[Frame],
-    broken_time: np.ndarray,
-    of: str = "bodies",
-) -> None:
-    """Write frames as an extended XYZ file.
+def write_particles(path: FileName, result: Any, of: str) -> None:
+    """Write the frames of a ``Result`` as an extended XYZ file.
 
     Parameters
     ----------
     path : str or path
         Name of the file, such as ``"run.xyz"``.
-    model : Model
-    frames : sequence of Frame
-        At least one.
-    broken_time : ndarray, shape (bond_count,)
-        When each bond broke [s], NaN while it holds.
+    result : Result
+        With a frame at least.
     of : {"bodies", "fragments"}
         What a particle is. Fragments are those of each frame, so that their number grows.
 
@@ -45,36 +38,31 @@ def write_particles(
     quaternion x, y, z, w, from the shape at rest), mass [kg], fragment (by falling mass).
     """
     kinds = {"bodies": _bodies, "fragments": _fragments}
-    columns_of = kinds[choice("of", of, kinds)]
-    tables = [columns_of(model, frame, broken_time) for frame in frames]
+    particles_of = kinds[choice("of", of, kinds)]
+    tables = [_table(*particles_of(result, frame)) for frame in result.frames]
     margin = max(table["radius"].max() for table in tables)
     low = np.min([table["pos"].min(axis=0) for table in tables], axis=0) - margin
     high = np.max([table["pos"].max(axis=0) for table in tables], axis=0) + margin
-    shots = [XyzFrame(f.time_s, table, low, high - low) for f, table in zip(frames, tables)]
+    shots = [XyzFrame(f.time_s, table, low, high - low) for f, table in zip(result.frames, tables)]
     write_extended_xyz(path, shots)
 
 
-def _bodies(model, frame, broken_time):
+def _table(place, radius, velocity, rotation, mass, fragment):
+    """Columns of the particles in a frame, by name."""
+    turns = {"orientation": quaternions_of(rotation), "mass": mass, "fragment": fragment}
+    return {"pos": place, "radius": radius, "velo": velocity, **turns}
+
+
+def _bodies(result, frame):
+    model = result.model
     volume = signed_volumes(model.mesh.points, model.mesh.tetrahedra)
-    of_body = fragment_of_body(model, broken_by(broken_time, frame.time_s))
-    return {
-        "pos": frame.position,
-        "radius": np.cbrt(0.75 * volume / np.pi),
-        "velo": frame.velocity,
-        "orientation": np.roll(quaternions_of(frame.rotation), -1, axis=1),
-        "mass": model.body_mass,
-        "fragment": of_body,
-    }
+    of_body = fragment_of_body(model, result.broken_time <= frame.time_s)
+    radius = np.cbrt(0.75 * volume / np.pi)
+    return frame.position, radius, frame.velocity, frame.rotation, model.body_mass, of_body
 
 
-def _fragments(model, frame, broken_time):
-    found = fragments_of(model, frame, broken_time)
-    centre, rotation = rigid_motion(model, frame, found.of_body)
-    return {
-        "pos": centre,
-        "radius": 0.5 * found["diameter_m"],
-        "velo": found.vectors("velocity"),
-        "orientation": np.roll(quaternions_of(rotation), -1, axis=1),
-        "mass": found["mass_kg"],
-        "fragment": found["fragment"],
-    }
+def _fragments(result, frame):
+    found = fragments_of(result.model, frame, result.broken_time)
+    centre, rotation = rigid_motion(result.model, frame, found.of_body)
+    radius, velocity = 0.5 * found["diameter_m"], found.vectors("velocity")
+    return centre, radius, velocity, rotation, found["mass_kg"], found["fragment"]

@@ -1,16 +1,14 @@
 """A series of frames in one VTKHDF file, which ParaView (5.12 or later) and pyvista open."""
 
 import io
-from collections.abc import Mapping, Sequence
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
 from taichi_dem.kit.files import write_bytes
 from taichi_dem.kit.optional import optional
 from taichi_dem.kit.validation import FileName
-from taichi_dem.output.record import Frame, body_corners, cell_data, corners_of_bodies
-from taichi_dem.state.model import Model
+from taichi_dem.output.record import body_corners, cell_data, corners_of_bodies
 
 _TETRAHEDRON = 10
 #: The format's version that brought series, the lowest that has all that is used here.
@@ -19,22 +17,15 @@ _VERSION = (2, 0)
 _CHUNK = 65536
 
 
-def write_vtkhdf(
-    path: FileName,
-    model: Model,
-    frames: Sequence[Frame],
-    acting_since: Optional[Mapping[str, np.ndarray]] = None,
-) -> None:
-    """Write frames as one VTKHDF file: moving points, and the cell data of the PVD series.
+def write_vtkhdf(path: FileName, result: Any) -> None:
+    """Write the frames of a ``Result`` as one VTKHDF file: moving points, cell data of the series.
 
     Parameters
     ----------
     path : str or path
         Name of the file, such as ``"run.vtkhdf"``.
-    model : Model
-    frames : sequence of Frame
-    acting_since : mapping of str to ndarray, optional
-        As of ``write_paraview``.
+    result : Result
+        With a frame at least.
 
     Raises
     ------
@@ -45,7 +36,7 @@ def write_vtkhdf(
     -----
     Format: VTK File Formats, section VTKHDF, unstructured grid over time, version 2.0.
     """
-    h5py = optional("h5py")
+    h5py, model, frames = optional("h5py"), result.model, result.frames
     # In memory: HDF5 on a full disk fails when it closes the file, and then again at the end.
     content = io.BytesIO()
     with h5py.File(content, "w") as file:
@@ -56,7 +47,7 @@ def write_vtkhdf(
         _write_cells(root, model)
         points = [body_corners(model, frame).reshape(-1, 3) for frame in frames]
         _column(root, "Points", points)
-        columns = [cell_data(model, frame, acting_since or {}) for frame in frames]
+        columns = [cell_data(model, frame, result.acting_since) for frame in frames]
         for name in columns[0]:
             _column(root, f"CellData/{name}", [column[name] for column in columns])
         _write_steps(root, [frame.time_s for frame in frames], model.body_count, list(columns[0]))
@@ -87,7 +78,7 @@ def _write_steps(root, times_s, count, names):
         steps[f"CellDataOffsets/{name}"] = count * every
 
 
-def _column(root: Any, name: str, parts: Sequence[np.ndarray]) -> None:
+def _column(root, name, parts):
     """Write the values of all frames, one after the other."""
     values = np.concatenate(parts)
     packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}

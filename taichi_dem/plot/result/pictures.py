@@ -12,9 +12,11 @@ from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, SPARE_COLOURS, area_key, picture
 from taichi_dem.kit.units import without_unit
 from taichi_dem.kit.validation import FileName, choices
-from taichi_dem.output.body_values import COLOURS, Bodies, body_values, scale_end
+from taichi_dem.output.body_values import COLOURS, body_values, scale_end
 from taichi_dem.output.cracks import Rose
-from taichi_dem.output.fragments import Fragments, broken_by
+from taichi_dem.output.fragments import Fragments
+from taichi_dem.output.record import Frame
+from taichi_dem.output.run_tables import RunTables
 from taichi_dem.plot.bodies import ALONG_Z, JOINT, draw_bodies, frame_block
 from taichi_dem.plot.series import ENERGY_TERMS
 from taichi_dem.plot.summary import scale
@@ -61,7 +63,7 @@ def _draw(axes, time, table, names, unit):
 
 
 def plot_energy_shares(path: Optional[FileName], shares: Mapping[str, np.ndarray]) -> Figure:
-    """Stack the shares of ``output.energy_shares``; what is missing to 100 % is unexplained."""
+    """Stack the shares of ``Result.energy_shares``; what is missing to 100 % is unexplained."""
     factor, unit = scale(float(shares["time_s"].max(initial=0.0)), "s")
     looks = {key.replace("_J", "_share"): look for key, look in ENERGY_TERMS.items()}
     terms = {name: look for name, look in looks.items() if name in shares and shares[name].any()}
@@ -174,7 +176,8 @@ def plot_attenuation(path: Optional[FileName], attenuation: Any, nearest: float)
 
 def plot_block(
     path: Optional[FileName],
-    bodies: Bodies,
+    result: RunTables,
+    frame: Frame,
     colour: str = "speed",
     magnify: float = 1.0,
     axis: Sequence[float] = ALONG_Z,
@@ -183,9 +186,8 @@ def plot_block(
 
     magnify: of the displacement. axis: towards the viewer.
     """
-    values, view = body_values(bodies, colour), View(axis)
-    model, frame, broken_time, _ = bodies
-    broken = broken_by(broken_time, frame.time_s)
+    values, view, model = body_values(result, frame, colour), View(axis), result.model
+    broken = result.broken_time <= frame.time_s
     options: dict[str, Any] = {"magnify": magnify, "axis": axis, "broken": broken}
     with picture(path, size=(6.2, 4.8)) as (figure, axes):
         if colour == "fragment":

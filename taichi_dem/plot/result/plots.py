@@ -153,4 +153,4 @@ class ResultPlots:
         path : str or path, optional
         """
         magnify, axis = positive("magnify", magnify), unit_vector("axis", axis).tolist()
-        return plot_block(path, self._result.bodies(frame), colour, magnify, axis)
+        return plot_block(path, self._result, self._result.frame(frame), colour, magnify, axis)

@@ -1,7 +1,6 @@
 """Cracks of a deep block in space and in sections, and how probable each face is to break."""
 
 import itertools
-from typing import Any
 
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
@@ -9,29 +8,20 @@ from matplotlib.colors import Normalize
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from taichi_dem.kit.plot_style import GREY, picture
-from taichi_dem.kit.validation import FileName
-from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.topology import Topology
 from taichi_dem.plot.bodies import JOINT, STONE, draw_lines, draw_stone, frame_block, shades
 from taichi_dem.plot.view import View, traces
-from taichi_dem.state.model import Model
 
 _AXES = "xyz"
 
 
-def plot_deep_cracks(
-    path: FileName,
-    mesh: Mesh,
-    topology: Topology,
-    broken_time: np.ndarray,
-    time_s: np.ndarray,
-    hole: Any,
-) -> None:
+def plot_deep_cracks(path, result, hole):
     """Broken faces of the block at rest by time of breaking: in space and cut by two planes.
 
-    broken_time: (bond_count,) [s], NaN while a bond holds. time_s: of the picture. hole: point on
-    the hole's axis (3,) [m], which runs along z; the planes are half-way along it, and through it.
+    hole: point on the hole's axis (3,) [m], which runs along z; the planes are half-way along it,
+    and through it.
     """
+    mesh, topology = result.model.mesh, result.model.topology
+    broken_time, time_s = result.broken_time, result.frames[-1].time_s
     broken = np.flatnonzero(broken_time <= time_s)
     # The latest first: early ones, near the hole, stay visible.
     broken = broken[np.argsort(-broken_time[broken], kind="stable")]
@@ -90,7 +80,7 @@ def _section(axes, triangles, time_ms, normal, place, bounds, look):
     return lines
 
 
-def crossings(triangles: np.ndarray, normal: int, place: float) -> Any:
+def crossings(triangles, normal, place):
     """Where triangles (n, 3, 3) [m] cross the plane at a place on an axis.
 
     Returns the ends of the lines (m, 2, 3) [m] and which triangle each belongs to (m,). One with a
@@ -111,17 +101,10 @@ def crossings(triangles: np.ndarray, normal: int, place: float) -> Any:
     return np.stack(lines, axis=1), which
 
 
-def plot_crack_probability(path: FileName, model: Model, probability: np.ndarray) -> None:
+def plot_crack_probability(path, model, probability):
     """Faces of the block at rest by their probability to break: on its front, and half-way through.
 
-    Parameters
-    ----------
-    path : path
-        Name of the PNG file.
-    model : Model
-        Of a scene with the mesh of all runs.
-    probability : ndarray, shape (bond_count,)
-        Of each bond to be broken [1]; faces at 0 are not drawn.
+    probability: of each bond to be broken, (bond_count,); faces at 0 are not drawn.
     """
     view = View()
     with picture(path, 1, 2, size=(9.0, 4.1), sharey=True) as (figure, panels):

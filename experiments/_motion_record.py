@@ -3,18 +3,7 @@
 import numpy as np
 
 from taichi_dem.observers import Every, RunView
-
-
-def body_spins(
-    inertia: np.ndarray, rotation: np.ndarray, angular_momentum: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Angular momenta [kg m^2/s] and spins [rad/s] of bodies in their own axes, (..., n, 3) each.
-
-    inertia: in body axes, (n, 3, 3). rotation: body to world, (..., n, 3, 3). angular_momentum: in
-    world axes, (..., n, 3).
-    """
-    local = np.einsum("...nji,...nj->...ni", rotation, angular_momentum)
-    return local, np.einsum("nij,...nj->...ni", np.linalg.inv(inertia), local)
+from taichi_dem.output.fragments import body_spins
 
 
 class MotionRecord:
