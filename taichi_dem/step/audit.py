@@ -6,10 +6,7 @@ result decides what is looked at, and nothing that the audit does remains.
 
 import taichi as ti
 
-from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.multirate.schedule import Schedule
 
 #: One bond in so many is looked at; a power of two.
 RATE = 1024
@@ -36,9 +33,9 @@ class Audit:
 
     scratch_fields = ("first",)
 
-    def __init__(self, tables: Tables, state: State, schedule: Schedule, advance: Advance):
-        self.tables, self.state, self.schedule, self.advance = tables, state, schedule, advance
-        self.sleeping = schedule.sleeping
+    def __init__(self, advance: Advance):
+        self.tables, self.state, self.advance = advance.tables, advance.state, advance
+        self.schedule, self.sleeping = advance.schedule, advance.schedule.sleeping
         self.first = ti.field(ti.i32, shape=())
         self.audited, self.misses = (ti.field(ti.i64, shape=()) for _ in range(2))
 

@@ -96,22 +96,17 @@ class BondStep:
     def _is_pending(self, b):
         """Whether a bond holds and has not applied its impulse for the coming step already."""
         pending = self.state.broken_tick[b] < 0
-        if ti.static(self.retimes):
-            slots = self.tables.bond_slots[b]
-            pending = pending and self.schedule.applied_until.is_pending(
-                b, slots[0] >> 2, slots[1] >> 2
-            )
+        if ti.static(self.schedule.controlled):
+            i, j = self.tables.bond_slots[b][0] >> 2, self.tables.bond_slots[b][1] >> 2
+            pending = pending and self.schedule.applied_until.is_pending(b, i, j)
         return pending
 
     @ti.func
     def _bond_step(self, b, i, j):
         """Time [s] for which a bond applies its force now."""
-        dt = 0.0
-        if ti.static(self.retimes):
-            dt = self.schedule.applied_until.apply_bond(b, i, j)
-        else:
-            dt = self.schedule.pair_step(i, j)
-        return dt
+        if ti.static(self.schedule.controlled):
+            self.schedule.applied_until.bond[b] = self.schedule.applied_until.until(i, j)
+        return self.schedule.pair_step(i, j)
 
     @ti.func
     def bond_share(self, b):

@@ -63,11 +63,11 @@ class Velocities:
     def _support(self, i, advance):
         """Apply the supports, which are linear, to the unit impulses and moments."""
         unit, turn = unit3(), self.turn[i]
-        rest, rest_turn = advance.allowed(i, 0.0 * unit[0, :], 0.0 * unit[0, :])
+        rest, rest_turn = advance.allowed_in_step(i, 0.0 * unit[0, :], 0.0 * unit[0, :])
         for k in ti.static(range(3)):
             axis = unit[:, k]
-            velocity, _ = advance.allowed(i, self.tables.mass_inverse[i] * axis, 0.0 * axis)
-            _, momentum = advance.allowed(i, 0.0 * axis, axis)
+            velocity, _ = advance.allowed_in_step(i, self.tables.mass_inverse[i] * axis, 0.0 * axis)
+            _, momentum = advance.allowed_in_step(i, 0.0 * axis, axis)
             spin = matvec(turn, momentum - rest_turn)
             for r in ti.static(range(3)):
                 self.hold[i][r, k] = velocity[r] - rest[r]
@@ -81,7 +81,7 @@ class Velocities:
         if ti.static(self.has_supports):
             momentum = self.state.angular_momentum[i] + angular
             self.given[i] = stacked(linear, angular)
-            velocity, momentum = advance.allowed(i, velocity, momentum)
+            velocity, momentum = advance.allowed_in_step(i, velocity, momentum)
             spin = advance.spin(i, momentum)
         self.twist[i] = stacked(velocity, spin)
 

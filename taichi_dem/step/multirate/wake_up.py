@@ -17,21 +17,17 @@ class WakeUp:
     then.
     """
 
-    def __init__(self, advance: Advance, schedule: Schedule):
-        self.advance, self.schedule, self.limits = advance, schedule, schedule.limits
-        self.state = schedule.state
-
-    @ti.func
-    def _is_awake(self, i):
-        awake = True
-        if ti.static(self.schedule.sleeps):
-            awake = self.schedule.sleeping.awake[i] != ASLEEP
-        return awake
+    def __init__(self, advance: Advance):
+        self.advance, self.schedule, self.limits = advance, advance.schedule, advance.limits
+        self.state = advance.state
 
     @ti.func
     def wake_up(self, i):
         """Bring body i to the present tick when it wants a shorter step because of an event."""
-        if self.limits.events[i] != 0 and self._is_awake(i):
+        noticed = self.limits.events[i] != 0
+        if ti.static(self.schedule.sleeps):
+            noticed = noticed and self.schedule.sleeping.awake[i] != ASLEEP
+        if noticed:
             wanted, bound = self.schedule.controlled_level(i)
             if ti.static(self.schedule.uniform):
                 ti.atomic_max(self.schedule.wanted[None], wanted)
@@ -82,7 +78,7 @@ class Chunks:
             self.sleeping.renew_bound()
             if self.sleeping.unsorted[None] > 0:
                 self.sleeping.unsorted[None] = 0
-                self.schedule.list_members()
+                self.schedule.list_members(0)
 
 
 @ti.data_oriented
