@@ -22,6 +22,7 @@ from taichi_dem.step.ground import GroundDashpots
 from taichi_dem.step.implicit.solver import Solver
 from taichi_dem.step.load_times import LoadTimes
 from taichi_dem.step.multirate.schedule import Schedule
+from taichi_dem.step.sleeping import ASLEEP
 from taichi_dem.step.tangential_springs import TangentialSprings
 
 
@@ -51,8 +52,7 @@ class Advance(BondStep, ContactForce):
         self.load_times, self.ground = LoadTimes(tables, state), GroundDashpots(tables, state)
         self.solver, self.solves = solver, solver is not None
         self.solves_bonds = self.solves and solver.has_bonds
-        self.contacts = contacts
-        self.has_contact = contacts is not None
+        self.contacts, self.has_contact = contacts, contacts is not None
         if not self.solves:
             self.springs = TangentialSprings(schedule, contacts)
         # Without fast_math a product with zero is not folded: absent terms must not be written.
@@ -72,6 +72,32 @@ class Advance(BondStep, ContactForce):
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
         self.state.spin[i] = spin
         self.schedule.choose_level(i, squared(velocity))
+
+    @ti.func
+    def wake_up(self, i):
+        """Bring body i to the present tick when it wants a shorter step because of an event.
+
+        It waits for its own time with a step chosen before a contact came near, a bond broke or a
+        neighbour refined its step. Bonds that have applied their impulse ahead apply no more until
+        then.
+        """
+        noticed = self.limits.events[i] != 0
+        if ti.static(self.schedule.sleeps):
+            noticed = noticed and self.schedule.sleeping.awake[i] != ASLEEP
+        if noticed:
+            wanted, bound = self.schedule.controlled_level(i)
+            if ti.static(self.schedule.uniform):
+                ti.atomic_max(self.schedule.wanted[None], wanted)
+                self.state.bound[i] = bound
+            elif wanted > self.state.level[i]:
+                ti.atomic_add(self.limits.woken[None], 1)
+                # The present is a time of level low and finer levels only.
+                self.state.level[i] = ti.max(self.state.level[i], self.schedule.low[None])
+                self.schedule.note_change(i)
+                if self.state.last_tick[i] < self.state.tick[None]:
+                    self.body(i)
+                else:
+                    self.schedule.choose_level(i, 0.0)
 
     @ti.func
     def _drift(self, i, elapsed, velocity, momentum, spin):

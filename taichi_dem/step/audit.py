@@ -7,6 +7,7 @@ result decides what is looked at, and nothing that the audit does remains.
 import taichi as ti
 
 from taichi_dem.step.advance import Advance
+from taichi_dem.step.multirate.lists import Places
 
 #: One bond in so many is looked at; a power of two.
 RATE = 1024
@@ -24,7 +25,7 @@ def mixed(number):
 
 
 @ti.data_oriented
-class Audit:
+class Audit(Places):
     """List of the bonds that are looked at in a substep, and what was found.
 
     audited, misses: bonds asleep. One is missed where it is opened by more than the share at which
@@ -49,11 +50,6 @@ class Audit:
     def count(self, low):
         """Number of bonds to look at."""
         return (self.tables.bond_count[None] - self.first[None] + (RATE - 1)) // RATE
-
-    @ti.func
-    def pick(self, a):
-        """Place of one of them."""
-        return a
 
     @ti.func
     def visit(self, a):

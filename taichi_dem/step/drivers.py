@@ -18,7 +18,7 @@ from taichi_dem.step.implicit.bonds import BOND_COLOURS
 from taichi_dem.step.implicit.pairs import COLOURS
 from taichi_dem.step.multirate.lists import Once
 from taichi_dem.step.multirate.schedule import Schedule
-from taichi_dem.step.multirate.wake_up import Chunks, WakeUp
+from taichi_dem.step.multirate.wake_up import Chunks
 
 #: The parallel driver is called for about this long [s] between two checks of divergence, progress
 #: and Ctrl-C.
@@ -87,7 +87,7 @@ class Step:
         if not self.schedule.sleeps:
             return ()
         chunks = Chunks(self.schedule)
-        return (chunks, chunks.add), (Once(), chunks.end)
+        return (chunks, self.schedule.sleeping.chunk), (Once(), chunks.end)
 
     def repeats(self, part: int) -> bool:
         """Whether a part of the phases is called for once more: never here."""
@@ -100,7 +100,7 @@ class Step:
             return ()
         phases: Phases = ((limits, limits.refresh),)
         if self.schedule.controlled:
-            phases += ((limits, WakeUp(self.advance).wake_up),)
+            phases += ((limits, self.advance.wake_up),)
         return (*phases, (Once(), self.schedule.apply_changes))
 
     def is_of_start(self, item: object) -> bool:

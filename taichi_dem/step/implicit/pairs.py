@@ -78,7 +78,8 @@ class PairDashpots:
                 for side in ti.static(range(2)):
                     self.taken[self.store.body[p][side]] = 0
         for a in range(count):
-            i, j = self._bodies(a)
+            pair = self.store.body[self.active[a]]
+            i, j = pair[0], pair[1]
             taken, colour = self.taken[i] | self.taken[j], 0
             while (taken >> colour) & 1 == 1 and colour < COLOURS:
                 colour += 1
@@ -88,11 +89,6 @@ class PairDashpots:
             self.colour[a] = colour
         self.count[None] = count
         group(self.colour_first, self.order, COLOURS + 1, count, self._colour_of)
-
-    @ti.func
-    def _bodies(self, a):
-        pair = self.store.body[self.active[a]]
-        return pair[0], pair[1]
 
     @ti.func
     def _colour_of(self, a):
@@ -141,7 +137,9 @@ class PairDashpots:
                 parted += self.springs.part(m, k)
         self.store.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
         if end > start:
-            self._deposit(p, branch, force, moment)
+            around = moment + cross(branch, force)
+            self.contacts.add_impulse(p, 0, -force, -around)
+            self.contacts.add_impulse(p, 1, force, moment)
         if ti.static(self.springs.present):
             self.contacts.book_friction(p, parted)
 
@@ -174,13 +172,6 @@ class PairDashpots:
             across += dot(first, matvec(turn_i, first))
             across += dot(second, matvec(turn_j, second))
         return ti.Vector([along, across - along])
-
-    @ti.func
-    def _deposit(self, p, branch, force, moment):
-        """Add the first guess to both bodies: impulse on the second, moment about its centre."""
-        around = moment + cross(branch, force)
-        self.contacts.add_impulse(p, 0, -force, -around)
-        self.contacts.add_impulse(p, 1, force, moment)
 
     @ti.func
     def visit(self, p):

@@ -7,7 +7,7 @@ import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import assign, raise_to
-from taichi_dem.kit.types import real
+from taichi_dem.kit.types import real, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
@@ -63,11 +63,11 @@ class Solver:
 
     @ti.func
     def begin(self, one):
-        """Reset the residual and the count of sweeps."""
+        """Reset the residual and the count of sweeps; the spare body is at rest."""
         self.sweeps[None] = 0
         self.unsolved[None] = 1
         self.change2[None], self.speed2[None] = 0.0, 0.0
-        self.velocities.rest_spare()
+        self.velocities.twist[self.velocities.spare] = vec6(0.0)
 
     @ti.func
     def solve(self, one):

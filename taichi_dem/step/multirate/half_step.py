@@ -32,17 +32,11 @@ class HalfStep:
         """
         due = 0
         if ti.static(self.staggered):
-            starts = self.state.tick[None] == 0 and self.is_held(i) == 1
-            due = ti.cast(self.state.last_tick[i] == self.state.tick[None] and not starts, ti.i32)
+            due = ti.cast(self.state.last_tick[i] == self.state.tick[None], ti.i32)
+            for effect in ti.static(self.tables.supports):
+                if self.state.tick[None] == 0 and effect.acts_on(i) != 0:
+                    due = 0
         return due
-
-    @ti.func
-    def is_held(self, i):
-        """1 for a body on which a support acts, else 0."""
-        held = 0
-        for effect in ti.static(self.tables.supports):
-            held |= ti.cast(effect.acts_on(i) != 0, ti.i32)
-        return held
 
     @ti.func
     def impulse(self, i, linear, angular, back):
@@ -86,10 +80,8 @@ class HalfStep:
             linear, angular, kick = self.impulse(i, pushed, turned, back)
             linear *= self.tables.mass_inverse[i]
             if back == 1:
-                self.state.velocity[i], self.state.angular_momentum[i] = (
-                    before - linear,
-                    spun - angular,
-                )
+                self.state.velocity[i] = before - linear
+                self.state.angular_momentum[i] = spun - angular
                 self.state.spin[i] = self.advance.spin(i, spun - angular)
             else:
                 now = self.schedule.seconds(self.state.tick[None])

@@ -18,7 +18,17 @@ def first_key(member):
 
 
 @ti.data_oriented
-class Once:
+class Places:
+    """Base of lists whose members are the numbers 0 .. count - 1."""
+
+    @ti.func
+    def pick(self, a):
+        """The place itself."""
+        return a
+
+
+@ti.data_oriented
+class Once(Places):
     """List of one member, for phases that run once a substep."""
 
     @ti.func
@@ -26,14 +36,9 @@ class Once:
         """One."""
         return 1
 
-    @ti.func
-    def pick(self, a):
-        """The place itself, which is not used."""
-        return a
-
 
 @ti.data_oriented
-class Everyone:
+class Everyone(Places):
     """List of all bodies or bonds of a scene, active or not. number: field of how many."""
 
     def __init__(self, number: ti.Field):
@@ -43,11 +48,6 @@ class Everyone:
     def count(self, low):
         """Number of all."""
         return self.number[None]
-
-    @ti.func
-    def pick(self, a):
-        """The place itself."""
-        return a
 
 
 @ti.data_oriented
@@ -59,9 +59,7 @@ class ActiveList:
     """
 
     def __init__(self, capacity: int):
-        self.order = ti.field(ti.i32, shape=capacity)
-        self.index = ti.field(ti.i32, shape=capacity)
-        self.key = ti.field(ti.i32, shape=capacity)
+        self.order, self.index, self.key = (ti.field(ti.i32, shape=capacity) for _ in range(3))
         self.end = ti.field(ti.i32, shape=MAX_LEVEL + 2)
 
     @ti.func

@@ -42,12 +42,6 @@ class LevelLimit:
         self.listed_level = ti.field(ti.i32, shape=tables.capacity.bodies)
 
     @ti.func
-    def note_all(self):
-        """Note the levels of all bodies."""
-        for i in range(self.tables.body_count[None]):
-            self.listed_level[i] = self.state.level[i]
-
-    @ti.func
     def least(self, i):
         """Coarsest level that body i may have beside those it touches; negative for any."""
         finest = -1
@@ -107,11 +101,6 @@ class AppliedUntil:
         self.bond = ti.field(ti.i64, shape=tables.capacity.bonds)
         if contacts is not None:
             self.pair = contacts.store.column("applied_until", ti.i64)
-
-    @ti.func
-    def is_pending(self, b, i, j):
-        """Whether bond b has yet to apply its impulse for the coming step of its two bodies."""
-        return self.bond[b] < self.until(i, j)
 
     @ti.func
     def until(self, i, j):

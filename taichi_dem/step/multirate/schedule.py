@@ -59,7 +59,7 @@ class Schedule:
         self.tables, self.state, self.contacts, self.limits = tables, state, contacts, limits
         self.has_limits = limits is not None
         self.sleeps, self.woken = tables.on_demand, None
-        self.sleeping = Sleeping(tables) if self.sleeps else None
+        self.sleeping = Sleeping(tables, state) if self.sleeps else None
         self.controlled = self.has_limits and limits.control is not None
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
         self.applied_until = AppliedUntil(tables, state, contacts) if self.controlled else None
@@ -122,8 +122,7 @@ class Schedule:
     @ti.func
     def elapsed(self, i):
         """Seconds since body i was last advanced."""
-        ticks = self.state.tick[None] - self.state.last_tick[i]
-        return ti.cast(ticks, real) * self.step_seconds[MAX_LEVEL]
+        return self.seconds(self.state.tick[None] - self.state.last_tick[i])
 
     @ti.func
     def seconds(self, tick):
@@ -233,7 +232,8 @@ class Schedule:
             self._level_all()
         self.changed_count[None] = 0
         if ti.static(self.spreads):
-            self.level_limit.note_all()
+            for i in range(self.tables.body_count[None]):
+                self.level_limit.listed_level[i] = self.state.level[i]
         self.list_members(0)
         if ti.static(self.sleeps):
             # Those that sleep act once.
@@ -259,7 +259,7 @@ class Schedule:
             for a in range(self.store.near_count[None]):
                 for side in ti.static(range(2)):
                     pair = self.store.body[self.store.near_slot[a]]
-                    self.sleeping.awaken(pair[side], self.state)
+                    self.sleeping.awaken(pair[side])
             self.woken.admit(False)
         self._list_pairs()
         if ti.static(not self.uniform):
