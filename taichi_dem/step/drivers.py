@@ -16,7 +16,7 @@ from taichi_dem.step.audit import Audit
 from taichi_dem.step.begin import Begin, Phases, SolvedBegin
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
 from taichi_dem.step.implicit.pairs import COLOURS
-from taichi_dem.step.multirate.lists import Once
+from taichi_dem.step.multirate.lists import Colour, Once
 from taichi_dem.step.multirate.schedule import Schedule
 from taichi_dem.step.multirate.wake_up import Chunks
 
@@ -121,24 +121,6 @@ class Step:
         if ti.static(self.has_contact):
             halt |= self.search.overflows()
         return halt
-
-
-@ti.data_oriented
-class Colour:
-    """The members of one colour: those from colour_first[colour] on, in their order."""
-
-    def __init__(self, colour_first: ti.Field, colour: int):
-        self.colour_first, self.colour = colour_first, colour
-
-    @ti.func
-    def count(self, low):
-        """Number of members."""
-        return self.colour_first[self.colour + 1] - self.colour_first[self.colour]
-
-    @ti.func
-    def pick(self, a):
-        """Place of one of them."""
-        return self.colour_first[self.colour] + a
 
 
 @ti.data_oriented

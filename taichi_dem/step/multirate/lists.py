@@ -51,6 +51,24 @@ class Everyone(Places):
 
 
 @ti.data_oriented
+class Colour:
+    """The members of one colour: those from colour_first[colour] on, in their order."""
+
+    def __init__(self, colour_first: ti.Field, colour: int):
+        self.colour_first, self.colour = colour_first, colour
+
+    @ti.func
+    def count(self, low):
+        """Number of members."""
+        return self.colour_first[self.colour + 1] - self.colour_first[self.colour]
+
+    @ti.func
+    def pick(self, a):
+        """Place of one of them."""
+        return self.colour_first[self.colour] + a
+
+
+@ti.data_oriented
 class ActiveList:
     """Indices in order of falling key; end[k] counts the members with a key of at least k.
 
