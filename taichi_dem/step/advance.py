@@ -22,6 +22,7 @@ from taichi_dem.step.ground import GroundDashpots
 from taichi_dem.step.implicit.solver import Solver
 from taichi_dem.step.load_times import LoadTimes
 from taichi_dem.step.multirate.schedule import Schedule
+from taichi_dem.step.sleeping import ASLEEP
 from taichi_dem.step.tangential_springs import TangentialSprings
 
 
@@ -51,14 +52,12 @@ class Advance(BondStep, ContactForce):
         self.load_times, self.ground = LoadTimes(tables, state), GroundDashpots(tables, state)
         self.solver, self.solves = solver, solver is not None
         self.solves_bonds = self.solves and solver.has_bonds
-        self.contacts = contacts
-        self.has_contact = contacts is not None
+        self.contacts, self.has_contact = contacts, contacts is not None
         if not self.solves:
-            self.springs = TangentialSprings(tables, state, schedule, contacts)
+            self.springs = TangentialSprings(schedule, contacts)
         # Without fast_math a product with zero is not folded: absent terms must not be written.
         self.has_dashpot = bool(tables.dashpot.name)
-        self.limits, self.retimes = schedule.limits, schedule.retimes
-        self.has_limits = schedule.has_limits
+        self.limits, self.has_limits = schedule.limits, schedule.has_limits
         self.limited = self.has_limits and schedule.limits.limited
         self.has_heat = self.has_dashpot or tables.bond.rubs
 
@@ -68,16 +67,37 @@ class Advance(BondStep, ContactForce):
         elapsed = self.schedule.elapsed(i)
         linear, angular = self._gathered(i)
         velocity, momentum = self._kicked(i, elapsed, linear, angular)
-        self._moved(i, elapsed, velocity, momentum)
-
-    @ti.func
-    def _moved(self, i, elapsed, velocity, momentum):
-        """Move body i for elapsed [s] and choose its next step."""
         spin = self.spin(i, momentum)
         self._drift(i, elapsed, velocity, momentum, spin)
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
         self.state.spin[i] = spin
         self.schedule.choose_level(i, squared(velocity))
+
+    @ti.func
+    def wake_up(self, i):
+        """Bring body i to the present tick when it wants a shorter step because of an event.
+
+        It waits for its own time with a step chosen before a contact came near, a bond broke or a
+        neighbour refined its step. Bonds that have applied their impulse ahead apply no more until
+        then.
+        """
+        noticed = self.limits.events[i] != 0
+        if ti.static(self.schedule.sleeps):
+            noticed = noticed and self.schedule.sleeping.awake[i] != ASLEEP
+        if noticed:
+            wanted, bound = self.schedule.controlled_level(i)
+            if ti.static(self.schedule.uniform):
+                ti.atomic_max(self.schedule.wanted[None], wanted)
+                self.state.bound[i] = bound
+            elif wanted > self.state.level[i]:
+                ti.atomic_add(self.limits.woken[None], 1)
+                # The present is a time of level low and finer levels only.
+                self.state.level[i] = ti.max(self.state.level[i], self.schedule.low[None])
+                self.schedule.note_change(i)
+                if self.state.last_tick[i] < self.state.tick[None]:
+                    self.body(i)
+                else:
+                    self.schedule.choose_level(i, 0.0)
 
     @ti.func
     def _drift(self, i, elapsed, velocity, momentum, spin):
@@ -125,21 +145,25 @@ class Advance(BondStep, ContactForce):
     @ti.func
     def _kicked(self, i, elapsed, linear, angular):
         """Velocity and angular momentum after all impulses, as the supports allow; books work."""
-        linear, angular, kick = self._loaded(i, elapsed, linear, angular)
+        linear, angular, kick = self.loaded(i, elapsed, linear, angular, self.load_times.of_step)
         if ti.static(self.ground.present):
-            linear, angular, kick = self.ground.brake(i, elapsed, linear, angular, kick)
+            rows = self.ground.impulses(i, elapsed, linear, angular)
+            linear, angular, kick = self.ground.added(rows, linear, angular, kick)
         velocity = self.state.velocity[i] + linear * self.tables.mass_inverse[i]
         momentum = self.state.angular_momentum[i] + angular
         return self._supported(i, elapsed, kick, velocity, momentum)
 
     @ti.func
-    def _loaded(self, i, elapsed, linear, angular):
-        """Impulse and moment with those of the loads added, and a row for each of ``drives``."""
+    def loaded(self, i, step, linear, angular, times: ti.template()):
+        """Impulse and moment with those of the loads added, and a row for each of ``drives``.
+
+        times: a function of ``LoadTimes``, and the step [s] that it takes.
+        """
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.drives))), 6)
-        begin = self.schedule.seconds(self.state.tick[None]) - elapsed
+        now = self.schedule.seconds(self.state.tick[None])
         for e in ti.static(range(len(self.tables.loads))):
             if self.tables.loads[e].acts_on(i):
-                motion, length = self.load_times.of_step(i, e, begin, elapsed)
+                motion, length = times(i, e, now, step)
                 force, torque = self.tables.loads[e].wrench(i, motion)
                 linear += force * length
                 angular += torque * length
@@ -167,6 +191,19 @@ class Advance(BondStep, ContactForce):
     def spin(self, i, momentum):
         """World spin of body i at an angular momentum, in its present orientation."""
         return spin_of(self.state.rotation[i], self.tables.inertia_inverse[i], momentum)
+
+    @ti.func
+    def allowed(self, i, time, step, velocity, momentum):
+        """Velocity and angular momentum that the supports of body i allow; nothing is booked.
+
+        time: of the middle of a step [s].
+        """
+        for effect in ti.static(self.tables.supports):
+            if effect.acts_on(i):
+                velocity, momentum = effect.held(
+                    i, time, step, self.state.rotation[i], velocity, momentum
+                )
+        return velocity, momentum
 
     @ti.func
     def _supported(self, i, elapsed, kick, velocity, momentum):

@@ -6,10 +6,8 @@ result decides what is looked at, and nothing that the audit does remains.
 
 import taichi as ti
 
-from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.multirate.schedule import Schedule
+from taichi_dem.step.multirate.lists import Places
 
 #: One bond in so many is looked at; a power of two.
 RATE = 1024
@@ -27,7 +25,7 @@ def mixed(number):
 
 
 @ti.data_oriented
-class Audit:
+class Audit(Places):
     """List of the bonds that are looked at in a substep, and what was found.
 
     audited, misses: bonds asleep. One is missed where it is opened by more than the share at which
@@ -36,9 +34,9 @@ class Audit:
 
     scratch_fields = ("first",)
 
-    def __init__(self, tables: Tables, state: State, schedule: Schedule, advance: Advance):
-        self.tables, self.state, self.schedule, self.advance = tables, state, schedule, advance
-        self.sleeping = schedule.sleeping
+    def __init__(self, advance: Advance):
+        self.tables, self.state, self.advance = advance.tables, advance.state, advance
+        self.schedule, self.sleeping = advance.schedule, advance.schedule.sleeping
         self.first = ti.field(ti.i32, shape=())
         self.audited, self.misses = (ti.field(ti.i64, shape=()) for _ in range(2))
 
@@ -52,11 +50,6 @@ class Audit:
     def count(self, low):
         """Number of bonds to look at."""
         return (self.tables.bond_count[None] - self.first[None] + (RATE - 1)) // RATE
-
-    @ti.func
-    def pick(self, a):
-        """Place of one of them."""
-        return a
 
     @ti.func
     def visit(self, a):

@@ -8,7 +8,6 @@ import taichi as ti
 from taichi_dem.kit.products import squared
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.multirate.lists import Everyone, Once
-from taichi_dem.step.multirate.schedule import Schedule
 
 #: Pairs of a list and the function that is called with each member that is active.
 Phases = tuple[tuple[Any, Callable[..., Any]], ...]
@@ -18,31 +17,24 @@ Phases = tuple[tuple[Any, Callable[..., Any]], ...]
 class Begin:
     """Phases before and after the bonds of the first tick, which the step's kernel evaluates."""
 
-    def __init__(self, advance: Advance, schedule: Schedule):
-        self.advance, self.schedule, self.state = advance, schedule, advance.state
+    def __init__(self, advance: Advance):
+        self.advance, self.schedule, self.state = advance, advance.schedule, advance.state
         self.bodies = Everyone(advance.tables.body_count)
         self.bonds = Everyone(advance.tables.bond_count)
 
     def before(self) -> Phases:
         """Those before the bonds."""
         schedule = self.schedule
-        asleep: Phases = ()
-        limited: Phases = ()
+        phases: Phases = ((Once(), self.reset),)
         if schedule.has_limits:
-            limited = ((self.bodies, schedule.limits.refresh),)
+            phases += ((self.bodies, schedule.limits.refresh),)
         if schedule.sleeps:
-            asleep = (self.bodies, self.stir), (self.bodies, schedule.sleeping.begin_beside)
-        return (
-            (Once(), self.reset),
-            *limited,
-            *asleep,
-            (self.bodies, self.choose_level),
-            (Once(), self.fill_lists),
-        )
+            phases += (self.bodies, self.stir), (self.bodies, schedule.sleeping.begin_beside)
+        return (*phases, (self.bodies, self.choose_level), (Once(), schedule.start_all))
 
     def after(self) -> Phases:
         """Those after them: bonds that sleep have acted once, and leave the list."""
-        return ((Once(), self.fill_lists_again),) if self.schedule.sleeps else ()
+        return ((Once(), self.schedule.list_members),) if self.schedule.sleeps else ()
 
     @ti.func
     def reset(self, one):
@@ -60,16 +52,6 @@ class Begin:
         """Choose the first level of body i."""
         self.schedule.choose_level(i, squared(self.state.velocity[i]))
 
-    @ti.func
-    def fill_lists(self, one):
-        """Fill all lists; that of bonds with all of them."""
-        self.schedule.start_all()
-
-    @ti.func
-    def fill_lists_again(self, one):
-        """Fill the list of bonds with those that are awake."""
-        self.schedule.list_members()
-
 
 @ti.data_oriented
 class SolvedBegin(Begin):
@@ -77,10 +59,10 @@ class SolvedBegin(Begin):
 
     def before(self) -> Phases:
         """Those before the bonds."""
-        guessed: Phases = ()
+        phases: Phases = (*super().before(), (self.bodies, self.update_inertia))
         if self.advance.solver.has_bonds:
-            guessed = ((self.bonds, self.advance.solver.bonds.first),)
-        return (*super().before(), (self.bodies, self.update_inertia), *guessed)
+            phases += ((self.bonds, self.advance.solver.bonds.first),)
+        return phases
 
     def after(self) -> Phases:
         """Those after them."""

@@ -48,7 +48,10 @@ class BondStep:
                 torque += cross(arm, traction)
                 slipped += spent
                 failed |= broken
-            dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
+            i, j = slots[0] >> 2, slots[1] >> 2
+            if ti.static(self.schedule.controlled):
+                self.schedule.applied_until.bond[b] = self.schedule.applied_until.until(i, j)
+            dt = self.schedule.pair_step(i, j)
             area = self.tables.unit_area[b]
             if failed == 0:
                 self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
@@ -96,22 +99,11 @@ class BondStep:
     def _is_pending(self, b):
         """Whether a bond holds and has not applied its impulse for the coming step already."""
         pending = self.state.broken_tick[b] < 0
-        if ti.static(self.retimes):
-            slots = self.tables.bond_slots[b]
-            pending = pending and self.schedule.applied_until.is_pending(
-                b, slots[0] >> 2, slots[1] >> 2
-            )
+        if ti.static(self.schedule.controlled):
+            i, j = self.tables.bond_slots[b][0] >> 2, self.tables.bond_slots[b][1] >> 2
+            until = self.schedule.applied_until.until(i, j)
+            pending = pending and self.schedule.applied_until.bond[b] < until
         return pending
-
-    @ti.func
-    def _bond_step(self, b, i, j):
-        """Time [s] for which a bond applies its force now."""
-        dt = 0.0
-        if ti.static(self.retimes):
-            dt = self.schedule.applied_until.apply_bond(b, i, j)
-        else:
-            dt = self.schedule.pair_step(i, j)
-        return dt
 
     @ti.func
     def bond_share(self, b):
@@ -165,8 +157,7 @@ class BondStep:
         """Elastic energy stored in a bond now [J]; zero once it is released."""
         energy = 0.0
         if self.state.broken_tick[b] < 0:
-            motion = self.motion_of(b)
-            energy = self.tables.unit_area[b] * self._stored(b, motion)
+            energy = self.tables.unit_area[b] * self._stored(b, self.motion_of(b))
         return energy
 
     @ti.func

@@ -80,17 +80,14 @@ class ContactForce:
         branch = self.state.position[j] - self.state.position[i]
         # Most candidates do not touch: tested in the first body's frame, at half the cost.
         turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
-        force, moment_i, moment_j = vec3(0.0), vec3(0.0), vec3(0.0)
-        dragged, rubbed, slipped, deepest = 0.0, 0.0, 0.0, 0.0
-        all_rub, all_bound = 0.0, 0.0
-        scale, near_count, active, m = 1.0, 0, ti.i64(0), self.tables.pair(i, j)
+        found, scale, m = PairForces(), 1.0, self.tables.pair(i, j)
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
         for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
             a, b = self.contacts.store.sphere[k][0], self.contacts.store.sphere[k][1]
             near = self.contacts.law.nearest(a, b, turn, offset)
             if ti.static(self.has_limits):
-                near_count += ti.cast(is_within(near, margin), ti.i32)
+                found.near_count += ti.cast(is_within(near, margin), ti.i32)
             if is_within(near, 0.0):
                 met = meeting(near.first, near.reach, near.apart, self.state.rotation[i])
                 overlap, normal, arm = met.overlap, met.normal, met.arm
@@ -101,31 +98,19 @@ class ContactForce:
                 drag = self._limited(self.contacts.law.damping(m), scale)
                 rub, stuck, spent = self._rub(m, k, i, normal, push, drag, slide, elapsed, stepping)
                 pushed = push * normal + rub
-                active |= active_bits(push, rub)
-                force += pushed
-                moment_i -= cross(arm, pushed)
-                moment_j += cross(arm - branch, pushed)
-                dragged += (self.contacts.law.elastic(m, overlap) - push) * rate
-                rubbed -= dot(rub - stuck, slide)
-                slipped += spent
-                all_rub += norm(rub)
-                all_bound += self.tables.friction.limit(m, push)
-                deepest = ti.max(deepest, overlap / near.size)
+                found.active |= active_bits(push, rub)
+                found.force += pushed
+                found.moment_i -= cross(arm, pushed)
+                found.moment_j += cross(arm - branch, pushed)
+                found.dragged += (self.contacts.law.elastic(m, overlap) - push) * rate
+                found.rubbed -= dot(rub - stuck, slide)
+                found.slipped += spent
+                found.rub += norm(rub)
+                found.bound += self.tables.friction.limit(m, push)
+                found.deepest = ti.max(found.deepest, overlap / near.size)
             elif ti.static(stepping):
-                slipped += self.springs.part(m, k)
-        return PairForces(
-            force=force,
-            moment_i=moment_i,
-            moment_j=moment_j,
-            dragged=dragged,
-            rubbed=rubbed,
-            slipped=slipped,
-            rub=all_rub,
-            bound=all_bound,
-            deepest=deepest,
-            near_count=near_count,
-            active=active,
-        )
+                found.slipped += self.springs.part(m, k)
+        return found
 
     @ti.func
     def _rub(self, m, k, i, normal, push, drag, slide, elapsed, stepping: ti.template()):
@@ -152,11 +137,13 @@ class ContactForce:
     @ti.func
     def _pair_step(self, p, i, j):
         """Time [s] for which a touching pair applies its force now; 0 if done already."""
-        dt = 0.0
-        if ti.static(self.retimes):
-            dt = self.schedule.applied_until.apply_pair(p, i, j)
-        else:
-            dt = self.schedule.pair_step(i, j)
+        dt = self.schedule.pair_step(i, j)
+        if ti.static(self.schedule.controlled):
+            until = self.schedule.applied_until.until(i, j)
+            if self.schedule.applied_until.pair[p] < until:
+                self.schedule.applied_until.pair[p] = until
+            else:
+                dt = 0.0
         return dt
 
     @ti.func

@@ -5,8 +5,7 @@ every item writes its own slots, and every sum has a fixed order.
 """
 
 import time
-from collections.abc import Callable
-from typing import Optional, Protocol
+from typing import Optional
 
 import taichi as ti
 
@@ -16,10 +15,10 @@ from taichi_dem.step.advance import Advance
 from taichi_dem.step.audit import Audit
 from taichi_dem.step.begin import Begin, Phases, SolvedBegin
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
-from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
-from taichi_dem.step.multirate.lists import Once
+from taichi_dem.step.implicit.pairs import COLOURS
+from taichi_dem.step.multirate.lists import Colour, Once
 from taichi_dem.step.multirate.schedule import Schedule
-from taichi_dem.step.multirate.wake_up import Chunks, WakeUp
+from taichi_dem.step.multirate.wake_up import Chunks
 
 #: The parallel driver is called for about this long [s] between two checks of divergence, progress
 #: and Ctrl-C.
@@ -48,12 +47,10 @@ class Step:
         self.advance, self.schedule, self.search = advance, schedule, search
         self.has_contact = search is not None
         self.state = advance.state
-        self.audit = None
-        if self.schedule.sleeps:
-            self.audit = Audit(self.advance.tables, self.state, self.schedule, self.advance)
+        self.audit = Audit(advance) if schedule.sleeps else None
         self.parts = self._parts()
         self.phases = self._phases()
-        begin = self.begin(advance, schedule)
+        begin = self.begin(advance)
         self.start_phases = begin.before(), begin.after()
 
     def _phases(self):
@@ -62,19 +59,27 @@ class Step:
 
     def _parts(self):
         """The same in parts of which one may be called for again."""
-        advance, schedule = self.advance, self.schedule
-        touching = ((schedule.pairs, advance.contact),) if self.has_contact else ()
+        schedule = self.schedule
+        touching = ((schedule.pairs, self.advance.contact),) if self.has_contact else ()
         return (
             (
                 *self._retimed(),
                 *touching,
                 (Once(), schedule.advance_clock),
                 *self._rested(),
-                (schedule.bodies, advance.body),
-                (Once(), schedule.reorder),
-                (schedule.bonds, advance.bond),
-                *self._audited(),
+                *self._moved(),
             ),
+        )
+
+    def _moved(self):
+        """Phases of the bodies, of the bonds at the next time, and of the audit."""
+        schedule, audit = self.schedule, self.audit
+        audited = ((Once(), audit.choose), (audit, audit.visit)) if audit is not None else ()
+        return (
+            (schedule.bodies, self.advance.body),
+            (Once(), schedule.reorder),
+            (schedule.bonds, self.advance.bond),
+            *audited,
         )
 
     def _rested(self):
@@ -82,12 +87,7 @@ class Step:
         if not self.schedule.sleeps:
             return ()
         chunks = Chunks(self.schedule)
-        return (chunks, chunks.add), (Once(), chunks.end)
-
-    def _audited(self):
-        """Phases that look at a few of the evaluations that were skipped."""
-        audit = self.audit
-        return ((Once(), audit.choose), (audit, audit.visit)) if audit is not None else ()
+        return (chunks, self.schedule.sleeping.chunk), (Once(), chunks.end)
 
     def repeats(self, part: int) -> bool:
         """Whether a part of the phases is called for once more: never here."""
@@ -99,8 +99,8 @@ class Step:
         if limits is None:
             return ()
         phases: Phases = ((limits, limits.refresh),)
-        if self.schedule.retimes:
-            phases += ((limits, WakeUp(self.advance, self.schedule).wake_up),)
+        if self.schedule.controlled:
+            phases += ((limits, self.advance.wake_up),)
         return (*phases, (Once(), self.schedule.apply_changes))
 
     def is_of_start(self, item: object) -> bool:
@@ -124,38 +124,6 @@ class Step:
 
 
 @ti.data_oriented
-class Colour:
-    """The members of one colour: those from colour_first[colour] on, in their order."""
-
-    def __init__(self, colour_first: ti.Field, colour: int):
-        self.colour_first, self.colour = colour_first, colour
-
-    @ti.func
-    def count(self, low):
-        """Number of members."""
-        return self.colour_first[self.colour + 1] - self.colour_first[self.colour]
-
-    @ti.func
-    def pick(self, a):
-        """Place of one of them."""
-        return self.colour_first[self.colour] + a
-
-
-@ti.data_oriented
-class PairColour(Colour):
-    """The contact pairs of one colour."""
-
-    def __init__(self, pairs: PairDashpots, colour: int):
-        super().__init__(pairs.colour_first, colour)
-        self.order = pairs.order
-
-    @ti.func
-    def pick(self, a):
-        """One of them."""
-        return self.order[self.colour_first[self.colour] + a]
-
-
-@ti.data_oriented
 class SolvedStep(Step):
     """The phases of a substep in which all dashpots are solved together."""
 
@@ -167,49 +135,42 @@ class SolvedStep(Step):
 
     def _parts(self):
         advance, schedule, solver = self.advance, self.schedule, self.advance.solver
-        touching: Phases = ()
-        booked: Phases = ()
+        before: Phases = ()
+        after: Phases = ()
         if self.has_contact:
-            touching = ((schedule.pairs, solver.pairs.begin), (Once(), solver.pairs.sort))
-            booked = ((schedule.pairs, solver.pairs.book),)
-        before = (
-            *touching,
-            (Once(), schedule.advance_clock),
-            *self._rested(),
-            (Once(), solver.begin),
-            (schedule.bodies, advance.predict),
-        )
-        after = (
-            *booked,
-            (schedule.bodies, advance.body),
-            (Once(), schedule.reorder),
-            (schedule.bonds, advance.bond),
-            *self._audited(),
-        )
-        return (before, self._sweep(solver), after)
+            before = (schedule.pairs, solver.pairs.begin), (Once(), solver.pairs.sort)
+            after = ((schedule.pairs, solver.pairs.book),)
+        before += (Once(), schedule.advance_clock), *self._rested(), (Once(), solver.begin)
+        before += ((schedule.bodies, advance.predict),)
+        return (before, self._sweep(solver), (*after, *self._moved()))
 
     def _sweep(self, solver):
         """One sweep, colour by colour."""
-        bonds: Phases = ()
-        pairs: Phases = ()
+        phases: Phases = ()
         if solver.has_bonds:
             first = solver.bonds.colour_first
-            bonds = tuple((Colour(first, c), solver.bonds_of) for c in range(BOND_COLOURS))
+            phases += tuple((Colour(first, c), solver.bonds_of) for c in range(BOND_COLOURS))
         if self.has_contact:
-            pairs = tuple((PairColour(solver.pairs, c), solver.pair) for c in range(COLOURS))
-            pairs += ((Once(), solver.last_pairs),)
-        ground = ((self.schedule.bodies, solver.joined),) if solver.has_ground else ()
-        return (*bonds, *pairs, *ground, (Once(), solver.check_convergence))
+            first = solver.pairs.colour_first
+            phases += tuple((Colour(first, c), solver.pair) for c in range(COLOURS))
+            phases += ((Once(), solver.last_pairs),)
+        if solver.has_ground:
+            phases += ((self.schedule.bodies, solver.joined),)
+        return (*phases, (Once(), solver.check_convergence))
 
     def repeats(self, part: int) -> bool:
         """Whether a part, the sweep, is called for once more."""
         return part == 1 and values(self.advance.solver.unsolved) == 1
 
 
-class Driver(Protocol):
+class Driver:
     """One way to run the phases of a ``Step``; all ways give the same bits."""
 
     name: str
+
+    def __init__(self, step: Step):
+        self.step = step
+        self.load()
 
     def load(self) -> None:
         """Begin with another scene."""
@@ -228,14 +189,10 @@ class Driver(Protocol):
 
 
 @ti.data_oriented
-class Resident:
+class Resident(Driver):
     """Many substeps in one serial kernel: the choice for small systems on a CPU."""
 
     name = "resident"
-
-    def __init__(self, step: Step):
-        self.step = step
-        self.load()
 
     def load(self) -> None:
         """Begin with short calls, as the cost of a step is not known yet."""
@@ -291,16 +248,10 @@ class Resident:
 
 
 @ti.data_oriented
-class Parallel:
+class Parallel(Driver):
     """One substep a kernel, every phase a parallel loop: for large systems and for GPUs."""
 
     name = "parallel"
-
-    def __init__(self, step: Step):
-        self.step = step
-
-    def load(self) -> None:
-        """Nothing depends on the scene."""
 
     def begin(self) -> None:
         """Run the phases of the start; compiles their kernels."""
@@ -356,6 +307,4 @@ class Parallel:
 
 
 #: Drivers by name.
-DRIVERS: dict[str, Callable[[Step], Driver]] = {
-    driver.name: driver for driver in (Resident, Parallel)
-}
+DRIVERS: dict[str, type[Driver]] = {driver.name: driver for driver in (Resident, Parallel)}

@@ -14,7 +14,7 @@ from taichi_dem.state.tables import Tables
 class GroundDashpots:
     """Impulses of the effects of the role ground.
 
-    present: whether the scene lists one. above: rows of ``Advance._loaded`` above theirs.
+    present: whether the scene lists one. above: rows of ``Advance.loaded`` above theirs.
     """
 
     def __init__(self, tables: Tables, state: State):
@@ -22,18 +22,15 @@ class GroundDashpots:
         self.present, self.above = bool(tables.ground), len(tables.loads)
 
     @ti.func
-    def brake(self, i, elapsed, linear, angular, kick):
-        """Impulse, moment and rows of ``Advance._loaded`` with those of the ground added."""
-        rows = self.impulses(i, elapsed, linear, angular)
-        pushed, turned = self.total(rows)
-        return linear + pushed, angular + turned, self.noted(kick, rows)
-
-    @ti.func
-    def noted(self, kick, rows):
-        """Rows of loads, and below them those of the ground."""
+    def added(self, rows, linear, angular, kick):
+        """Impulse, moment and rows of ``Advance.loaded`` with those of the ground added."""
+        pushed, turned = vec3(0.0), vec3(0.0)
+        for e, k in ti.static(ti.ndrange(len(self.tables.ground), 3)):
+            pushed[k] += rows[e, k]
+            turned[k] += rows[e, 3 + k]
         for e, k in ti.static(ti.ndrange(len(self.tables.ground), 6)):
             kick[self.above + e, k] = rows[e, k]
-        return kick
+        return linear + pushed, angular + turned, kick
 
     @ti.func
     def impulses(self, i, elapsed, linear, angular):
@@ -56,11 +53,11 @@ class GroundDashpots:
                 self.state.angular_momentum[i] + 0.5 * angular,
                 elapsed,
             )
-            rows = self._shares(i, elapsed, velocity, spin)
+            rows = self.shares(i, elapsed, velocity, spin)
         return rows
 
     @ti.func
-    def _shares(self, i, elapsed, velocity, spin):
+    def shares(self, i, elapsed, velocity, spin):
         """Impulse and moment of each ground at a mean velocity and spin, a row each."""
         rows = ti.Matrix.zero(real, ti.static(len(self.tables.ground)), 6)
         for e in ti.static(range(len(self.tables.ground))):
@@ -69,17 +66,3 @@ class GroundDashpots:
                 for k in ti.static(range(3)):
                     rows[e, k], rows[e, 3 + k] = -elapsed * force[k], -elapsed * moment[k]
         return rows
-
-    @ti.func
-    def impulses_before(self, i, elapsed):
-        """The same in a step around the present, whose mean motion is the present one."""
-        return self._shares(i, elapsed, self.state.velocity[i], self.state.spin[i])
-
-    @ti.func
-    def total(self, rows):
-        """Impulse and moment of all grounds together."""
-        linear, angular = vec3(0.0), vec3(0.0)
-        for e, k in ti.static(ti.ndrange(len(self.tables.ground), 3)):
-            linear[k] += rows[e, k]
-            angular[k] += rows[e, 3 + k]
-        return linear, angular

@@ -25,8 +25,9 @@ class LoadTimes:
             self.state.lag[i][e] = half
 
     @ti.func
-    def of_step(self, i, e: ti.template(), begin, elapsed):
-        """Motion of body i for load e in a step that begins at a time, and how long it acts [s]."""
+    def of_step(self, i, e: ti.template(), now, elapsed):
+        """Motion of body i for load e in the step up to a time, and how long it acts [s]."""
+        begin = now - elapsed
         since = begin - self.state.lag[i][e]
         until, length = since + elapsed, elapsed
         if ti.static(self.tables.loads[e].varies):

@@ -16,6 +16,7 @@ from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.mesh.parts import parts_of
 from taichi_dem.physics.bond import unit_arm, unit_opening, unit_velocity
 from taichi_dem.state.model import Model
+from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS, NEVER
 
@@ -49,21 +50,17 @@ class Sleeping:
     bound of the impulse [N s] and the energy [J] that each bond left out before it woke.
     """
 
-    def __init__(self, tables: Tables):
+    def __init__(self, tables: Tables, state: State):
         n = tables.capacity.bodies
-        self.tables, self.acting = tables, (*tables.loads, *tables.supports)
-        self.awake = ti.field(ti.i32, shape=n)
-        self.since = ti.field(ti.i64, shape=n)
-        self.stride = ti.field(real, shape=n)
-        self.woken = ti.field(ti.i32, shape=n)
-        self.woken_count = ti.field(ti.i32, shape=())
-        self.unsorted = ti.field(ti.i32, shape=())
-        self.share = ti.field(real, shape=())
+        self.tables, self.state, self.acting = tables, state, (*tables.loads, *tables.supports)
+        self.awake, self.woken = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.part, self.members = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.mass, self.mean, self.bound2 = (ti.field(real, shape=n) for _ in range(3))
+        self.stride, self.sums = (ti.field(real, shape=n) for _ in range(2))
+        self.since, self.share = ti.field(ti.i64, shape=n), ti.field(real, shape=())
+        self.woken_count, self.unsorted = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.chunk_count = ti.field(ti.i32, shape=())
         self.chunk_first = ti.field(ti.i32, shape=n + 1)
-        self.sums = ti.field(real, shape=n)
         self.left_out = ti.Vector.field(2, real, shape=tables.capacity.bonds)
 
     def load(self, model: Model, share: float) -> None:
@@ -129,17 +126,17 @@ class Sleeping:
 
         Bodies may also be at rest with strained bonds, and these act at once.
         """
-        state, stirred = advance.state, self.share[None] <= 0.0
+        stirred = self.share[None] <= 0.0
         for f in range(4):
             b = self.tables.face_bond[4 * i + f]
             if b >= 0:
-                energy, _ = self.at_rest(b, 1.0, self.rounding(i, state), advance)
+                energy, _ = self.at_rest(b, 1.0, self.rounding(i), advance)
                 if energy > 0.0:
                     stirred = True
         for effect in ti.static(self.acting):
             if effect.acts_on(i) != 0:
                 stirred = True
-        moving = squared(state.velocity[i]) + squared(state.spin[i])
+        moving = squared(self.state.velocity[i]) + squared(self.state.spin[i])
         if stirred or moving > 0.0:
             self.awake[i] = STIRRED
             self.since[i] = 0
@@ -161,9 +158,9 @@ class Sleeping:
         return self.awake[i] != ASLEEP and self.awake[j] != ASLEEP
 
     @ti.func
-    def rounding(self, i, state):
+    def rounding(self, i):
         """Opening [m] that a bond of body i may show at rest: a few roundings of coordinates."""
-        place = ti.abs(state.position[i]).max() + self.tables.radius[i]
+        place = ti.abs(self.state.position[i]).max() + self.tables.radius[i]
         return ti.static(_ROUNDINGS * np.finfo(float).eps) * place
 
     @ti.func
@@ -180,8 +177,8 @@ class Sleeping:
                 for f in range(4):
                     b = self.tables.face_bond[4 * i + f]
                     if b >= 0:
-                        if advance.state.broken_tick[b] < 0:
-                            self.awaken(self.tables.neighbour[4 * i + f], advance.state)
+                        if self.state.broken_tick[b] < 0:
+                            self.awaken(self.tables.neighbour[4 * i + f])
 
     @ti.func
     def _opens(self, i, is_fast, advance):
@@ -189,14 +186,14 @@ class Sleeping:
 
         is_fast: whether any opening beyond rounding is.
         """
-        state, found = advance.state, False
+        found = False
         for f in range(4):
             b = self.tables.face_bond[4 * i + f]
             if b >= 0:
                 j = self.tables.neighbour[4 * i + f]
                 # Whether another thread has woken it in this substep must not matter.
-                slept = self.since[j] < 0 or self.since[j] == state.tick[None]
-                if slept and state.broken_tick[b] < 0:
+                slept = self.since[j] < 0 or self.since[j] == self.state.tick[None]
+                if slept and self.state.broken_tick[b] < 0:
                     energy, is_more = self._held(b, i, j, self.bound2[self.part[i]], advance)
                     if is_more or (is_fast and energy > 0.0):
                         found = True
@@ -216,34 +213,35 @@ class Sleeping:
         It is where a law would begin at the opening over the share, or the lighter body would get
         more than a speed from it; speed2: its square [(m/s)^2].
         """
-        rounding = self.rounding(i, advance.state)
+        rounding = self.rounding(i)
         energy, begins = self.at_rest(b, 1.0 / self.share[None], rounding, advance)
         lighter = ti.min(self.tables.mass[i], self.tables.mass[j])
         return energy, begins != 0 or 2.0 * energy > lighter * speed2
 
     @ti.func
-    def awaken(self, j, state):
+    def awaken(self, j):
         """Wake body j now, if it sleeps; it is listed at the end of this substep."""
         if ti.atomic_max(self.awake[j], AWAKE) == ASLEEP:
-            self.since[j] = state.tick[None]
-            state.last_tick[j] = state.tick[None]
+            self.since[j] = self.state.tick[None]
+            self.state.last_tick[j] = self.state.tick[None]
             self.woken[ti.atomic_add(self.woken_count[None], 1)] = j
 
     @ti.func
-    def is_due(self, tick):
-        """Whether the mean speeds are found anew at a tick."""
+    def is_due(self):
+        """Whether the mean speeds are found anew at the present tick."""
+        tick = self.state.tick[None]
         step = tick // MACRO_TICKS
         due = tick % MACRO_TICKS == 0 and (step < _EARLY or step % _EVERY == 0)
         return due and self.share[None] > 0.0
 
     @ti.func
-    def chunk(self, c, state):
+    def chunk(self, c):
         """Sum the momenta of a chunk of bodies [N s]."""
         total = 0.0
         for a in range(self.chunk_first[c], self.chunk_first[c + 1]):
             i = self.members[a]
             if self.awake[i] != ASLEEP:
-                total += self.tables.mass[i] * norm(state.velocity[i])
+                total += self.tables.mass[i] * norm(self.state.velocity[i])
         self.sums[c] = total
 
     @ti.func

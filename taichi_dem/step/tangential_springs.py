@@ -6,8 +6,6 @@ import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.products import matvec, transposed_matvec
-from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
 from taichi_dem.step.multirate.schedule import Schedule
 
 
@@ -18,19 +16,16 @@ class TangentialSprings:
     evaluated: of a pair, one more than the tick at which it was last evaluated, 0 for never.
     """
 
-    def __init__(
-        self, tables: Tables, state: State, schedule: Schedule, contacts: Optional[Contacts]
-    ):
-        self.friction, self.state, self.schedule = tables.friction, state, schedule
+    def __init__(self, schedule: Schedule, contacts: Optional[Contacts]):
+        self.friction, self.schedule = schedule.tables.friction, schedule
         self.present = contacts is not None and contacts.remembers
-        self.store = contacts.store if self.present else None
-        if self.present:
-            self.evaluated = self.store.column("evaluated", ti.i64)
+        if contacts is not None and self.present:
+            self.evaluated = contacts.store.column("evaluated", ti.i64)
 
     @ti.func
     def elapsed(self, p):
         """Seconds since pair p was last evaluated, 0 for never; it is evaluated now."""
-        elapsed, present = 0.0, self.state.tick[None] + 1
+        elapsed, present = 0.0, self.schedule.state.tick[None] + 1
         if self.evaluated[p] > 0:
             elapsed = self.schedule.seconds(present - self.evaluated[p])
         self.evaluated[p] = present

@@ -23,10 +23,11 @@ class SolvedAdvance(Advance):
         """Predict the velocities at the end of the step before it is solved."""
         elapsed = self.schedule.elapsed(i)
         linear, angular = self._gathered(i)
-        linear, angular, _ = self._loaded(i, elapsed, linear, angular)
+        linear, angular, kick = self.loaded(i, elapsed, linear, angular, self.load_times.of_step)
         if ti.static(self.ground.present):
-            pushed, twisted = self.ground.total(self.solver.ground.impulse[i])
-            linear, angular = linear + pushed, angular + twisted
+            linear, angular, kick = self.ground.added(
+                self.solver.ground.impulse[i], linear, angular, kick
+            )
         self.solver.velocities.predict(i, self, linear, angular)
         raise_to(self.solver.speed2, squared(self.state.velocity[i]))
 
@@ -35,12 +36,15 @@ class SolvedAdvance(Advance):
         """Bring a body to the present tick with the velocities found by the sweeps."""
         elapsed = self.schedule.elapsed(i)
         velocity, momentum = self.solver.velocities.found(i)
-        _, _, kick = self._loaded(i, elapsed, vec3(0.0), vec3(0.0))
+        linear, angular, kick = self.loaded(
+            i, elapsed, vec3(0.0), vec3(0.0), self.load_times.of_step
+        )
         if ti.static(self.ground.present):
-            kick = self.ground.noted(kick, self.solver.ground.impulse[i])
+            linear, angular, kick = self.ground.added(
+                self.solver.ground.impulse[i], linear, angular, kick
+            )
         velocity, momentum = self._supported(i, elapsed, kick, velocity, momentum)
-        spin = self.spin(i, momentum)
-        self._drift(i, elapsed, velocity, momentum, spin)
+        self._drift(i, elapsed, velocity, momentum, self.spin(i, momentum))
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
         # The next step begins with the spin in the new orientation.
         self.state.spin[i] = self.spin(i, momentum)
@@ -53,15 +57,7 @@ class SolvedAdvance(Advance):
         return self.solver.pairs.last_forces(p)
 
     @ti.func
-    def allowed(self, i, velocity, momentum):
-        """Velocity and angular momentum that the supports of body i allow; nothing is booked."""
-        for effect in ti.static(self.tables.supports):
-            if effect.acts_on(i):
-                now, step = (
-                    self.schedule.seconds(self.state.tick[None]),
-                    self.schedule.step_seconds[0],
-                )
-                velocity, momentum = effect.held(
-                    i, now - 0.5 * step, step, self.state.rotation[i], velocity, momentum
-                )
-        return velocity, momentum
+    def allowed_in_step(self, i, velocity, momentum):
+        """Velocity and angular momentum that the supports of body i allow in the present step."""
+        now, step = self.schedule.seconds(self.state.tick[None]), self.schedule.step_seconds[0]
+        return self.allowed(i, now - 0.5 * step, step, velocity, momentum)

@@ -11,8 +11,6 @@ from taichi_dem.kit.types import real, vec3, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
 from taichi_dem.state.model import Model
-from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.multirate.schedule import Schedule
@@ -43,10 +41,10 @@ class BondDashpots:
 
     constant_fields = ("theta", "refresh_every", "index", "colour_first")
 
-    def __init__(self, tables: Tables, state: State, schedule: Schedule, velocities: Velocities):
-        self.tables, self.state = tables, state
+    def __init__(self, schedule: Schedule, velocities: Velocities):
+        self.tables, self.state = schedule.tables, schedule.state
         self.schedule, self.velocities = schedule, velocities
-        bonds = tables.capacity.bonds
+        bonds = self.tables.capacity.bonds
         self.theta = ti.field(real, shape=2)
         self.refresh_every = ti.field(ti.i64, shape=())
         self.index = ti.field(ti.i32, shape=bonds)
@@ -166,9 +164,8 @@ class BondDashpots:
         velocity_j, spin_j = self.velocities.pushed_lanes(j, velocity_j, spin_j, -force, -moment)
         linear = velocity_j - velocity_i - cross(spin_i, branch)
         angular = spin_j - spin_i
-        for k in ti.static(range(3)):
-            for n in ti.static(range(LANES)):
-                last[k, n], last[3 + k, n] = linear[k, n], angular[k, n]
+        for k, n in ti.static(ti.ndrange(3, LANES)):
+            last[k, n], last[3 + k, n] = linear[k, n], angular[k, n]
         # Before what goes to bodies: the compiler makes vectors from the first row that it finds.
         self.last[g] = last
         self.velocities.assign_lanes(i, velocity_i, spin_i, force, around)
@@ -184,9 +181,8 @@ class BondDashpots:
         stiffness = self.tables.bond_stiffness[b]
         along += 1e-9 * dt * vec3(stiffness[0], stiffness[1], stiffness[1])
         scaled = axes
-        for r in ti.static(range(3)):
-            for c in ti.static(range(3)):
-                scaled[r, c] = axes[r, c] * along[r]
+        for r, c in ti.static(ti.ndrange(3, 3)):
+            scaled[r, c] = axes[r, c] * along[r]
         law = (self.theta[0] * dt * self.tables.unit_area[b]) * transposed_matmul(axes, scaled)
         block = zero_block()
         for q in range(3):
@@ -200,8 +196,7 @@ class BondDashpots:
             branch,
         )
         solved = inverse(plus(inverse(block), free))
-        for r in ti.static(range(3)):
-            for c in ti.static(range(3)):
-                self.a[r][g][c, n] = solved.a[r, c]
-                self.b[r][g][c, n] = solved.b[r, c]
-                self.c[r][g][c, n] = solved.c[r, c]
+        for r, c in ti.static(ti.ndrange(3, 3)):
+            self.a[r][g][c, n] = solved.a[r, c]
+            self.b[r][g][c, n] = solved.b[r, c]
+            self.c[r][g][c, n] = solved.c[r, c]

@@ -6,8 +6,6 @@ from taichi_dem.kit.products import matvec, squared
 from taichi_dem.kit.types import real
 from taichi_dem.physics.ground import braked_twist, twist_of
 from taichi_dem.physics.rotation import world_tensor
-from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.multirate.schedule import Schedule
 
@@ -20,10 +18,10 @@ class GroundSweeps:
     of the velocities at both ends of the step, as of every ``GroundDashpots``.
     """
 
-    def __init__(self, tables: Tables, state: State, schedule: Schedule, velocities: Velocities):
-        self.tables, self.state = tables, state
+    def __init__(self, schedule: Schedule, velocities: Velocities):
+        self.tables, self.state = schedule.tables, schedule.state
         self.schedule, self.velocities = schedule, velocities
-        rows, n = len(tables.ground), tables.capacity.bodies
+        rows, n = len(self.tables.ground), self.tables.capacity.bodies
         self.impulse = ti.Matrix.field(rows, 6, real, shape=n)
 
     @ti.func

@@ -8,8 +8,6 @@ from taichi_dem.kit.products import cross, dot, matvec, norm, squared
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import place_in, unit3
 from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to, is_within, meeting
-from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
 from taichi_dem.step.contact_force import PairForces
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.multirate.schedule import Schedule
@@ -43,37 +41,25 @@ class PairDashpots:
         *("active", "order", "colour", "taken", "colour_first"),
     )
 
-    def __init__(
-        self,
-        tables: Tables,
-        state: State,
-        schedule: Schedule,
-        contacts: Contacts,
-        velocities: Velocities,
-    ):
-        self.tables, self.state, self.schedule = tables, state, schedule
+    def __init__(self, schedule: Schedule, contacts: Contacts, velocities: Velocities):
+        self.tables, self.state, self.schedule = schedule.tables, schedule.state, schedule
         self.contacts, self.velocities = contacts, velocities
-        self.has_friction = bool(tables.friction.name)
+        self.has_friction = bool(self.tables.friction.name)
         self.store = contacts.store
-        self.springs = TangentialSprings(tables, state, schedule, contacts)
+        self.springs = TangentialSprings(schedule, contacts)
         if self.springs.present:
             self.elapsed = ti.field(real, shape=self.store.slots)
             self.pull = ti.Vector.field(3, real, shape=self.store.spheres)
         pairs, spheres = self.store.slots, self.store.spheres
-        self.touching = ti.field(ti.i32, shape=pairs)
-        self.entry = ti.field(ti.i32, shape=spheres)
-        self.normal = ti.Vector.field(3, real, shape=spheres)
-        self.arm = ti.Vector.field(3, real, shape=spheres)
-        self.push = ti.field(real, shape=spheres)
+        self.entry, self.push = ti.field(ti.i32, shape=spheres), ti.field(real, shape=spheres)
+        self.normal, self.arm = (ti.Vector.field(3, real, shape=spheres) for _ in range(2))
         self.share = ti.Vector.field(2, real, shape=spheres)
         self.impulse = self.store.sphere_column("solved_impulse", real, 3)
         self.branch = ti.Vector.field(3, real, shape=pairs)
-        n = tables.capacity.bodies
         self.count = ti.field(ti.i32, shape=())
-        self.active = ti.field(ti.i32, shape=pairs)
-        self.order = ti.field(ti.i32, shape=pairs)
-        self.colour = ti.field(ti.i32, shape=pairs)
-        self.taken = ti.field(ti.i32, shape=n)
+        self.touching, self.active = (ti.field(ti.i32, shape=pairs) for _ in range(2))
+        self.order, self.colour = (ti.field(ti.i32, shape=pairs) for _ in range(2))
+        self.taken = ti.field(ti.i32, shape=self.tables.capacity.bodies)
         self.colour_first = ti.field(ti.i32, shape=COLOURS + 3)
 
     @ti.func
@@ -92,7 +78,8 @@ class PairDashpots:
                 for side in ti.static(range(2)):
                     self.taken[self.store.body[p][side]] = 0
         for a in range(count):
-            i, j = self._bodies(a)
+            pair = self.store.body[self.active[a]]
+            i, j = pair[0], pair[1]
             taken, colour = self.taken[i] | self.taken[j], 0
             while (taken >> colour) & 1 == 1 and colour < COLOURS:
                 colour += 1
@@ -102,11 +89,6 @@ class PairDashpots:
             self.colour[a] = colour
         self.count[None] = count
         group(self.colour_first, self.order, COLOURS + 1, count, self._colour_of)
-
-    @ti.func
-    def _bodies(self, a):
-        pair = self.store.body[self.active[a]]
-        return pair[0], pair[1]
 
     @ti.func
     def _colour_of(self, a):
@@ -155,17 +137,23 @@ class PairDashpots:
                 parted += self.springs.part(m, k)
         self.store.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
         if end > start:
-            self._deposit(p, branch, force, moment)
+            around = moment + cross(branch, force)
+            self.contacts.add_impulse(p, 0, -force, -around)
+            self.contacts.add_impulse(p, 1, force, moment)
         if ti.static(self.springs.present):
             self.contacts.book_friction(p, parted)
 
     @ti.func
     def _way(self, i, j, branch, arm, normal, elapsed):
         """Tangential displacement of a contact's second sphere against the first in a time [m]."""
-        spin = self.state.spin[i]
-        velocity = self.state.velocity[j] + cross(self.state.spin[j], arm)
-        velocity -= self.state.velocity[i] + cross(spin, arm + branch)
+        velocity = self._velocity(i, j, arm + branch, arm)
         return elapsed * (velocity - dot(velocity, normal) * normal)
+
+    @ti.func
+    def _velocity(self, i, j, first, second):
+        """Velocity of body j at an arm against that of body i at another, at the present time."""
+        velocity = self.state.velocity[j] + cross(self.state.spin[j], second)
+        return velocity - (self.state.velocity[i] + cross(self.state.spin[i], first))
 
     @ti.func
     def _share(self, i, j, branch, arm, normal):
@@ -184,13 +172,6 @@ class PairDashpots:
             across += dot(first, matvec(turn_i, first))
             across += dot(second, matvec(turn_j, second))
         return ti.Vector([along, across - along])
-
-    @ti.func
-    def _deposit(self, p, branch, force, moment):
-        """Add the first guess to both bodies: impulse on the second, moment about its centre."""
-        around = moment + cross(branch, force)
-        self.contacts.add_impulse(p, 0, -force, -around)
-        self.contacts.add_impulse(p, 1, force, moment)
 
     @ti.func
     def visit(self, p):
@@ -280,44 +261,29 @@ class PairDashpots:
         i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
         turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
-        m = self.tables.pair(i, j)
-        force, moment_i, moment_j, dragged, rubbed = vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0
-        all_rub, all_bound = 0.0, 0.0
+        found, m = PairForces(), self.tables.pair(i, j)
         for k in range(self.store.first[p], self.store.last[p]):
             pushed = self.impulse[k] / dt
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
             near = self.contacts.law.nearest(a, b, turn, offset)
             met = meeting(near.first, near.reach, near.apart, self.state.rotation[i])
             arm = met.arm - branch
-            force += pushed
-            moment_i -= cross(met.arm, pushed)
-            moment_j += cross(arm, pushed)
-            velocity = self.state.velocity[j] + cross(self.state.spin[j], arm)
-            velocity -= self.state.velocity[i] + cross(self.state.spin[i], met.arm)
+            found.force += pushed
+            found.moment_i -= cross(met.arm, pushed)
+            found.moment_j += cross(arm, pushed)
+            velocity = self._velocity(i, j, met.arm, arm)
             rate, pressed = dot(velocity, met.normal), dot(pushed, met.normal)
             spring = 0.0
             if near.can_meet == 1:
                 spring = self.contacts.law.elastic(m, ti.max(met.overlap, 0.0))
-            dragged += (spring - pressed) * rate
+            found.dragged += (spring - pressed) * rate
             rub = pushed - pressed * met.normal
             if ti.static(self.springs.present):
                 rub -= self.springs.force(m, k, self.state.rotation[i])
-            rubbed -= dot(rub, velocity)
-            all_rub += norm(rub)
-            all_bound += self.tables.friction.limit(m, pressed)
-        return PairForces(
-            force=force,
-            moment_i=moment_i,
-            moment_j=moment_j,
-            dragged=dragged,
-            rubbed=rubbed,
-            slipped=0.0,
-            rub=all_rub,
-            bound=all_bound,
-            deepest=0.0,
-            near_count=0,
-            active=0,
-        )
+            found.rubbed -= dot(rub, velocity)
+            found.rub += norm(rub)
+            found.bound += self.tables.friction.limit(m, pressed)
+        return found
 
     @ti.func
     def _slip(self, m, p, c, i, j, pressed):

@@ -7,7 +7,7 @@ import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import assign, raise_to
-from taichi_dem.kit.types import real
+from taichi_dem.kit.types import real, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
@@ -37,30 +37,22 @@ class Solver:
     def __init__(
         self, tables: Tables, state: State, schedule: Schedule, contacts: Optional[Contacts]
     ):
-        self.tables, self.state, self.schedule, self.contacts = tables, state, schedule, contacts
+        self.schedule = schedule
         self.bounds = ti.field(ti.i32, shape=2)
         self.tolerance = ti.field(real, shape=())
         self.velocities = Velocities(tables, state)
-        self.bonds = None
-        self.has_bonds = bool(tables.dashpot.name)
-        if self.has_bonds:
-            self.bonds = BondDashpots(tables, state, schedule, self.velocities)
-        self.has_ground = bool(tables.ground)
-        if self.has_ground:
-            self.ground = GroundSweeps(tables, state, schedule, self.velocities)
-        self.pairs = None
+        self.has_bonds, self.has_ground = bool(tables.dashpot.name), bool(tables.ground)
         self.has_contact = contacts is not None
+        if self.has_bonds:
+            self.bonds = BondDashpots(schedule, self.velocities)
+        if self.has_ground:
+            self.ground = GroundSweeps(schedule, self.velocities)
         if contacts is not None:
-            self.pairs = PairDashpots(tables, state, schedule, contacts, self.velocities)
-        self.sweeps = ti.field(ti.i32, shape=())
-        self.unsolved = ti.field(ti.i32, shape=())
-        self.total_sweeps = ti.field(ti.i64, shape=())
-        self.change2 = ti.field(real, shape=())
-        self.residual2 = ti.field(real, shape=())
-        self.speed2 = ti.field(real, shape=())
-        self.first_change2 = ti.field(real, shape=())
-        self.unconverged = ti.field(ti.i64, shape=())
-        self.worst = ti.field(real, shape=())
+            self.pairs = PairDashpots(schedule, contacts, self.velocities)
+        self.sweeps, self.unsolved = (ti.field(ti.i32, shape=()) for _ in range(2))
+        self.total_sweeps, self.unconverged = (ti.field(ti.i64, shape=()) for _ in range(2))
+        self.change2, self.first_change2 = (ti.field(real, shape=()) for _ in range(2))
+        self.residual2, self.speed2, self.worst = (ti.field(real, shape=()) for _ in range(3))
 
     def load(self, model: Model, method: ImplicitDashpots) -> None:
         """Load the numbers of a method, and the bonds of a model."""
@@ -71,11 +63,11 @@ class Solver:
 
     @ti.func
     def begin(self, one):
-        """Reset the residual and the count of sweeps."""
+        """Reset the residual and the count of sweeps; the spare body is at rest."""
         self.sweeps[None] = 0
         self.unsolved[None] = 1
         self.change2[None], self.speed2[None] = 0.0, 0.0
-        self.velocities.rest_spare()
+        self.velocities.twist[self.velocities.spare] = vec6(0.0)
 
     @ti.func
     def solve(self, one):
@@ -86,7 +78,7 @@ class Solver:
                     self.bonds_of(g)
             if ti.static(self.has_contact):
                 for a in range(self.pairs.count[None]):
-                    self.pair(self.pairs.order[a])
+                    self.pair(a)
             if ti.static(self.has_ground):
                 for a in range(self.schedule.bodies.count(0)):
                     self.joined(self.schedule.bodies.pick(a))
@@ -99,8 +91,8 @@ class Solver:
 
     @ti.func
     def pair(self, a):
-        """Visit the touching spheres of the pair at place a."""
-        raise_to(self.change2, self.pairs.visit(self.pairs.active[a]))
+        """Visit the touching spheres of the pair at place a of their order."""
+        raise_to(self.change2, self.pairs.visit(self.pairs.active[self.pairs.order[a]]))
 
     @ti.func
     def joined(self, i):
@@ -112,7 +104,7 @@ class Solver:
         """Visit the pairs that found no colour, one after the other."""
         first = self.pairs.colour_first[COLOURS]
         for a in range(first, self.pairs.count[None]):
-            self.pair(self.pairs.order[a])
+            self.pair(a)
 
     @ti.func
     def check_convergence(self, one):

@@ -11,7 +11,7 @@ from taichi_dem.kit.lanes import (
     scaled,
 )
 from taichi_dem.kit.products import cross, matvec, stacked, transposed_matvec
-from taichi_dem.kit.types import real, vec6
+from taichi_dem.kit.types import real
 from taichi_dem.physics.rotation import unit3, world_tensor
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
@@ -63,11 +63,11 @@ class Velocities:
     def _support(self, i, advance):
         """Apply the supports, which are linear, to the unit impulses and moments."""
         unit, turn = unit3(), self.turn[i]
-        rest, rest_turn = advance.allowed(i, 0.0 * unit[0, :], 0.0 * unit[0, :])
+        rest, rest_turn = advance.allowed_in_step(i, 0.0 * unit[0, :], 0.0 * unit[0, :])
         for k in ti.static(range(3)):
             axis = unit[:, k]
-            velocity, _ = advance.allowed(i, self.tables.mass_inverse[i] * axis, 0.0 * axis)
-            _, momentum = advance.allowed(i, 0.0 * axis, axis)
+            velocity, _ = advance.allowed_in_step(i, self.tables.mass_inverse[i] * axis, 0.0 * axis)
+            _, momentum = advance.allowed_in_step(i, 0.0 * axis, axis)
             spin = matvec(turn, momentum - rest_turn)
             for r in ti.static(range(3)):
                 self.hold[i][r, k] = velocity[r] - rest[r]
@@ -81,7 +81,7 @@ class Velocities:
         if ti.static(self.has_supports):
             momentum = self.state.angular_momentum[i] + angular
             self.given[i] = stacked(linear, angular)
-            velocity, momentum = advance.allowed(i, velocity, momentum)
+            velocity, momentum = advance.allowed_in_step(i, velocity, momentum)
             spin = advance.spin(i, momentum)
         self.twist[i] = stacked(velocity, spin)
 
@@ -115,20 +115,13 @@ class Velocities:
         """Apply an impulse and a moment at j's centre to body i, and the opposite to j."""
         turned = matvec(self.turn[i], moment + cross(branch, force))
         back = matvec(self.turn[j], moment)
-        first, second = force, force
+        first, second = self.lightness[i] * force, self.lightness[j] * force
         if ti.static(self.has_supports):
             first, second = matvec(self.hold[i], force), matvec(self.hold[j], force)
-            self._add_impulse(i, force, moment + cross(branch, force))
-            self._add_impulse(j, -force, -moment)
-        else:
-            first, second = self.lightness[i] * force, self.lightness[j] * force
+            self.given[i] = self.given[i] + stacked(force, moment + cross(branch, force))
+            self.given[j] = self.given[j] + stacked(-force, -moment)
         self.twist[i] = self.twist[i] + stacked(first, turned)
         self.twist[j] = self.twist[j] - stacked(second, back)
-
-    @ti.func
-    def rest_spare(self):
-        """Set the spare body at rest; nothing moves it."""
-        self.twist[self.spare] = vec6(0.0)
 
     @ti.func
     def of_lanes(self, i):
@@ -163,9 +156,5 @@ class Velocities:
         """Apply an impulse and a moment at its centre to body i."""
         velocity, spin = matvec(self.slack(i), force), matvec(self.turn[i], moment)
         if ti.static(self.has_supports):
-            self._add_impulse(i, force, moment)
+            self.given[i] = self.given[i] + stacked(force, moment)
         self.twist[i] = self.twist[i] + stacked(velocity, spin)
-
-    @ti.func
-    def _add_impulse(self, i, impulse, moment):
-        self.given[i] = self.given[i] + stacked(impulse, moment)

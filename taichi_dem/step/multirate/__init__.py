@@ -6,6 +6,6 @@ A body steps by dt0 / 2^k, with the least level k at which it moves by no more t
 
 ``schedule``: levels, clock, who is active. ``lists``: members by level. ``neighbours``: how far
 levels of bodies that touch may differ, and up to when they have pushed each other. ``wake_up``:
-bodies brought to the present between their own times. ``half_step``: what is recorded at one time.
+bodies that no longer sleep. ``half_step``: what is recorded at one time.
 One step for all is one level for all.
 """

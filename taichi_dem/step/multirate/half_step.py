@@ -23,7 +23,6 @@ class HalfStep:
     def __init__(self, advance: Advance):
         self.advance, self.tables, self.state = advance, advance.tables, advance.state
         self.schedule, self.staggered = advance.schedule, advance.staggered
-        self.ground = advance.ground
 
     @ti.func
     def is_due(self, i):
@@ -33,17 +32,11 @@ class HalfStep:
         """
         due = 0
         if ti.static(self.staggered):
-            starts = self.state.tick[None] == 0 and self.is_held(i) == 1
-            due = ti.cast(self.state.last_tick[i] == self.state.tick[None] and not starts, ti.i32)
+            due = ti.cast(self.state.last_tick[i] == self.state.tick[None], ti.i32)
+            for effect in ti.static(self.tables.supports):
+                if self.state.tick[None] == 0 and effect.acts_on(i) != 0:
+                    due = 0
         return due
-
-    @ti.func
-    def is_held(self, i):
-        """1 for a body on which a support acts, else 0."""
-        held = 0
-        for effect in ti.static(self.tables.supports):
-            held |= ti.cast(effect.acts_on(i) != 0, ti.i32)
-        return held
 
     @ti.func
     def impulse(self, i, linear, angular, back):
@@ -56,34 +49,18 @@ class HalfStep:
         for f in range(4):
             linear += 0.5 * self.state.slot[4 * i + f][0:3]
             angular += 0.5 * self.state.slot[4 * i + f][3:6]
-        kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.drives))), 6)
-        step, now = self.schedule.own_step(i), self.schedule.seconds(self.state.tick[None])
-        for e in ti.static(range(len(self.tables.loads))):
-            if self.tables.loads[e].acts_on(i):
-                motion, length = self.advance.load_times.up_to(i, e, now, step)
-                push, twist = self.tables.loads[e].wrench(i, motion)
-                linear += push * length
-                angular += twist * length
-                for k in ti.static(range(3)):
-                    kick[e, k], kick[e, 3 + k] = push[k] * length, twist[k] * length
-        if ti.static(self.ground.present):
-            rows = 0.5 * self.ground.impulses(i, step, 2.0 * linear, 2.0 * angular)
+        step = self.schedule.own_step(i)
+        linear, angular, kick = self.advance.loaded(
+            i, step, linear, angular, self.advance.load_times.up_to
+        )
+        if ti.static(self.advance.ground.present):
+            rows = 0.5 * self.advance.ground.impulses(i, step, 2.0 * linear, 2.0 * angular)
             if back == 1:
-                rows = self.ground.impulses_before(i, 0.5 * step)
-            pushed, turned = self.ground.total(rows)
-            linear, angular, kick = linear + pushed, angular + turned, self.ground.noted(kick, rows)
+                # Of a step around the present: its mean motion is the present one.
+                velocity, spin = self.state.velocity[i], self.state.spin[i]
+                rows = self.advance.ground.shares(i, 0.5 * step, velocity, spin)
+            linear, angular, kick = self.advance.ground.added(rows, linear, angular, kick)
         return linear, angular, kick
-
-    @ti.func
-    def held(self, i, velocity, momentum):
-        """Velocity and angular momentum that supports allow now."""
-        now = self.schedule.seconds(self.state.tick[None])
-        for effect in ti.static(self.tables.supports):
-            if effect.acts_on(i):
-                velocity, momentum = effect.held(
-                    i, now, 0.0, self.state.rotation[i], velocity, momentum
-                )
-        return velocity, momentum
 
     @ti.func
     def visit(self, i, pushed, turned, back):
@@ -103,13 +80,14 @@ class HalfStep:
             linear, angular, kick = self.impulse(i, pushed, turned, back)
             linear *= self.tables.mass_inverse[i]
             if back == 1:
-                self.state.velocity[i], self.state.angular_momentum[i] = (
-                    before - linear,
-                    spun - angular,
-                )
+                self.state.velocity[i] = before - linear
+                self.state.angular_momentum[i] = spun - angular
                 self.state.spin[i] = self.advance.spin(i, spun - angular)
             else:
-                velocity, momentum = self.held(i, before + linear, spun + angular)
+                now = self.schedule.seconds(self.state.tick[None])
+                velocity, momentum = self.advance.allowed(
+                    i, now, 0.0, before + linear, spun + angular
+                )
                 mean = 0.5 * (before + velocity)
                 turning = self.advance.spin(i, 0.5 * (spun + momentum))
                 for _effect, e, place, _bit in ti.static(self.tables.drives):

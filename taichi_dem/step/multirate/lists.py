@@ -18,7 +18,17 @@ def first_key(member):
 
 
 @ti.data_oriented
-class Once:
+class Places:
+    """Base of lists whose members are the numbers 0 .. count - 1."""
+
+    @ti.func
+    def pick(self, a):
+        """The place itself."""
+        return a
+
+
+@ti.data_oriented
+class Once(Places):
     """List of one member, for phases that run once a substep."""
 
     @ti.func
@@ -26,14 +36,9 @@ class Once:
         """One."""
         return 1
 
-    @ti.func
-    def pick(self, a):
-        """The place itself, which is not used."""
-        return a
-
 
 @ti.data_oriented
-class Everyone:
+class Everyone(Places):
     """List of all bodies or bonds of a scene, active or not. number: field of how many."""
 
     def __init__(self, number: ti.Field):
@@ -44,10 +49,23 @@ class Everyone:
         """Number of all."""
         return self.number[None]
 
+
+@ti.data_oriented
+class Colour:
+    """The members of one colour: those from colour_first[colour] on, in their order."""
+
+    def __init__(self, colour_first: ti.Field, colour: int):
+        self.colour_first, self.colour = colour_first, colour
+
+    @ti.func
+    def count(self, low):
+        """Number of members."""
+        return self.colour_first[self.colour + 1] - self.colour_first[self.colour]
+
     @ti.func
     def pick(self, a):
-        """The place itself."""
-        return a
+        """Place of one of them."""
+        return self.colour_first[self.colour] + a
 
 
 @ti.data_oriented
@@ -59,9 +77,7 @@ class ActiveList:
     """
 
     def __init__(self, capacity: int):
-        self.order = ti.field(ti.i32, shape=capacity)
-        self.index = ti.field(ti.i32, shape=capacity)
-        self.key = ti.field(ti.i32, shape=capacity)
+        self.order, self.index, self.key = (ti.field(ti.i32, shape=capacity) for _ in range(3))
         self.end = ti.field(ti.i32, shape=MAX_LEVEL + 2)
 
     @ti.func

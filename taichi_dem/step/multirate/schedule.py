@@ -24,7 +24,7 @@ from taichi_dem.state.timeline import (
     ticks_of,
 )
 from taichi_dem.step.multirate.lists import ActiveList, first_key, itself
-from taichi_dem.step.multirate.neighbours import AppliedUntil, LevelLimit
+from taichi_dem.step.multirate.neighbours import AppliedUntil, LevelLimit, beside
 from taichi_dem.step.sleeping import ASLEEP, Sleeping
 from taichi_dem.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 
@@ -38,12 +38,12 @@ class Schedule:
     finest: finest level present. undivided: 1 once it was the last one, below which no step is
     divided further. low: coarsest level active now. changed: bodies whose own level or
     bonds changed since the lists were ordered.
-    limits: the ``StabilityLimits`` of the bodies, None where the rule needs none. retimes: whether
-    bodies may be brought to the present between their own times; applied_until then holds the time
-    up to which bonds and pairs have applied their impulses. level_limit: largest difference of
-    levels between neighbours. evaluations: substeps, bodies advanced, bonds and pairs evaluated,
-    and the bonds and pairs that one step for all would have evaluated in the same substeps, and the
-    bonds whose laws were called.
+    limits: the ``StabilityLimits`` of the bodies, None where the rule needs none. controlled:
+    whether they choose the steps, and bodies may be brought to the present between their own times;
+    applied_until then holds the time up to which bonds and pairs have applied their impulses.
+    level_limit: largest difference of levels between neighbours. evaluations: substeps, bodies
+    advanced, bonds and pairs evaluated, and the bonds and pairs that one step for all would have
+    evaluated in the same substeps, and the bonds whose laws were called.
     """
 
     def __init__(
@@ -59,29 +59,24 @@ class Schedule:
         self.tables, self.state, self.contacts, self.limits = tables, state, contacts, limits
         self.has_limits = limits is not None
         self.sleeps, self.woken = tables.on_demand, None
-        self.sleeping = Sleeping(tables) if self.sleeps else None
+        self.sleeping = Sleeping(tables, state) if self.sleeps else None
         self.controlled = self.has_limits and limits.control is not None
-        self.retimes = self.controlled
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
-        self.applied_until = (
-            AppliedUntil(tables, state, self.step_seconds, contacts) if self.retimes else None
-        )
+        self.applied_until = AppliedUntil(tables, state, contacts) if self.controlled else None
         self.spreads = self.controlled and not uniform and limits.spreads
         if limits is not None and self.spreads:
             self.level_limit = LevelLimit(tables, state, contacts, limits)
         self.criterion, self.uniform, self.drifted = criterion, uniform, drifted
         self.has_contact = contacts is not None
-        self.store = contacts.store if self.has_contact else None
+        self.store = None if contacts is None else contacts.store
+        self.beside = () if contacts is None else beside(contacts.store)
         capacity = tables.capacity
         self.bodies = ActiveList(capacity.bodies)
         self.bonds = ActiveList(capacity.bonds)
         self.pairs = ActiveList(self.store.slots if self.has_contact else 1)
-        self.low = ti.field(ti.i32, shape=())
-        self.finest = ti.field(ti.i32, shape=())
-        self.undivided = ti.field(ti.i32, shape=())
-        self.wanted = ti.field(ti.i32, shape=())
+        self.low, self.finest, self.undivided = (ti.field(ti.i32, shape=()) for _ in range(3))
+        self.wanted, self.changed_count = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.changed = ti.field(ti.i32, shape=2 * capacity.bodies + 2 * capacity.bonds + 1)
-        self.changed_count = ti.field(ti.i32, shape=())
         self.evaluations = ti.field(ti.i64, shape=6)
 
     def load(self, model: Model, method: Method, sleep: float) -> None:
@@ -127,8 +122,7 @@ class Schedule:
     @ti.func
     def elapsed(self, i):
         """Seconds since body i was last advanced."""
-        ticks = self.state.tick[None] - self.state.last_tick[i]
-        return ti.cast(ticks, real) * self.step_seconds[MAX_LEVEL]
+        return self.seconds(self.state.tick[None] - self.state.last_tick[i])
 
     @ti.func
     def seconds(self, tick):
@@ -185,13 +179,18 @@ class Schedule:
     def reorder(self, one):
         """Move the entries of changed bodies, and count the evaluations of this tick."""
         self._rearrange()
-        self._count()
+        low = self.low[None]
+        self.evaluations[0] = self.evaluations[0] + 1
+        self.evaluations[1] = self.evaluations[1] + self.bodies.count(low)
+        self.evaluations[2] = self.evaluations[2] + self.bonds.count(low)
+        self.evaluations[4] = self.evaluations[4] + self.bonds.end[0]
+        self.evaluations[5] = self.evaluations[5] + self.bonds.count(low)
 
     @ti.func
     def apply_changes(self, one):
         """Move entries after bodies have been brought to the present, and clear their list."""
         self.limits.done()
-        if ti.static(self.retimes):
+        if ti.static(self.controlled):
             self._rearrange()
 
     @ti.func
@@ -219,29 +218,23 @@ class Schedule:
                 if ti.static(self.drifted):
                     j = self.tables.neighbour[4 * i + f]
                     self.bodies.move(j, self.body_key(j))
-        if ti.static(self.has_contact):
-            for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
-                self._move_pair(self.store.near_slot[k], 1)
-            for k in range(self.store.second_start[i], self.store.second_start[i + 1]):
-                self._move_pair(self.store.second_slot[k], 0)
+        for first, slots, other in ti.static(self.beside):
+            for k in range(first[i], first[i + 1]):
+                self.pairs.move(slots[k], self._pair_key(slots[k]))
+                if ti.static(self.drifted):
+                    j = self.store.body[slots[k]][other]
+                    self.bodies.move(j, self.body_key(j))
 
     @ti.func
-    def _move_pair(self, p, partner: ti.template()):
-        # As a plain argument, the component's number crashes the compiler of Quadrants.
-        self.pairs.move(p, self._pair_key(p))
-        if ti.static(self.drifted):
-            j = self.store.body[p][partner]
-            self.bodies.move(j, self.body_key(j))
-
-    @ti.func
-    def start_all(self):
+    def start_all(self, one):
         """Fill all lists."""
         if ti.static(self.uniform):
             self._level_all()
         self.changed_count[None] = 0
         if ti.static(self.spreads):
-            self.level_limit.note_all()
-        self.list_members()
+            for i in range(self.tables.body_count[None]):
+                self.level_limit.listed_level[i] = self.state.level[i]
+        self.list_members(0)
         if ti.static(self.sleeps):
             # Those that sleep act once.
             self.bonds.fill(self.tables.bond_count[None], itself, first_key)
@@ -250,7 +243,7 @@ class Schedule:
         self._find_finest()
 
     @ti.func
-    def list_members(self):
+    def list_members(self, one):
         """Fill the lists of bodies and bonds, in their order."""
         self.bodies.fill(self.tables.body_count[None], itself, self.body_key)
         self.bonds.fill(self.tables.bond_count[None], itself, self.bond_key)
@@ -266,11 +259,11 @@ class Schedule:
             for a in range(self.store.near_count[None]):
                 for side in ti.static(range(2)):
                     pair = self.store.body[self.store.near_slot[a]]
-                    self.sleeping.awaken(pair[side], self.state)
+                    self.sleeping.awaken(pair[side])
             self.woken.admit(False)
         self._list_pairs()
         if ti.static(not self.uniform):
-            self.list_members()
+            self.list_members(0)
 
     @ti.func
     def _list_pairs(self):
@@ -298,16 +291,6 @@ class Schedule:
             self.finest[None] = finest
         if self.finest[None] == MAX_LEVEL:
             self.undivided[None] = 1
-
-    @ti.func
-    def _count(self):
-        """Count the evaluations of this tick: substeps, bodies, bonds, contact pairs."""
-        low = self.low[None]
-        self.evaluations[0] = self.evaluations[0] + 1
-        self.evaluations[1] = self.evaluations[1] + self.bodies.count(low)
-        self.evaluations[2] = self.evaluations[2] + self.bonds.count(low)
-        self.evaluations[4] = self.evaluations[4] + self.bonds.end[0]
-        self.evaluations[5] = self.evaluations[5] + self.bonds.count(low)
 
     @ti.func
     def count_sweep(self, with_bonds: ti.template()):

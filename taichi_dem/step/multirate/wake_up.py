@@ -1,76 +1,27 @@
-"""Wake bodies: from sleep, and between their updates where an event requires a shorter step."""
+"""Wake bodies from sleep: when that is decided, and how they come on the lists."""
 
 import taichi as ti
 
 from taichi_dem.kit.types import vec2
 from taichi_dem.step.advance import Advance
+from taichi_dem.step.multirate.lists import Places
 from taichi_dem.step.multirate.schedule import Schedule
-from taichi_dem.step.sleeping import ASLEEP
 
 
 @ti.data_oriented
-class WakeUp:
-    """Updates the bodies that ``StabilityLimits`` has listed, at the start of a substep.
-
-    A body waits for its own time with a step chosen before a contact came near, a bond broke or a
-    neighbour refined its step. Bonds that have applied their impulse ahead apply no more until
-    then.
-    """
-
-    def __init__(self, advance: Advance, schedule: Schedule):
-        self.advance, self.schedule, self.limits = advance, schedule, schedule.limits
-        self.state = schedule.state
-
-    @ti.func
-    def _is_awake(self, i):
-        awake = True
-        if ti.static(self.schedule.sleeps):
-            awake = self.schedule.sleeping.awake[i] != ASLEEP
-        return awake
-
-    @ti.func
-    def wake_up(self, i):
-        """Bring body i to the present tick when it wants a shorter step because of an event."""
-        if self.limits.events[i] != 0 and self._is_awake(i):
-            wanted, bound = self.schedule.controlled_level(i)
-            if ti.static(self.schedule.uniform):
-                ti.atomic_max(self.schedule.wanted[None], wanted)
-                self.state.bound[i] = bound
-            elif wanted > self.state.level[i]:
-                ti.atomic_add(self.limits.woken[None], 1)
-                # The present is a time of level low and finer levels only.
-                self.state.level[i] = ti.max(self.state.level[i], self.schedule.low[None])
-                self.schedule.note_change(i)
-                if self.state.last_tick[i] < self.state.tick[None]:
-                    self.advance.body(i)
-                else:
-                    self.schedule.choose_level(i, 0.0)
-
-
-@ti.data_oriented
-class Chunks:
+class Chunks(Places):
     """List of the chunks of bodies, at the ticks at which their momenta are summed."""
 
     def __init__(self, schedule: Schedule):
-        self.sleeping, self.state, self.schedule = schedule.sleeping, schedule.state, schedule
+        self.sleeping, self.schedule = schedule.sleeping, schedule
 
     @ti.func
     def count(self, low):
         """Number of chunks now."""
         count = 0
-        if self.sleeping.is_due(self.state.tick[None]):
+        if self.sleeping.is_due():
             count = self.sleeping.chunk_count[None]
         return count
-
-    @ti.func
-    def pick(self, a):
-        """One of them."""
-        return a
-
-    @ti.func
-    def add(self, c):
-        """Sum the momenta of one."""
-        self.sleeping.chunk(c, self.state)
 
     @ti.func
     def end(self, one):
@@ -78,11 +29,11 @@ class Chunks:
 
         Visits in the order of waking take up to 40 % longer.
         """
-        if self.sleeping.is_due(self.state.tick[None]):
+        if self.sleeping.is_due():
             self.sleeping.renew_bound()
             if self.sleeping.unsorted[None] > 0:
                 self.sleeping.unsorted[None] = 0
-                self.schedule.list_members()
+                self.schedule.list_members(0)
 
 
 @ti.data_oriented
@@ -132,6 +83,6 @@ class WokenLists:
             last = self.sleeping.stride[i]
         if 0 <= first and first < self.state.tick[None]:
             elapsed = self.schedule.seconds(self.state.tick[None] - first)
-            rounding = self.sleeping.rounding(i, self.state)
+            rounding = self.sleeping.rounding(i)
             found = self.sleeping.withheld(b, elapsed, last, rounding, self.advance)
         return found
