@@ -259,7 +259,7 @@ class Simulation(Uncopied):
         self.evaluation_rate()
 
     def _open_balance(self):
-        """Begin the energy balance and the other diagnostics."""
+        """Begin the energy balance and all else that is followed."""
         self._balance = EnergyBalance(self.parts)
         self.divergence_check = DivergenceCheck(self.parts, self.energy_balance)
         self.shared_volume = SharedVolume(self.parts)

@@ -1,9 +1,10 @@
-"""Advance one bond, one contact pair, one body: the only place that composes the physics.
+"""Advance one bond, one contact pair, one body: the only class that composes the physics.
 
-Drivers choose the active members and call these functions; no other file applies a force or moves a
-body. A bond or pair evaluated at a tick applies the impulse F * (smaller of their steps) to both
-bodies, with opposite signs; a body takes the sum at its own time (Konno et al., 3.1, eq. 3): v += S
-/ m, L += T, then x += dt v and q = exp(dt w) q, with the spin w in the middle of the turn.
+Its bonds are in ``bond``, its pairs in ``contact_force``. Drivers choose the active members and
+call these functions; nothing else applies a force or moves a body. A bond or pair evaluated at a
+tick applies the impulse F * (smaller of their steps) to both bodies, with opposite signs; a body
+takes the sum at its own time (Konno et al., 3.1, eq. 3): v += S / m, L += T, then x += dt v and q =
+exp(dt w) q, with the spin w in the middle of the turn.
 """
 
 from typing import Optional
