@@ -1,5 +1,6 @@
 """Effects that a scene may list; all others are not computed, allocated or compiled."""
 
+from taichi_dem.laws.body_contact import BodyContact
 from taichi_dem.laws.bond import ShearSlip, Softening
 from taichi_dem.laws.bond_damping import BondDamping
 from taichi_dem.laws.face_contact import FaceContact
@@ -15,6 +16,7 @@ from taichi_dem.loads.quiet_boundary import QuietBoundary
 from taichi_dem.loads.supports import Fixed, PrescribedMotion, Roller
 
 __all__ = [
+    "BodyContact",
     "BondDamping",
     "FaceContact",
     "Fixed",

@@ -55,6 +55,9 @@ class Contacts:
         self.skin = ti.field(real, shape=n)
         self.search_requested = ti.field(ti.i32, shape=())
         self.outer_waits = ti.field(ti.i32, shape=())
+        if self.law.meets_bodies:
+            self.path = ti.field(real, shape=n)
+            self.clear_until = self.store.sphere_column("clear_until", real)
 
     def load(self, model: Model, method: Method) -> None:
         """Load the numbers of a scene and a method; no pairs exist yet."""
@@ -64,6 +67,12 @@ class Contacts:
         assign(self.pace, np.array([method.dt0, method.steps_ahead]))
         assign(self.store.slot_limit, n * effect.pairs_per_body + SPARE_PAIRS)
         assign(self.store.sphere_limit, n * effect.spheres_per_body + SPARE_SPHERES)
+
+    def forget_gaps(self) -> None:
+        """Forget how far bodies may go before they touch: they have been moved by hand."""
+        if self.law.meets_bodies:
+            assign(self.path, 0.0)
+            assign(self.clear_until, 0.0)
 
     @ti.func
     def cluster_centre(self, i, face):
@@ -76,16 +85,26 @@ class Contacts:
     def gap(self, i, j, a, b):
         """Gap between bodies i and j by an entry (a, b) of the pair store [m]."""
         gap = 0.0
-        if ti.static(self.law.meets_faces):
-            branch = self.state.position[j] - self.state.position[i]
-            turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
-            near = self.law.nearest(a, b, turn, offset)
+        if ti.static(self.law.meets_bodies):
+            near = self.nearest(i, j, a, b)
+            gap = -near.reach
+            if near.can_meet == 0:
+                gap = 0.0
+        elif ti.static(self.law.meets_faces):
+            near = self.nearest(i, j, a, b)
             gap = norm(near.apart) - near.reach
             if near.can_meet == 0:
                 gap = AWAY
         else:
             gap = self._gap_of_spheres(i, j, a, b)
         return gap
+
+    @ti.func
+    def nearest(self, i, j, a, b):
+        """Where bodies i and j are nearest by an entry (a, b), in the frame of the first."""
+        branch = self.state.position[j] - self.state.position[i]
+        turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
+        return self.law.nearest(a, b, turn, offset)
 
     @ti.func
     def _gap_of_spheres(self, i, j, a, b):
@@ -102,8 +121,13 @@ class Contacts:
         m = self.tables.pair(pair[0], pair[1])
         for k in range(self.store.first[p], self.store.last[p]):
             spheres = self.store.sphere[k]
-            overlap = -self.gap(pair[0], pair[1], spheres[0], spheres[1])
-            energy += self.law.stored(m, ti.max(0.0, overlap))
+            if ti.static(self.law.meets_bodies):
+                near = self.nearest(pair[0], pair[1], spheres[0], spheres[1])
+                met = self.law.meeting(near, k, self.state.rotation[pair[0]])
+                energy += met.area * self.law.stored(m, ti.max(0.0, met.overlap))
+            else:
+                overlap = -self.gap(pair[0], pair[1], spheres[0], spheres[1])
+                energy += self.law.stored(m, ti.max(0.0, overlap))
             if ti.static(self.remembers):
                 energy += self.friction.stored(m, k)
         return energy
@@ -174,6 +198,23 @@ class Contacts:
         return level
 
     @ti.func
+    def may_meet(self, k, i, j, margin):
+        """Whether entry k, bodies i and j, may be nearer than a margin [m] by their paths."""
+        meets = True
+        if ti.static(self.law.meets_bodies):
+            meets = not self.path[i] + self.path[j] + margin < self.clear_until[k]
+        return meets
+
+    @ti.func
+    def settle(self, k, i, j, near):
+        """Take note of a ``Nearest`` of entry k before its forces are asked."""
+        self.law.settle(near, k)
+        if ti.static(self.law.meets_bodies):
+            # Rounding of paths is far below what is left of the gap.
+            gap = ti.max(0.0, -near.reach) * (1.0 - 1e-6)
+            self.clear_until[k] = self.path[i] + self.path[j] + gap
+
+    @ti.func
     def moved(self, i, velocity, spin, elapsed):
         """Add to the displacement of body i; request a search once it may exceed the body skin.
 
@@ -185,6 +226,8 @@ class Contacts:
                 ti.atomic_min(self.state.bad_body[None], i)
             way = self.travel[i] + speed * elapsed
             self.travel[i] = way
+            if ti.static(self.law.meets_bodies):
+                self.path[i] = self.path[i] + speed * elapsed
             if way + self.pace[1] * elapsed * speed > self.body_skin[i]:
                 self.search_requested[None] = 1
 

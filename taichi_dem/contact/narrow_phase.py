@@ -5,6 +5,7 @@ import taichi as ti
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.products import matvec, norm, squared
 from taichi_dem.kit.types import real, vec4
+from taichi_dem.physics.rotation import place_in
 from taichi_dem.physics.triangle import closest_point
 
 #: Skins beyond their margin within which the gap of two spheres is found; others count as farther.
@@ -26,6 +27,9 @@ class NarrowPhase:
         self.sphere = ti.Vector.field(4, real, shape=capacity.spheres)
         self.cluster = ti.Vector.field(3, real, shape=capacity.faces)
         self.law = contacts.law
+        if self.law.meets_bodies:
+            self.position = ti.Vector.field(3, real, shape=capacity.bodies)
+            self.rotation = ti.Matrix.field(3, 3, real, shape=capacity.bodies)
         if self.law.meets_faces:
             self.corner = ti.Vector.field(3, real, shape=3 * capacity.faces)
 
@@ -34,6 +38,8 @@ class NarrowPhase:
         """Compute the positions of the spheres of body i, once for all comparisons."""
         size = self.tables.face_spheres[None]
         position, rotation = self.state.position[i], self.state.rotation[i]
+        if ti.static(self.law.meets_bodies):
+            self.position[i], self.rotation[i] = position, rotation
         for face in range(4 * i, 4 * i + 4):
             self.cluster[face] = self.contacts.cluster_centre(i, face)
             if self.state.exposed_tick[face] >= 0:
@@ -57,6 +63,11 @@ class NarrowPhase:
         count, hits, least = 0, 0, margin
         if not write:
             least += 0.5 * OUTLOOK * (self.contacts.skin[i] + self.contacts.skin[j])
+        if ti.static(self.law.meets_bodies):
+            if faces != 0:
+                count, least = self._of_bodies(i, j, start, margin, write)
+                hits = count * faces
+            faces = 0
         for fg in range(16):
             if (faces >> fg) & 1 == 1:
                 face_i, face_j = 4 * i + fg // 4, 4 * j + fg % 4
@@ -76,6 +87,19 @@ class NarrowPhase:
         """Whether the balls around the spheres of two faces are nearer than wide [m]."""
         reach = self.tables.cluster[face_i][3] + self.tables.cluster[face_j][3] + wide
         return squared(self.cluster[face_j] - self.cluster[face_i]) < reach * reach
+
+    @ti.func
+    def _of_bodies(self, i, j, start, margin, write):
+        """1 where two bodies may meet, and how far they may go until then."""
+        count = 0
+        apart = self.position[j] - self.position[i]
+        turn, offset = place_in(self.rotation[i], self.rotation[j], apart)
+        gap = self.law.gap(i, j, turn, offset)
+        if gap < margin:
+            if write:
+                self.store.sphere[start] = [i, j]
+            count, gap = 1, margin
+        return count, gap
 
     @ti.func
     def _of_faces(self, face_i, face_j, start, margin, least, write):

@@ -72,6 +72,8 @@ class BroadPhase:
     def ask(self, everywhere: bool = False) -> None:
         """Request a search before the next step."""
         assign(self.everywhere, int(everywhere))
+        if everywhere:
+            self.contacts.forget_gaps()
         assign(self.contacts.search_requested, 1)
 
     def renew(self) -> None:
@@ -231,7 +233,9 @@ class BroadPhase:
         for k in range(self.neighbours.first[i], self.neighbours.last[i]):
             j = self.listed.body[k]
             if self.looked[j] >= least:
-                faces = self.listed.faces[k] & self._broken_faces(i, j)
+                faces = self._broken_faces(i, j)
+                if not ti.static(self.contacts.law.meets_bodies):
+                    faces &= self.listed.faces[k]
                 if self.everywhere[None] == 1 or self.listed.may_gain_spheres(k, i, j, faces):
                     self._count_spheres(k, i, j, faces)
 

@@ -10,7 +10,7 @@ from taichi_dem.kit.validation import between, flag, shown, whole
 from taichi_dem.laws.base import Effect
 from taichi_dem.materials import Material
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
-from taichi_dem.physics.sphere_pair import Nearest, normal_force
+from taichi_dem.physics.sphere_pair import Nearest, is_within, meeting, normal_force
 from taichi_dem.state.model import Model
 
 #: Entries of a list for each body: a thousand tetrahedra with as many take some GiB.
@@ -67,8 +67,9 @@ class SphereContact(Effect):
     role = "contact"
     name = "sphere_contact"
     activation = "spheres of free faces touch"
-    #: Whether spheres meet the faces of other bodies, instead of their spheres.
+    #: Whether spheres meet the faces of other bodies, or bodies each other, instead of spheres.
     meets_faces = False
+    meets_bodies = False
 
     def __init__(
         self,
@@ -117,6 +118,20 @@ class SphereContact(Effect):
         apart = matvec(turn, second.xyz) + offset - first.xyz
         size = first[3] + second[3]
         return Nearest(first=first, apart=apart, reach=size, size=size, can_meet=1)
+
+    @ti.func
+    def is_within(self, near, margin):
+        """Whether two bodies are nearer than a margin [m], by a ``Nearest``."""
+        return is_within(near, margin)
+
+    @ti.func
+    def meeting(self, near, k, rotation):
+        """The ``Meeting`` of entry k; rotation: of the first body."""
+        return meeting(near.first, near.reach, near.apart, rotation)
+
+    @ti.func
+    def settle(self, near, k):
+        """Take note of how entry k is now, before its forces are asked."""
 
     @ti.func
     def face_of(self, a):

@@ -52,12 +52,36 @@ class StickingFriction(Friction):
         self.stiffness_ratio = between("stiffness_ratio", stiffness_ratio, 1e-6, 1.0)
 
     def numbers(self, material: Material) -> tuple[float, ...]:
-        """Friction coefficient, and stiffness of the spring [N/m]."""
-        return material.friction, self.stiffness_ratio * float(material.contact_stiffness)
+        """Friction coefficient, stiffness of the spring of spheres [N/m], and its ratio."""
+        spring = self.stiffness_ratio * float(material.contact_stiffness)
+        return material.friction, spring, self.stiffness_ratio
 
     def declare_columns(self, store: PairStore) -> None:
         """Keep the stretch [m] of the spring of each sphere pair, in the first body's frame."""
         self.stretch = store.sphere_column("tangential_stretch", real, 3)
+        if self.tables.contact.meets_bodies:
+            self.area = store.sphere_column("tangential_area", real)
+
+    @ti.func
+    def stiffness(self, m, k):
+        """Stiffness of the spring of pair k [N/m]; that of bodies grows with their contact."""
+        found = self.law[m, 1]
+        if ti.static(self.tables.contact.meets_bodies):
+            found = self.law[m, 2] * self.tables.contact.elastic(m, 1.0) * self.area[k]
+        return found
+
+    @ti.func
+    def resize(self, m, k, area):
+        """Give the spring of pair k a new area of contact [m2]; energy [J] that this takes.
+
+        It keeps its force where the area grows, and its stretch where it shrinks: neither adds
+        energy.
+        """
+        before = self.stored(m, k)
+        if area > self.area[k]:
+            self.stretch[k] = self.stretch[k] * (self.area[k] / area)
+        self.area[k] = area
+        return before - self.stored(m, k)
 
     @ti.func
     def follow(self, k, normal, way):
@@ -78,23 +102,24 @@ class StickingFriction(Friction):
         and after, is the energy stored plus that dissipated by slipping.
         """
         trial = self.stretch[k]
-        longest = limit / self.law[m, 1]
+        stiffness = self.stiffness(m, k)
+        longest = limit / stiffness
         size = norm(trial)
         present = trial
         if size > longest:
             present = trial * (longest / size)
         self.stretch[k] = present
-        return 0.5 * self.law[m, 1] * dot(trial - way + present, trial - present)
+        return 0.5 * stiffness * dot(trial - way + present, trial - present)
 
     @ti.func
     def spring(self, m, k):
         """Force of the spring of sphere pair k on the second sphere [N]."""
-        return -self.law[m, 1] * self.stretch[k]
+        return -self.stiffness(m, k) * self.stretch[k]
 
     @ti.func
     def stored(self, m, k):
         """Elastic energy in the spring of sphere pair k [J]."""
-        return 0.5 * self.law[m, 1] * squared(self.stretch[k])
+        return 0.5 * self.stiffness(m, k) * squared(self.stretch[k])
 
     @ti.func
     def part(self, m, k):

@@ -66,7 +66,8 @@ class Nearest:
 
     first: centre of the first's sphere and its radius [m], or a point of its face and 0. apart:
     from there to the second's centre or point [m]. reach: their distance when they touch [m].
-    size: the sum of the radii [m]. can_meet: 0 where another face of the body is nearer.
+    size: the sum of the radii [m]. can_meet: 0 where another face of the body is nearer. area,
+    couple: as in ``Meeting``.
     """
 
     first: ti.types.vector(4, ti.f64)
@@ -74,6 +75,8 @@ class Nearest:
     reach: ti.f64
     size: ti.f64
     can_meet: ti.i32
+    area: ti.f64
+    couple: ti.types.vector(3, ti.f64)
 
 
 @ti.func
@@ -88,12 +91,16 @@ class Meeting:
     """Where two spheres meet: overlap [m], negative while they are apart.
 
     normal: from the first to the second, world. arm: from the first body's centre to the middle
-    of the overlap, world [m].
+    of the overlap, world [m]. area: by which the numbers of a law are multiplied; 1 for spheres, of
+    contact [m2] for bodies. couple: moment of the contact about its point, per force along the
+    normal, world [m]; 0 for spheres.
     """
 
     overlap: ti.f64
     normal: ti.types.vector(3, ti.f64)
     arm: ti.types.vector(3, ti.f64)
+    area: ti.f64
+    couple: ti.types.vector(3, ti.f64)
 
 
 @ti.func
@@ -106,7 +113,7 @@ def meeting(first, reach, apart, rotation):
     overlap = reach - distance
     normal = matvec(rotation, apart) / distance
     arm = matvec(rotation, first.xyz) + (first[3] - 0.5 * overlap) * normal
-    return Meeting(overlap=overlap, normal=normal, arm=arm)
+    return Meeting(overlap=overlap, normal=normal, arm=arm, area=1.0, couple=0.0 * normal)
 
 
 @ti.func

@@ -9,7 +9,6 @@ from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.products import matmul, matmul_transposed, transposed_matmul
 from taichi_dem.kit.types import mat3, real
 from taichi_dem.physics.rotation import place_in, unit3
-from taichi_dem.physics.sphere_pair import is_within
 from taichi_dem.physics.wrench import cross_matrix
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
@@ -123,9 +122,12 @@ class ContactLimits:
             if side == 1:
                 own, other = other, own
             near = self.contacts.law.nearest(own, other, turn, offset)
-            if is_within(near, margin):
+            if self.contacts.law.is_within(near, margin):
                 normal = near.apart / ti.max(near.apart.norm(), 1e-30)
                 da, db, dc = self._contact(i, near.first.xyz + near.first[3] * normal, normal)
+                if ti.static(self.contacts.law.meets_bodies):
+                    area = self.contacts.law.largest_area(i, j)
+                    da, db, dc = area * da, area * db, area * dc
                 a, b, c = a + da, b + db, c + dc
         return a, b, c
 

@@ -5,7 +5,7 @@ import taichi as ti
 from taichi_dem.kit.products import cross, dot, norm
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import place_in
-from taichi_dem.physics.sphere_pair import active_bits, add_within, is_within, meeting
+from taichi_dem.physics.sphere_pair import active_bits, add_within
 from taichi_dem.stability.body_limits import HIT
 
 
@@ -84,43 +84,63 @@ class ContactForce:
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
         for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
-            a, b = self.contacts.store.sphere[k][0], self.contacts.store.sphere[k][1]
-            near = self.contacts.law.nearest(a, b, turn, offset)
-            if ti.static(self.has_limits):
-                found.near_count += ti.cast(is_within(near, margin), ti.i32)
-            if is_within(near, 0.0):
-                met = meeting(near.first, near.reach, near.apart, self.state.rotation[i])
-                overlap, normal, arm = met.overlap, met.normal, met.arm
-                velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
-                rate = dot(velocity, normal)
-                slide = velocity - rate * normal
-                push = self.contacts.law.normal(m, overlap, self._limited(rate, scale))
-                drag = self._limited(self.contacts.law.damping(m), scale)
-                rub, stuck, spent = self._rub(m, k, i, normal, push, drag, slide, elapsed, stepping)
-                pushed = push * normal + rub
-                found.active |= active_bits(push, rub)
-                found.force += pushed
-                found.moment_i -= cross(arm, pushed)
-                found.moment_j += cross(arm - branch, pushed)
-                found.dragged += (self.contacts.law.elastic(m, overlap) - push) * rate
-                found.rubbed -= dot(rub - stuck, slide)
-                found.slipped += spent
-                found.rub += norm(rub)
-                found.bound += self.tables.friction.limit(m, push)
-                found.deepest = ti.max(found.deepest, overlap / near.size)
-            elif ti.static(stepping):
-                found.slipped += self.springs.part(m, k)
+            if self.contacts.may_meet(k, i, j, margin):
+                a, b = self.contacts.store.sphere[k][0], self.contacts.store.sphere[k][1]
+                near = self.contacts.law.nearest(a, b, turn, offset)
+                if ti.static(stepping):
+                    self.contacts.settle(k, i, j, near)
+                if ti.static(self.has_limits):
+                    found.near_count += ti.cast(self.contacts.law.is_within(near, margin), ti.i32)
+                if self.contacts.law.is_within(near, 0.0):
+                    met = self.contacts.law.meeting(near, k, self.state.rotation[i])
+                    overlap, normal, arm = met.overlap, met.normal, met.arm
+                    velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
+                    rate = dot(velocity, normal)
+                    slide = velocity - rate * normal
+                    if ti.static(self.contacts.law.meets_bodies):
+                        rate += dot(met.couple, self.state.spin[j] - self.state.spin[i])
+                    push = met.area * self.contacts.law.normal(
+                        m, overlap, self._limited(rate, scale)
+                    )
+                    drag = met.area * self._limited(self.contacts.law.damping(m), scale)
+                    spring = met.area * self.contacts.law.elastic(m, overlap)
+                    rub, stuck, spent = self._rub(
+                        m, k, i, met, push, drag, slide, elapsed, stepping
+                    )
+                    pushed = push * normal + rub
+                    found.active |= active_bits(push, rub)
+                    found.force += pushed
+                    found.moment_i -= cross(arm, pushed)
+                    found.moment_j += cross(arm - branch, pushed)
+                    if ti.static(self.contacts.law.meets_bodies):
+                        found.moment_i -= push * met.couple
+                        found.moment_j += push * met.couple
+                    found.dragged += (spring - push) * rate
+                    found.rubbed -= dot(rub - stuck, slide)
+                    found.slipped += spent
+                    found.rub += norm(rub)
+                    found.bound += self.tables.friction.limit(m, push)
+                    found.deepest = ti.max(found.deepest, self._depth(near, overlap))
+                elif ti.static(stepping):
+                    found.slipped += self.springs.part(m, k)
         return found
 
     @ti.func
-    def _rub(self, m, k, i, normal, push, drag, slide, elapsed, stepping: ti.template()):
+    def _depth(self, near, overlap):
+        """Depth of a contact as a share of its size; that of bodies counts what lies at rest."""
+        if ti.static(self.contacts.law.meets_bodies):
+            overlap = near.reach
+        return overlap / near.size
+
+    @ti.func
+    def _rub(self, m, k, i, met, push, drag, slide, elapsed, stepping: ti.template()):
         """Friction on the second sphere and the spring's part of it [N]; energy of slipping [J]."""
         rub, stuck, spent = vec3(0.0), vec3(0.0), 0.0
         if ti.static(self.springs.present):
             rotation, bound = self.state.rotation[i], self.tables.friction.limit(m, push)
             if ti.static(stepping):
-                self.springs.follow(k, rotation, normal, elapsed * slide)
-                spent = self.springs.slip(m, k, rotation, bound, elapsed * slide)
+                spent = self.springs.follow(m, k, rotation, met, elapsed * slide)
+                spent += self.springs.slip(m, k, rotation, bound, elapsed * slide)
             stuck = self.springs.force(m, k, rotation)
             rub = add_within(stuck, -drag * slide, bound)
         else:

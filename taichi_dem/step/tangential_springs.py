@@ -19,6 +19,7 @@ class TangentialSprings:
     def __init__(self, schedule: Schedule, contacts: Optional[Contacts]):
         self.friction, self.schedule = schedule.tables.friction, schedule
         self.present = contacts is not None and contacts.remembers
+        self.by_area = contacts is not None and contacts.law.meets_bodies
         if contacts is not None and self.present:
             self.evaluated = contacts.store.column("evaluated", ti.i64)
 
@@ -32,10 +33,14 @@ class TangentialSprings:
         return elapsed
 
     @ti.func
-    def follow(self, k, rotation, normal, way):
-        """Stretch the spring of sphere pair k by ``way`` [m]."""
-        across = transposed_matvec(rotation, normal)
+    def follow(self, m, k, rotation, met, way):
+        """Stretch the spring of pair k, at a ``Meeting``, by ``way`` [m]; energy that is lost [J]."""
+        lost = 0.0
+        if ti.static(self.by_area):
+            lost = self.friction.resize(m, k, met.area)
+        across = transposed_matvec(rotation, met.normal)
         self.friction.follow(k, across, transposed_matvec(rotation, way))
+        return lost
 
     @ti.func
     def slip(self, m, k, rotation, bound, way):

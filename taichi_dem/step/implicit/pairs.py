@@ -7,7 +7,7 @@ from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.products import cross, dot, matvec, norm, squared
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import place_in, unit3
-from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to, is_within, meeting
+from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to
 from taichi_dem.step.contact_force import PairForces
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.multirate.schedule import Schedule
@@ -54,6 +54,10 @@ class PairDashpots:
         self.entry, self.push = ti.field(ti.i32, shape=spheres), ti.field(real, shape=spheres)
         self.normal, self.arm = (ti.Vector.field(3, real, shape=spheres) for _ in range(2))
         self.share = ti.Vector.field(2, real, shape=spheres)
+        self.of_bodies = contacts.law.meets_bodies
+        if self.of_bodies:
+            self.area = ti.field(real, shape=spheres)
+            self.couple = ti.Vector.field(3, real, shape=spheres)
         self.impulse = self.store.sphere_column("solved_impulse", real, 3)
         self.branch = ti.Vector.field(3, real, shape=pairs)
         self.count = ti.field(ti.i32, shape=())
@@ -111,30 +115,38 @@ class PairDashpots:
         start = self.store.first[p]
         end = start
         for k in range(start, self.store.last[p]):
-            a, b = self.store.sphere[k][0], self.store.sphere[k][1]
-            near = self.contacts.law.nearest(a, b, turn, offset)
-            if is_within(near, ahead):
-                met = meeting(near.first, near.reach, near.apart, self.state.rotation[i])
-                overlap, normal, arm = met.overlap, met.normal, met.arm - branch
-                self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
-                # Spheres still apart may approach until they touch, at the end of the step.
-                push = dt * self.contacts.law.elastic(m, ti.max(overlap, 0.0))
-                self.push[end] = push + self.contacts.law.damping(m) * ti.min(overlap, 0.0)
-                self.share[end] = self._share(i, j, branch, arm, normal)
-                force += self.impulse[k]
-                moment += cross(arm, self.impulse[k])
-                deepest = ti.max(deepest, overlap / near.size)
-                if ti.static(self.springs.present):
-                    self.pull[end] = vec3(0.0)
-                    if overlap > 0.0:
-                        way = self._way(i, j, branch, arm, normal, elapsed)
-                        self.springs.follow(k, self.state.rotation[i], normal, way)
-                        self.pull[end] = dt * self.springs.force(m, k, self.state.rotation[i])
-                end += 1
-            else:
-                self.impulse[k] = vec3(0.0)
-            if not is_within(near, 0.0):
-                parted += self.springs.part(m, k)
+            if self.contacts.may_meet(k, i, j, self._outlook(ahead)):
+                a, b = self.store.sphere[k][0], self.store.sphere[k][1]
+                near = self.contacts.law.nearest(a, b, turn, offset)
+                self.contacts.settle(k, i, j, near)
+                if self.contacts.law.is_within(near, self._outlook(ahead)):
+                    met = self.contacts.law.meeting(near, k, self.state.rotation[i])
+                    overlap, normal, arm = met.overlap, met.normal, met.arm - branch
+                    self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
+                    # Spheres still apart may approach until they touch, at the end of the step.
+                    push = dt * self.contacts.law.elastic(m, ti.max(overlap, 0.0))
+                    push += self.contacts.law.damping(m) * ti.min(overlap, 0.0)
+                    self.push[end] = met.area * push
+                    self.share[end] = self._share(i, j, branch, arm, met)
+                    force += self.impulse[k]
+                    moment += cross(arm, self.impulse[k])
+                    depth = overlap
+                    if ti.static(self.of_bodies):
+                        self.area[end], self.couple[end] = met.area, met.couple
+                        moment += dot(self.impulse[k], normal) * met.couple
+                        depth = near.reach
+                    deepest = ti.max(deepest, depth / near.size)
+                    if ti.static(self.springs.present):
+                        self.pull[end] = vec3(0.0)
+                        if depth > 0.0:
+                            way = self._way(i, j, branch, arm, normal, elapsed)
+                            parted += self.springs.follow(m, k, self.state.rotation[i], met, way)
+                            self.pull[end] = dt * self.springs.force(m, k, self.state.rotation[i])
+                    end += 1
+                else:
+                    self.impulse[k] = vec3(0.0)
+                if not self.contacts.law.is_within(near, 0.0):
+                    parted += self.springs.part(m, k)
         self.store.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
         if end > start:
             around = moment + cross(branch, force)
@@ -142,6 +154,37 @@ class PairDashpots:
             self.contacts.add_impulse(p, 1, force, moment)
         if ti.static(self.springs.present):
             self.contacts.book_friction(p, parted)
+
+    @ti.func
+    def _outlook(self, ahead):
+        """Gap within which a contact is solved [m]; bodies have no area before they touch."""
+        if ti.static(self.of_bodies):
+            ahead = 0.0
+        return ahead
+
+    @ti.func
+    def _turned(self, c, angular):
+        """Part of a contact's rate of opening that its couple makes of a spin [m/s]."""
+        rate = 0.0
+        if ti.static(self.of_bodies):
+            rate = dot(self.couple[c], angular)
+        return rate
+
+    @ti.func
+    def _damping(self, m, c):
+        """Impulse of a contact's dashpot per velocity in a step [kg]."""
+        damping = self.schedule.step_seconds[0] * self.contacts.law.damping(m)
+        if ti.static(self.of_bodies):
+            damping *= self.area[c]
+        return damping
+
+    @ti.func
+    def _moment(self, c, impulse):
+        """Moment of a contact's impulse about the second body's centre [N m s]."""
+        moment = cross(self.arm[c], impulse)
+        if ti.static(self.of_bodies):
+            moment += dot(impulse, self.normal[c]) * self.couple[c]
+        return moment
 
     @ti.func
     def _way(self, i, j, branch, arm, normal, elapsed):
@@ -156,22 +199,28 @@ class PairDashpots:
         return velocity - (self.state.velocity[i] + cross(self.state.spin[i], first))
 
     @ti.func
-    def _share(self, i, j, branch, arm, normal):
+    def _share(self, i, j, branch, arm, met):
         """Velocity per impulse along the normal, and the largest across it [1/kg]."""
-        other = arm + branch
+        other, normal = arm + branch, met.normal
         slack = self.velocities.slack(i) + self.velocities.slack(j)
         # trace([r]x^T A [r]x) and n [r]x^T A [r]x n, for both bodies.
         first, second = cross(other, normal), cross(arm, normal)
         along = dot(normal, matvec(slack, normal))
         turn_i, turn_j = self.velocities.turn[i], self.velocities.turn[j]
         along += dot(first, matvec(turn_i, first)) + dot(second, matvec(turn_j, second))
+        first_along, second_along = first, second
         across = slack.trace()
         for c in ti.static(range(3)):
             axis = unit3()[:, c]
             first, second = cross(other, axis), cross(arm, axis)
             across += dot(first, matvec(turn_i, first))
             across += dot(second, matvec(turn_j, second))
-        return ti.Vector([along, across - along])
+        across -= along
+        if ti.static(self.of_bodies):
+            first, second = first_along + met.couple, second_along + met.couple
+            along = dot(normal, matvec(slack, normal))
+            along += dot(first, matvec(turn_i, first)) + dot(second, matvec(turn_j, second))
+        return ti.Vector([along, across])
 
     @ti.func
     def visit(self, p):
@@ -179,36 +228,38 @@ class PairDashpots:
         change2 = 0.0
         pair = self.store.body[p]
         m = self.tables.pair(pair[0], pair[1])
-        damping = self.schedule.step_seconds[0] * self.contacts.law.damping(m)
         start = self.store.first[p]
         for c in range(start, start + self.touching[p]):
-            found = self._visit(m, c, pair[0], pair[1], self.branch[p], damping)
+            found = self._visit(m, c, pair[0], pair[1], self.branch[p])
             change2 = ti.max(change2, found)
         return change2
 
     @ti.func
-    def _visit(self, m, c, i, j, branch, damping):
-        k, arm, share = self.entry[c], self.arm[c], self.share[c]
+    def _visit(self, m, c, i, j, branch):
+        k, share = self.entry[c], self.share[c]
         linear, angular = self.velocities.apart(i, j, branch)
-        found = self._answer(m, c, linear + cross(angular, arm), damping)
+        found = self._answer(m, c, linear, angular)
         step = self.impulse[k] - found
         self.impulse[k] = found
-        self.velocities.pull(i, j, branch, step, cross(arm, step))
+        self.velocities.pull(i, j, branch, step, self._moment(c, step))
         return share[0] * share[0] * squared(step)
 
     @ti.func
-    def _answer(self, m, c, velocity, damping):
+    def _answer(self, m, c, linear, angular):
         """Impulse of a contact by its laws [N s], with those of all others as they are.
 
-        velocity: of the second sphere against the first, with the present impulse [m/s].
+        linear, angular: velocity [m/s] and spin [1/s] of the second body against the first, with
+        the present impulse.
         """
         normal, share, held = self.normal[c], self.share[c], self.impulse[self.entry[c]]
-        pressed, rate = dot(held, normal), dot(velocity, normal)
+        velocity, damping = linear + cross(angular, self.arm[c]), self._damping(m, c)
+        pressed, along = dot(held, normal), dot(velocity, normal)
+        rate = along + self._turned(c, angular)
         # The opening rate without this contact's own impulse, and the law solved for the impulse.
         free = rate - share[0] * pressed
         found = ti.max(0.0, (self.push[c] - damping * free) / (1.0 + damping * share[0])) * normal
         if ti.static(self.has_friction):
-            slide = velocity - rate * normal - share[1] * (held - pressed * normal)
+            slide = velocity - along * normal - share[1] * (held - pressed * normal)
             bound = self.tables.friction.limit(m, dot(found, normal))
             stick = -damping / (1.0 + damping * share[1])
             if ti.static(self.springs.present):
@@ -230,7 +281,6 @@ class PairDashpots:
             i, j, branch = pair[0], pair[1], self.branch[p]
             after, turned = self.velocities.apart(i, j, branch)
             m = self.tables.pair(i, j)
-            damping = self.schedule.step_seconds[0] * self.contacts.law.damping(m)
             spin = self.state.spin[i]
             before = self.state.velocity[j] - self.state.velocity[i] - cross(spin, branch)
             linear = 0.5 * (after + before)
@@ -239,8 +289,9 @@ class PairDashpots:
             dragged, rubbed, active = 0.0, 0.0, ti.i64(0)
             for c in range(start, start + self.touching[p]):
                 velocity, normal = linear + cross(angular, self.arm[c]), self.normal[c]
-                impulse = self._answer(m, c, after + cross(turned, self.arm[c]), damping)
-                pressed, rate = dot(impulse, normal), dot(velocity, normal)
+                impulse = self._answer(m, c, after, turned)
+                pressed = dot(impulse, normal)
+                rate = dot(velocity, normal) + self._turned(c, angular)
                 dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
                 rub = impulse - pressed * normal
                 active |= active_bits(pressed, rub)
@@ -266,16 +317,20 @@ class PairDashpots:
             pushed = self.impulse[k] / dt
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
             near = self.contacts.law.nearest(a, b, turn, offset)
-            met = meeting(near.first, near.reach, near.apart, self.state.rotation[i])
+            met = self.contacts.law.meeting(near, k, self.state.rotation[i])
             arm = met.arm - branch
             found.force += pushed
             found.moment_i -= cross(met.arm, pushed)
             found.moment_j += cross(arm, pushed)
             velocity = self._velocity(i, j, met.arm, arm)
             rate, pressed = dot(velocity, met.normal), dot(pushed, met.normal)
+            if ti.static(self.of_bodies):
+                found.moment_i -= pressed * met.couple
+                found.moment_j += pressed * met.couple
+                rate += dot(met.couple, self.state.spin[j] - self.state.spin[i])
             spring = 0.0
             if near.can_meet == 1:
-                spring = self.contacts.law.elastic(m, ti.max(met.overlap, 0.0))
+                spring = met.area * self.contacts.law.elastic(m, ti.max(met.overlap, 0.0))
             found.dragged += (spring - pressed) * rate
             rub = pushed - pressed * met.normal
             if ti.static(self.springs.present):

@@ -1,0 +1,244 @@
+"""Contact of whole bodies, whose energy is that of the volume in which they overlap."""
+
+from dataclasses import replace
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.kit import fixed_order
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.fixed_order import length
+from taichi_dem.kit.products import cross, matvec, norm
+from taichi_dem.kit.types import real, vec3, vec4
+from taichi_dem.kit.validation import whole
+from taichi_dem.laws.sphere_contact import SphereContact
+from taichi_dem.materials import Material
+from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.mesh.tetrahedra import LOCAL_FACES, signed_volumes
+from taichi_dem.physics.body_overlap import (
+    depths,
+    pushed_out,
+    ray_ends,
+    sum_of_rays,
+)
+from taichi_dem.physics.sphere_pair import Meeting, Nearest
+from taichi_dem.state.capacity import Capacity
+from taichi_dem.state.model import Model
+from taichi_dem.state.pair_store import PairStore
+
+#: Largest number of parts of an edge, and overlap [m2] that counts as none.
+_MOST_PARTS, _NONE = 8, 1e-28
+
+
+@ti.data_oriented
+class BodyContact(SphereContact):
+    """Bodies repel each other by the gradient of an energy of their overlap; outer faces too.
+
+    Takes the place of ``SphereContact``. The energy of a pair is k (q - q0)^2 / 2, k the normal
+    stiffness of a bond per area and q the size of the overlap, the area of contact's root times the
+    depth where flat sides meet; q0 is the smallest q since the two could first touch. So a break
+    injects nothing, whatever overlaps then. A dashpot acts on the rate of q, never as attraction.
+
+    Parameters
+    ----------
+    parts : int, default 3
+        Equal parts of the edges of a face; parts^2 rays go from the middle of a body to each face.
+    skin : float, default 0.0075
+        Gap up to which pairs enter the candidate list, as a share of the radius of a body to its
+        corners. It changes time, not results.
+    neighbours_per_body : int, default 192
+        Mean capacity of the list of neighbours.
+    pairs_per_body : int, default 48
+        Mean capacity of the list of body pairs.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range.
+
+    References
+    ----------
+    Munjiza, The combined finite-discrete element method (2004), for the potential.
+
+    Examples
+    --------
+    >>> BodyContact(parts=4).parts
+    4
+    """
+
+    name = "body_contact"
+    activation = "bodies touch"
+    meets_bodies = True
+    constant_fields = (
+        *("corner", "normal_of", "plane", "incentre", "volume", "inradius", "face_area"),
+        *("ends", "end_count"),
+    )
+
+    def __init__(
+        self,
+        parts: int = 3,
+        skin: float = 0.0075,
+        neighbours_per_body: int = 192,
+        pairs_per_body: int = 48,
+    ):
+        self.parts = whole("parts", parts, 1, _MOST_PARTS)
+        super().__init__(3, True, skin, neighbours_per_body, pairs_per_body, pairs_per_body)
+
+    def numbers(self, material: Material) -> tuple[float, ...]:
+        """Stiffness [Pa/m] and damping [Pa s/m] per area: those of a bond."""
+        return float(material.normal_stiffness), float(material.normal_damping)
+
+    def spheres(self, model: Model) -> ContactSpheres:
+        """Balls around the faces of all bodies, by which neighbours are found."""
+        spheres = spheres_of_faces(model.mesh, model.centre, self.divisions)
+        corners = _corners(model)[:, LOCAL_FACES]
+        away = length(corners - spheres.cluster[:, :, None, :3]).max(axis=2)
+        cluster = spheres.cluster.copy()
+        cluster[..., 3] = np.maximum(cluster[..., 3], away)
+        return replace(spheres, cluster=cluster, extent=model.body_radius)
+
+    def declare(self, capacity: Capacity) -> None:
+        """Corners, planes (4 x 3 normals, 4 distances) and ray ends of bodies, in their frames.
+
+        incentre: weights of the corners there. volume: [m3]. inradius: [m]. face_area: of the
+        largest face [m2].
+        """
+        self.corner = ti.Matrix.field(4, 3, real, shape=capacity.bodies)
+        self.normal_of = ti.Matrix.field(4, 3, real, shape=capacity.bodies)
+        self.plane = ti.Vector.field(4, real, shape=capacity.bodies)
+        self.incentre = ti.Vector.field(4, real, shape=capacity.bodies)
+        self.volume, self.inradius, self.face_area = (
+            ti.field(real, shape=capacity.bodies) for _ in range(3)
+        )
+        self.ends = ti.Vector.field(4, real, shape=4 * _MOST_PARTS**2)
+        self.end_count = ti.field(ti.i32, shape=())
+
+    def declare_columns(self, store: PairStore) -> None:
+        """Keep q0 [m2] of each pair, and 1 once it is known."""
+        self.rest = store.sphere_column("rest_overlap", real, 2)
+
+    def load(self, model: Model) -> None:
+        """Load the bodies of a scene."""
+        corners = _corners(model)
+        faces = corners[:, LOCAL_FACES]
+        normal = np.cross(faces[:, :, 1] - faces[:, :, 0], faces[:, :, 2] - faces[:, :, 0])
+        twice = length(normal)
+        normal /= twice[..., None]
+        volume = signed_volumes(model.mesh.points, model.mesh.tetrahedra)
+        whole_area = 0.5 * twice.sum(axis=1)
+        ends = ray_ends(self.parts)
+        assign(self.corner, corners)
+        assign(self.normal_of, normal)
+        assign(self.plane, fixed_order.dot(normal, faces[:, :, 0]))
+        assign(self.incentre, 0.5 * twice / whole_area[:, None])
+        assign(self.volume, volume)
+        assign(self.face_area, 0.5 * twice.max(axis=1))
+        assign(self.inradius, 3.0 * volume / whole_area)
+        assign(self.ends, np.concatenate([ends, np.zeros((4 * _MOST_PARTS**2 - len(ends), 4))]))
+        assign(self.end_count, len(ends))
+
+    @ti.func
+    def nearest(self, a, b, turn, offset):
+        """How bodies a and b overlap, or a bound of their gap, a ``Nearest``.
+
+        first: middle of the shared volume. apart: direction of the force on the second. reach:
+        overlap as if a flat side met a flat one [m], or minus the gap.
+        """
+        corners, normals = self._placed(b, turn, offset)
+        mine, others = self._depths(a, b, corners, normals, offset)
+        return self._overlap(a, b, mine, others, corners, normals)
+
+    @ti.func
+    def gap(self, a, b, turn, offset):
+        """A bound of the way that bodies may go before a ray of one enters the other [m]."""
+        return ti.max(0.0, -self.nearest(a, b, turn, offset).reach)
+
+    @ti.func
+    def _depths(self, a, b, corners, normals, offset):
+        """Depths of the corners of body a below the planes of body b [m], and the other way."""
+        distances = self.plane[b]
+        for g in ti.static(range(4)):
+            for k in ti.static(range(3)):
+                distances[g] += normals[g, k] * offset[k]
+        mine = depths(self.corner[a], normals, distances)
+        return mine, depths(corners, self.normal_of[a], self.plane[a])
+
+    @ti.func
+    def _placed(self, b, turn, offset):
+        """Corners and outward normals of the second body in the frame of the first."""
+        corners = self.corner[b] @ turn.transpose()
+        for c in ti.static(range(4)):
+            for k in ti.static(range(3)):
+                corners[c, k] += offset[k]
+        return corners, self.normal_of[b] @ turn.transpose()
+
+    @ti.func
+    def _overlap(self, a, b, mine, others, corners, normals):
+        """The ``Nearest`` of two bodies that may overlap."""
+        force, moment, middle = vec3(0.0), vec3(0.0), vec3(0.0)
+        doubled, volume, outside = 0.0, 0.0, 1e30
+        for side in range(2):
+            body, depth, at, planes, sign = a, mine, self.corner[a], normals, -1.0
+            if side == 1:
+                body, depth, at, planes, sign = b, others, corners, self.normal_of[a], 1.0
+            total, slope, apart = sum_of_rays(
+                depth, self.incentre[body], self.volume[body], self.ends, self.end_count[None]
+            )
+            outside = ti.min(outside, apart)
+            push, turning, place, shared = pushed_out(slope, planes, at)
+            force, moment = force + sign * push, moment + sign * turning
+            middle, volume, doubled = middle + place, volume + shared, doubled + total
+        size, strength = ti.min(self.inradius[a], self.inradius[b]), norm(force)
+        near = Nearest(reach=-outside, can_meet=1, size=size)
+        if doubled > _NONE * _NONE and strength > 0.0:
+            middle /= volume
+            near.first, near.apart = vec4(middle[0], middle[1], middle[2], 0.0), force / strength
+            near.couple = (moment - cross(middle, force)) / strength
+            # The overlap is q = sqrt(doubled) [m2], and moves by this much a metre.
+            slope = 0.5 * strength / ti.sqrt(doubled)
+            near.area, near.reach = slope * slope, ti.sqrt(doubled) / slope
+        else:
+            near.apart = vec3(1.0, 0.0, 0.0)
+        return near
+
+    @ti.func
+    def largest_area(self, a, b):
+        """Bound of the area of contact of two bodies [m2]."""
+        return ti.min(self.face_area[a], self.face_area[b])
+
+    @ti.func
+    def is_within(self, near, margin):
+        """Whether two bodies are nearer than a margin [m]."""
+        return near.can_meet == 1 and near.reach + margin > 0.0
+
+    @ti.func
+    def meeting(self, near, k, rotation):
+        """The ``Meeting`` of entry k; rotation: of the first body."""
+        overlap = near.reach
+        if near.area > 0.0:
+            overlap -= self._rest(near, k) / ti.sqrt(near.area)
+        return Meeting(
+            overlap=overlap,
+            normal=matvec(rotation, near.apart),
+            arm=matvec(rotation, near.first.xyz),
+            area=near.area,
+            couple=matvec(rotation, near.couple),
+        )
+
+    @ti.func
+    def settle(self, near, k):
+        """Take the present overlap of entry k as that at rest, if it is the smallest so far."""
+        self.rest[k] = [self._rest(near, k), 1.0]
+
+    @ti.func
+    def _rest(self, near, k):
+        """Overlap at rest of entry k [m2], as ``settle`` would leave it."""
+        rest = ti.max(near.reach, 0.0) * ti.sqrt(near.area)
+        if self.rest[k][1] > 0.0:
+            rest = ti.min(rest, self.rest[k][0])
+        return rest
+
+
+def _corners(model):
+    """Corners of all bodies in their frames, (n, 4, 3) [m]."""
+    return model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
