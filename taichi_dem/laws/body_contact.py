@@ -70,7 +70,7 @@ class BodyContact(SphereContact):
     activation = "bodies touch"
     meets_bodies = True
     constant_fields = (
-        *("corner", "normal_of", "plane", "incentre", "volume", "inradius", "face_area"),
+        *("corner", "normal_of", "plane", "incentre", "volume", "face_area"),
         *("ends", "end_count"),
     )
 
@@ -100,16 +100,13 @@ class BodyContact(SphereContact):
     def declare(self, capacity: Capacity) -> None:
         """Corners, planes (4 x 3 normals, 4 distances) and ray ends of bodies, in their frames.
 
-        incentre: weights of the corners there. volume: [m3]. inradius: [m]. face_area: of the
-        largest face [m2].
+        incentre: weights of the corners there. volume: [m3]. face_area: of the largest face [m2].
         """
         self.corner = ti.Matrix.field(4, 3, real, shape=capacity.bodies)
         self.normal_of = ti.Matrix.field(4, 3, real, shape=capacity.bodies)
         self.plane = ti.Vector.field(4, real, shape=capacity.bodies)
         self.incentre = ti.Vector.field(4, real, shape=capacity.bodies)
-        self.volume, self.inradius, self.face_area = (
-            ti.field(real, shape=capacity.bodies) for _ in range(3)
-        )
+        self.volume, self.face_area = (ti.field(real, shape=capacity.bodies) for _ in range(2))
         self.ends = ti.Vector.field(4, real, shape=4 * _MOST_PARTS**2)
         self.end_count = ti.field(ti.i32, shape=())
 
@@ -133,7 +130,6 @@ class BodyContact(SphereContact):
         assign(self.incentre, 0.5 * twice / whole_area[:, None])
         assign(self.volume, volume)
         assign(self.face_area, 0.5 * twice.max(axis=1))
-        assign(self.inradius, 3.0 * volume / whole_area)
         assign(self.ends, np.concatenate([ends, np.zeros((4 * _MOST_PARTS**2 - len(ends), 4))]))
         assign(self.end_count, len(ends))
 
@@ -142,7 +138,8 @@ class BodyContact(SphereContact):
         """How bodies a and b overlap, or a bound of their gap, a ``Nearest``.
 
         first: middle of the shared volume. apart: direction of the force on the second. reach:
-        overlap as if a flat side met a flat one [m], or minus the gap.
+        overlap as if a flat side met a flat one [m], or minus the gap. reach / size: share of the
+        smaller body that both fill.
         """
         corners, normals = self._placed(b, turn, offset)
         mine, others = self._depths(a, b, corners, normals, offset)
@@ -188,8 +185,7 @@ class BodyContact(SphereContact):
             push, turning, place, shared = pushed_out(slope, planes, at)
             force, moment = force + sign * push, moment + sign * turning
             middle, volume, doubled = middle + place, volume + shared, doubled + total
-        size, strength = ti.min(self.inradius[a], self.inradius[b]), norm(force)
-        near = Nearest(reach=-outside, can_meet=1, size=size)
+        near, strength = Nearest(reach=-outside, can_meet=1, size=1.0), norm(force)
         if doubled > _NONE * _NONE and strength > 0.0:
             middle /= volume
             near.first, near.apart = vec4(middle[0], middle[1], middle[2], 0.0), force / strength
@@ -197,6 +193,7 @@ class BodyContact(SphereContact):
             # The overlap is q = sqrt(doubled) [m2], and moves by this much a metre.
             slope = 0.5 * strength / ti.sqrt(doubled)
             near.area, near.reach = slope * slope, ti.sqrt(doubled) / slope
+            near.size = 2.0 * near.reach * ti.min(self.volume[a], self.volume[b]) / volume
         else:
             near.apart = vec3(1.0, 0.0, 0.0)
         return near

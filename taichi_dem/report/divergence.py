@@ -90,7 +90,10 @@ class DivergenceCheck:
             return
         bodies, _, deepest = contacts.store.near_table()
         pair = int(deepest.argmax())
-        if deepest[pair] > DEEPEST_OVERLAP:
+        if contacts.law.meets_bodies:
+            if deepest[pair] > DEEPEST_SHARE:
+                self._shares(*bodies[pair].tolist(), deepest[pair])
+        elif deepest[pair] > DEEPEST_OVERLAP:
             body, other = bodies[pair].tolist()
             inside, size = f"one of body {other}", "their radii"
             if contacts.law.meets_faces:
@@ -105,9 +108,11 @@ class DivergenceCheck:
             return
         place = int(volume.share.argmax())
         if volume.share[place] > DEEPEST_SHARE:
-            body, other = volume.pairs[place].tolist()
-            share = f"{100 * volume.share[place]:.0f} %"
-            raise self._too_deep(body, f"shares {share} of its volume with body {other}")
+            self._shares(*volume.pairs[place].tolist(), volume.share[place])
+
+    def _shares(self, body, other, share):
+        what = f"shares {100 * share:.0f} % of its volume with body {other}"
+        raise self._too_deep(body, what)
 
     def _check_energy(self):
         account = self.energy_balance.account()
