@@ -44,7 +44,6 @@ from taichi_dem import (
     Every,
     ImplicitDashpots,
     Scene,
-    plot,
     read_mesh,
     simulate,
 )
@@ -160,8 +159,8 @@ def run(options):
 def draw(result, fall, at):
     """Draw and write everything that is plotted."""
     plot_deep_cracks(at("cracks.png"), result, HoleMonitor(result.model, "hole").axis_point)
-    plot.plot_attenuation(at("peaks.png"), fall, FROM_RADII)
-    plot.plot_energy(at("energy.png"), result.history)
+    result.plot.attenuation("hole", nearest=FROM_RADII, path=at("peaks.png"))
+    result.plot.energy(path=at("energy.png"))
     peaks = {"distance_radii": fall.distance, "peak_speed_m_s": fall.speed}
     write_csv(at("peaks.csv"), {**peaks, "nearer_to_hole": fall.inner.astype(int)})
 

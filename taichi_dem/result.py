@@ -4,6 +4,7 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MethodType, SimpleNamespace
 from typing import Any, Optional
 
 import numpy as np
@@ -146,11 +147,15 @@ class Result(RunTables):
 
     @property
     def plot(self) -> Any:
-        """Pictures of the run, one function each: ``result.plot.energy(path="energy.png")``."""
-        # Imported here, so that matplotlib loads only where a picture is drawn.
-        from taichi_dem.plot.result.plots import ResultPlots
+        """Pictures of the run, a function of ``taichi_dem.plot`` each.
 
-        return ResultPlots(self)
+        ``result.plot.energy(path="energy.png")`` is ``plot_energy(result, path="energy.png")``.
+        """
+        # Imported here, so that matplotlib loads only where a picture is drawn.
+        from taichi_dem import plot
+
+        drawn = {name.removeprefix("plot_"): getattr(plot, name) for name in plot.__all__}
+        return SimpleNamespace(**{name: MethodType(one, self) for name, one in drawn.items()})
 
     def _figures(self):
         """The main figures of the run, (name, text) each."""

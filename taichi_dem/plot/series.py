@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, seconds
 from taichi_dem.kit.validation import FileName
-from taichi_dem.output.record import outward_columns
+from taichi_dem.output.run_tables import RunTables
 from taichi_dem.plot.bodies import shades
 
 #: Energy terms from the bottom of the stack up, with colours and dashes: blue is held, orange lost
@@ -32,9 +32,10 @@ _GIVEN = {
 }
 
 
-_AT_HOLE = {
-    "monitor_displacement_mm": "body of the hole nearest to the free face",
-    "hole_radial_displacement_mm": "outward, mean over the hole's bodies",
+_MEAN = "outward, mean over the hole's bodies"
+_AT_HOLE: dict[str, Any] = {
+    "monitor_displacement_mm": {"color": RED, "label": "body of the hole nearest to the free face"},
+    "hole_radial_displacement_mm": {"color": BLUE, "linestyle": "--", "label": _MEAN},
 }
 
 
@@ -60,19 +61,13 @@ def plot_pressure(
         axes.set(xlim=(0.0, time_ms[-1]), ylim=(0.0, 1.12 * pressure[peak]))
 
 
-def plot_history(path: Optional[FileName], history: Mapping[str, np.ndarray]) -> Figure:
+def at_hole(path: Optional[FileName], history: Mapping[str, np.ndarray]) -> Figure:
     """Displacement at the hole, broken faces and the smallest step over time."""
     time = 1e3 * history["time_s"]
     with picture(path, 3, 1, size=(6.2, 6.6), sharex=True) as (figure, (top, middle, bottom)):
-        lines = {f"{hole}, outward": moved for hole, moved in outward_columns(history).items()}
-        looks: Any = ({},) * len(lines)
-        if "hole_radial_displacement_mm" in history:
-            lines = {words: history[name] for name, words in _AT_HOLE.items()}
-            looks = {"color": RED}, {"color": BLUE, "linestyle": "--"}
-        for (label, moved), look in zip(lines.items(), looks):
-            top.plot(time, moved, label=label, **look)
-        if lines:
-            top.legend(loc="upper left")
+        for name, look in _AT_HOLE.items():
+            top.plot(time, history[name], **look)
+        top.legend(loc="upper left")
         top.set(ylabel="displacement [mm]", ylim=(0.0, None))
         middle.step(time, history["broken_faces"], where="post", color=BLUE)
         middle.set(ylabel="broken faces [1]", ylim=(0.0, None))
@@ -91,8 +86,9 @@ def _smallest_step(axes, time, step_ns):
     _span(axes, time)
 
 
-def plot_energy(path: Optional[FileName], history: Mapping[str, np.ndarray]) -> Figure:
-    """Energy account: where the work went, every term by size, and what is unexplained."""
+def plot_energy(result: RunTables, *, path: Optional[FileName] = None) -> Figure:
+    """Draw the terms of the energy balance over time, and what is unexplained."""
+    history = result.history
     time = 1e3 * history["time_s"]
     present = {key: look for key, look in ENERGY_TERMS.items() if key in history}
     terms = {key: look for key, look in present.items() if np.abs(history[key]).max() > 0.0}

@@ -10,7 +10,7 @@ LAYERS = {
         kit | meshes mesh shapes | materials | elasticity | physics | state
         | laws | loads | effects initial_motion | scene | step_control | methods | contact
         | stability | step | report | engine | simulation
-        | output measured_speedup observers run_plan | plot | viewer
+        | output observers run_plan | plot | viewer
         | result scene_pictures | simulate needed_effects | goals
         | accuracy | solve | demo | __init__ | __main__""",
     "ca_damper": """
