@@ -21,7 +21,7 @@ from _step_too_large import TABLE, Struck, caption, corner_speed, write
 from taichi_dem.kit import study
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.run_plan import macro_steps
+from taichi_dem.observers import macro_steps
 from taichi_dem.simulate import result_of
 
 NAME = "demo_step_too_large"

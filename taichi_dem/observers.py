@@ -22,6 +22,17 @@ from taichi_dem.state.timeline import MACRO_TICKS
 _MOST_CALLS = 1_000_000
 
 
+def macro_steps(until: float, dt0: float) -> int:
+    """Number of largest steps that reach a time [s]; InputError unless it can be counted to."""
+    steps = positive("until", until) / dt0
+    if steps > MOST_STEPS:
+        got, most = told_apart(until, MOST_STEPS * dt0)
+        raise InputError(
+            f"until must be at most {most} s, {MOST_STEPS} largest steps of {dt0:g} s, got {got}"
+        )
+    return max(1, math.ceil(steps - 1e-9))
+
+
 @dataclass(frozen=True)
 class Every:
     """Calls of an observer at even distances, besides at the start and at the end of the run.

@@ -18,7 +18,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, instance, shown, whole
-from taichi_dem.methods import Method, check_method
+from taichi_dem.methods import Method
 from taichi_dem.report.certificate import certificate_of
 from taichi_dem.report.divergence import DivergenceCheck
 from taichi_dem.report.effects import effect_uses, on_demand
@@ -101,7 +101,7 @@ class Simulation(Uncopied):
 
     def __init__(self, scene: Scene, method: Method, driver: str = "auto"):
         instance("scene", scene, Scene)
-        check_method(method)
+        instance("method", method, Method)
         choice("driver", driver, ("auto", *DRIVERS))
         runtime.check_thread("simulation")
         started = time.perf_counter()
@@ -190,8 +190,7 @@ class Simulation(Uncopied):
             The structure differs, or the scene finds no room.
         """
         scene = self.scene if scene is None else instance("scene", scene, Scene)
-        method = self.method if method is None else method
-        check_method(method)
+        method = self.method if method is None else instance("method", method, Method)
         same = scene is self.scene
         model = self.model if same else Model(scene.mesh, scene.body_materials, scene.effects)
         self._check_reset(scene, method, model)
@@ -256,7 +255,6 @@ class Simulation(Uncopied):
         self._open_balance()
         self.sample()
         self.divergence_check.check()
-        self.evaluation_rate()
 
     def _open_balance(self):
         """Begin the energy balance and all else that is followed."""
@@ -380,22 +378,6 @@ class Simulation(Uncopied):
         """
         solver = self.advance.solver
         return int(values(solver.total_sweeps)) if solver is not None else 0
-
-    def evaluation_rate(self) -> float:
-        """Bonds and pairs to evaluate in a simulated second, if all levels stay as they are.
-
-        Returns
-        -------
-        float
-            Rate [1/s].
-        """
-        members = self.schedule.members()
-        steps = 2.0 ** np.arange(len(members))
-        if self.schedule.uniform:
-            steps[:] = 2.0 ** int(values(self.schedule.finest))
-        if self.solves:
-            steps *= 1.0 + self.sweeps() / max(1, int(values(self.schedule.evaluations)[0]))
-        return float(members @ steps) / self.method.dt0
 
     def report(self, brief: bool = False) -> Report:
         """Report of the run so far.

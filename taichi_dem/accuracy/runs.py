@@ -6,7 +6,7 @@ from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem.accuracy.job import Job, Methods
+from taichi_dem.accuracy.job import Job
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.progress.progress import Listener, Progress
 from taichi_dem.kit.study.timing import clock
@@ -44,23 +44,27 @@ class Runs:
     sentence of the last run that diverged.
     """
 
-    def __init__(self, job: Job, methods: Methods, listen: Optional[Listener]):
-        self.job, self.methods, self._listen = job, methods, listen
+    def __init__(self, job: Job, listen: Optional[Listener]):
+        self.job, self._listen = job, listen
         self.seconds, self.count, self.failure = 0.0, 0, ""
         self.results: dict[int, Result] = {}
         self.cost: dict[int, float] = {}
         self._simulation: Optional[Simulation] = None
         self._known: dict[tuple[int, int, bool], Optional[float]] = {}
 
-    def value(self, level: int, twin: int = 0, tight: bool = False) -> Optional[float]:
+    def value(self, level: int, twin: int = 0, tight: bool = False) -> Any:
         """Goal of a run at a level; None for one that diverged.
 
         twin: 0 for the scene as it is, else the seed of its disturbance. tight: see
-        ``Methods.at``.
+        ``Job.method``.
         """
         key = level, twin, tight
         if key not in self._known:
-            self._known[key] = self._run(*key)
+            result = self._timed(*key)
+            self.failure = result.diverged or self.failure
+            if not (twin or tight or result.diverged):
+                self.results[level] = result
+            self._known[key] = None if result.diverged else self.job.goal.value(result)
         return self._known[key]
 
     def parting(self, level: int) -> float:
@@ -100,15 +104,6 @@ class Runs:
         broken = (~np.isnan(self.results[level].broken_time) for level in (coarse, fine))
         return np.array_equal(*broken)
 
-    def _run(self, level, twin, tight):
-        result = self._timed(level, twin, tight)
-        if result.diverged:
-            self.failure = result.diverged
-            return None
-        if not (twin or tight):
-            self.results[level] = result
-        return self.job.goal.value(result)
-
     def _timed(self, level, twin, tight, frames=1):
         """Result of a run, whose CPU time is added to the sum."""
         started = clock()
@@ -127,7 +122,7 @@ class Runs:
 
     def _simulated(self, level, twin, tight, frames, brief):
         """Result of a run; the simulation of the first is used again, which is not set up anew."""
-        method = self.methods.at(level, tight)
+        method = self.job.method(level, tight)
         if self._simulation is None:
             self._simulation = Simulation(self.job.scene, method)
         else:

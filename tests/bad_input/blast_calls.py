@@ -36,7 +36,6 @@ from taichi_dem import (
     in_space_order,
     join,
     mesh_stiffness,
-    methods,
     needed_effects,
     quality_report,
     read_mesh,
@@ -115,7 +114,6 @@ def _scenes():
     yield "Mesh.body_group", PAIR.body_group, chosen
     yield "Mesh.moved", PAIR.moved, {}
     yield "with_body_group", with_body_group, {"mesh": PAIR, **chosen}
-    yield "methods.check_method", methods.check_method, {"method": METHOD}
     yield "Multirate", Multirate, {"control": StepControl()}
     yield "Uniform", Uniform, {"distance": 1e-5, "control": StepControl()}
     yield "StepControl", StepControl, {}

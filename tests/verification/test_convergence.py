@@ -16,6 +16,7 @@ from taichi_dem import (
 )
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar
+from taichi_dem.methods import Method
 from taichi_dem.state.timeline import MAX_LEVEL
 from tests.scenes import brisk_scene
 
@@ -34,11 +35,10 @@ class Unchanged:
         return level
 
 
-class FixedLevels:
+class FixedLevels(Method):
     """Multirate without a rule: the order of a scheme shows where its steps do not jump."""
 
-    name, uniform, solves, steps_ahead = "fixed_levels", False, False, 0.0
-    control, dashpot, distance = None, "full", None
+    name, uniform = "fixed_levels", False
 
     def __init__(self, neighbour):
         self.neighbour, self.dt0 = neighbour, UNTIL / STEPS[0]

@@ -104,11 +104,6 @@ class Schedule:
         """Present time [s]."""
         return int(values(self.state.tick)) * self.tick_seconds
 
-    def members(self) -> np.ndarray:
-        """How many bonds and pairs are evaluated at the step of each level, (MAX_LEVEL + 1,)."""
-        ends = values(self.bonds.end) + values(self.pairs.end)
-        return ends[:-1] - ends[1:]
-
     @ti.func
     def pair_step(self, i, j):
         """Time [s] until a pair of bodies is evaluated again: the smaller of their steps."""
