@@ -19,6 +19,7 @@ import numpy as np
 
 from taichi_dem.effects import GasPressure, ShearSlip, SphereContact
 from taichi_dem.kit import study
+from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.study.entries import Entry
 from taichi_dem.materials import CONCRETE
@@ -30,8 +31,8 @@ from taichi_dem.plot.series import (
     level_columns,
     level_shares,
     plot_levels,
-    plot_pressure,
 )
+from taichi_dem.plot.tables import plot_columns
 from taichi_dem.report.certificate import Certificate
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
@@ -148,12 +149,13 @@ def picture(result: Result, folder: str) -> None:
         When the folder cannot be made or written to.
     """
     at = study.output_paths(folder)
-    frames, history, drawn = result.frames, result.history, result.plot
+    frames, drawn = result.frames, result.plot
     write_bodies(at("bodies.csv"), frames)
     for gas in (load for load in result.model.loads if isinstance(load, GasPressure)):
         time_s = np.linspace(0.0, 1.1 * gas.duration, 400)
         pressure = gas.pressure_at(time_s)
-        plot_pressure(at("pressure.png"), time_s, pressure, history["time_s"][-1])
+        curve = Table({"time_s": time_s, "pressure": pressure}, {"pressure": "Pa"})
+        plot_columns(at("pressure.png"), curve, ["pressure"])
         write_csv(at("pressure.csv"), {"time_s": time_s, "pressure_pa": pressure})
     drawn.history(path=at("history.png"))
     drawn.energy(path=at("energy.png"))

@@ -70,7 +70,7 @@ def _rows(name, given, mesh, centre) -> tuple[np.ndarray, list[_Shared]]:
 def _by_group(name, given, mesh):
     """The same from vectors by body group; bodies in none are at rest."""
     rows, shared = np.zeros((mesh.body_count, 3)), []
-    taken: dict[int, str] = {}
+    taken = np.zeros(mesh.body_count, dtype=bool)
     for group, value in given.items():
         try:
             bodies = mesh.group_bodies(group)
@@ -79,13 +79,11 @@ def _by_group(name, given, mesh):
                 f"{name} must have names of body groups, got {shown(given)}: {error}"
             ) from None
         vector = np.array(direction(f"{name}[{group!r}]", value))
-        for body in bodies.tolist():
-            if body in taken:
-                raise InputError(
-                    f"{name} must have each body in one group at most, got body {body} in "
-                    f"{taken[body]} and in {group}"
-                )
-            taken[body] = group
-        rows[bodies] = vector
+        if taken[bodies].any():
+            raise InputError(
+                f"{name} must have each body in one group at most, got body "
+                f"{bodies[taken[bodies]][0]} in {group} and in another"
+            )
+        rows[bodies], taken[bodies] = vector, True
         shared.append((bodies, vector))
     return rows, shared

@@ -8,9 +8,6 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import between, choice, plain_fields, positive, shown
 from taichi_dem.step_control import Displacement, FixedStep, StepControl
 
-NEIGHBOURS = ("held", "drifted")
-DASHPOTS = ("full", "limited")
-
 
 class Method:
     """How bodies step; the base of the methods here and of one's own.
@@ -29,11 +26,11 @@ class Method:
     uniform : bool
         Whether all bodies share one step.
     neighbour : str
-        One of NEIGHBOURS.
+        "held" or "drifted", see ``Multirate``.
     control : StepControl or None
         Further limits of the step.
     dashpot : str
-        One of DASHPOTS.
+        "full" or "limited", see ``Uniform``.
     distance : float or None
         Largest displacement of a body in a step [m]; None for no limit.
     solves : bool
@@ -121,8 +118,8 @@ class _Explicit(Method):
         # Without a limit of the way there is one level only.
         if self.distance is not None or not self.uniform:
             positive("distance", self.distance)
-        choice("neighbour", self.neighbour, NEIGHBOURS)
-        choice("dashpot", self.dashpot, DASHPOTS)
+        choice("neighbour", self.neighbour, ("held", "drifted"))
+        choice("dashpot", self.dashpot, ("full", "limited"))
         rule = self.control
         if rule is not None and not isinstance(rule, StepControl):
             raise InputError(f"control must be a StepControl or None, got {shown(rule)}")

@@ -13,7 +13,7 @@ from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import counted, embedded, in_brief, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, remove_files, write_csv, write_text
-from taichi_dem.kit.validation import FileName, shown
+from taichi_dem.kit.validation import FileName
 from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.output.receivers import Received, write_receivers
@@ -113,37 +113,6 @@ class Result(RunTables):
     def effects(self) -> Table:
         """One row for each effect: what it did, since when, what was left out, and advice."""
         return self.report.advice().table()
-
-    def mean_displacement(self, bodies: np.ndarray) -> np.ndarray:
-        """Mean displacement of some bodies.
-
-        Parameters
-        ----------
-        bodies : ndarray
-            Numbers of the bodies, or a mask of all.
-
-        Returns
-        -------
-        ndarray
-            Displacement [m], shape (frames, 3).
-
-        Raises
-        ------
-        InputError
-            There is no such body, or none is chosen.
-        """
-        numbers = np.arange(self.model.body_count)
-        try:
-            chosen = numbers[np.atleast_1d(bodies)]
-        except (IndexError, ValueError):
-            chosen = numbers[:0]
-        if not chosen.size:
-            raise InputError(
-                f"bodies must be numbers from 0 to {len(numbers) - 1} or a mask of "
-                f"{len(numbers)}, got {shown(bodies)}"
-            )
-        ways = (frame.displacement[chosen].T for frame in self.frames)
-        return np.array([[along.mean() for along in way] for way in ways]).reshape(-1, 3)
 
     @property
     def plot(self) -> Any:

@@ -4,7 +4,6 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
-from taichi_dem.kit.allocation import values
 from taichi_dem.kit.checkpoint import Checkpoint, digest, identity_of, version_text
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.field_memory import FieldMemory
@@ -43,12 +42,8 @@ def writer_of(
         saved_run(simulation, recorder).restore(arrays, resume)
     if checkpoint is None:
         return NoCheckpointWriter()
-
-    def now():
-        """Present largest step, and time [s]."""
-        return int(values(simulation.state.tick)) // MACRO_TICKS, simulation.time_s
-
-    return CheckpointWriter(checkpoint, saved_run(simulation, recorder), now)
+    run = saved_run(simulation, recorder)
+    return CheckpointWriter(checkpoint, run, lambda: (simulation.macro_step, simulation.time_s))
 
 
 def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:

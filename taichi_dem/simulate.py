@@ -254,16 +254,13 @@ def _checked(observers):
     if not isinstance(observers, (list, tuple)):
         raise InputError(f"observers must be a list of observers, got {shown(observers)}")
     for place, one in enumerate(observers):
-        when = getattr(one, "when", None)
-        if not isinstance(when, (Every, At)):
+        timed = isinstance(getattr(one, "when", None), (Every, At))
+        if isinstance(one, type) or not (timed and callable(getattr(one, "observe", None))):
             raise InputError(
-                f"observers[{place}] must have a member when, an Every or an At, got {shown(when)}"
+                f"observers[{place}] must have a member when, an Every or an At, and a method "
+                f"observe(view), got {shown(one)}"
             )
-        if isinstance(one, type) or not callable(getattr(one, "observe", None)):
-            raise InputError(
-                f"observers[{place}] must have a method observe(view), got {shown(one)}"
-            )
-    return tuple(observers)
+    return observers
 
 
 def _receivers_among(observers):

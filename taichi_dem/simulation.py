@@ -106,7 +106,7 @@ class Simulation(Uncopied):
         runtime.check_thread("simulation")
         started = time.perf_counter()
         compiling("set-up", 0.0)
-        self.scene, self.method, self.solves = scene, method, method.solves
+        self.scene, self.method = scene, method
         self.model = Model(scene.mesh, scene.body_materials, scene.effects)
         name = driver_name(driver, self.model.bond_count)
         structure = Structure(scene.effects, method, scene.on_demand)
@@ -214,6 +214,11 @@ class Simulation(Uncopied):
     def time_s(self) -> float:
         """Present time [s]."""
         return self.schedule.time_s
+
+    @property
+    def macro_step(self) -> int:
+        """Number of largest steps done."""
+        return int(values(self.state.tick)) // MACRO_TICKS
 
     def start(self) -> None:
         """Choose the first steps, evaluate the bonds and open the account; done once.

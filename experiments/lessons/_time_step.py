@@ -62,7 +62,7 @@ class Strike:
         )
         end, frames = result.model.centre[:, 0] > LENGTH * (1.0 - 1.0 / CELLS[0]), result.frames
         self.moved = np.full(SAMPLES + 1, np.nan)
-        self.moved[: len(frames)] = result.mean_displacement(end)[:, 0]
+        self.moved[: len(frames)] = [frame.displacement[end, 0].mean() for frame in frames]
         self.motion = frames[SHOWN] if len(frames) > SHOWN else None
 
     def error(self, truth):

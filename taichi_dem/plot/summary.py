@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from taichi_dem.kit.display import scale
 from taichi_dem.kit.plot_style import BLACK, BLUE, png_of, styled
 from taichi_dem.output.record import outward_columns
 from taichi_dem.output.run_tables import RunTables
@@ -22,7 +23,6 @@ _VISIBLE = 0.08
 #: Displacements below this share of the block's size are round-off, and not magnified.
 _ROUND_OFF = 1e-12
 _BROKEN = "broken bonds"
-_PREFIXES = ("p", "n", "µ", "m", "", "k", "M", "G", "T")
 #: Energies by what they are: terms of the account that add up to them, and look; the colours are
 #: near those of ``series.plot_energy``.
 _ENERGIES: dict[str, Any] = {
@@ -152,13 +152,6 @@ def _largest(values):
     """Largest finite size of values, 0 where there is none."""
     values = np.abs(np.asarray(values, dtype=float))
     return float(values[np.isfinite(values)].max(initial=0.0))
-
-
-def scale(largest: float, unit: str) -> Any:
-    """Factor and name of the unit in which a value has one to three digits before the point."""
-    power = math.floor(math.log10(largest) / 3.0 + 1e-9) if largest > 0.0 else 0
-    power = min(max(power, -4), len(_PREFIXES) - 5)
-    return 1e3**-power, f"{_PREFIXES[power + 4]}{unit}"
 
 
 def _round_down(factor):

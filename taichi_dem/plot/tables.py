@@ -9,22 +9,22 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.display import scale
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, SPARE_COLOURS, area_key, picture
 from taichi_dem.kit.units import without_unit
 from taichi_dem.kit.validation import FileName, choices, positive, unit_vector
 from taichi_dem.output.body_values import COLOURS, body_values, scale_end
 from taichi_dem.output.run_tables import RunTables
 from taichi_dem.plot.bodies import ALONG_Z, JOINT, draw_bodies, frame_block
-from taichi_dem.plot.series import ENERGY_TERMS, at_hole
-from taichi_dem.plot.summary import scale
+from taichi_dem.plot.series import ENERGY_TERMS
 from taichi_dem.plot.view import View
 
 #: Fragments of a colour of their own; lighter ones are grey.
 _NAMED = 6
 #: What columns of a unit are called together.
 _KINDS = {"J": "energy", "m/s": "speed", "m": "length", "mm": "displacement", "s": "time"}
-#: Columns that are drawn where there is no hole to look at.
-_PLAIN = ("largest_speed_m_s", "broken_faces", "smallest_step_s")
+_SCALED = ("s", "m", "J", "m/s", "N", "Pa")
+_AT_HOLE = ("monitor_displacement_mm", "hole_radial_displacement_mm")
 
 
 def plot_history(
@@ -41,18 +41,19 @@ def plot_history(
     path : str or path, optional
     """
     history = result.history
-    if names is None and "hole_radial_displacement_mm" in history:
-        return at_hole(path, history)
-    return _columns(path, history, _PLAIN if names is None else names)
+    if names is None:
+        moved = [name for name in _AT_HOLE if name in history] or ["largest_speed_m_s"]
+        names = [*moved, "broken_faces", "smallest_step_s"]
+    return plot_columns(path, history, names)
 
 
 def plot_crack_area(result: RunTables, *, path: Optional[FileName] = None) -> Figure:
     """Draw the area of all cracks over time."""
-    return _columns(path, result.crack_area(), ["crack_area_m2"])
+    return plot_columns(path, result.crack_area(), ["crack_area_m2"])
 
 
-def _columns(path: Optional[FileName], table: Table, names: Sequence[str]) -> Figure:
-    """Columns of a table over its time_s; those of one unit share a panel."""
+def plot_columns(path: Optional[FileName], table: Table, names: Sequence[str]) -> Figure:
+    """Draw columns of a table over its time_s; those of one unit share a panel."""
     names = choices("names", names, [name for name in table if name != "time_s"])
     units = list(dict.fromkeys(table.units[name] for name in names))
     factor, unit = scale(float(np.abs(table["time_s"]).max(initial=0.0)), "s")
@@ -69,7 +70,7 @@ def _draw(axes, time, table, names, unit):
     """A panel of columns of one unit, scaled to one that is readable."""
     largest = max(float(np.abs(table[name]).max(initial=0.0)) for name in names)
     # Numbers take no prefix, and what has one in its name keeps it.
-    factor, words = scale(largest, unit) if unit in ("s", "m", "J", "m/s", "N") else (1.0, unit)
+    factor, words = scale(largest, unit) if unit in _SCALED else (1.0, unit)
     words = words.replace("^2", "²").replace("^3", "³")
     for k, name in enumerate(names):
         colour, line = SPARE_COLOURS[k % len(SPARE_COLOURS)], ("-", "--")[k % 2]

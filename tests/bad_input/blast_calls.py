@@ -161,7 +161,6 @@ def _questions():
     yield "goals.displacement", goals.displacement, {"group": "left"}
     yield "goals.energy_share", goals.energy_share, {"term": "kinetic"}
     yield "goals.hole_displacement", goals.hole_displacement, {}
-    yield "goals.peak_particle_velocity", goals.peak_particle_velocity, {"distance": 0.5}
     yield "goals.peak_speed", goals.peak_speed, {"body": 0}
     yield "elastic_report", elastic_report, {"scene": Scene(BAR, rock)}
     yield "estimated_effects", estimated_effects, {"scene": SCENE, "until": 1e-5}
@@ -191,7 +190,6 @@ def _results():
     series = {"folder": path("pv"), "model": done.model, "frames": done.frames}
     yield "write_paraview", write_paraview, series
     where = "result.Result"
-    yield f"{where}.mean_displacement", done.mean_displacement, {"bodies": np.arange(2)}
     yield f"{where}.write", run().write, {"folder": path("o")}
     page = {"path": path("v.html"), "open_browser": False}
     yield f"{where}.show", run(frames=1).show, page
