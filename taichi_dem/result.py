@@ -10,7 +10,7 @@ from typing import Any, Optional
 import numpy as np
 
 from taichi_dem.kit.data_table import Table
-from taichi_dem.kit.display import counted, embedded, in_brief, table, titled, unfolded
+from taichi_dem.kit.display import counted, embedded, in_brief, titled, verbatim
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, remove_files, write_csv, write_text
 from taichi_dem.kit.validation import FileName
@@ -19,7 +19,6 @@ from taichi_dem.mesh.files import write_mesh
 from taichi_dem.output.receivers import Received, write_receivers
 from taichi_dem.output.record import (
     Frame,
-    outward_columns,
     remove_series,
     series_name,
     write_bonds,
@@ -36,7 +35,7 @@ from taichi_dem.state.model import Model
 class Result(RunTables):
     """Result of a run.
 
-    As the last line of a notebook's cell it shows a picture and a table.
+    As the last line of a notebook's cell it shows a picture and the report.
 
     Parameters
     ----------
@@ -96,13 +95,9 @@ class Result(RunTables):
         from taichi_dem.plot.summary import picture_of_run
 
         words = "The block, its energy and what happened in it over time"
-        return titled(
-            f"Result: {self.report.outcome}",
-            embedded(picture_of_run(self), words),
-            table(self._figures()),
-            unfolded("All figures of the run", str(self.report)),
-            warning=self.diverged,
-        )
+        title = f"Result: {counted(self.model.body_count, 'body')}, {self.report.outcome}"
+        shown = embedded(picture_of_run(self), words), verbatim(str(self.report))
+        return titled(title, *shown, warning=self.diverged)
 
     @property
     def certificate(self) -> Optional[Certificate]:
@@ -125,28 +120,6 @@ class Result(RunTables):
 
         drawn = {name.removeprefix("plot_"): getattr(plot, name) for name in plot.__all__}
         return SimpleNamespace(**{name: MethodType(one, self) for name, one in drawn.items()})
-
-    def _figures(self):
-        """The main figures of the run, (name, text) each."""
-        report, model, history = self.report, self.model, self.history
-        parts = counted(model.body_count, "body"), counted(model.bond_count, "bond")
-        rows = [
-            ("simulated", f"{report.until_s:.4g} s"),
-            ("method", f"{report.method}, {report.driver} driver"),
-            ("smallest step", f"{report.smallest_step_s:.3g} s"),
-            ("scene", ", ".join(parts)),
-            ("effects", ", ".join(report.effects) or "none"),
-            ("broken bonds", f"{report.broken_faces:,}"),
-            ("largest speed", f"{np.fmax.reduce(self.peak_speed, initial=np.nan):.4g} m/s"),
-            ("work put in", f"{report.work_put_in:.4g} J"),
-            ("energy not explained", report.unexplained),
-            *((("energy injected", report.injected),) if report.injected else ()),
-            ("time", f"{report.compile_seconds:.1f} s compiling, {report.run_seconds:.1f} s run"),
-        ]
-        for hole, moved in outward_columns(history).items():
-            if len(moved):
-                rows.insert(7, (f"{hole}, mean outward displacement", f"{moved[-1]:.4g} mm"))
-        return [*rows, *(("warning", need) for need in report.needs)]
 
     def write(self, folder: FileName) -> None:
         """Write history.csv, bonds.csv, mesh.msh, report.json and a ParaView series to a folder.

@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple, Optional, Union
 
 from taichi_dem.kit.allocation import values
@@ -10,7 +9,7 @@ from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, output_folder
-from taichi_dem.kit.progress.progress import Listener, Pace, Progress, compiling
+from taichi_dem.kit.progress.progress import Listener, Pace, Worded, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.restart import NoCheckpointWriter
 from taichi_dem.kit.validation import AUTO, FileName, instance, progress_option, shown, whole, word
@@ -66,7 +65,7 @@ def simulate(
         Number of evenly spaced snapshots after the one at the start.
     progress : callable or str or None, default "auto"
         ``"auto"``: a bar on a terminal and in Jupyter. None: silence. A function is called with a
-        Progress while kernels are compiled, and then with a RunProgress about five times a second;
+        Progress, also while kernels are compiled, about five times a second;
         ``print`` prints percent and time left.
     title : str, default "simulating"
         Title of the progress bar.
@@ -170,21 +169,6 @@ def result_of(run: Callable[..., Result], *arguments: Any, **options: Any) -> Re
         return diverged.result
 
 
-@dataclass(frozen=True)
-class RunProgress(Progress):
-    """How far a run is: its time [s]; bonds and pairs evaluated."""
-
-    time_s: float
-    evaluations: int
-
-    @property
-    def speed(self) -> str:
-        """Simulated time and evaluations a second."""
-        seconds = max(self.seconds, 1e-9)
-        passed = prefixed(self.time_s / seconds, "s/s")
-        return f"{passed}, {prefixed(self.evaluations / seconds, 'evaluations/s')}"
-
-
 class Call(NamedTuple):
     """A function to call with a view at some of the largest steps, and whenever its pace says."""
 
@@ -231,9 +215,10 @@ class _Plan:
                 recorder.sample()
 
         def progress(_):
-            time_s, spent = simulation.time_s, simulation.run_seconds
-            share = min(1.0, time_s / (self.last * self.dt0))
-            tell(RunProgress(share, spent, time_s, simulation.evaluations()))
+            time_s, seconds = simulation.time_s, simulation.run_seconds
+            rates = (time_s, "s/s"), (simulation.evaluations(), "evaluations/s")
+            words = ", ".join(prefixed(done / max(seconds, 1e-9), unit) for done, unit in rates)
+            tell(Worded(min(1.0, time_s / (self.last * self.dt0)), seconds, words))
 
         made = [Call(sample, self._evenly(self.samples))]
         if self.frames:

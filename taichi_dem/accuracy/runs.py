@@ -1,14 +1,13 @@
 """Runs of one question: by level of the step, and twins that differ by one rounding."""
 
 import math
-from dataclasses import dataclass
 from typing import Any, Optional
 
 import numpy as np
 
 from taichi_dem.accuracy.job import Job
 from taichi_dem.kit.display import counted
-from taichi_dem.kit.progress.progress import Listener, Progress
+from taichi_dem.kit.progress.progress import Listener, Worded
 from taichi_dem.kit.study.timing import clock
 from taichi_dem.output.record import Frame
 from taichi_dem.result import Result
@@ -22,18 +21,6 @@ _ROUNDING = 1e-12
 _GROWTH = 0.3
 #: Frames of a run, at which twins are compared.
 _FRAMES = 32
-
-
-@dataclass(frozen=True)
-class Sought(Progress):
-    """Progress of a search, whose number of runs is not known: the share grows ever slower."""
-
-    runs: int
-
-    @property
-    def speed(self) -> str:
-        """How many runs were made."""
-        return counted(self.runs, "run")
 
 
 class Runs:
@@ -117,7 +104,7 @@ class Runs:
         self.cost.setdefault(level, spent)
         if self._listen is not None:
             share = 1.0 - 1.0 / (1.0 + _GROWTH * self.count)
-            self._listen(Sought(share, self.seconds, self.count))
+            self._listen(Worded(share, self.seconds, counted(self.count, "run")))
         return result
 
     def _simulated(self, level, twin, tight, frames, brief):

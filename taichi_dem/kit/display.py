@@ -115,5 +115,9 @@ def titled(title: str, *sections: str, warning: str = "") -> str:
 
 def unfolded(title: str, text: str) -> str:
     """HTML of text that appears, as it stands, when its title is clicked on."""
-    words, lines = html.escape(title), html.escape(text)
-    return f"<details><summary>{words}</summary><pre>{lines}</pre></details>"
+    return f"<details><summary>{html.escape(title)}</summary>{verbatim(text)}</details>"
+
+
+def verbatim(text: str) -> str:
+    """HTML of text as it stands."""
+    return f"<pre>{html.escape(text)}</pre>"

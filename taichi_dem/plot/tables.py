@@ -75,7 +75,8 @@ def _draw(axes, time, table, names, unit):
     for k, name in enumerate(names):
         colour, line = SPARE_COLOURS[k % len(SPARE_COLOURS)], ("-", "--")[k % 2]
         label = without_unit(name).replace("_", " ")
-        axes.plot(time, factor * table[name], line, color=colour, label=label)
+        steps = "steps-post" if unit == "1" else "default"
+        axes.plot(time, factor * table[name], line, color=colour, label=label, drawstyle=steps)
     if len(names) == 1:
         axes.set(ylabel=f"{label} [{words}]")
     else:
