@@ -17,8 +17,8 @@ from taichi_dem.report.report import Report
 from taichi_dem.simulation import MOST_STEPS, Simulation
 from taichi_dem.state.model import Model
 
-#: Calls of an observer in a run.
-_MOST_CALLS = 1_000_000
+#: Samples, frames and calls of an observer in a run, at most.
+MOST_CALLS = 1_000_000
 
 
 def macro_steps(until: float, dt0: float) -> int:
@@ -108,10 +108,10 @@ class Every:
             return {round(last * k / samples) for k in range(0, samples, self.samples)} | {last}
         name, unit = ("steps", 1.0) if self.time_s is None else ("time_s", dt)
         distance = (self.time_s or float(self.steps or 1)) / unit
-        if last > _MOST_CALLS * distance:
-            least = last * unit / _MOST_CALLS
+        if last > MOST_CALLS * distance:
+            least = last * unit / MOST_CALLS
             got, bound = told_apart(distance * unit, least)
-            raise InputError(f"{name} must be at least {bound} for {_MOST_CALLS} calls, got {got}")
+            raise InputError(f"{name} must be at least {bound} for {MOST_CALLS} calls, got {got}")
         count = math.floor(last / distance * (1.0 + 1e-12))
         return {min(last, round(k * distance)) for k in range(count + 1)} | {last}
 

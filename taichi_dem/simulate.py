@@ -15,7 +15,7 @@ from taichi_dem.kit.restart import NoCheckpointWriter
 from taichi_dem.kit.validation import AUTO, FileName, instance, progress_option, shown, whole, word
 from taichi_dem.loads.history import unresolved_histories
 from taichi_dem.methods import Method
-from taichi_dem.observers import At, Every, Observer, RunView, macro_steps
+from taichi_dem.observers import MOST_CALLS, At, Every, Observer, RunView, macro_steps
 from taichi_dem.output.hole_monitor import watched_groups
 from taichi_dem.output.receivers import Receivers
 from taichi_dem.output.record import Recorder
@@ -27,8 +27,6 @@ from taichi_dem.state.timeline import MACRO_TICKS
 
 #: Progress is reported this often [s].
 _REPORT_SECONDS = 0.2
-#: Most samples or frames of a run: each reads all bodies.
-_MOST_RECORDS = 1_000_000
 
 
 @claiming()
@@ -194,8 +192,8 @@ class _Plan:
         progress: Union[Listener, str, None],
     ):
         self.dt0, self.last = method.dt0, macro_steps(until, method.dt0)
-        whole("samples", samples, 1, _MOST_RECORDS)
-        whole("frames", frames, 0, _MOST_RECORDS)
+        whole("samples", samples, 1, MOST_CALLS)
+        whole("frames", frames, 0, MOST_CALLS)
         progress_option("progress", progress)
         self.samples, self.frames = samples, frames
         self.observed = [
