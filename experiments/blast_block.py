@@ -38,6 +38,7 @@ from _blast import (
 )
 from _crack_sections import plot_deep_cracks
 from _meshes import mirrored_copies
+from make_meshes import block_with_hole
 from taichi_dem import (
     CONCRETE,
     PAPER_BLOCK,
@@ -53,7 +54,6 @@ from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.process_memory import peak_memory_mb
 from taichi_dem.kit.progress.progress import time_left
-from taichi_dem.mesh.gmsh import block_with_hole
 from taichi_dem.mesh.joined import in_space_order
 from taichi_dem.output.attenuation import Attenuation
 from taichi_dem.output.hole_monitor import HoleMonitor

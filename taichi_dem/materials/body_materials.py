@@ -98,10 +98,9 @@ class BodyMaterials:
 
     def _on_mesh(self, k):
         """Material k with the numbers that contacts of its bodies have."""
-        material, bodies = self.materials[k], np.flatnonzero(self.of_body == k)
-        chosen: Any = slice(None) if self.is_one or not len(bodies) else bodies
+        material, bodies = self.materials[k], self.of_body == k
         numbers = {
-            name: rule.of_mesh(self.mesh, material.density, chosen)
+            name: rule.of_mesh(self.mesh, material.density, bodies)
             for name, rule in vars(material).items()
             if isinstance(rule, ContactRule)
         }

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import finite, shown, told_apart, word
 from taichi_dem.mesh import tetrahedra as geometry
@@ -257,19 +256,8 @@ def joined_bodies(tetrahedra: np.ndarray) -> np.ndarray:
     return geometry.components(len(tetrahedra), geometry.shared_faces(tetrahedra) // 4)
 
 
-def unbonded_places(points: np.ndarray, tetrahedra: np.ndarray) -> str:
-    """A sentence on bodies that meet without a common face although their points are the same.
-
-    "" where there are none. points (n, 3) [m], tetrahedra (m, 4), two at most at a face.
-    """
-    crossed = _crossed_quadrangles(points, tetrahedra)
-    if len(crossed):
-        place = ", ".join(f"{x:g}" for x in points[list(crossed[0])].mean(axis=0))
-        return (
-            f"at {counted(len(crossed), 'quadrangle')}, the first around ({place}) m, the "
-            "tetrahedra of one side have the other diagonal than those of the other side: they "
-            "share no face there and are not bonded"
-        )
+def unbonded_places(tetrahedra: np.ndarray) -> str:
+    """A sentence on parts that meet in points without a common face, "" where there are none."""
     part = np.unique(joined_bodies(tetrahedra), return_inverse=True)[1]
     held = np.unique(np.stack([tetrahedra.ravel(), np.repeat(part, 4)]), axis=1)[0]
     count = int((np.bincount(held) > 1).sum())
@@ -279,21 +267,3 @@ def unbonded_places(points: np.ndarray, tetrahedra: np.ndarray) -> str:
             "no face and are not bonded"
         )
     return ""
-
-
-def _crossed_quadrangles(points, tetrahedra):
-    """Quadrangles that outer faces cut by both diagonals, their four points, a list."""
-    faces = geometry.all_faces(tetrahedra)
-    outer = geometry.outer_rows(faces)
-    faces, body = faces[outer], outer // 4
-    normal = geometry.area_vectors(points, faces)
-    first, second = geometry.pairs_at_edges(faces)
-    # In a hole of the shape of one tetrahedron, faces look at each other.
-    alike = np.einsum("ij,ij->i", normal[first], normal[second]) > 0.0
-    chosen = alike & (body[first] != body[second])
-    cut = set()
-    for one, other in zip(faces[first[chosen]].tolist(), faces[second[chosen]].tolist()):
-        four = frozenset(one + other)
-        if len(four) == 4:  # not two triangles on the same three points
-            cut.add((four, frozenset(one) & frozenset(other)))
-    return sorted({tuple(sorted(four)) for four, diagonal in cut if (four, four - diagonal) in cut})

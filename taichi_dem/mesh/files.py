@@ -111,14 +111,14 @@ def read_mesh(
     in_unit(f"median edge of mesh file {path} at scale={scale:g}", float(edge), EDGE)
     unread = unread_groups(raw, mesh)
     notes = [f"the groups {', '.join(unread)} are not read: {_NEEDED}"] if unread else []
-    told = [_of_dropped_cells(printed), unbonded_places(mesh.points, mesh.tetrahedra)]
+    told = [_of_dropped_cells(printed), unbonded_places(mesh.tetrahedra)]
     # A set of all points is a program's own, one of some was meant for something.
     told += notes if any(len(some) < len(raw.points) for some in raw.point_sets.values()) else []
     told = [sentence for sentence in told if sentence]
     for sentence in told:
         warnings.warn(f"mesh file {path}: {sentence}", stacklevel=2)
     notes = [*dict.fromkeys((*notes, *told)), *mesh.notes]
-    return replace(mesh, notes=tuple(notes), source=path, unread=unread)
+    return replace(mesh, notes=tuple(notes), source=path)
 
 
 def write_mesh(path: FileName, mesh: Mesh) -> None:
@@ -147,15 +147,14 @@ def write_vtu(
     path: FileName,
     points: np.ndarray,
     tetrahedra: np.ndarray,
-    point_data: Optional[Mapping[str, np.ndarray]] = None,
     cell_data: Optional[Mapping[str, np.ndarray]] = None,
 ) -> None:
     """Write tetrahedra with data as a compressed VTU file, for ParaView.
 
-    point_data: name -> (point_count, ...).  cell_data: name -> (body_count, ...).
+    cell_data: name -> (body_count, ...).
     """
     of_cells = {name: [np.asarray(values)] for name, values in (cell_data or {}).items()}
-    content = meshio.Mesh(points, [("tetra", tetrahedra)], point_data or {}, of_cells)
+    content = meshio.Mesh(points, [("tetra", tetrahedra)], cell_data=of_cells)
     with renamed_when_done(path) as temporary:
         meshio.write(temporary, content, file_format="vtu", compression="zlib")
 

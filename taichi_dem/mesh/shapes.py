@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Sequence
-from typing import Optional
 
 import numpy as np
 
@@ -24,23 +23,23 @@ _SIDES = {
 _MOST_BOXES = 1_666_666
 
 
-def single(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
-    """One tetrahedron: equilateral base of ``edge`` [m] in the plane x = 0, apex at x = -height.
+def single(edge: float = 0.05) -> Mesh:
+    """One regular tetrahedron of ``edge`` [m]: base in the plane x = 0, apex at x < 0.
 
-    height: [m]; None makes the tetrahedron regular.  Groups: base, sides.
+    Groups: base, sides.
     """
-    base, height = _base(edge, height)
+    base, height = _base(edge)
     points = np.vstack([[-height, 0.0, 0.0], base])
     groups = {"base": [[1, 2, 3]], "sides": [[0, 1, 2], [0, 2, 3], [0, 3, 1]]}
     return checked_mesh(points, [[0, 1, 2, 3]], groups)
 
 
-def pair(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
-    """Two equal tetrahedra that share the face in x = 0; body 0 lies at x < 0, body 1 at x > 0.
+def pair(edge: float = 0.05) -> Mesh:
+    """Two regular tetrahedra that share the face in x = 0; body 0 lies at x < 0, body 1 at x > 0.
 
-    edge, height: as in ``single``.  Groups: left and right, the free faces of either body.
+    edge: [m].  Groups: left and right, the free faces of either body.
     """
-    base, height = _base(edge, height)
+    base, height = _base(edge)
     points = np.vstack([base, [-height, 0.0, 0.0], [height, 0.0, 0.0]])
     around = [(0, 1), (1, 2), (2, 0)]
     groups = {
@@ -100,13 +99,12 @@ def _bodies_together(parts):
     return {**groups, **dict(zip(parts, np.split(np.arange(firsts[-1]), firsts[1:-1])))}
 
 
-def _base(edge, height):
+def _base(edge):
     """Equilateral triangle in x = 0 about the origin, normal +x, and the apex height [m]."""
     edge = positive("edge", edge)
-    height = positive("height", edge * np.sqrt(2.0 / 3.0) if height is None else height)
     radius, half = edge / np.sqrt(3.0), 0.5 * edge
     triangle = [[0.0, radius, 0.0], [0.0, -0.5 * radius, half], [0.0, -0.5 * radius, -half]]
-    return np.array(triangle), height
+    return np.array(triangle), edge * np.sqrt(2.0 / 3.0)
 
 
 def _checked_cells(length, width, cells):

@@ -121,33 +121,23 @@ def components(count: int, pairs: np.ndarray) -> np.ndarray:
 
     count: number of nodes.  pairs: linked nodes, shape (n, 2).
     """
-    label = np.arange(count)
-    while True:
-        lowest = np.minimum(label[pairs[:, 0]], label[pairs[:, 1]])
-        merged = label.copy()
-        for side in (0, 1):
-            np.minimum.at(merged, label[pairs[:, side]], lowest)
-        while not np.array_equal(merged, merged[merged]):
-            merged = merged[merged]
-        if np.array_equal(merged, label):
-            return label
-        label = merged
+    # Imported here, as in ``close_pairs``: SciPy loads only where a mesh is made.
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    part = connected_components(links, directed=False)[1]
+    return np.unique(part, return_index=True)[1][part]
 
 
 def close_pairs(points: np.ndarray, distance: float) -> np.ndarray:
-    """Pairs of points not farther apart than ``distance`` [m], shape (n, 2), first < second.
+    """Pairs of points not farther apart than ``distance`` [m], shape (n, 2), first < second."""
+    from scipy.spatial import KDTree
 
-    Two such points lie in one cell of at least one of eight cubic grids of cell size 4 distance,
-    shifted by half a cell along each axis; so sorting by cell finds them without all pairs.
-    """
-    found = []
-    cell = 4.0 * distance
-    low = points.min(axis=0)
-    for shift in np.ndindex(2, 2, 2):
-        first, second = _equal_rows(np.floor((points - low) / cell + 0.5 * np.array(shift)))
-        near = length(points[first] - points[second]) <= distance
-        found.append(np.sort(np.column_stack([first[near], second[near]]), axis=1))
-    return np.unique(np.vstack(found), axis=0)
+    # The tree compares squares, whose last bit may be another.
+    pairs = KDTree(points).query_pairs((1.0 + 1e-9) * distance, output_type="ndarray")
+    near = length(points[pairs[:, 0]] - points[pairs[:, 1]]) <= distance
+    return np.unique(pairs[near], axis=0)
 
 
 def pairs_at_edges(faces: np.ndarray) -> np.ndarray:

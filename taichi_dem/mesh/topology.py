@@ -47,8 +47,7 @@ class Topology:
     is_open: np.ndarray
     bonded_share: np.ndarray
 
-    def __repr__(self):
-        return by_fields(self)
+    __repr__ = by_fields
 
     @property
     def bond_count(self) -> int:

@@ -34,8 +34,7 @@ class Attenuation:
     speed: np.ndarray
     inner: np.ndarray
 
-    def __repr__(self) -> str:
-        return by_fields(self)
+    __repr__ = by_fields
 
     @classmethod
     def of(

@@ -81,8 +81,7 @@ class Frame:
     bound: np.ndarray
     angular_momentum: np.ndarray
 
-    def __repr__(self):
-        return by_fields(self)
+    __repr__ = by_fields
 
     @property
     def speed(self) -> np.ndarray:
@@ -348,5 +347,5 @@ def write_paraview(
         names.append(f"{name}_{number:04d}.vtu")
         points = body_corners(model, frame).reshape(-1, 3)
         data = cell_data(model, frame, acting_since or {})
-        write_vtu(os.path.join(folder, names[-1]), points, cells, {}, data)
+        write_vtu(os.path.join(folder, names[-1]), points, cells, data)
     write_pvd(os.path.join(folder, f"{name}.pvd"), [frame.time_s for frame in frames], names)
