@@ -105,9 +105,9 @@ def contact_eigenvalues(
     root = inverse_root(mass, inertia)
     one, whole_face = np.zeros(len(mass)), np.zeros(len(mass))
     faces = geometry.all_faces(mesh.tetrahedra)
-    vectors = geometry.area_vectors(mesh.points, faces).reshape(-1, 4, 3)
+    normals = geometry.unit_normals(mesh.points, faces).reshape(-1, 4, 3)
     for face in range(4):
-        outward = vectors[:, face] / length(vectors[:, face])[:, None]
+        outward = normals[:, face]
         arms = spheres.centre[:, face] + spheres.radius[:, face, :, None] * outward[:, None]
         along = outward[:, :, None] * outward[:, None, :]
         law = np.broadcast_to(np.eye(3), along.shape) if friction else along

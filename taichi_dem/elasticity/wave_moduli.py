@@ -6,7 +6,7 @@ import numpy as np
 
 from taichi_dem.elasticity.rates import levers
 from taichi_dem.kit.fixed_order import dot, inverse, length, product, transposed
-from taichi_dem.mesh.tetrahedra import area_vectors, signed_volumes
+from taichi_dem.mesh.tetrahedra import area_vectors, signed_volumes, unit_normals
 
 #: Rings of bodies around a face over which its moduli are means.
 _RINGS = 2
@@ -45,8 +45,7 @@ def wave_moduli(model: Any, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     around = sum(at_points[faces[:, k]] for k in range(3))
     around[around[:, -1] == 0.0] = np.nan
     mean = (around[:, :-1] / around[:, -1:]).reshape(-1, 6, 6)
-    normal = area_vectors(mesh.points, faces)
-    normal = normal / length(normal)[:, None]
+    normal = unit_normals(mesh.points, faces)
     shear = sum(_modulus(mean, normal, tangent) for tangent in _tangents(normal))
     return _modulus(mean, normal, normal), 0.5 * shear
 

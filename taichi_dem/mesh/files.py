@@ -3,7 +3,6 @@
 import contextlib
 import io
 import os
-import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -30,7 +29,7 @@ from taichi_dem.mesh.cells import (
 )
 from taichi_dem.mesh.check import checked_points, unbonded_places, weld_labels
 from taichi_dem.mesh.gmsh_files import keyed_by_dimension, read_gmsh
-from taichi_dem.mesh.mesh import Mesh, checked_mesh
+from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import edge_lengths
 
 #: Time that a reader may take [s], and what it reads at the slowest [byte/s]: some of meshio's wait
@@ -39,10 +38,6 @@ _PATIENCE_S = 20.0
 _SLOWEST_BYTES_PER_S = 1e5
 _SPLIT = "split them into tetrahedra, for example by ParaView's filter Tetrahedralize"
 _UNKNOWN = "holds cells of a type that meshio does not know, such as voxels"
-_FOLDED = (
-    "tetrahedra are numbered after cells have been cut, and a cell folds over itself if it is "
-    "strongly twisted, or its corners are not in the order of the file's format"
-)
 _NEEDED = (
     "loads and supports need groups of faces (physical surfaces in Gmsh), materials groups of "
     "solid cells"
@@ -187,7 +182,7 @@ def _read_raw(path):
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             return run_with_timeout(seconds, lambda: _meshio_read(path), sentence), said.getvalue()
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
-        reason = _reason_of(error, said.getvalue())
+        reason = " ".join(f"{type(error).__name__} {error} {said.getvalue()}".split())
         raise InputError(f"mesh file {path} cannot be read: {reason}") from None
 
 
@@ -196,15 +191,6 @@ def _meshio_read(path):
         if path.lower().endswith(".msh"):
             return read_gmsh(path)
         return keyed_by_dimension(meshio.read(path), {})
-
-
-def _reason_of(error, printed):
-    """Why a reader failed, in words: an exception may hold a number only."""
-    text = " ".join(str(error).split())
-    if isinstance(error, SystemExit):
-        text = " ".join(printed.replace("Error: ", "").split())
-    named = text if re.search(r"[^\W\d]", text) else f"{type(error).__name__} {text}"
-    return _of_dropped_cells(text) or named.strip()
 
 
 def _of_dropped_cells(printed):
@@ -242,10 +228,5 @@ def _mesh(raw, scale, weld_tolerance, keep_coincident):
             block.data = np.hstack([label[corners], block.data[:, corners.shape[1] :]])
         bodies = bodies_in(raw, points)
     kept = {"keep_coincident": keep_coincident, "body_groups": body_groups_in(raw, bodies)}
-    try:
-        mesh = checked_mesh(points, bodies.tetrahedra, face_groups_in(raw), **kept)
-    except InputError as error:
-        is_cut = any(shape_of(block.type) != "tetra" for _, block in blocks_of(raw, 3))
-        fault = f"; {_FOLDED}" if is_cut and "tetrahedra " in str(error) else ""
-        raise InputError(f"{error}{fault}") from None
-    return replace(mesh, notes=(*welding, *mesh.notes))
+    arrays = points, bodies.tetrahedra, face_groups_in(raw)
+    return Mesh(*arrays, notes=tuple(welding), **kept)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.fixed_order import dot, length
+from taichi_dem.kit.fixed_order import dot
 from taichi_dem.kit.validation import FileName, path_name, positive, told_apart
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
@@ -85,8 +85,6 @@ def filled_surface(path: FileName, element: float, scale: float = 1.0) -> Mesh:
             gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
             gmsh.model.occ.importShapes(name)
             gmsh.model.occ.synchronize()
-            if not gmsh.model.getEntities(3):
-                raise InputError(f"surface file {name} must hold a closed surface, got none")
         else:
             _draw_triangles(gmsh, name)
         refuse_too_many(element, _drawn_volume(gmsh, drawn) * scale**3)
@@ -120,7 +118,6 @@ def _draw_triangles(gmsh: Any, name: str) -> None:
     """Read triangles, part them at their edges, and make a volume of what they enclose."""
     gmsh.merge(name)
     gmsh.model.mesh.removeDuplicateNodes()
-    _refuse_open(gmsh, name)
     angle = np.radians(_EDGE_DEG)
     gmsh.model.mesh.classifySurfaces(angle, True, True, np.pi)
     gmsh.model.mesh.createGeometry()
@@ -129,26 +126,14 @@ def _draw_triangles(gmsh: Any, name: str) -> None:
     gmsh.model.geo.synchronize()
 
 
-def _refuse_open(gmsh, name):
-    """Raise InputError unless every edge of the triangles belongs to two of them."""
-    _, nodes = gmsh.model.mesh.getElementsByType(2)
-    if not len(nodes):
-        raise InputError(f"surface file {name} must hold triangles, got none")
-    corners = nodes.reshape(-1, 3)[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
-    count = np.unique(np.sort(corners, axis=1), axis=0, return_counts=True)[1]
-    wrong = int((count != 2).sum())
-    if wrong:
-        raise InputError(
-            f"surface file {name} must be closed, each edge between two triangles, but {wrong} of "
-            f"its {len(count)} edges are not: close its holes, or join its points"
-        )
-
-
 def _mesh_of(gmsh, scale, name, drawn):
     """The mesh that Gmsh has made; a group for each surface."""
     points, tetrahedra = _places_and_rows(gmsh, 4)
     if not len(tetrahedra):
-        raise InputError(f"surface file {name} must enclose a solid, but Gmsh filled none")
+        raise InputError(
+            f"surface file {name} must be closed, each edge between two faces, but Gmsh found no "
+            "solid in it: close its holes, or join its points"
+        )
     points *= scale
     groups = _drawn_groups(gmsh) if drawn else _smooth_parts(points, tetrahedra)
     return Mesh(points, tetrahedra, groups, source=name)
@@ -177,8 +162,7 @@ def _drawn_groups(gmsh):
 def _smooth_parts(points, tetrahedra):
     """Outer faces in groups that end at sharp edges: Gmsh cuts smooth surfaces into patches."""
     outer = geometry.outer_faces(tetrahedra)
-    normal = geometry.area_vectors(points, outer)
-    normal /= length(normal)[:, None]
+    normal = geometry.unit_normals(points, outer)
     first, second = geometry.pairs_at_edges(outer)
     smooth = dot(normal[first], normal[second]) > np.cos(np.radians(_EDGE_DEG))
     label = geometry.components(len(outer), np.stack([first[smooth], second[smooth]], axis=1))

@@ -49,6 +49,12 @@ def area_vectors(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
+def unit_normals(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Right-hand unit normals of triangles, shape (n, 3); faces: point indices, (n, 3)."""
+    vectors = area_vectors(points, faces)
+    return vectors / length(vectors)[:, None]
+
+
 def all_faces(tetrahedra: np.ndarray) -> np.ndarray:
     """Every face of every body, outward order, shape (4 * body_count, 3); row 4 * body + f."""
     return tetrahedra[:, LOCAL_FACES].reshape(-1, 3)

@@ -193,10 +193,9 @@ def body_at(mesh: Mesh, name: str, point: np.ndarray) -> int:
     InputError
         For a point in no body, with the nearest body and the distance of its centre.
     """
-    corners = mesh.points[geometry.all_faces(mesh.tetrahedra)]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= length(normal)[:, None]
-    outside = dot(point - corners[:, 0], normal).reshape(-1, 4).max(axis=1)
+    faces = geometry.all_faces(mesh.tetrahedra)
+    normal = geometry.unit_normals(mesh.points, faces)
+    outside = dot(point - mesh.points[faces[:, 0]], normal).reshape(-1, 4).max(axis=1)
     holding = np.flatnonzero(outside <= _ROUNDING * np.ptp(mesh.points, axis=0).max())
     if len(holding):
         return int(holding[0])

@@ -130,7 +130,7 @@ def test_a_hexahedron_with_repeated_corners_is_what_is_left_of_it(tmp_path, name
 
 def test_corners_in_another_order_are_refused(tmp_path):
     cells = np.array([[0, 1, 3, 2, 4, 5, 7, 6]])
-    with pytest.raises(InputError, match="a cell folds over itself"):
+    with pytest.raises(InputError, match="lie on the same side"):
         told(tmp_path, CUBE, ("hexahedron", cells))
 
 
