@@ -55,7 +55,6 @@ from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.process_memory import peak_memory_mb
 from taichi_dem.kit.progress.progress import time_left
 from taichi_dem.mesh.joined import in_space_order
-from taichi_dem.output.attenuation import Attenuation
 from taichi_dem.output.hole_monitor import HoleMonitor
 
 NAME = "blast_block"
@@ -149,7 +148,7 @@ def run(options):
     looks = {"title": "blasting", "observers": [ProgressLines(options.until)]}
     result = simulate(scene, method=ImplicitDashpots(BLOCK_STEP), **run_options(options), **looks)
     started = time.perf_counter()
-    fall = Attenuation.of(result.model, result.peak_speed, HOLE_RADIUS)
+    fall = result.attenuation("hole", HOLE_RADIUS)
     draw(result, fall, study.output_paths(options.out))
     figures = figures_of(result, fall.power_law(FROM_RADII)[0])
     figures["picture_seconds"] = (time.perf_counter() - started, "s")

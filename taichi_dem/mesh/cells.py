@@ -157,16 +157,10 @@ def body_groups_in(raw: Any, bodies: Bodies) -> dict[str, np.ndarray]:
 def volumes_of(mesh: Mesh, first: int) -> tuple[list[str], np.ndarray]:
     """Names of physical volumes, which have numbers from ``first`` on, and that of every body.
 
-    Bodies in no group have the number 0; without any group one volume holds them all. Raises
-    InputError for the name of a group that stands for two.
+    Bodies in no group have the number 0; without any group one volume holds them all.
     """
     if not mesh.body_groups:
         return ["bodies"], np.full(mesh.body_count, first)
-    for name in mesh.body_groups:
-        if _BOTH in name:
-            raise InputError(
-                f"a body group must have a name without {_BOTH!r} in a file, got {name!r}"
-            )
     member = np.zeros((mesh.body_count, len(mesh.body_groups)), dtype=bool)
     for k, bodies in enumerate(mesh.body_groups.values()):
         member[bodies, k] = True

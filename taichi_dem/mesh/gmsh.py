@@ -163,8 +163,8 @@ def _smooth_parts(points, tetrahedra):
     """Outer faces in groups that end at sharp edges: Gmsh cuts smooth surfaces into patches."""
     outer = geometry.outer_faces(tetrahedra)
     normal = geometry.unit_normals(points, outer)
-    first, second = geometry.pairs_at_edges(outer)
-    smooth = dot(normal[first], normal[second]) > np.cos(np.radians(_EDGE_DEG))
-    label = geometry.components(len(outer), np.stack([first[smooth], second[smooth]], axis=1))
+    pairs = geometry.equal_rows(outer[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)) // 3
+    smooth = dot(normal[pairs[:, 0]], normal[pairs[:, 1]]) > np.cos(np.radians(_EDGE_DEG))
+    label = geometry.components(len(outer), pairs[smooth])
     parts = (outer[label == first] for first in np.unique(label))
     return {f"surface_{k}": part for k, part in enumerate(parts, 1)}

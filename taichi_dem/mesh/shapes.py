@@ -2,11 +2,12 @@
 
 import itertools
 from collections.abc import Sequence
+from typing import Optional
 
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import positive, shown
+from taichi_dem.kit.validation import positive, several, shown, whole
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
 
 #: Groups of a bar: name -> (axis, 0 low or 1 high end).
@@ -34,12 +35,14 @@ def single(edge: float = 0.05) -> Mesh:
     return checked_mesh(points, [[0, 1, 2, 3]], groups)
 
 
-def pair(edge: float = 0.05) -> Mesh:
-    """Two regular tetrahedra that share the face in x = 0; body 0 lies at x < 0, body 1 at x > 0.
+def pair(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
+    """Two equal tetrahedra that share the face in x = 0; body 0 lies at x < 0, body 1 at x > 0.
 
-    edge: [m].  Groups: left and right, the free faces of either body.
+    edge, height: [m]; regular ones where no height is given.  Groups: left and right, the free
+    faces of either body.
     """
-    base, height = _base(edge)
+    base, regular = _base(edge)
+    height = regular if height is None else positive("height", height)
     points = np.vstack([base, [-height, 0.0, 0.0], [height, 0.0, 0.0]])
     around = [(0, 1), (1, 2), (2, 0)]
     groups = {
@@ -111,14 +114,11 @@ def _checked_cells(length, width, cells):
     """Numbers of boxes as an array (3,)."""
     for name, value in (("length", length), ("width", width)):
         positive(name, value)
-    try:
-        numbers = np.asarray(cells)
-    except ValueError:
-        numbers = np.zeros(0)
-    if numbers.shape != (3,) or numbers.dtype.kind not in "iu" or numbers.min() < 1:
-        raise InputError(f"cells must be three integers of at least 1, got {shown(cells)}")
-    if np.prod(numbers.astype(float)) > _MOST_BOXES:
-        raise InputError(f"cells must make at most {_MOST_BOXES} boxes, got {shown(cells)}")
+    numbers = np.array(several("cells", cells, lambda name, n: whole(name, n, 1, _MOST_BOXES)))
+    if len(numbers) != 3 or np.prod(numbers.astype(float)) > _MOST_BOXES:
+        raise InputError(
+            f"cells must be three numbers that make at most {_MOST_BOXES} boxes, got {shown(cells)}"
+        )
     return numbers
 
 

@@ -89,7 +89,12 @@ def shared_faces(tetrahedra: np.ndarray) -> np.ndarray:
 
     Call it only where no face is shared by three bodies.
     """
-    number = face_numbers(all_faces(tetrahedra))
+    return equal_rows(all_faces(tetrahedra))
+
+
+def equal_rows(rows: np.ndarray) -> np.ndarray:
+    """Numbers of rows on the same points, each with the next such one, (n, 2)."""
+    number = face_numbers(rows)
     order = np.argsort(number, kind="stable")
     same = number[order[1:]] == number[order[:-1]]
     return np.column_stack([order[:-1][same], order[1:][same]])
@@ -144,23 +149,6 @@ def close_pairs(points: np.ndarray, distance: float) -> np.ndarray:
     pairs = KDTree(points).query_pairs((1.0 + 1e-9) * distance, output_type="ndarray")
     near = length(points[pairs[:, 0]] - points[pairs[:, 1]]) <= distance
     return np.unique(pairs[near], axis=0)
-
-
-def pairs_at_edges(faces: np.ndarray) -> np.ndarray:
-    """Numbers of each two faces (n, 3) that have an edge in common, (2, pairs)."""
-    return _equal_rows(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)) // 3
-
-
-def _equal_rows(rows):
-    """Numbers of each two equal rows (n, ...), (2, pairs)."""
-    order = np.lexsort(rows.T)
-    rows, found = rows[order], [np.empty((2, 0), dtype=np.int64)]
-    for step in range(1, len(rows)):
-        same = np.flatnonzero((rows[step:] == rows[:-step]).all(axis=1))
-        if len(same) == 0:
-            break
-        found.append(np.stack([order[same], order[same + step]]))
-    return np.hstack(found)
 
 
 @functools.cache

@@ -153,14 +153,6 @@ def check_free(mesh: Mesh, name: str) -> None:
         )
 
 
-def mean_density(mesh: Mesh, density: Density) -> float:
-    """Mass over volume of a mesh [kg/m3]; density: as for ``body_properties``."""
-    if not isinstance(density, np.ndarray):
-        return density
-    volume = geometry.signed_volumes(mesh.points, mesh.tetrahedra)
-    return float((density * volume).sum() / volume.sum())
-
-
 def body_properties(mesh: Mesh, density: Density) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass [kg] (n,), centre of mass [m] (n, 3), inertia about it [kg m2] (n, 3, 3).
 
