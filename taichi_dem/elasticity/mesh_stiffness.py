@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.elasticity.rates import springs_of
-from taichi_dem.elasticity.statics import BondStatics
+from taichi_dem.elasticity.statics import motions_under
 from taichi_dem.elasticity.wave_moduli import PAIRS, STRAINS
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
@@ -141,12 +141,11 @@ def mesh_stiffness(mesh: Mesh, material: AnyMaterial) -> MeshStiffness:
     if not hasattr(material, "normal_stiffness"):
         raise InputError(f"material must be a Material or BodyMaterials, got {shown(material)}")
     springs = per_bond(mesh, topology, material.density, springs_of(material))
-    statics = BondStatics(mesh, topology, springs)
     outer = _OuterFaces(mesh, material)
     # Of 1 Pa, one for each component.
     stresses = (STRAINS != 0.0).astype(float)
     loads = np.stack([outer.wrenches(stress) for stress in stresses], axis=2)
-    motions = statics.motions(loads)
+    motions = motions_under(mesh, topology, springs, loads)
     volume, density = volumes(mesh), material.density
     if isinstance(density, np.ndarray):
         density = float((density * volume).sum() / volume.sum())

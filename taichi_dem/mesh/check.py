@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import finite, shown, told_apart, word
+from taichi_dem.kit.validation import finite, shown, word
 from taichi_dem.mesh import tetrahedra as geometry
 
 #: Share of (longest edge)^3 below which a volume counts as zero, as it may be round-off.
 FLAT = 1e-12
 #: Points nearer than this share of the mesh's extent count as one and the same place.
 COINCIDENT = 1e-9
-#: The extent of a mesh lies between these [m]: a moment of inertia is its fifth power.
-_LEAST_EXTENT, _MOST_EXTENT = 1e-30, 1e30
+#: Largest coordinate [m]: a moment of inertia is its fifth power.
+_FARTHEST = 1e30
 
 
 def checked_arrays(
@@ -34,9 +34,6 @@ def checked_arrays(
     corners, faces = label[corners], {name: label[faces[name]] for name in faces}
     places, corners, faces = _without_loose_points(places, corners, faces, notes)
     extent = np.ptp(places, axis=0).max()
-    if extent < _LEAST_EXTENT:
-        got, least = told_apart(extent, _LEAST_EXTENT)
-        raise InputError(f"points must span at least {least} m, got {got} m")
     pairs = geometry.close_pairs(places, COINCIDENT * extent)
     if len(pairs) and not coincident:
         _refuse_coincident(places, pairs, extent)
@@ -59,11 +56,11 @@ def checked_points(points: Any) -> np.ndarray:
     found = _rows("points", points, 3, "iuf", "numbers")
     with np.errstate(over="ignore"):
         found = found.astype(np.float64)
-    bad = np.flatnonzero(~(np.abs(found) <= _MOST_EXTENT).all(axis=1))
+    bad = found[~(np.abs(found) <= _FARTHEST).all(axis=1)]
     if len(bad):
         raise InputError(
-            f"points must be finite, within {_MOST_EXTENT:g} m, but {len(bad)} are not, the first "
-            f"is number {bad[0]}: {found[bad[0]].tolist()}"
+            f"points must be finite, within {_FARTHEST:g} m, but {len(bad)} are not, the first is "
+            f"{bad[0].tolist()}"
         )
     return found
 

@@ -37,14 +37,9 @@ from taichi_dem.mesh.tetrahedra import edge_lengths
 _PATIENCE_S = 20.0
 _SLOWEST_BYTES_PER_S = 1e5
 _SPLIT = "split them into tetrahedra, for example by ParaView's filter Tetrahedralize"
-_UNKNOWN = "holds cells of a type that meshio does not know, such as voxels"
-_NEEDED = (
-    "loads and supports need groups of faces (physical surfaces in Gmsh), materials groups of "
-    "solid cells"
-)
-_IN_A_GROUP = (
-    "mesh in three dimensions (gmsh -3), and make a physical group of the volume too, as Gmsh "
-    "saves only what is in a group"
+_REMEDY = (
+    "mesh in three dimensions (gmsh -3) with a physical group of the volume too, without which "
+    "Gmsh does not save it, or fill a closed surface by taichi_dem.shapes.from_surface"
 )
 
 
@@ -105,7 +100,8 @@ def read_mesh(
     edge = np.median(edge_lengths(mesh.points, mesh.tetrahedra))
     in_unit(f"median edge of mesh file {path} at scale={scale:g}", float(edge), EDGE)
     unread = unread_groups(raw, mesh)
-    notes = [f"the groups {', '.join(unread)} are not read: {_NEEDED}"] if unread else []
+    words = "are not read, as they hold no triangles or solid cells"
+    notes = [f"the groups {', '.join(unread)} {words}"] if unread else []
     told = [_of_dropped_cells(printed), unbonded_places(mesh.tetrahedra)]
     # A set of all points is a program's own, one of some was meant for something.
     told += notes if any(len(some) < len(raw.points) for some in raw.point_sets.values()) else []
@@ -197,7 +193,8 @@ def _of_dropped_cells(printed):
     """A sentence about cells that meshio ignores, or ""; printed: its message."""
     if "cells that meshio cannot handle" not in " ".join(printed.split()):
         return ""
-    return f"it {_UNKNOWN}, and these are not read: {_SPLIT}"
+    unknown = "it holds cells of a type that meshio does not know, such as voxels"
+    return f"{unknown}, and these are not read: {_SPLIT}"
 
 
 def _refuse_unreadable(raw, path, printed):
@@ -209,8 +206,7 @@ def _refuse_unreadable(raw, path, printed):
             f"mesh file {path} holds {', '.join(others)} cells, which cannot be read: {_SPLIT}"
         )
     if not blocks_of(raw, 3):
-        remedy = f"{_IN_A_GROUP}, or fill a closed surface by taichi_dem.shapes.from_surface"
-        remedy = _of_dropped_cells(printed) or remedy
+        remedy = _of_dropped_cells(printed) or _REMEDY
         kinds = ", ".join(sorted(held)) or "no cells"
         raise InputError(f"mesh file {path} holds no tetrahedra (it holds: {kinds}): {remedy}")
 
