@@ -6,7 +6,6 @@ import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Optional
 from xml.sax.saxutils import quoteattr
 
 import meshio
@@ -17,16 +16,7 @@ from taichi_dem.kit.files import renamed_when_done, write_text
 from taichi_dem.kit.likely_units import EDGE, in_unit
 from taichi_dem.kit.timeout import run_with_timeout
 from taichi_dem.kit.validation import FileName, path_name, positive
-from taichi_dem.mesh.cells import (
-    blocks_of,
-    bodies_in,
-    body_groups_in,
-    corners_of,
-    face_groups_in,
-    shape_of,
-    unread_groups,
-    volumes_of,
-)
+from taichi_dem.mesh import cells
 from taichi_dem.mesh.check import checked_points, unbonded_places, weld_labels
 from taichi_dem.mesh.gmsh_files import keyed_by_dimension, read_gmsh
 from taichi_dem.mesh.mesh import Mesh
@@ -99,7 +89,7 @@ def read_mesh(
         raise InputError(f"mesh file {path}: {error}") from None
     edge = np.median(edge_lengths(mesh.points, mesh.tetrahedra))
     in_unit(f"median edge of mesh file {path} at scale={scale:g}", float(edge), EDGE)
-    unread = unread_groups(raw, mesh)
+    unread = cells.unread_groups(raw, mesh)
     words = "are not read, as they hold no triangles or solid cells"
     notes = [f"the groups {', '.join(unread)} {words}"] if unread else []
     told = [_of_dropped_cells(printed), unbonded_places(mesh.tetrahedra)]
@@ -119,7 +109,7 @@ def write_mesh(path: FileName, mesh: Mesh) -> None:
     several groups are in the volume "NAME|NAME", which ``read_mesh`` takes for both.
     """
     names, first = list(mesh.groups), 1 + len(mesh.groups)
-    volumes, tags = volumes_of(mesh, first)
+    volumes, tags = cells.volumes_of(mesh, first)
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames"]
     lines += [str(len(names) + len(volumes))]
     lines += [f'2 {tag} "{name}"' for tag, name in enumerate(names, start=1)]
@@ -135,16 +125,13 @@ def write_mesh(path: FileName, mesh: Mesh) -> None:
 
 
 def write_vtu(
-    path: FileName,
-    points: np.ndarray,
-    tetrahedra: np.ndarray,
-    cell_data: Optional[Mapping[str, np.ndarray]] = None,
+    path: FileName, points: np.ndarray, tetrahedra: np.ndarray, cell_data: Mapping[str, np.ndarray]
 ) -> None:
     """Write tetrahedra with data as a compressed VTU file, for ParaView.
 
     cell_data: name -> (body_count, ...).
     """
-    of_cells = {name: [np.asarray(values)] for name, values in (cell_data or {}).items()}
+    of_cells = {name: [np.asarray(values)] for name, values in cell_data.items()}
     content = meshio.Mesh(points, [("tetra", tetrahedra)], cell_data=of_cells)
     with renamed_when_done(path) as temporary:
         meshio.write(temporary, content, file_format="vtu", compression="zlib")
@@ -200,12 +187,12 @@ def _of_dropped_cells(printed):
 def _refuse_unreadable(raw, path, printed):
     """Refuse solid cells that cannot be cut, which would leave holes, and files without any."""
     held = {block.type: block.dim for block in raw.cells if len(block.data)}
-    others = sorted(kind for kind in held if held[kind] == 3 and not shape_of(kind))
+    others = sorted(kind for kind in held if held[kind] == 3 and not cells.shape_of(kind))
     if others:
         raise InputError(
             f"mesh file {path} holds {', '.join(others)} cells, which cannot be read: {_SPLIT}"
         )
-    if not blocks_of(raw, 3):
+    if not cells.blocks_of(raw, 3):
         remedy = _of_dropped_cells(printed) or _REMEDY
         kinds = ", ".join(sorted(held)) or "no cells"
         raise InputError(f"mesh file {path} holds no tetrahedra (it holds: {kinds}): {remedy}")
@@ -216,13 +203,13 @@ def _mesh(raw, scale, weld_tolerance, keep_coincident):
     with np.errstate(over="ignore"):  # numbers that are not finite are refused
         points = checked_points(scale * np.asarray(raw.points, dtype=np.float64))
     welding: list[str] = []
-    bodies = bodies_in(raw, points)
+    bodies = cells.bodies_in(raw, points)
     label = weld_labels(points, bodies.tetrahedra, weld_tolerance, welding)
     if welding:
-        for _, block in (*blocks_of(raw, 2), *blocks_of(raw, 3)):
-            corners = corners_of(block, len(points))
+        for _, block in (*cells.blocks_of(raw, 2), *cells.blocks_of(raw, 3)):
+            corners = cells.corners_of(block, len(points))
             block.data = np.hstack([label[corners], block.data[:, corners.shape[1] :]])
-        bodies = bodies_in(raw, points)
-    kept = {"keep_coincident": keep_coincident, "body_groups": body_groups_in(raw, bodies)}
-    arrays = points, bodies.tetrahedra, face_groups_in(raw)
+        bodies = cells.bodies_in(raw, points)
+    kept = {"keep_coincident": keep_coincident, "body_groups": cells.body_groups_in(raw, bodies)}
+    arrays = points, bodies.tetrahedra, cells.face_groups_in(raw)
     return Mesh(*arrays, notes=tuple(welding), **kept)

@@ -10,16 +10,8 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import positive, several, shown, whole
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
 
-#: Groups of a bar: name -> (axis, 0 low or 1 high end).
-_SIDES = {
-    "left": (0, 0),
-    "right": (0, 1),
-    "bottom": (1, 0),
-    "top": (1, 1),
-    "back": (2, 0),
-    "front": (2, 1),
-}
-
+#: Groups of a bar: its low and high end along each axis.
+_SIDES = ("left", "right"), ("bottom", "top"), ("back", "front")
 #: Boxes of a bar: ten million tetrahedra take some ten GiB to check.
 _MOST_BOXES = 1_666_666
 
@@ -144,7 +136,7 @@ def _sides(grid, cells, tetrahedra):
     """Faces of the tetrahedra in the six outer planes: a face with all its points in the plane."""
     faces = tetrahedra[:, list(itertools.combinations(range(4), 3))].reshape(-1, 3)
     groups = {}
-    for name, (axis, end) in _SIDES.items():
-        inside = grid[faces, axis] == end * cells[axis]
-        groups[name] = faces[inside.all(axis=1)]
+    for axis, names in enumerate(_SIDES):
+        for name, end in zip(names, (0, cells[axis])):
+            groups[name] = faces[(grid[faces, axis] == end).all(axis=1)]
     return groups
