@@ -1,4 +1,4 @@
-"""Geometry and connectivity of bare tetrahedron arrays (NumPy only).
+"""Geometry and connectivity of bare tetrahedron arrays (NumPy and SciPy only).
 
 Everything here works on ``points`` (point_count, 3) [m] and ``tetrahedra`` (body_count, 4).
 Local face f of a tetrahedron is the face opposite its local vertex f.
@@ -132,7 +132,7 @@ def components(count: int, pairs: np.ndarray) -> np.ndarray:
 
     count: number of nodes.  pairs: linked nodes, shape (n, 2).
     """
-    # Imported here, as in ``close_pairs``: SciPy loads only where a mesh is made.
+    # Imported here, as in ``close_pairs``, so that SciPy loads only where a mesh is made.
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
