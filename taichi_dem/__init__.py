@@ -33,7 +33,6 @@ from taichi_dem.kit.sweeps.sweep import sweep
 from taichi_dem.kit.sweeps.table import SweepTable
 from taichi_dem.kit.version import __version__
 from taichi_dem.materials import CONCRETE, Material
-from taichi_dem.mesh.face_groups import with_body_group
 from taichi_dem.mesh.files import read_mesh
 from taichi_dem.mesh.joined import in_space_order, join
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
@@ -102,6 +101,5 @@ __all__ = [
     "solve",
     "step_report",
     "sweep",
-    "with_body_group",
     "write_paraview",
 ]

@@ -1,4 +1,4 @@
-"""Geometry and connectivity of bare tetrahedron arrays (NumPy only).
+"""Geometry and connectivity of bare tetrahedron arrays (NumPy and SciPy only).
 
 Everything here works on ``points`` (point_count, 3) [m] and ``tetrahedra`` (body_count, 4).
 Local face f of a tetrahedron is the face opposite its local vertex f.
@@ -49,6 +49,12 @@ def area_vectors(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
+def unit_normals(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Right-hand unit normals of triangles, shape (n, 3); faces: point indices, (n, 3)."""
+    vectors = area_vectors(points, faces)
+    return vectors / length(vectors)[:, None]
+
+
 def all_faces(tetrahedra: np.ndarray) -> np.ndarray:
     """Every face of every body, outward order, shape (4 * body_count, 3); row 4 * body + f."""
     return tetrahedra[:, LOCAL_FACES].reshape(-1, 3)
@@ -83,7 +89,12 @@ def shared_faces(tetrahedra: np.ndarray) -> np.ndarray:
 
     Call it only where no face is shared by three bodies.
     """
-    number = face_numbers(all_faces(tetrahedra))
+    return equal_rows(all_faces(tetrahedra))
+
+
+def equal_rows(rows: np.ndarray) -> np.ndarray:
+    """Numbers of rows on the same points, each with the next such one, (n, 2)."""
+    number = face_numbers(rows)
     order = np.argsort(number, kind="stable")
     same = number[order[1:]] == number[order[:-1]]
     return np.column_stack([order[:-1][same], order[1:][same]])
@@ -121,50 +132,23 @@ def components(count: int, pairs: np.ndarray) -> np.ndarray:
 
     count: number of nodes.  pairs: linked nodes, shape (n, 2).
     """
-    label = np.arange(count)
-    while True:
-        lowest = np.minimum(label[pairs[:, 0]], label[pairs[:, 1]])
-        merged = label.copy()
-        for side in (0, 1):
-            np.minimum.at(merged, label[pairs[:, side]], lowest)
-        while not np.array_equal(merged, merged[merged]):
-            merged = merged[merged]
-        if np.array_equal(merged, label):
-            return label
-        label = merged
+    # Imported here, as in ``close_pairs``, so that SciPy loads only where a mesh is made.
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    part = connected_components(links, directed=False)[1]
+    return np.unique(part, return_index=True)[1][part]
 
 
 def close_pairs(points: np.ndarray, distance: float) -> np.ndarray:
-    """Pairs of points not farther apart than ``distance`` [m], shape (n, 2), first < second.
+    """Pairs of points not farther apart than ``distance`` [m], shape (n, 2), first < second."""
+    from scipy.spatial import KDTree
 
-    Two such points lie in one cell of at least one of eight cubic grids of cell size 4 distance,
-    shifted by half a cell along each axis; so sorting by cell finds them without all pairs.
-    """
-    found = []
-    cell = 4.0 * distance
-    low = points.min(axis=0)
-    for shift in np.ndindex(2, 2, 2):
-        first, second = _equal_rows(np.floor((points - low) / cell + 0.5 * np.array(shift)))
-        near = length(points[first] - points[second]) <= distance
-        found.append(np.sort(np.column_stack([first[near], second[near]]), axis=1))
-    return np.unique(np.vstack(found), axis=0)
-
-
-def pairs_at_edges(faces: np.ndarray) -> np.ndarray:
-    """Numbers of each two faces (n, 3) that have an edge in common, (2, pairs)."""
-    return _equal_rows(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)) // 3
-
-
-def _equal_rows(rows):
-    """Numbers of each two equal rows (n, ...), (2, pairs)."""
-    order = np.lexsort(rows.T)
-    rows, found = rows[order], [np.empty((2, 0), dtype=np.int64)]
-    for step in range(1, len(rows)):
-        same = np.flatnonzero((rows[step:] == rows[:-step]).all(axis=1))
-        if len(same) == 0:
-            break
-        found.append(np.stack([order[same], order[same + step]]))
-    return np.hstack(found)
+    # The tree compares squares, whose last bit may be another.
+    pairs = KDTree(points).query_pairs((1.0 + 1e-9) * distance, output_type="ndarray")
+    near = length(points[pairs[:, 0]] - points[pairs[:, 1]]) <= distance
+    return np.unique(pairs[near], axis=0)
 
 
 @functools.cache

@@ -7,7 +7,7 @@ import numpy as np
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, whole
-from taichi_dem.output.attenuation import Attenuation
+from taichi_dem.output.attenuation import Attenuation, attenuation_of
 from taichi_dem.output.cracks import Rose, cracks_of, rose_of
 from taichi_dem.output.export.gltf import write_gltf
 from taichi_dem.output.export.particles import write_particles
@@ -172,7 +172,7 @@ class RunTables:
             raise InputError(
                 "group must name the wall of a hole, as this scene has no gas pressure"
             )
-        return Attenuation.of(self.model, self.peak_speed, radius, group)
+        return attenuation_of(self.model, self.peak_speed, group, radius)
 
     def write_vtkhdf(self, path: FileName) -> None:
         """Write all frames as one VTKHDF file for ParaView, with the data of the PVD series.

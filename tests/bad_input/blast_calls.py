@@ -44,7 +44,6 @@ from taichi_dem import (
     simulate,
     solve,
     step_report,
-    with_body_group,
     write_paraview,
 )
 from taichi_dem.mesh.face_groups import with_inner_group
@@ -113,7 +112,6 @@ def _scenes():
     yield "Mesh.group", PAIR.group, chosen
     yield "Mesh.body_group", PAIR.body_group, chosen
     yield "Mesh.moved", PAIR.moved, {}
-    yield "with_body_group", with_body_group, {"mesh": PAIR, **chosen}
     yield "Multirate", Multirate, {"control": StepControl()}
     yield "Uniform", Uniform, {"distance": 1e-5, "control": StepControl()}
     yield "StepControl", StepControl, {}
