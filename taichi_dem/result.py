@@ -30,6 +30,17 @@ from taichi_dem.report.report import Report
 from taichi_dem.scene import Scene
 from taichi_dem.state.model import Model
 
+#: Rows of the report that a notebook shows at once.
+_SHOWN = (
+    "method",
+    "simulated",
+    "smallest step",
+    "work put in",
+    "energy residual",
+    "injected",
+    "time",
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Result(RunTables):
@@ -154,25 +165,17 @@ class Result(RunTables):
 
     def _figures(self):
         """The main figures of the run, (name, text) each."""
-        report, model, history = self.report, self.model, self.history
+        model, told = self.model, self.report.rows()
         parts = counted(model.body_count, "body"), counted(model.bond_count, "bond")
-        rows = [
-            ("simulated", f"{report.until_s:.4g} s"),
-            ("method", f"{report.method}, {report.driver} driver"),
-            ("smallest step", f"{report.smallest_step_s:.3g} s"),
+        moved = outward_columns(self.history).items()
+        return [
             ("scene", ", ".join(parts)),
-            ("effects", ", ".join(report.effects) or "none"),
-            ("broken bonds", f"{report.broken_faces:,}"),
+            ("effects", ", ".join(self.report.effects) or "none"),
+            *((name, told[name]) for name in _SHOWN if told[name]),
             ("largest speed", f"{np.fmax.reduce(self.peak_speed, initial=np.nan):.4g} m/s"),
-            ("work put in", f"{report.work_put_in:.4g} J"),
-            ("energy not explained", report.unexplained),
-            *((("energy injected", report.injected),) if report.injected else ()),
-            ("time", f"{report.compile_seconds:.1f} s compiling, {report.run_seconds:.1f} s run"),
+            *((f"{hole}, mean outward", f"{way[-1]:.4g} mm") for hole, way in moved if len(way)),
+            *(("warning", need) for need in self.report.needs),
         ]
-        for hole, moved in outward_columns(history).items():
-            if len(moved):
-                rows.insert(7, (f"{hole}, mean outward displacement", f"{moved[-1]:.4g} mm"))
-        return [*rows, *(("warning", need) for need in report.needs)]
 
     def write(self, folder: FileName) -> None:
         """Write history.csv, bonds.csv, mesh.msh, report.json and a ParaView series to a folder.

@@ -479,4 +479,4 @@ class Simulation(Uncopied):
         dict of ndarray
             Times [s], shape (body_count,), by name; NaN for never.
         """
-        return on_demand(self.parts).since
+        return on_demand(self.parts)[0]

@@ -42,7 +42,8 @@ class Creep(Kept):
     def sample(self, time_s: float) -> np.ndarray:
         """Bodies that creep at a recording time [s]."""
         count = self.run.model.body_count
-        bodies, (force, bound, power) = self.run.readings.rubbing()
+        force, bound, power = self.run.readings.pushes()[1][:, 2:5].T
+        bodies = self.run.contacts.store.near_bodies()
         slides = (force > 0.0) & (force < _HELD * bound)
         bodies, force, bound = bodies[slides], force[slides], bound[slides]
         place = values(self.run.state.position, slice(count))

@@ -131,10 +131,6 @@ class EnergyBalance(Kept):
         """Work of one load [J], by its place in the scene's list of loads."""
         return float(self.works()[:, index].sum())
 
-    def ground_heats(self, index: int) -> np.ndarray:
-        """Heat [J] in the dashpots of one ground at every body, (body_count,), by its place."""
-        return 0.0 - self.works()[:, len(self.run.model.loads) + 1 + index]
-
     def momentum(self) -> np.ndarray:
         """Linear [N s] and angular momentum about the origin [N m s], less external impulses."""
         return _own(self.run.readings.momentum())

@@ -47,21 +47,12 @@ class Readings:
             self._held[name] = read()
         return self._held[name]
 
-    def rubbing(self) -> tuple[np.ndarray, np.ndarray]:
-        """Both bodies of every pair near each other, (pairs, 2), and of their contacts, (3, pairs).
-
-        Sums of friction, of its limit [N], and of its power [W].
-        """
-        _, table = self.pushes()
-        bodies = self.contacts.store.near_bodies() if len(table) else np.zeros((0, 2), np.int32)
-        return bodies, table[:, 2:5].T
-
     def pushes(self) -> tuple[np.ndarray, np.ndarray]:
         """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
 
         Summed in the order of the pairs, so that no thread changes a bit. Also the heat of each
-        pair's dashpots and friction by which the booked one is behind [J], the sums of
-        ``rubbing``, and the pair's strain and booked heats [J], (pairs, 9).
+        pair's dashpots and friction by which the booked one is behind [J], sums of friction, of its
+        limit [N] and of its power [W], and the pair's strain and booked heats [J], (pairs, 9).
         """
         return self._once("pushes", self._pushes)
 

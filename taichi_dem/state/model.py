@@ -149,3 +149,18 @@ class Model:
 
     def _per_bond(self, constants):
         return per_bond(self.mesh, self.topology, self.materials.density, constants)
+
+
+def sums(group: np.ndarray, of_bodies: np.ndarray) -> np.ndarray:
+    """Sums over groups of bodies of an array of each; group: number of that of each body.
+
+    of_bodies: (body_count, ...). Returns (groups, ...).
+    """
+    flat = of_bodies.reshape(len(of_bodies), -1)
+    columns = [np.bincount(group, column) for column in flat.T]
+    return np.stack(columns, axis=1).reshape(-1, *of_bodies.shape[1:])
+
+
+def centres(group: np.ndarray, body_mass: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Centres of mass of groups of bodies [m], (groups, 3); position (body_count, 3) [m]."""
+    return sums(group, body_mass[:, None] * position) / sums(group, body_mass)[:, None]

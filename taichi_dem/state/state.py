@@ -32,9 +32,8 @@ def unserved_limits(model: Model) -> np.ndarray:
     for a, row in enumerate(model.materials.pairs):
         for b, pair in enumerate(row):
             strength = np.inf if served & {"bond", "tension"} else pair.tensile_strength
-            cohesion = np.inf if served & {"bond", "shear"} else pair.cohesion
-            friction = 0.0 if served & {"bond", "shear"} else pair.friction
-            rows[MOST * a + b] = strength, cohesion, friction
+            slides = (np.inf, 0.0) if served & {"bond", "shear"} else (pair.cohesion, pair.friction)
+            rows[MOST * a + b] = strength, *slides
     return rows
 
 
@@ -130,10 +129,10 @@ class State:
         """
         given = (position, orientation, velocity, spin)
         rest = ([0.0] * 3, [1.0, 0.0, 0.0, 0.0], [0.0] * 3, [0.0] * 3)
-        rows = [still if part is None else part for part, still in zip(given, rest)]
-        shapes = [(self.body_count, len(still)) for still in rest]
-        shaped = [np.broadcast_to(part, shape) for part, shape in zip(rows, shapes)]
-        whole = [np.ascontiguousarray(part, dtype=np.float64) for part in shaped]
+        whole = [np.tile(still, (self.body_count, 1)) for still in rest]
+        for rows, part in zip(whole, given):
+            if part is not None:
+                rows[:] = part
         inertia = values(self.tables.inertia, slice(self.body_count))
         found = turned_bodies(whole[1], whole[3], inertia)
         names = (*_GIVEN, "rotation", "angular_momentum")

@@ -47,7 +47,7 @@ class Tables:
 
     def __init__(self, capacity: Capacity, on_demand: bool = False):
         self.capacity, self.on_demand = capacity, on_demand
-        self.body_count, self.bond_count = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
+        self.body_count, self.bond_count = (ti.field(ti.i32, shape=()) for _ in range(2))
         self._declare_bodies(capacity.bodies)
         self._declare_bonds(capacity)
 
@@ -58,21 +58,19 @@ class Tables:
         self.contact = by_role["contact"][0] if by_role["contact"] else None
         self.loads, self.supports, self.ground = (tuple(by_role[role]) for role in MANY)
         self.effects = tuple(effect for role in ROLES for effect in by_role[role])
-        self.drives = self._drives()
         self.has_contact = self.contact is not None
         self.has_bond_heat = bool(self.dashpot.name) or not bond.is_null
         if self.has_contact:
             self._declare_spheres(self.capacity)
 
-    def _drives(self):
+    @property
+    def drives(self) -> tuple[tuple[Any, int, int, int], ...]:
         """Loads and ground with the row of their impulse, account of work, and bit of activity."""
         loads, held = len(self.loads), len(self.supports)
-        pushes = [(effect, e, e, e) for e, effect in enumerate(self.loads)]
-        drags = [
-            (effect, loads + e, loads + 1 + e, loads + held + e)
-            for e, effect in enumerate(self.ground)
-        ]
-        return (*pushes, *drags)
+        drives = [(effect, e, e, e) for e, effect in enumerate(self.loads)]
+        for row, effect in enumerate(self.ground, loads):
+            drives.append((effect, row, 1 + row, held + row))
+        return tuple(drives)
 
     def _declare_bodies(self, n):
         self.mass = ti.field(real, shape=n)
