@@ -425,8 +425,7 @@ class Simulation(Uncopied):
         if not brief:
             shared_volume.sample(self.time_s, finished=True)
         linear, angular = self.energy_balance.momentum_errors()
-        tables = self.energy_balance.tables()
-        account = self.energy_balance.account(tables)
+        account = self.energy_balance.account()
         bound = np.bincount(values(self.state.bound, here), minlength=len(CRITERIA))
         unconverged, worst = self.step_resolution.unconverged
         report = Report(
@@ -453,7 +452,7 @@ class Simulation(Uncopied):
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
-            effect_activity=effect_uses(self.parts, self.energy_balance, tables, account),
+            effect_activity=effect_uses(self.parts, self.energy_balance, account),
             missing_effects=() if brief else self.missing_effects.findings(shared_volume),
             unresolved=(
                 *self.step_resolution.findings(),

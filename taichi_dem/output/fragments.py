@@ -3,7 +3,7 @@
 import numpy as np
 
 from taichi_dem.kit.data_table import Table
-from taichi_dem.mesh.tetrahedra import components, signed_volumes
+from taichi_dem.mesh.tetrahedra import signed_volumes
 from taichi_dem.output.record import Frame
 from taichi_dem.state.model import Model, centres, sums
 
@@ -62,9 +62,7 @@ def fragment_of_body(model: Model, broken: np.ndarray) -> np.ndarray:
     ndarray of int, shape (body_count,)
         Fragment of each body.
     """
-    links = np.stack([model.topology.master, model.topology.slave], axis=1)[~broken]
-    first = components(model.body_count, links)
-    heads, number = np.unique(first, return_inverse=True)
+    heads, number = np.unique(model.pieces(broken), return_inverse=True)
     order = np.lexsort((heads, -np.bincount(number.reshape(-1), model.body_mass)))
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))

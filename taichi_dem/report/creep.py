@@ -42,7 +42,7 @@ class Creep(Kept):
     def sample(self, time_s: float) -> np.ndarray:
         """Bodies that creep at a recording time [s]."""
         count = self.run.model.body_count
-        force, bound, power = self.run.readings.pushes()[1][:, 2:5].T
+        force, bound, power = self.run.readings.contacts_now()[:, 14:17].T
         bodies = self.run.contacts.store.near_bodies()
         slides = (force > 0.0) & (force < _HELD * bound)
         bodies, force, bound = bodies[slides], force[slides], bound[slides]
@@ -75,7 +75,8 @@ class Creep(Kept):
 
     def _is_pushed(self, bodies, table):
         """Whether the drag between two pieces would have stopped them many times over."""
-        model, piece = self.run.model, self.run.pieces()
+        model = self.run.model
+        piece = model.pieces(self.run.state.broken())
         mass = np.bincount(piece, model.body_mass, minlength=model.body_count)
         ends = np.sort(piece[bodies], axis=1)
         _, group = np.unique(ends, axis=0, return_inverse=True)

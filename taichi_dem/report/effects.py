@@ -7,7 +7,7 @@ import numpy as np
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
-from taichi_dem.report.energy_balance import EnergyBalance, EnergyTables
+from taichi_dem.report.energy_balance import EnergyBalance
 from taichi_dem.report.missing_effects import bond_rounding
 from taichi_dem.report.run import Run
 from taichi_dem.state.activity import LATER
@@ -58,23 +58,22 @@ def _times(ticks, never, tick_seconds):
 
 
 def effect_uses(
-    run: Run, balance: EnergyBalance, tables: EnergyTables, account: Mapping[str, float]
+    run: Run, balance: EnergyBalance, account: Mapping[str, float]
 ) -> tuple[EffectUse, ...]:
     """An EffectUse for every listed effect, in the model's order.
 
     Events are counted where effects act: one is idle only if not a bit of the run depends on it.
-    tables, account: from the methods of that name of the energy balance. Effects are judged by
-    role, so that user-defined ones are judged like those of the package; they are never called idle
-    where only their own code could tell.
+    account: of the energy balance. Effects are judged by role, so that user-defined ones are judged
+    like those of the package; they are never called idle where only their own code could tell.
     """
-    uses = _Uses(run, balance, tables[1][:, 1], account)
+    uses = _Uses(run, balance, account)
     return tuple(uses.of(effect) for effect in run.model.effects if effect.name)
 
 
 class _Uses:
-    """Makes the EffectUse of an effect; heat: of the dashpots of each bond [J]."""
+    """Makes the EffectUse of an effect."""
 
-    def __init__(self, run, balance, heat, account):
+    def __init__(self, run, balance, account):
         self.run, self.account, self.works = run, account, balance.works()
         self.given = abs(account["load_work"]) + abs(account["support_work"]) + balance.start_energy
         self.bits = values(run.state.active_effects, slice(run.model.body_count))
@@ -84,7 +83,7 @@ class _Uses:
             "bond": marks.any(axis=1),
             "tension": marks[:, 0],
             "shear": marks[:, 1],
-            "dashpot": heat > bond_rounding(run),
+            "dashpot": run.readings.bonds()[:, 1] > bond_rounding(run),
             "contact": self.bits & np.int64(CONTACT),
             "friction": self.bits & np.int64(RUBBED),
         }

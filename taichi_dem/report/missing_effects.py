@@ -154,7 +154,8 @@ class MissingEffects(Kept):
         """First bodies of pairs of two pieces within each other, those that share most first."""
         pairs = volume.pairs[np.argsort(-volume.share, kind="stable")]
         if len(pairs):
-            pairs = pairs[np.diff(self.run.pieces()[pairs], axis=1)[:, 0] != 0]
+            piece = self.run.model.pieces(self.run.state.broken())
+            pairs = pairs[np.diff(piece[pairs], axis=1)[:, 0] != 0]
         return pairs[:, 0]
 
     def _touching(self):

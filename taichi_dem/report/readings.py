@@ -39,37 +39,39 @@ class Readings:
         finally:
             self._held = outer
 
-    def _once(self, name, read):
-        """Result of read(), which inside of ``held`` is called once under a name."""
-        if self._held is None:
-            return read()
-        if name not in self._held:
-            self._held[name] = read()
-        return self._held[name]
+    def _once(self, name, shape, fill):
+        """A table that a kernel fills, which inside of ``held`` is asked once under a name."""
+        held = {} if self._held is None else self._held
+        if name not in held:
+            held[name] = np.zeros(shape)
+            if shape[0]:
+                fill(held[name])
+        return held[name]
 
-    def pushes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
-
-        Summed in the order of the pairs, so that no thread changes a bit. Also the heat of each
-        pair's dashpots and friction by which the booked one is behind [J], sums of friction, of its
-        limit [N] and of its power [W], and the pair's strain and booked heats [J], (pairs, 9).
-        """
-        return self._once("pushes", self._pushes)
+    def contacts_now(self) -> np.ndarray:
+        """All that ``_push`` finds of the contacts of every pair, (pairs, 21)."""
+        count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
+        return self._once("contacts", (count, 21), self._push)
 
     def _pushes(self):
-        pushed = np.zeros((int(values(self.tables.body_count)), 6))
-        count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
-        table = np.zeros((count, 21))
-        if count:
+        """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
+
+        Summed in the order of the pairs, so that no thread changes a bit.
+        """
+        pushed, table = np.zeros((int(values(self.tables.body_count)), 6)), self.contacts_now()
+        if len(table):
             bodies = self.contacts.store.near_bodies()
-            self._push(table)
             for side in range(2):
                 np.add.at(pushed, bodies[:, side], table[:, 6 * side : 6 * side + 6])
-        return pushed, table[:, 12:]
+        return pushed
 
     @ti.kernel
     def _push(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Impulse and moment of every pair's contacts on both bodies in half a step, and heats."""
+        """Impulse [N s] and moment [N m s] of every pair's contacts on both bodies in half a step.
+
+        Also the heat of its dashpots and friction by which the booked one is behind [J], sums of
+        friction, of its limit [N] and of its power [W], its strain and booked heats [J].
+        """
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
             found, half = self.advance.forces_now(p), self.half_step.pair_step(p)
@@ -97,16 +99,12 @@ class Readings:
 
     def step_back(self) -> None:
         """Set the velocities, which are given at time zero, half a step back."""
-        self._table(back=1)
+        pushed = self._pushes()
+        self._visit(pushed, 1, np.zeros((len(pushed), 16 + len(self.tables.drives))))
 
     def _present(self):
-        return self._once("table", self._table)
-
-    def _table(self, back=0):
-        pushed, _ = self.pushes()
-        table = np.zeros((len(pushed), 16 + len(self.tables.drives)))
-        self._visit(pushed, back, table)
-        return table
+        shape = int(values(self.tables.body_count)), 16 + len(self.tables.drives)
+        return self._once("bodies", shape, lambda table: self._visit(self._pushes(), 0, table))
 
     @ti.kernel
     def _visit(
@@ -155,12 +153,8 @@ class Readings:
         return self._bonds()[:, 8]
 
     def _bonds(self):
-        return self._once("bonds", self._bond_table)
-
-    def _bond_table(self):
-        table = np.zeros((int(values(self.tables.bond_count)), 9))
-        self._visit_bonds(table)
-        return table
+        shape = int(values(self.tables.bond_count)), 9
+        return self._once("bonds", shape, self._visit_bonds)
 
     @ti.kernel
     def _visit_bonds(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
@@ -195,8 +189,8 @@ class Readings:
 
     def pairs(self) -> np.ndarray:
         """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""
-        table = self.pushes()[1][:, 5:].copy()
-        table[:, 1:3] += self.pushes()[1][:, :2]
+        table = self.contacts_now()[:, 17:].copy()
+        table[:, 1:3] += self.contacts_now()[:, 12:14]
         return table
 
     def momentum(self) -> np.ndarray:

@@ -6,7 +6,6 @@ from typing import ClassVar, NamedTuple, Optional
 import numpy as np
 
 from taichi_dem.contact.contacts import Contacts
-from taichi_dem.mesh.tetrahedra import components
 from taichi_dem.report.readings import Readings
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
@@ -23,12 +22,6 @@ class Run(NamedTuple):
     advance: Advance
     readings: Readings
     contacts: Optional[Contacts]
-
-    def pieces(self) -> np.ndarray:
-        """Piece of each body, which bonds that hold keep together, (body_count,)."""
-        top = self.model.topology
-        ends = np.column_stack([top.master, top.slave])[~self.state.broken()]
-        return components(self.model.body_count, ends)
 
 
 class Kept:

@@ -41,7 +41,7 @@ class StabilityLimits:
     limit_level, limit_by: level of the longest stable step, and the criterion that sets it.
     displacement, turn, leap: levels for speed, spin and acceleration. listed, listed_count: bodies
     to look at; events: why, as bits. woken: how many were brought to the present between their
-    times. control: a StepControl, None for a method that only limits dashpots. rule: dt0 [s],
+    times. controlled: not by a method that only limits dashpots. rule: dt0 [s],
     safety and dashpot floor [s]. jump: levels between neighbours, where they are limited.
 
     Limited dashpots share 1.7 by need. With X = 2 dt rate for bonds (b) and contacts (c) of a body
@@ -71,8 +71,7 @@ class StabilityLimits:
 
     def __init__(self, tables: Tables, state: State, contacts: Optional[Contacts], method: Method):
         self.tables, self.state, self.contacts = tables, state, contacts
-        self.control, rule = method.control, method.control or StepControl()
-        self.controlled = self.control is not None
+        rule, self.controlled = method.control or StepControl(), method.control is not None
         self.has_contact = contacts is not None
         self.has_distance = method.distance is not None
         self.limited = method.dashpot == "limited"

@@ -17,7 +17,7 @@ from taichi_dem.materials.material import harmless
 from taichi_dem.mesh.colouring import edge_colours
 from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.tetrahedra import area_vectors
+from taichi_dem.mesh.tetrahedra import area_vectors, components
 from taichi_dem.mesh.topology import body_properties, topology_of
 
 #: Roles that take one effect, in the order in which effects are listed, bound and reported.
@@ -103,6 +103,21 @@ class Model:
 
     def _subset_rates(self, coefficients):
         return subset_rates(self.mesh, self.topology, self.materials.density, coefficients)
+
+    @cached_property
+    def neighbours(self) -> np.ndarray:
+        """Body behind each local face of every body, -1 where it is outer, (body_count, 4)."""
+        top = self.topology
+        both = np.append(top.master + top.slave, 0)[top.body_bond]
+        return np.where(top.body_bond < 0, -1, both - np.arange(self.body_count)[:, None])
+
+    def pieces(self, broken: np.ndarray) -> np.ndarray:
+        """First body of the piece of each body, which unbroken bonds keep together, (body_count,).
+
+        broken: whether each bond has been released, (bond_count,).
+        """
+        ends = np.column_stack([self.topology.master, self.topology.slave])
+        return components(self.body_count, ends[~broken])
 
     @cached_property
     def bond_colours(self) -> np.ndarray:

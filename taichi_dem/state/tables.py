@@ -128,14 +128,9 @@ class Tables:
 
     def _load_bonds(self, model):
         bonds = model.bonds
-        slots, first = bonds["slots"], np.arange(model.bond_count, dtype=np.int32)
-        neighbour = np.full((2, 4 * model.body_count), -1, dtype=np.int32)
-        for side in range(2):
-            neighbour[0, slots[:, side]] = slots[:, 1 - side] >> 2
-            neighbour[1, slots[:, side]] = first
-        assign(self.neighbour, neighbour[0])
-        assign(self.face_bond, neighbour[1])
-        assign(self.bond_slots, slots)
+        assign(self.neighbour, model.neighbours.reshape(-1))
+        assign(self.face_bond, model.topology.body_bond.reshape(-1))
+        assign(self.bond_slots, bonds["slots"])
         assign(self.bond_frame, bonds["frame"])
         assign(self.bond_stiffness, model.bond_stiffness)
         assign(self.unit_area, bonds["area"])
