@@ -24,10 +24,9 @@ from taichi_dem.report.divergence import DivergenceCheck
 from taichi_dem.report.effects import effect_uses, on_demand
 from taichi_dem.report.energy_balance import EnergyBalance, open_account
 from taichi_dem.report.missing_effects import MissingEffects
-from taichi_dem.report.readings import Readings
+from taichi_dem.report.readings import Kept, Readings, Run
 from taichi_dem.report.report import Report, known_error
 from taichi_dem.report.resolution import StepResolution
-from taichi_dem.report.run import Kept, Run
 from taichi_dem.report.shared_volume import SharedVolume
 from taichi_dem.scene import Scene
 from taichi_dem.state.capacity import capacity_of

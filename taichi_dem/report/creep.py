@@ -10,7 +10,7 @@ that slide on as fast after many times as much are pushed by a load.
 import numpy as np
 
 from taichi_dem.kit.allocation import values
-from taichi_dem.report.run import Kept, Run
+from taichi_dem.report.readings import Kept, Run
 
 #: Share of its limit below which friction would hold; a contact near it may slide next.
 _HELD = 0.98

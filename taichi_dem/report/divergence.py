@@ -9,7 +9,7 @@ from taichi_dem.contact.contacts import FARTHEST
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.report.energy_balance import EnergyBalance, unexplained_share
-from taichi_dem.report.run import Run
+from taichi_dem.report.readings import Run
 from taichi_dem.report.shared_volume import SharedVolume
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
 from taichi_dem.stability.step_report import bond_steps

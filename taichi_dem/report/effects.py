@@ -9,7 +9,7 @@ from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.report.energy_balance import EnergyBalance
 from taichi_dem.report.missing_effects import bond_rounding
-from taichi_dem.report.run import Run
+from taichi_dem.report.readings import Run
 from taichi_dem.state.activity import LATER
 from taichi_dem.state.timeline import NEVER
 

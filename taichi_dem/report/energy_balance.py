@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from taichi_dem.report.run import Kept, Run
+from taichi_dem.report.readings import Kept, Run
 
 #: Terms of the account in the order of tables and files, all in J.
 TERMS = tuple(

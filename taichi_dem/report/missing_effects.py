@@ -9,7 +9,7 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.mesh.tetrahedra import penetration
 from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.report.creep import Creep
-from taichi_dem.report.run import Kept, Run
+from taichi_dem.report.readings import Kept, Run
 from taichi_dem.report.shared_volume import SharedVolume
 from taichi_dem.state.model import Model
 from taichi_dem.state.timeline import NEVER

@@ -1,20 +1,23 @@
-"""Readings of a run: tables of energy, momentum and shares that kernels fill for the host."""
+"""What reports read of a run, by tables that kernels fill, and what they keep of it."""
 
 import contextlib
-from collections.abc import Iterator
-from typing import Any, Optional
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, NamedTuple, Optional
 
 import numpy as np
 import taichi as ti
 
+from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.products import norm
 from taichi_dem.kit.types import vec3
 from taichi_dem.state.activity import PARTS
+from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.multirate.half_step import HalfStep
+from taichi_dem.step.multirate.schedule import Schedule
 
 
 @ti.data_oriented
@@ -243,3 +246,29 @@ class Readings:
                     rate = count * self.contacts.law.damping(self.tables.pair(i, j))
                     rate *= 1.0 / self.tables.mass[i] + 1.0 / self.tables.mass[j]
                     ti.atomic_max(taken[i], rate * self.advance.schedule.pair_step(i, j))
+
+
+class Run(NamedTuple):
+    """What a report reads of a simulation; contacts is None without contact."""
+
+    model: Model
+    state: State
+    schedule: Schedule
+    advance: Advance
+    readings: Readings
+    contacts: Optional[Contacts]
+
+
+class Kept:
+    """What is followed over a run: a checkpoint holds its attributes of the names ``kept``."""
+
+    kept: ClassVar[tuple[str, ...]] = ()
+
+    def saved(self) -> dict[str, np.ndarray]:
+        """Data for a checkpoint, arrays by name."""
+        return {name: np.array(getattr(self, name)) for name in self.kept}
+
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Restore the data that ``saved`` returned."""
+        for name in self.kept:
+            setattr(self, name, saved[name].copy()[()])

@@ -13,7 +13,7 @@ import taichi as ti
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.tetrahedra import points_of_parts
-from taichi_dem.report.run import Kept, Run
+from taichi_dem.report.readings import Kept, Run
 from taichi_dem.scene import remedy
 
 #: Share of the smaller body beyond which two bodies count as within each other.

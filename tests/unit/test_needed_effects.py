@@ -20,7 +20,7 @@ from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.report.effects import effect_uses
 from taichi_dem.report.energy_balance import TERMS
-from taichi_dem.report.run import Run
+from taichi_dem.report.readings import Run
 from taichi_dem.state.model import Model
 
 #: Far below the strength of concrete: a block of some 1 kg that falls from rest for 1e-5 s.
