@@ -86,16 +86,11 @@ class StabilityLimits:
         self.jump = ti.field(ti.i32, shape=())
         self.rule = ti.field(real, shape=3)
         n = tables.capacity.bodies
-        self.dashpot_table = ti.field(real, shape=(n, 16))
-        self.spring_table = ti.field(real, shape=(n, 16))
-        self.bond_damping = ti.field(real, shape=n)
-        self.contact_damping = ti.field(real, shape=n)
-        self.limit_by = ti.field(ti.i32, shape=n)
-        self.limit_level = ti.field(ti.i32, shape=n)
-        self.events = ti.field(ti.i32, shape=n)
-        self.listed = ti.field(ti.i32, shape=n)
-        self.listed_count = ti.field(ti.i32, shape=())
-        self.woken = ti.field(ti.i32, shape=())
+        self.dashpot_table, self.spring_table = (ti.field(real, shape=(n, 16)) for _ in range(2))
+        self.bond_damping, self.contact_damping = (ti.field(real, shape=n) for _ in range(2))
+        self.limit_by, self.limit_level = (ti.field(ti.i32, shape=n) for _ in range(2))
+        self.events, self.listed = (ti.field(ti.i32, shape=n) for _ in range(2))
+        self.listed_count, self.woken = (ti.field(ti.i32, shape=()) for _ in range(2))
 
     def load(self, model: Model, method: Method) -> None:
         """Load the bonds of a model and the numbers of a method."""

@@ -36,10 +36,8 @@ class Columns:
         """
         if name in self.by_name:
             raise InputError(f"a column of the pair store must have a new name, got {name!r}")
-        if width:
-            column = ti.Vector.field(width, kind, shape=self.entries)
-        else:
-            column = ti.field(kind, shape=self.entries)
+        n = self.entries
+        column = ti.Vector.field(width, kind, shape=n) if width else ti.field(kind, shape=n)
         self.by_name[name] = column
         self.members += (column,)
         return column

@@ -71,14 +71,11 @@ class State:
         n, bonds = tables.capacity.bodies, tables.capacity.bonds
         self.tables = tables
         self.activity = Activity(tables) if tables.on_demand else None
-        self.position = ti.Vector.field(3, real, shape=n)
         self.orientation = ti.Vector.field(4, real, shape=n)
         self.rotation = ti.Matrix.field(3, 3, real, shape=n)
-        self.velocity = ti.Vector.field(3, real, shape=n)
-        self.spin = ti.Vector.field(3, real, shape=n)
-        self.angular_momentum = ti.Vector.field(3, real, shape=n)
-        self.level = ti.field(ti.i32, shape=n)
-        self.bound = ti.field(ti.i32, shape=n)
+        self.position, self.velocity = (ti.Vector.field(3, real, shape=n) for _ in range(2))
+        self.spin, self.angular_momentum = (ti.Vector.field(3, real, shape=n) for _ in range(2))
+        self.level, self.bound = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.last_tick = ti.field(ti.i64, shape=n)
         if tables.loads:
             self.lag = ti.Vector.field(len(tables.loads), real, shape=n)

@@ -73,9 +73,7 @@ class Tables:
         return tuple(drives)
 
     def _declare_bodies(self, n):
-        self.mass = ti.field(real, shape=n)
-        self.mass_inverse = ti.field(real, shape=n)
-        self.radius = ti.field(real, shape=n)
+        self.mass, self.mass_inverse, self.radius = (ti.field(real, shape=n) for _ in range(3))
         self.material = ti.field(ti.i32, shape=n)
         self.inertia = ti.Matrix.field(3, 3, real, shape=n)
         self.inertia_inverse = ti.Matrix.field(3, 3, real, shape=n)
