@@ -89,7 +89,7 @@ class EnergyBalance(Kept):
         held = *HELD, "residual"
         self.start = np.array([0.0 if name in held else first[name] for name in TERMS])
         self.start_works = self.works()
-        self.start_momentum = self.momentum()
+        self.start_momentum = _own(run.readings.momentum())
 
     def account(self) -> dict[str, float]:
         """All terms in J by name; residual is the unexplained remainder."""
@@ -125,10 +125,6 @@ class EnergyBalance(Kept):
         """Work of one load [J], by its place in the scene's list of loads."""
         return float(self.works()[:, index].sum())
 
-    def momentum(self) -> np.ndarray:
-        """Linear [N s] and angular momentum about the origin [N m s], less external impulses."""
-        return _own(self.run.readings.momentum())
-
     def momentum_errors(self) -> tuple[float, float]:
         """Errors of linear and angular momentum, relative to the momentum exchanged.
 
@@ -154,7 +150,7 @@ class EnergyBalance(Kept):
 
 
 def _own(rows):
-    """Linear and angular momentum of all bodies less what loads and supports gave, (6,)."""
+    """Linear [N s] and angular momentum [N m s] less what loads and supports gave, (6,)."""
     return rows[:, :6].sum(axis=0) - rows[:, 6:12].sum(axis=0)
 
 
