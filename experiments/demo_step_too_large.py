@@ -65,8 +65,8 @@ def strike(limit, share, peak):
 
 def longest_step(limit):
     """Longest safe step of the bar's worst body [s], by what sets it."""
-    report = dem.quality_report(BAR, dem.CONCRETE)
-    return float({"dashpots": report.dashpot_step_s, "springs": report.spring_step_s}[limit].min())
+    limits = dem.step_report(dem.Scene(BAR, dem.CONCRETE, [dem.effects.BondDamping()])).limits
+    return float(limits["bond_dashpot" if limit == "dashpots" else "bond_stiffness"].min())
 
 
 def marks(last):

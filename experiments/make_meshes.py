@@ -13,7 +13,7 @@ Needs gmsh: ``make mesh`` installs it and runs this script. Takes two seconds.
 import os
 import sys
 
-from taichi_dem import CONCRETE, PAPER_BLOCK, quality_report, read_mesh
+from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, read_mesh, step_report
 from taichi_dem.kit.files import output_folder, renamed_when_done
 from taichi_dem.kit.study import bare_parser, main_of_tool
 from taichi_dem.mesh.gmsh import session
@@ -36,7 +36,7 @@ def write(folder):
     path = os.path.join(output_folder(folder), "paper_block.msh")
     block_with_hole(path)
     print(path)
-    print(quality_report(read_mesh(path), CONCRETE))
+    print(step_report(Scene(read_mesh(path), CONCRETE, "all")))
 
 
 def block_with_hole(path, depth=0.2, size_hole=0.055, size_far=0.5):

@@ -48,7 +48,6 @@ from taichi_dem.simulate import simulate
 from taichi_dem.simulation import Simulation
 from taichi_dem.solve import solve
 from taichi_dem.stability.elastic_report import elastic_report
-from taichi_dem.stability.quality import quality_report
 from taichi_dem.stability.step_report import step_report
 from taichi_dem.step_control import StepControl
 
@@ -93,7 +92,6 @@ __all__ = [
     "methods",
     "needed_effects",
     "parameter_grid",
-    "quality_report",
     "read_mesh",
     "runtime",
     "shapes",

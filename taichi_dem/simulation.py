@@ -24,10 +24,9 @@ from taichi_dem.report.divergence import DivergenceCheck
 from taichi_dem.report.effects import effect_uses, on_demand
 from taichi_dem.report.energy_balance import EnergyBalance, open_account
 from taichi_dem.report.missing_effects import MissingEffects
-from taichi_dem.report.readings import Readings
+from taichi_dem.report.readings import Kept, Readings, Run
 from taichi_dem.report.report import Report, known_error
 from taichi_dem.report.resolution import StepResolution
-from taichi_dem.report.run import Kept, Run
 from taichi_dem.report.shared_volume import SharedVolume
 from taichi_dem.scene import Scene
 from taichi_dem.state.capacity import capacity_of
@@ -412,8 +411,7 @@ class Simulation(Uncopied):
         if not brief:
             shared_volume.sample(self.time_s, finished=True)
         linear, angular = self.energy_balance.momentum_errors()
-        tables = self.energy_balance.tables()
-        account = self.energy_balance.account(tables)
+        account = self.energy_balance.account()
         bound = np.bincount(values(self.state.bound, here), minlength=len(CRITERIA))
         unconverged, worst = self.step_resolution.unconverged
         report = Report(
@@ -440,7 +438,7 @@ class Simulation(Uncopied):
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
-            effect_activity=effect_uses(self.parts, self.energy_balance, tables, account),
+            effect_activity=effect_uses(self.parts, self.energy_balance, account),
             missing_effects=() if brief else self.missing_effects.findings(shared_volume),
             unresolved=(
                 *self.step_resolution.findings(),
@@ -466,4 +464,4 @@ class Simulation(Uncopied):
         dict of ndarray
             Times [s], shape (body_count,), by name; NaN for never.
         """
-        return on_demand(self.parts).since
+        return on_demand(self.parts)[0]

@@ -87,8 +87,8 @@ def scene(rise=RISES[0]):
 
 def limits():
     """Longest stable explicit step of the worst body [s]: by its dashpots, and by its springs."""
-    report = dem.quality_report(scene().mesh, dem.CONCRETE)
-    return float(report.dashpot_step_s.min()), float(report.spring_step_s.min())
+    own = dem.step_report(scene()).limits
+    return float(own["bond_dashpot"].min()), float(own["bond_stiffness"].min())
 
 
 #: One scene a rise, so that another step finds the limits of its bodies there.

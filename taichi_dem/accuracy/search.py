@@ -255,10 +255,8 @@ class Search:
         found = report.certificate
         if found is not None and not found.holds:
             seconds = self.runs.seconds / max(_LEAST_AWAKE, 1.0 - found.asleep)
-            yield (
-                f"the certificate of its run does not hold, as {found.failure}: {found.remedy}, "
-                f"about {seconds:.2g} s"
-            )
+            why = f"the certificate of its run does not hold, as {found.failure}"
+            yield f"{why}, about {seconds:.2g} s"
 
     def _cost_curve(self):
         """Cost of other tolerances: what the runs cost that were enough for them, or would be."""

@@ -37,7 +37,6 @@ from taichi_dem import (
     join,
     mesh_stiffness,
     needed_effects,
-    quality_report,
     read_mesh,
     runtime,
     shapes,
@@ -163,7 +162,6 @@ def _questions():
     yield "elastic_report", elastic_report, {"scene": Scene(BAR, rock)}
     yield "estimated_effects", estimated_effects, {"scene": SCENE, "until": 1e-5}
     yield "mesh_stiffness", mesh_stiffness, {"mesh": BAR, "material": rock}
-    yield "quality_report", quality_report, {"mesh": BAR, "material": CONCRETE}
     yield "step_report", step_report, {"scene": SCENE}
     yield "Simulation", Simulation, {"scene": ALONE, "method": METHOD}
     moving = simulation()
@@ -200,7 +198,3 @@ def _results():
     yield f"{where}.attenuation", done.attenuation, {"group": "left", "radius": 0.01}
     law = done.attenuation(group="left", radius=0.01).power_law
     yield "output.attenuation.Attenuation.power_law", law, {"nearest": 0.01}
-    quality, step = quality_report(BAR, CONCRETE), step_report(ALONE)
-    for name in ("worst", "price"):
-        yield f"stability.quality.QualityReport.{name}", getattr(quality, name), {}
-        yield f"stability.step_report.StepReport.{name}", getattr(step, name), {}

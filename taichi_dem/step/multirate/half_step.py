@@ -42,8 +42,8 @@ class HalfStep:
     def impulse(self, i, linear, angular, back):
         """Impulse and moment on body i by which it is behind, and a row for each of ``drives``.
 
-        linear [N s], angular [N m s]: of its contacts, from ``Readings.pushes``. A bond adds half
-        of what waits in its slot, also where the other body steps finer: the impulses of all but
+        linear [N s], angular [N m s]: of its contacts, from ``Readings``. A bond adds half of what
+        waits in its slot, also where the other body steps finer: the impulses of all but
         the last of its steps have been taken. back: 1 where the body is to be set back.
         """
         for f in range(4):

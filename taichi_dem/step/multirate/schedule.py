@@ -60,7 +60,7 @@ class Schedule:
         self.has_limits = limits is not None
         self.sleeps, self.woken = tables.on_demand, None
         self.sleeping = Sleeping(tables, state) if self.sleeps else None
-        self.controlled = self.has_limits and limits.control is not None
+        self.controlled = self.has_limits and limits.controlled
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
         self.applied_until = AppliedUntil(tables, state, contacts) if self.controlled else None
         self.spreads = self.controlled and not uniform and limits.spreads
