@@ -1,1 +1,1 @@
-"""Meshes of tetrahedra and all that follows from their geometry; NumPy and SciPy only."""
+"""Meshes of tetrahedra and all that follows from their geometry; NumPy only."""

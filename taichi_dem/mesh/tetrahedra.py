@@ -1,4 +1,4 @@
-"""Geometry and connectivity of bare tetrahedron arrays (NumPy and SciPy only).
+"""Geometry and connectivity of bare tetrahedron arrays (NumPy only).
 
 Everything here works on ``points`` (point_count, 3) [m] and ``tetrahedra`` (body_count, 4).
 Local face f of a tetrahedron is the face opposite its local vertex f.
@@ -132,23 +132,45 @@ def components(count: int, pairs: np.ndarray) -> np.ndarray:
 
     count: number of nodes.  pairs: linked nodes, shape (n, 2).
     """
-    # Imported here, as in ``close_pairs``, so that SciPy loads only where a mesh is made.
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
-    part = connected_components(links, directed=False)[1]
-    return np.unique(part, return_index=True)[1][part]
+    label = np.arange(count)
+    while True:
+        lowest = np.minimum(label[pairs[:, 0]], label[pairs[:, 1]])
+        merged = label.copy()
+        for side in (0, 1):
+            np.minimum.at(merged, label[pairs[:, side]], lowest)
+        while not np.array_equal(merged, merged[merged]):
+            merged = merged[merged]
+        if np.array_equal(merged, label):
+            return label
+        label = merged
 
 
 def close_pairs(points: np.ndarray, distance: float) -> np.ndarray:
-    """Pairs of points not farther apart than ``distance`` [m], shape (n, 2), first < second."""
-    from scipy.spatial import KDTree
+    """Pairs of points not farther apart than ``distance`` [m], shape (n, 2), first < second.
 
-    # The tree compares squares, whose last bit may be another.
-    pairs = KDTree(points).query_pairs((1.0 + 1e-9) * distance, output_type="ndarray")
-    near = length(points[pairs[:, 0]] - points[pairs[:, 1]]) <= distance
-    return np.unique(pairs[near], axis=0)
+    Two such points lie in one cell of at least one of eight cubic grids of cell size 4 distance,
+    shifted by half a cell along each axis; so sorting by cell finds them without all pairs.
+    """
+    found = []
+    cell = 4.0 * distance
+    low = points.min(axis=0)
+    for shift in np.ndindex(2, 2, 2):
+        first, second = _in_one_cell(np.floor((points - low) / cell + 0.5 * np.array(shift)))
+        near = length(points[first] - points[second]) <= distance
+        found.append(np.sort(np.column_stack([first[near], second[near]]), axis=1))
+    return np.unique(np.vstack(found), axis=0)
+
+
+def _in_one_cell(rows):
+    """Numbers of each two equal rows (n, ...), (2, pairs)."""
+    order = np.lexsort(rows.T)
+    rows, found = rows[order], [np.empty((2, 0), dtype=np.int64)]
+    for step in range(1, len(rows)):
+        same = np.flatnonzero((rows[step:] == rows[:-step]).all(axis=1))
+        if len(same) == 0:
+            break
+        found.append(np.stack([order[same], order[same + step]]))
+    return np.hstack(found)
 
 
 @functools.cache
