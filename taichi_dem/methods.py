@@ -6,7 +6,6 @@ from typing import Any, Optional, Protocol, Union
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import between, choice, plain_fields, positive, shown
-from taichi_dem.laws.roles import members_of
 from taichi_dem.step_control import Displacement, FixedStep, StepControl
 
 NEIGHBOURS = ("held", "drifted")
@@ -67,7 +66,7 @@ class Method(Protocol):
         """
 
 
-_MEMBERS = members_of(Method)
+_MEMBERS = tuple(name for name in vars(Method) if not name.startswith("_"))
 
 
 def check_method(method: object) -> None:

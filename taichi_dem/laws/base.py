@@ -49,16 +49,17 @@ class Effect(Sealed):
 
     role = ""
     name = ""
-    #: Whether a friction law keeps a spring for each sphere pair (``roles.FrictionMemory``).
+    #: Each of the next four asks for members of its own (``laws.roles``).
+    #: Whether a friction law keeps a spring for each sphere pair.
     remembers = False
-    #: Whether a shear law keeps a residual slip of each unit (``roles.SlipMemory``).
+    #: Whether a shear law keeps a residual slip of each unit.
     remembers_slip = False
-    #: Whether a shear law may release a face (``roles.ShearFailure``).
+    #: Whether a shear law may release a face.
     releases = False
     #: Whether a law of bonds spends energy in slip, and whether it limits tension and shear alike.
     rubs = False
     is_whole = True
-    #: Whether a load acts by its mean from a time to a later one (``roles.VaryingLoad``).
+    #: Whether a load acts by its mean from a time to a later one.
     varies = False
     law: ti.Field
     tables: Tables
@@ -394,13 +395,10 @@ class ElasticTension(Effect):
 
     @ti.func
     def spent(self, b, u):
-        """Nothing is spent by softening."""
+        """Nothing is spent, and no unit damaged."""
         return 0.0
 
-    @ti.func
-    def damage(self, b, u):
-        """An elastic unit is never damaged."""
-        return 0.0
+    damage = spent
 
 
 @ti.data_oriented

@@ -193,7 +193,7 @@ class ShearSlip(Effect):
 class Separable:
     """A normal and a tangential law, each for itself but for the pressure: the paper's.
 
-    tension, shear: bound effects of these roles. The rest is as of ``laws.roles.BondLaw``.
+    tension, shear: bound effects of these roles. The rest is as of the role bond.
     Source: Konno et al., section 2.1.
     """
 

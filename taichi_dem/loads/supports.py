@@ -257,7 +257,7 @@ class PrescribedMotion(_Support):
         times, shares = (np.array(points) for points in self._points)
         if not self._frequency:
             back, on = _reach(times, shares)
-            ways = [sorted((_times(x, back), _times(x, on))) for x in self._velocity]
+            ways = [sorted((x * back, x * on)) if x else (0.0, 0.0) for x in self._velocity]
             return tuple(way[0] for way in ways), tuple(way[1] for way in ways)
         # By parts: |integral of s cos| is at most (|s| + the variation of s) / (angular frequency).
         most = np.abs(shares).max() + np.abs(np.diff(shares)).sum()
@@ -276,13 +276,13 @@ def _shares(ramp, history):
     """Points of the history of a velocity: times [s] and shares of it."""
     if history is None:
         return history_points(*(((0.0, ramp), (0.0, 1.0)) if ramp else ((0.0,), (1.0,))))
-    refused = f"history must be a pair of times and shares, got {shown(history)}"
-    if not isinstance(history, (tuple, list)) or len(history) != 2:
-        raise InputError(refused)
     try:
-        return history_points(*history)
-    except InputError as error:
-        raise InputError(f"{refused}: {error}") from None
+        times, shares = history
+        return history_points(times, shares)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"history must be a pair of times and shares, got {shown(history)}: {error}"
+        ) from None
 
 
 def _reach(times, shares):
@@ -294,10 +294,6 @@ def _reach(times, shares):
     turns = (np.abs(shares).max() * np.diff(times))[turning].sum()
     low, high = ends.min() - turns, ends.max() + turns
     return low if shares[-1] >= 0.0 else -np.inf, high if shares[-1] <= 0.0 else np.inf
-
-
-def _times(speed, reach):
-    return speed * reach if speed else 0.0
 
 
 def _allows(effect, motion):

@@ -8,6 +8,22 @@ from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_ve
 from taichi_dem.stability.body_limits import RELEASE
 
 
+@ti.func
+def motion_of(step, b):
+    """Relative motion of the bodies of a bond now, a ``BondMotion``; step has tables and state."""
+    slots = step.tables.bond_slots[b]
+    i, j = slots[0] >> 2, slots[1] >> 2
+    return bond_motion(
+        step.tables.bond_frame[b],
+        step.state.position[j] - step.state.position[i],
+        step.state.rotation[i],
+        step.state.rotation[j],
+        step.state.velocity[j] - step.state.velocity[i],
+        step.state.spin[i],
+        step.state.spin[j],
+    )
+
+
 @ti.data_oriented
 class BondStep:
     """What a bond does when it is due: the part of ``Advance``, which owns all that is used here.
@@ -23,7 +39,7 @@ class BondStep:
             scale = 1.0
             if ti.static(self.limited):
                 scale = self.bond_share(b)
-            motion = self.motion_of(b)
+            motion = motion_of(self, b)
             if ti.static(self.solves_bonds):
                 motion = self.solver.bonds.mean(b, motion)
             stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
@@ -77,7 +93,7 @@ class BondStep:
         slipped, failed, acts = 0.0, 0, True
         if ti.static(self.on_demand):
             near = self.tables.bond.begins(m, stiffness, opening)
-            acts = self.activity.is_active(b, near, self.state.tick[None])
+            acts = self.state.activity.is_active(b, near, self.state.tick[None])
         if ti.static(not self.tables.bond.is_null):
             if acts:
                 traction, slipped = self.tables.bond.traction(m, u, stiffness, opening)
@@ -113,21 +129,6 @@ class BondStep:
         return ti.min(first, self.limits.bond_share(j, self.schedule.own_step(j)))
 
     @ti.func
-    def motion_of(self, b):
-        """Relative motion of the two bodies of a bond now, a ``BondMotion``."""
-        slots = self.tables.bond_slots[b]
-        i, j = slots[0] >> 2, slots[1] >> 2
-        return bond_motion(
-            self.tables.bond_frame[b],
-            self.state.position[j] - self.state.position[i],
-            self.state.rotation[i],
-            self.state.rotation[j],
-            self.state.velocity[j] - self.state.velocity[i],
-            self.state.spin[i],
-            self.state.spin[j],
-        )
-
-    @ti.func
     def _pull_together(self, slots, motion, impulse, moment):
         """Add opposite impulses to master and slave; moment is about the slave's centre."""
         linear = transposed_matvec(motion.axes, impulse)
@@ -157,14 +158,14 @@ class BondStep:
         """Elastic energy stored in a bond now [J]; zero once it is released."""
         energy = 0.0
         if self.state.broken_tick[b] < 0:
-            energy = self.tables.unit_area[b] * self._stored(b, self.motion_of(b))
+            energy = self.tables.unit_area[b] * self._stored(b, motion_of(self, b))
         return energy
 
     @ti.func
     def bond_power(self, b):
         """Power that the dashpots of an intact bond take now [W]."""
         power, scale = 0.0, 1.0
-        motion = self.motion_of(b)
+        motion = motion_of(self, b)
         if ti.static(self.limited):
             scale = self.bond_share(b)
         if ti.static(self.solves_bonds):

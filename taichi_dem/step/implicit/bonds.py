@@ -4,8 +4,8 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit import products
-from taichi_dem.kit.allocation import assign, values
-from taichi_dem.kit.lanes import LANES, by_lane, cross, dot, product, transposed_product
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.lanes import LANES, cross, dot, product, transposed_product
 from taichi_dem.kit.products import matmul_transposed, matvec, stacked, transposed_matmul
 from taichi_dem.kit.types import real, vec3, vec6
 from taichi_dem.methods import ImplicitDashpots
@@ -77,16 +77,6 @@ class BondDashpots:
         assign(self.colour_first, 0 * first if self.tables.dashpot.stands_silent else first)
         for bodies in (self.masters, self.slaves):
             assign(bodies, self.velocities.spare)
-
-    def read(self) -> dict[str, np.ndarray]:
-        """Arrays by place: masters, slaves (n,), branch (n, 3), last (n, 6), block (n, 6, 6)."""
-        names = ("masters", "slaves", "branch", "last")
-        found = {name: by_lane(values(getattr(self, name))) for name in names}
-        a, b, c = (
-            np.stack([by_lane(values(row)) for row in rows], axis=1)
-            for rows in (self.a, self.b, self.c)
-        )
-        return {**found, "block": np.block([[a, b], [b.swapaxes(1, 2), c]])}
 
     @ti.func
     def mean(self, b, motion):

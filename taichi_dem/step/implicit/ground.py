@@ -15,7 +15,7 @@ class GroundSweeps:
     """Impulses of the ground, one row of impulse and moment for each effect of a body.
 
     impulse: [N s] and [N m s], that of the step before as a first guess. They are those of the mean
-    of the velocities at both ends of the step, as of every ``GroundDashpots``.
+    of the velocities at both ends of the step, as of every ground.
     """
 
     def __init__(self, schedule: Schedule, velocities: Velocities):

@@ -3,7 +3,6 @@
 import taichi as ti
 
 from taichi_dem.contact.cell_grid import group
-from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.products import cross, dot, matvec, norm, squared
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import place_in, unit3
@@ -41,12 +40,12 @@ class PairDashpots:
         *("active", "order", "colour", "taken", "colour_first"),
     )
 
-    def __init__(self, schedule: Schedule, contacts: Contacts, velocities: Velocities):
+    def __init__(self, schedule: Schedule, velocities: Velocities):
         self.tables, self.state, self.schedule = schedule.tables, schedule.state, schedule
-        self.contacts, self.velocities = contacts, velocities
+        self.contacts, self.store = schedule.contacts, schedule.store
+        self.velocities = velocities
         self.has_friction = bool(self.tables.friction.name)
-        self.store = contacts.store
-        self.springs = TangentialSprings(schedule, contacts)
+        self.springs = TangentialSprings(schedule)
         if self.springs.present:
             self.elapsed = ti.field(real, shape=self.store.slots)
             self.pull = ti.Vector.field(3, real, shape=self.store.spheres)

@@ -1,17 +1,12 @@
 """Sweeps over the dashpots of all bonds and contacts until their impulses agree."""
 
-from typing import Optional
-
 import numpy as np
 import taichi as ti
 
-from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import assign, raise_to
 from taichi_dem.kit.types import real, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.state.model import Model
-from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
 from taichi_dem.step.implicit.bonds import BOND_COLOURS, BondDashpots
 from taichi_dem.step.implicit.ground import GroundSweeps
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
@@ -34,21 +29,19 @@ class Solver:
     larger, over the change by the first sweep.
     """
 
-    def __init__(
-        self, tables: Tables, state: State, schedule: Schedule, contacts: Optional[Contacts]
-    ):
-        self.schedule = schedule
+    def __init__(self, schedule: Schedule):
+        self.schedule, tables = schedule, schedule.tables
         self.bounds = ti.field(ti.i32, shape=2)
         self.tolerance = ti.field(real, shape=())
-        self.velocities = Velocities(tables, state)
+        self.velocities = Velocities(tables)
         self.has_bonds, self.has_ground = bool(tables.dashpot.name), bool(tables.ground)
-        self.has_contact = contacts is not None
+        self.has_contact = schedule.has_contact
         if self.has_bonds:
             self.bonds = BondDashpots(schedule, self.velocities)
         if self.has_ground:
             self.ground = GroundSweeps(schedule, self.velocities)
-        if contacts is not None:
-            self.pairs = PairDashpots(schedule, contacts, self.velocities)
+        if self.has_contact:
+            self.pairs = PairDashpots(schedule, self.velocities)
         self.sweeps, self.unsolved = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.total_sweeps, self.unconverged = (ti.field(ti.i64, shape=()) for _ in range(2))
         self.change2, self.first_change2 = (ti.field(real, shape=()) for _ in range(2))

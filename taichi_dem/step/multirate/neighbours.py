@@ -30,11 +30,7 @@ class LevelLimit:
     """
 
     def __init__(
-        self,
-        tables: Tables,
-        state: State,
-        contacts: Optional[Contacts],
-        limits: StabilityLimits,
+        self, tables: Tables, state: State, contacts: Optional[Contacts], limits: StabilityLimits
     ):
         self.tables, self.state, self.limits = tables, state, limits
         self.store = None if contacts is None else contacts.store
@@ -44,15 +40,7 @@ class LevelLimit:
     @ti.func
     def least(self, i):
         """Coarsest level that body i may have beside those it touches; negative for any."""
-        finest = -1
-        for f in range(4):
-            if self._bonded(4 * i + f):
-                finest = ti.max(finest, self.listed_level[self.tables.neighbour[4 * i + f]])
-        for first, slots, other in ti.static(self.beside):
-            for k in range(first[i], first[i + 1]):
-                if self.limits.contact_limits.count[slots[k]] > 0:
-                    finest = ti.max(finest, self.listed_level[self.store.body[slots[k]][other]])
-        return self.least_beside(finest)
+        return self.least_beside(self._visit(i, 0, False))
 
     @ti.func
     def least_beside(self, finest):
@@ -62,15 +50,33 @@ class LevelLimit:
     @ti.func
     def spread(self, i):
         """Note the level of body i, and list those it touches that are too coarse."""
-        level = self.state.level[i]
-        self.listed_level[i] = level
+        self.listed_level[i] = self.state.level[i]
+        self._visit(i, self.state.level[i], True)
+
+    @ti.func
+    def _visit(self, i, level, lists: ti.template()):
+        """Finest listed level of the bodies that body i touches, -1 for none.
+
+        lists: whether to list those that are too coarse beside a level.
+        """
+        finest = -1
         for f in range(4):
             if self._bonded(4 * i + f):
-                self._notify(self.tables.neighbour[4 * i + f], level)
+                j = self.tables.neighbour[4 * i + f]
+                finest = ti.max(finest, self._visit_one(j, level, lists))
         for first, slots, other in ti.static(self.beside):
             for k in range(first[i], first[i + 1]):
                 if self.limits.contact_limits.count[slots[k]] > 0:
-                    self._notify(self.store.body[slots[k]][other], level)
+                    j = self.store.body[slots[k]][other]
+                    finest = ti.max(finest, self._visit_one(j, level, lists))
+        return finest
+
+    @ti.func
+    def _visit_one(self, j, level, lists: ti.template()):
+        if ti.static(lists):
+            if self.state.level[j] < self.least_beside(level):
+                self.limits.notice(j, CLOSE)
+        return self.listed_level[j]
 
     @ti.func
     def _bonded(self, face):
@@ -78,11 +84,6 @@ class LevelLimit:
         if self.tables.neighbour[face] >= 0:
             bonded = self.state.broken_tick[self.tables.face_bond[face]] < 0
         return bonded
-
-    @ti.func
-    def _notify(self, j, level):
-        if self.state.level[j] < level - self.limits.jump[None]:
-            self.limits.notice(j, CLOSE)
 
 
 @ti.data_oriented

@@ -17,12 +17,7 @@ from taichi_dem.stability.body_limits import StabilityLimits
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
-from taichi_dem.state.timeline import (
-    MACRO_TICKS,
-    MAX_LEVEL,
-    coarsest_active,
-    ticks_of,
-)
+from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL, coarsest_active, ticks_of
 from taichi_dem.step.multirate.lists import ActiveList, first_key, itself
 from taichi_dem.step.multirate.neighbours import AppliedUntil, LevelLimit, beside
 from taichi_dem.step.sleeping import ASLEEP, Sleeping
@@ -33,8 +28,9 @@ from taichi_dem.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 class Schedule:
     """Clock and active lists of a run.
 
-    criterion: rule from ``step_control``. uniform: all bodies share the finest level wanted.
-    drifted: neighbours of an active body are brought to its time too, else only active bodies move.
+    criterion: the method's rule from ``step_control``. uniform: all bodies share the finest level
+    wanted. drifted: neighbours of an active body are brought to its time too, else only active ones
+    move.
     finest: finest level present. undivided: 1 once it was the last one, below which no step is
     divided further. low: coarsest level active now. changed: bodies whose own level or
     bonds changed since the lists were ordered.
@@ -46,27 +42,21 @@ class Schedule:
     evaluated in the same substeps, and the bonds whose laws were called.
     """
 
-    def __init__(
-        self,
-        tables: Tables,
-        state: State,
-        contacts: Optional[Contacts],
-        criterion: Any,
-        uniform: bool,
-        drifted: bool,
-        limits: Optional[StabilityLimits] = None,
-    ):
-        self.tables, self.state, self.contacts, self.limits = tables, state, contacts, limits
-        self.has_limits = limits is not None
-        self.sleeps, self.woken = tables.on_demand, None
+    def __init__(self, tables: Tables, state: State, contacts: Optional[Contacts], method: Method):
+        self.tables, self.state, self.contacts = tables, state, contacts
+        self.has_limits = method.control is not None or method.dashpot == "limited"
+        self.limits: Any = None
+        if self.has_limits:
+            self.limits = StabilityLimits(tables, state, contacts, method)
+        self.sleeps = tables.on_demand
         self.sleeping = Sleeping(tables, state) if self.sleeps else None
-        self.controlled = self.has_limits and limits.control is not None
+        self.controlled, self.uniform = method.control is not None, method.uniform
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
         self.applied_until = AppliedUntil(tables, state, contacts) if self.controlled else None
-        self.spreads = self.controlled and not uniform and limits.spreads
-        if limits is not None and self.spreads:
-            self.level_limit = LevelLimit(tables, state, contacts, limits)
-        self.criterion, self.uniform, self.drifted = criterion, uniform, drifted
+        self.spreads = self.controlled and not self.uniform and self.limits.spreads
+        if self.spreads:
+            self.level_limit = LevelLimit(tables, state, contacts, self.limits)
+        self.criterion, self.drifted = method.criterion(), method.neighbour == "drifted"
         self.has_contact = contacts is not None
         self.store = None if contacts is None else contacts.store
         self.beside = () if contacts is None else beside(contacts.store)
@@ -198,13 +188,45 @@ class Schedule:
         if ti.static(self.uniform):
             self._level_all()
         if ti.static(self.sleeps):
-            self.woken.admit(True)
+            self._admit_woken(True)
         for a in range(self.changed_count[None]):
             self._move_entries(self.changed[a])
             if ti.static(self.spreads):
                 self.level_limit.spread(self.changed[a])
         self.changed_count[None] = 0
         self._find_finest()
+
+    @ti.func
+    def _admit_woken(self, moved: ti.template()):
+        """List the bodies woken since the last call, and the bonds that now act.
+
+        moved: whether bodies have moved since bonds were evaluated.
+        """
+        sleeping = self.sleeping
+        for a in range(sleeping.woken_count[None]):
+            i = sleeping.woken[a]
+            self.bodies.insert(i, self.body_key(i))
+            for f in range(4):
+                b = self.tables.face_bond[4 * i + f]
+                if b >= 0:
+                    key = self.bond_key(b)
+                    if key >= 0 and self.bonds.key[b] < 0:
+                        self.bonds.insert(b, key)
+                        sleeping.left_out[b] = sleeping.left_out_now(b, self.seconds(1), moved)
+        sleeping.unsorted[None] = sleeping.unsorted[None] + sleeping.woken_count[None]
+        sleeping.woken_count[None] = 0
+
+    @ti.func
+    def sort_woken(self, one):
+        """Renew the bound of sleep; bring bodies woken of late into the order of the others.
+
+        Visits in the order of waking take up to 40 % longer.
+        """
+        if self.sleeping.is_due():
+            self.sleeping.renew_bound()
+            if self.sleeping.unsorted[None] > 0:
+                self.sleeping.unsorted[None] = 0
+                self.list_members(0)
 
     @ti.func
     def _move_entries(self, i):
@@ -260,7 +282,7 @@ class Schedule:
                 for side in ti.static(range(2)):
                     pair = self.store.body[self.store.near_slot[a]]
                     self.sleeping.awaken(pair[side])
-            self.woken.admit(False)
+            self._admit_woken(False)
         self._list_pairs()
         if ti.static(not self.uniform):
             self.list_members(0)
