@@ -143,10 +143,6 @@ class Advance(BondStep, ContactForce, BodyLoads):
         momentum = self.state.angular_momentum[i] + angular
         return self._supported(i, elapsed, kick, velocity, momentum)
 
-    def _support_bit(self, effect):
-        """Bit of a support in ``State.active_effects``."""
-        return 1 << len(self.tables.loads) + self.tables.supports.index(effect)
-
     @ti.func
     def spin(self, i, momentum):
         """World spin of body i at an angular momentum, in its present orientation."""
@@ -175,7 +171,7 @@ class Advance(BondStep, ContactForce, BodyLoads):
         """
         free, free_momentum, held = velocity, momentum, 0
         half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
-        for effect in ti.static(self.tables.supports):
+        for k, effect in ti.static(enumerate(self.tables.supports)):
             if effect.acts_on(i):
                 before, spun = velocity, momentum
                 velocity, momentum = effect.held(
@@ -183,7 +179,7 @@ class Advance(BondStep, ContactForce, BodyLoads):
                 )
                 held = 1
                 if squared(velocity - before) + squared(momentum - spun) > 0.0:
-                    self.state.note_active(i, ti.i64(ti.static(self._support_bit(effect))))
+                    self.state.note_active(i, ti.i64(ti.static(1 << len(self.tables.loads) + k)))
         mean = 0.5 * (self.state.velocity[i] + velocity)
         mean_momentum = 0.5 * (self.state.angular_momentum[i] + momentum)
         self._book_loads(i, kick, mean, mean_momentum)

@@ -12,7 +12,7 @@ from taichi_dem.step.advance import Advance
 from taichi_dem.step.audit import Audit
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
 from taichi_dem.step.implicit.pairs import COLOURS
-from taichi_dem.step.multirate.lists import Colour, Everyone, Once
+from taichi_dem.step.multirate.lists import Colour, Once
 
 #: Pairs of a list and the function that is called with each member that is active.
 Phases = tuple[tuple[Any, Callable[..., Any]], ...]
@@ -35,15 +35,13 @@ class Step:
         self.has_contact = search is not None
         self.state = advance.state
         self.audit = Audit(self.schedule) if self.schedule.sleeps else None
-        self.all_bodies = Everyone(advance.tables.body_count)
-        self.all_bonds = Everyone(advance.tables.bond_count)
         self.parts = self._parts()
         self.phases = self._phases()
         self.start_phases = self._before_bonds(), self._after_bonds()
 
     def _before_bonds(self):
         """First levels and full lists."""
-        schedule, bodies = self.schedule, self.all_bodies
+        schedule, bodies = self.schedule, self.schedule.bodies.everyone
         phases: Phases = ()
         if schedule.has_limits:
             phases += ((bodies, schedule.limits.refresh),)
@@ -139,13 +137,16 @@ class SolvedStep(Step):
     """
 
     def _before_bonds(self):
-        phases: Phases = (*super()._before_bonds(), (self.all_bodies, self.advance.update_inertia))
+        phases: Phases = (
+            *super()._before_bonds(),
+            (self.schedule.bodies.everyone, self.advance.update_inertia),
+        )
         if self.advance.solver.has_bonds:
-            phases += ((self.all_bonds, self.advance.solver.bonds.first),)
+            phases += ((self.schedule.bonds.everyone, self.advance.solver.bonds.first),)
         return phases
 
     def _after_bonds(self):
-        return (*super()._after_bonds(), (self.all_bonds, self.undo))
+        return (*super()._after_bonds(), (self.schedule.bonds.everyone, self.undo))
 
     @ti.func
     def undo(self, b):
@@ -176,13 +177,13 @@ class SolvedStep(Step):
         phases: Phases = ()
         if solver.has_bonds:
             first = solver.bonds.colour_first
-            phases += tuple((Colour(first, c), solver.bonds_of) for c in range(BOND_COLOURS))
+            phases += tuple((Colour(first, c), solver.bonds.visit) for c in range(BOND_COLOURS))
         if self.has_contact:
             first = solver.pairs.colour_first
-            phases += tuple((Colour(first, c), solver.pair) for c in range(COLOURS))
-            phases += ((Once(), solver.last_pairs),)
+            phases += tuple((Colour(first, c), solver.pairs.visit) for c in range(COLOURS))
+            phases += ((Once(), solver.pairs.visit_last),)
         if solver.has_ground:
-            phases += ((self.schedule.bodies, solver.joined),)
+            phases += ((self.schedule.bodies, solver.ground.visit),)
         return (*phases, (Once(), solver.check_convergence))
 
     def repeats(self, part: int) -> bool:

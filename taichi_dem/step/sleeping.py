@@ -171,8 +171,7 @@ class Sleeping(Places):
                 j = self.tables.neighbour[4 * i + f]
                 # Not in one condition: "and" evaluates both sides.
                 if j >= 0:
-                    if ti.atomic_max(self.awake[j], AWAKE) == ASLEEP:
-                        self.since[j] = 0
+                    self.awaken(j)
 
     @ti.func
     def both_awake(self, i, j):

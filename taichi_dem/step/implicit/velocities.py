@@ -6,6 +6,7 @@ from taichi_dem.kit.lanes import LANES, gathered, gathered_numbers, gathered_pro
 from taichi_dem.kit.products import cross, matvec, stacked
 from taichi_dem.kit.types import real
 from taichi_dem.physics.rotation import unit3
+from taichi_dem.physics.wrench import mobility
 from taichi_dem.state.tables import Tables
 
 
@@ -18,6 +19,7 @@ class Velocities:
     contiguously, 128 bytes a body: a sweep visits bodies out of order, and large blocks wait for
     memory. With supports, hold: velocity per impulse [1/kg], and given: total impulse and moment on
     a body in the step [N s, N m s].
+    change2: largest squared change of a velocity in the present sweep [m2/s2].
     spare: number of a body that is none and stays at rest, for lanes without a bond.
     """
 
@@ -28,6 +30,7 @@ class Velocities:
         n = self.spare + 1
         self.twist, self.turn = ti.Vector.field(6, real), ti.Matrix.field(3, 3, real)
         self.lightness = ti.field(real)
+        self.change2 = ti.field(real, shape=())
         ti.root.dense(ti.i, n).place(self.twist, self.turn, self.lightness)
         self.has_supports = bool(tables.supports)
         if self.has_supports:
@@ -41,6 +44,11 @@ class Velocities:
         if ti.static(self.has_supports):
             slack = self.hold[i]
         return slack
+
+    @ti.func
+    def mobility(self, i, j, branch):
+        """Twist of body j against i per wrench between them at j's centre, a ``Block``."""
+        return mobility(self.slack(i), self.turn[i], self.slack(j), self.turn[j], branch)
 
     @ti.func
     def apart(self, i, j, branch):

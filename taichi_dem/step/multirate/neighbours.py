@@ -1,24 +1,11 @@
 """What bodies that touch owe each other: how far their levels differ, how far impulses reach."""
 
-from typing import Optional
+from typing import Any
 
 import taichi as ti
 
-from taichi_dem.contact.contacts import Contacts
-from taichi_dem.stability.body_limits import CLOSE, StabilityLimits
-from taichi_dem.state.pair_store import PairStore
-from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
+from taichi_dem.stability.body_limits import CLOSE
 from taichi_dem.state.timeline import ticks_of
-
-
-def beside(store: PairStore) -> tuple[tuple[ti.Field, ti.Field, int], ...]:
-    """Where the pairs of a body begin, their slots, and the place of the other body in them.
-
-    Of those whose first body it is, then of those whose second.
-    """
-    firsts = store.first_of, store.near_slot, 1
-    return firsts, (store.second_start, store.second_slot, 0)
 
 
 @ti.data_oriented
@@ -29,13 +16,10 @@ class LevelLimit:
     levels at the last ordering of the lists, so that no result depends on the order of bodies.
     """
 
-    def __init__(
-        self, tables: Tables, state: State, contacts: Optional[Contacts], limits: StabilityLimits
-    ):
-        self.tables, self.state, self.limits = tables, state, limits
-        self.store = None if contacts is None else contacts.store
-        self.beside = () if contacts is None else beside(contacts.store)
-        self.listed_level = ti.field(ti.i32, shape=tables.capacity.bodies)
+    def __init__(self, schedule: Any):
+        self.tables, self.state, self.limits = schedule.tables, schedule.state, schedule.limits
+        self.store, self.beside = schedule.store, schedule.beside
+        self.listed_level = ti.field(ti.i32, shape=self.tables.capacity.bodies)
 
     @ti.func
     def least(self, i):
@@ -97,11 +81,11 @@ class AppliedUntil:
     bond, pair: that tick for every bond, and for every slot of the pair store.
     """
 
-    def __init__(self, tables: Tables, state: State, contacts: Optional[Contacts]):
-        self.state = state
-        self.bond = ti.field(ti.i64, shape=tables.capacity.bonds)
-        if contacts is not None:
-            self.pair = contacts.store.column("applied_until", ti.i64)
+    def __init__(self, schedule: Any):
+        self.state = schedule.state
+        self.bond = ti.field(ti.i64, shape=schedule.tables.capacity.bonds)
+        if schedule.has_contact:
+            self.pair = schedule.store.column("applied_until", ti.i64)
 
     @ti.func
     def until(self, i, j):
