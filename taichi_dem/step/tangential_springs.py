@@ -15,10 +15,9 @@ class TangentialSprings:
 
     def __init__(self, schedule: Schedule):
         self.friction, self.schedule = schedule.tables.friction, schedule
-        contacts = schedule.contacts
-        self.present = contacts is not None and contacts.remembers
-        if contacts is not None and self.present:
-            self.evaluated = contacts.store.column("evaluated", ti.i64)
+        self.present = schedule.has_contact and schedule.contacts.remembers
+        if self.present:
+            self.evaluated = schedule.store.column("evaluated", ti.i64)
 
     @ti.func
     def elapsed(self, p):
