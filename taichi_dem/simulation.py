@@ -36,8 +36,9 @@ from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.auto_driver import MEASURED, AutoDriver, driver_name
-from taichi_dem.step.drivers import DRIVERS, Step
+from taichi_dem.step.drivers import DRIVERS
 from taichi_dem.step.multirate.schedule import Schedule
+from taichi_dem.step.phases import Step
 from taichi_dem.step_control import CRITERIA
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.

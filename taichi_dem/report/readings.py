@@ -212,9 +212,10 @@ class Readings:
         """Bound of impulse [N s] and energy [J] that each bond has left out while it slept."""
         for b in range(self.tables.bond_count[None]):
             slots = self.tables.bond_slots[b]
-            found = self.advance.schedule.sleeping.left_out[b]
-            if not self.advance.schedule.sleeping.both_awake(slots[0] >> 2, slots[1] >> 2):
-                found = self.advance.schedule.woken.left_out(b, False)
+            schedule = self.advance.schedule
+            found = schedule.sleeping.left_out[b]
+            if not schedule.sleeping.both_awake(slots[0] >> 2, slots[1] >> 2):
+                found = schedule.sleeping.left_out_now(b, schedule.seconds(1), False)
             table[b, 0], table[b, 1] = found[0], found[1]
 
     @ti.kernel

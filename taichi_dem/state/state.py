@@ -212,8 +212,11 @@ class State:
         return found
 
     def fields(self) -> dict[str, ti.Field]:
-        """Every field that changes, by name, the bound effects' state included."""
-        own = {k: v for k, v in vars(self).items() if isinstance(v, (ti.Field,))}
-        for effect in self.tables.effects:
-            own.update(effect.state())
-        return own
+        """Every field that changes, and those of the bound effects, by name."""
+        owners = [("", self), *((f"{effect.name}_", effect) for effect in self.tables.effects)]
+        return {
+            prefix + name: field
+            for prefix, owner in owners
+            for name, field in vars(owner).items()
+            if isinstance(field, ti.Field)
+        }

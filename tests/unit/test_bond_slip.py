@@ -24,7 +24,7 @@ def slid(share):
 
 def write_slip(simulation, share):
     """Let the second unit of the bond have slipped by a share of an edge, oblique to the axes."""
-    field = simulation.state.fields()["shear_slip"]
+    field = simulation.state.fields()["shear_slip_slip"]
     slip = values(field)
     slip[1, :2] = share * EDGE * np.array([0.6, -0.8])
     assign(field, slip)
