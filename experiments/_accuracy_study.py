@@ -8,7 +8,7 @@ import numpy as np
 
 from _damper_reference import reference_values
 from ca_damper import solve_response
-from taichi_dem import Answer, ImplicitDashpots, InputError, Uniform, simulate, solve, step_report
+from taichi_dem import Answer, InputError, Uniform, simulate, solve, step_report
 from taichi_dem.accuracy.job import Job
 from taichi_dem.accuracy.runs import Runs
 from taichi_dem.kit.accuracy.branches import BranchedAnswer
@@ -81,7 +81,7 @@ def judged_blast(question: Any) -> Optional[Judged]:
     job = _job(question)
     try:
         answer, seconds = answered(question)
-        true = Runs(job, job.methods(), None).value(answer.plan.begin + 1 + FINER)
+        true = Runs(job, None).value(answer.plan.begin + 1 + FINER)
     except InputError as refused:
         print(f"left out: {question}: {refused}")
         return None
@@ -127,10 +127,10 @@ def fixed_runs(question: Any, others: bool = True) -> list[FixedRun]:
 
 def _scanned(question, others):
     """Methods of the scan, with their words."""
-    base = _job(question).methods()
-    longest = base.until / base.steps
-    found = [(base.in_words(k), base.make(longest / 2**k)) for k in SCANNED]
-    if others and base.make is ImplicitDashpots:
+    job = _job(question)
+    make, longest = type(job.method(0)), job.method(0).dt0
+    found = [(job.in_words(k), make(longest / 2**k)) for k in SCANNED]
+    if others and job.solves:
         report = step_report(question.scene)
         full, limited = (float(report.borne(kind).min()) for kind in ("full", "limited"))
         found += [(f"explicit, {dt:.2g} s", Uniform(dt)) for dt in (full, 0.5 * full)]
@@ -168,7 +168,7 @@ def twins_of(question: Any, count: int) -> tuple[np.ndarray, np.ndarray, np.ndar
     (frames,), (count, frames) and (count - 1, frames), the last as a share of a usual way.
     """
     job = _job(question)
-    runs = Runs(job, job.methods(), None)
+    runs = Runs(job, None)
     level = next(k for k in SCANNED if runs.value(k) is not None)
     frames = [runs.frames(level, twin) for twin in range(count)]
     moved = np.array([[frame.displacement for frame in some] for some in frames])

@@ -12,7 +12,7 @@ from taichi_dem import ImplicitDashpots, Multirate, Simulation, Uniform, simulat
 from taichi_dem.kit import study
 from taichi_dem.kit.study import on_device
 from taichi_dem.kit.study.floors import Work
-from taichi_dem.run_plan import macro_steps
+from taichi_dem.observers import macro_steps
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
 
 #: Ends of the short and of the whole run [s].

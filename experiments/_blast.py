@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, quality_report, read_mesh
+from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, read_mesh, step_report
 from taichi_dem.kit.study import add_checkpoints, checkpoint_of, parser
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.step_control import StepControl
@@ -64,7 +64,7 @@ def paper_scene(mesh=PAPER_BLOCK):
 
 def print_quality(scene):
     """Print the worst of a scene's mesh."""
-    print("\n".join(str(quality_report(scene.mesh, scene.material)).splitlines()[:7]))
+    print("\n".join(str(step_report(scene)).splitlines()[:10]))
 
 
 def controlled(step):

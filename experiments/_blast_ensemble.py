@@ -7,7 +7,7 @@ import numpy as np
 from _blast import BLOCK_STEP, EFFECTS
 from taichi_dem import CONCRETE, Every, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.kit.plot_style import BLACK, BLUE, ORANGE, picture
-from taichi_dem.run_plan import macro_steps
+from taichi_dem.observers import macro_steps
 
 #: Name of a result: displacement of the hole at a sample [mm].
 HOLE = "hole_mm_{:02d}"

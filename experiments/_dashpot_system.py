@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.lanes import by_lane
 from taichi_dem.mesh.colouring import edge_colours
 
 #: All bonds.
@@ -31,6 +32,17 @@ def applied(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return np.einsum("nij,nj->ni", matrices, vectors)
 
 
+def read_blocks(bonds: Any) -> dict[str, np.ndarray]:
+    """Arrays by place: masters, slaves (n,), branch (n, 3), last (n, 6), block (n, 6, 6)."""
+    names = ("masters", "slaves", "branch", "last")
+    found = {name: by_lane(values(getattr(bonds, name))) for name in names}
+    a, b, c = (
+        np.stack([by_lane(values(row)) for row in rows], axis=1)
+        for rows in (bonds.a, bonds.b, bonds.c)
+    )
+    return {**found, "block": np.block([[a, b], [b.swapaxes(1, 2), c]])}
+
+
 class DashpotSystem:
     """Matrices of the bonds that hold in a simulation by ``ImplicitDashpots``, started.
 
@@ -44,7 +56,7 @@ class DashpotSystem:
 
     def __init__(self, simulation: Any):
         solver, model = simulation.advance.solver, simulation.model
-        read = solver.bonds.read()
+        read = read_blocks(solver.bonds)
         holds = read["masters"] != solver.velocities.spare
         self.bodies = np.stack([read["masters"][holds], read["slaves"][holds]])
         self.colours = edge_colours(self.bodies.T, model.body_count)

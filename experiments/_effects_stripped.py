@@ -13,7 +13,9 @@ from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.physics.bond import unit_arm, unit_opening
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.drivers import Resident, Step
+from taichi_dem.step.bond import motion_of
+from taichi_dem.step.drivers import Resident
+from taichi_dem.step.phases import Step
 
 #: Step of the elastic block [s], far below its limit.
 STEP = 1e-8
@@ -44,8 +46,8 @@ def _elastic(mesh, stripped):
     driver = simulation.driver
     if stripped is not None:
         engine = simulation.engine
-        advance = stripped(engine.tables, engine.state, engine.schedule, None)
-        driver = Resident(Step(advance, engine.schedule, None))
+        advance = stripped(engine.schedule)
+        driver = Resident(Step(advance, None))
     driver.prepare()
     return lambda substeps: driver.few(1 << 60, substeps)
 
@@ -59,7 +61,7 @@ class ByHand(Advance):
         """Elastic traction of three units, given to both bodies."""
         if self.state.broken_tick[b] < 0:
             slots = self.tables.bond_slots[b]
-            motion = self.motion_of(b)
+            motion = motion_of(self, b)
             k, force, torque = self.tables.bond_stiffness[b], vec3(0.0), vec3(0.0)
             m = self.tables.bond_pair[b]
             for q in range(3):

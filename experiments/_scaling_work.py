@@ -14,8 +14,9 @@ from taichi_dem import Every, Simulation
 from taichi_dem.kit.allocation import values
 from taichi_dem.simulate import run_simulation
 from taichi_dem.state.timeline import MAX_LEVEL
-from taichi_dem.step.drivers import Resident, Step
+from taichi_dem.step.drivers import Resident
 from taichi_dem.step.multirate.lists import Once
+from taichi_dem.step.phases import Step
 
 #: What is counted: bonds, contact pairs, and the pairs of spheres that are compared in these.
 KINDS = ("bonds", "pairs", "spheres")
@@ -144,7 +145,7 @@ def record_workload(scene, method, until, every):
     """
     simulation = Simulation(scene, method, "resident")
     counter, engine = EvaluationCounter(simulation), simulation.engine
-    step = CountedStep(counter, engine.advance, engine.schedule, engine.broad_phase)
+    step = CountedStep(counter, engine.advance, engine.broad_phase)
     simulation.driver = Resident(step)
     made = _Intervals(simulation, counter, every)
     run_simulation(simulation, until=until, samples=1, title="blast", observers=[made])

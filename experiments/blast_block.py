@@ -38,13 +38,13 @@ from _blast import (
 )
 from _crack_sections import plot_deep_cracks
 from _meshes import mirrored_copies
+from make_meshes import block_with_hole
 from taichi_dem import (
     CONCRETE,
     PAPER_BLOCK,
     Every,
     ImplicitDashpots,
     Scene,
-    plot,
     read_mesh,
     simulate,
 )
@@ -53,9 +53,7 @@ from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.process_memory import peak_memory_mb
 from taichi_dem.kit.progress.progress import time_left
-from taichi_dem.mesh.gmsh import block_with_hole
 from taichi_dem.mesh.joined import in_space_order
-from taichi_dem.output.attenuation import Attenuation
 from taichi_dem.output.hole_monitor import HoleMonitor
 
 NAME = "blast_block"
@@ -149,7 +147,7 @@ def run(options):
     looks = {"title": "blasting", "observers": [ProgressLines(options.until)]}
     result = simulate(scene, method=ImplicitDashpots(BLOCK_STEP), **run_options(options), **looks)
     started = time.perf_counter()
-    fall = Attenuation.of(result.model, result.peak_speed, HOLE_RADIUS)
+    fall = result.attenuation("hole", HOLE_RADIUS)
     draw(result, fall, study.output_paths(options.out))
     figures = figures_of(result, fall.power_law(FROM_RADII)[0])
     figures["picture_seconds"] = (time.perf_counter() - started, "s")
@@ -160,8 +158,8 @@ def run(options):
 def draw(result, fall, at):
     """Draw and write everything that is plotted."""
     plot_deep_cracks(at("cracks.png"), result, HoleMonitor(result.model, "hole").axis_point)
-    plot.plot_attenuation(at("peaks.png"), fall, FROM_RADII)
-    plot.plot_energy(at("energy.png"), result.history)
+    result.plot.attenuation("hole", nearest=FROM_RADII, path=at("peaks.png"))
+    result.plot.energy(path=at("energy.png"))
     peaks = {"distance_radii": fall.distance, "peak_speed_m_s": fall.speed}
     write_csv(at("peaks.csv"), {**peaks, "nearer_to_hole": fall.inner.astype(int)})
 

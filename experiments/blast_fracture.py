@@ -42,7 +42,6 @@ from taichi_dem import (
     SimulationDiverged,
     estimated_effects,
     goals,
-    plot,
     read_mesh,
     simulate,
     solve,
@@ -150,9 +149,7 @@ def run_to_accuracy(scene, options):
     answer = solve(scene, until=options.until, goal=goal, tolerance=options.accuracy)
     study.show_answer(f"blast, {options.until:g} s", answer)
     study.write_accuracy(options.out, (), [((), answer)])
-    result = answer.result
-    shown = result.model, result.frames[-1], result.broken_time
-    plot.plot_cracks(at("cracks.png"), *shown, magnify=3.0)
+    answer.result.plot.cracks(magnify=3.0, path=at("cracks.png"))
     study.finish(options, NAME, figures_of_answer(answer), 0.0, see="cracks.png")
 
 

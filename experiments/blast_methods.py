@@ -26,11 +26,11 @@ import numpy as np
 
 from _blast import METHODS, blast_parser, paper_scene, run_options
 from _method_costs import RunCosts, plot_methods
-from taichi_dem import ImplicitDashpots, ProgressBar, SimulationDiverged, plot, simulate
+from taichi_dem import ImplicitDashpots, ProgressBar, SimulationDiverged, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.validation import choice
-from taichi_dem.plot.series import level_shares
+from taichi_dem.plot.series import level_shares, plot_levels
 
 NAME = "blast_methods"
 REFERENCE = "reference", partial(ImplicitDashpots, sweeps=(6, 40)), 2.5e-8
@@ -72,7 +72,7 @@ def follow(scene, name, make, step, options):
     made = {"report": result.report, "series": series, "moved": float(series[MOVED][-1])}
     if not method.uniform:
         shares, path = level_shares(costs.levels), f"{options.out}/levels_{name}.png"
-        plot.plot_levels(path, series["time_s"], shares, step)
+        plot_levels(path, series["time_s"], shares, step)
     return SimpleNamespace(name=name, make=make, step=step, **made)
 
 

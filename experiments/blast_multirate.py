@@ -19,13 +19,13 @@ from types import SimpleNamespace
 
 from _blast import blast_parser, paper_scene, run_options
 from _method_costs import RunCosts, plot_methods
-from taichi_dem import At, InputError, Multirate, Uniform, plot, simulate
+from taichi_dem import At, InputError, Multirate, Uniform, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import styles_of
 from taichi_dem.kit.validation import told_apart
 from taichi_dem.output.hole_monitor import HoleMonitor
-from taichi_dem.plot.series import level_columns, level_shares
+from taichi_dem.plot.series import level_columns, level_shares, plot_levels
 
 NAME = "blast_multirate"
 METHODS = {
@@ -156,7 +156,7 @@ def draw(at, runs, dt0):
         shares = level_shares(made.levels)
         write_csv(at(f"{name}.csv"), {**made.series, **level_columns(shares)})
         if name != "uniform":
-            plot.plot_levels(at(f"levels_{name}.png"), made.series["time_s"], shares, dt0)
+            plot_levels(at(f"levels_{name}.png"), made.series["time_s"], shares, dt0)
     series = {name: made.series for name, made in runs.items()}
     plot_methods(at("methods.png"), series, "monitor_displacement_mm")
 

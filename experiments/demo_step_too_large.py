@@ -21,7 +21,7 @@ from _step_too_large import TABLE, Struck, caption, corner_speed, write
 from taichi_dem.kit import study
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.run_plan import macro_steps
+from taichi_dem.observers import macro_steps
 from taichi_dem.simulate import result_of
 
 NAME = "demo_step_too_large"
@@ -65,8 +65,8 @@ def strike(limit, share, peak):
 
 def longest_step(limit):
     """Longest safe step of the bar's worst body [s], by what sets it."""
-    report = dem.quality_report(BAR, dem.CONCRETE)
-    return float({"dashpots": report.dashpot_step_s, "springs": report.spring_step_s}[limit].min())
+    limits = dem.step_report(dem.Scene(BAR, dem.CONCRETE, [dem.effects.BondDamping()])).limits
+    return float(limits["bond_dashpot" if limit == "dashpots" else "bond_stiffness"].min())
 
 
 def marks(last):

@@ -33,7 +33,6 @@ from taichi_dem.kit.sweeps.sweep import sweep
 from taichi_dem.kit.sweeps.table import SweepTable
 from taichi_dem.kit.version import __version__
 from taichi_dem.materials import CONCRETE, Material
-from taichi_dem.mesh.face_groups import with_body_group
 from taichi_dem.mesh.files import read_mesh
 from taichi_dem.mesh.joined import in_space_order, join
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
@@ -49,7 +48,6 @@ from taichi_dem.simulate import simulate
 from taichi_dem.simulation import Simulation
 from taichi_dem.solve import solve
 from taichi_dem.stability.elastic_report import elastic_report
-from taichi_dem.stability.quality import quality_report
 from taichi_dem.stability.step_report import step_report
 from taichi_dem.step_control import StepControl
 
@@ -94,7 +92,6 @@ __all__ = [
     "methods",
     "needed_effects",
     "parameter_grid",
-    "quality_report",
     "read_mesh",
     "runtime",
     "shapes",
@@ -102,6 +99,5 @@ __all__ = [
     "solve",
     "step_report",
     "sweep",
-    "with_body_group",
     "write_paraview",
 ]

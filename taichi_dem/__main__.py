@@ -9,11 +9,7 @@ import taichi_dem
 from taichi_dem import effects, materials, mesh, meshes, methods
 from taichi_dem.kit import listing
 
-#: Modules of meshes whose functions a user may call.
-_MESH_MODULES = tuple(
-    f"mesh.{name}"
-    for name in ("mesh", "files", "shapes", "gmsh", "reorder", "content", "split", "weld")
-)
+_MESH_MODULES = ("mesh.mesh", "mesh.files", "mesh.shapes", "mesh.gmsh")
 
 
 def sections() -> list[tuple[str, list]]:

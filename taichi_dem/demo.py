@@ -17,9 +17,9 @@ from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem import plot
 from taichi_dem.effects import GasPressure, ShearSlip, SphereContact
 from taichi_dem.kit import study
+from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.study.entries import Entry
 from taichi_dem.materials import CONCRETE
@@ -27,7 +27,12 @@ from taichi_dem.mesh.files import read_mesh
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.output.record import write_bodies
-from taichi_dem.plot.series import level_columns, level_shares
+from taichi_dem.plot.series import (
+    level_columns,
+    level_shares,
+    plot_levels,
+)
+from taichi_dem.plot.tables import plot_columns
 from taichi_dem.report.certificate import Certificate
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
@@ -144,24 +149,24 @@ def picture(result: Result, folder: str) -> None:
         When the folder cannot be made or written to.
     """
     at = study.output_paths(folder)
-    frames, model, history = result.frames, result.model, result.history
-    dt0, broken_time = result.method.dt0, result.broken_time
+    frames, drawn = result.frames, result.plot
     write_bodies(at("bodies.csv"), frames)
-    for gas in (load for load in model.loads if isinstance(load, GasPressure)):
+    for gas in (load for load in result.model.loads if isinstance(load, GasPressure)):
         time_s = np.linspace(0.0, 1.1 * gas.duration, 400)
         pressure = gas.pressure_at(time_s)
-        plot.plot_pressure(at("pressure.png"), time_s, pressure, history["time_s"][-1])
+        curve = Table({"time_s": time_s, "pressure": pressure}, {"pressure": "Pa"})
+        plot_columns(at("pressure.png"), curve, ["pressure"])
         write_csv(at("pressure.csv"), {"time_s": time_s, "pressure_pa": pressure})
-    plot.plot_history(at("history.png"), history)
-    plot.plot_energy(at("energy.png"), history)
-    plot.plot_cracks(at("cracks.png"), model, frames[-1], broken_time, magnify=3.0)
+    drawn.history(path=at("history.png"))
+    drawn.energy(path=at("energy.png"))
+    drawn.cracks(magnify=3.0, path=at("cracks.png"))
     if result.acting_since:
-        plot.plot_acting(at("acting.png"), model, result.acting_since, frames[-1].time_s)
+        drawn.acting(path=at("acting.png"))
     shares = level_shares([frame.level for frame in frames])
     times = np.array([frame.time_s for frame in frames])
     if shares.shape[1] > 1:
-        plot.plot_steps(at("steps.png"), model, frames[1:] or frames, dt0, broken_time)
-        plot.plot_levels(at("levels.png"), times, shares, dt0)
+        drawn.steps(path=at("steps.png"))
+        plot_levels(at("levels.png"), times, shares, result.method.dt0)
         write_csv(at("levels.csv"), {"time_s": times, **level_columns(shares)})
-    plot.save_animation(at("blast.gif"), model, frames, broken_time, magnify=3.0)
+    drawn.film(at("blast.gif"), magnify=3.0)
     result.show(at("view.html"), open_browser=False)

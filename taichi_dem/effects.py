@@ -1,14 +1,12 @@
 """Effects that a scene may list; all others are not computed, allocated or compiled."""
 
 from taichi_dem.laws.body_contact import BodyContact
-from taichi_dem.laws.bond import ShearSlip, Softening
-from taichi_dem.laws.bond_damping import BondDamping
+from taichi_dem.laws.bond import BondDamping, ShearSlip, Softening
 from taichi_dem.laws.face_contact import FaceContact
-from taichi_dem.laws.friction import Friction
+from taichi_dem.laws.friction import Friction, StickingFriction
 from taichi_dem.laws.mixed_mode import MixedMode
 from taichi_dem.laws.slip_weakening import SlipWeakening
 from taichi_dem.laws.sphere_contact import SphereContact
-from taichi_dem.laws.sticking_friction import StickingFriction
 from taichi_dem.loads.gas_pressure import GasPressure
 from taichi_dem.loads.gravity import Gravity
 from taichi_dem.loads.pressure import Pressure

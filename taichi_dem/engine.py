@@ -1,6 +1,7 @@
 """The engine of a blast: all fields and kernels of one structure, which runs any scene of it."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -13,17 +14,15 @@ from taichi_dem.laws.base import ABSENT, PARTS_OF_BOND, Effect, bound
 from taichi_dem.laws.bond import Separable
 from taichi_dem.methods import Method, structure_of
 from taichi_dem.report.readings import Readings
-from taichi_dem.stability.body_limits import StabilityLimits
 from taichi_dem.state.capacity import LEAST, Capacity
 from taichi_dem.state.model import ROLES, Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.drivers import DRIVERS, SolvedStep, Step
+from taichi_dem.step.drivers import DRIVERS
 from taichi_dem.step.implicit.advance import SolvedAdvance
-from taichi_dem.step.implicit.solver import Solver
 from taichi_dem.step.multirate.schedule import Schedule
-from taichi_dem.step.multirate.wake_up import WokenLists
+from taichi_dem.step.phases import SolvedStep, Step
 
 
 class Structure:
@@ -64,32 +63,19 @@ class BlastEngine(Engine):
         self.tables.take(*_bound_by_role(self.structure.effects, self.tables))
         self.state = State(self.tables)
         self.contacts = Contacts(self.tables, self.state) if self.tables.has_contact else None
-        self.schedule = self._schedule(method)
-        self.advance = self._advance(method)
-        if self.schedule.sleeps:
-            self.schedule.woken = WokenLists(self.schedule, self.advance)
+        self.schedule = Schedule(self.tables, self.state, self.contacts, method)
+        # A method may have its own order of the physics (docs/add_a_time_integrator.md).
+        kinds: tuple[Any, type[Step]] = (getattr(method, "advance", Advance), Step)
+        if method.solves:
+            kinds = SolvedAdvance, SolvedStep
+        self.advance = kinds[0](self.schedule)
         self.broad_phase = None
         if self.contacts is not None:
             told = self.schedule.start_pairs, self.schedule.limits
             self.broad_phase = BroadPhase(self.contacts, *told)
-        kind = SolvedStep if method.solves else Step
-        self.step = kind(self.advance, self.schedule, self.broad_phase)
+        self.step = kinds[1](self.advance, self.broad_phase)
         self.drivers = {name: driver(self.step) for name, driver in DRIVERS.items()}
         self.readings = Readings(self.tables, self.state, self.advance)
-
-    def _schedule(self, method):
-        parts = self.tables, self.state, self.contacts
-        limited = method.control or method.dashpot == "limited"
-        limits = StabilityLimits(*parts, method) if limited else None
-        drifted = method.neighbour == "drifted"
-        return Schedule(*parts, method.criterion(), method.uniform, drifted, limits)
-
-    def _advance(self, method):
-        parts = self.tables, self.state, self.schedule, self.contacts
-        if method.solves:
-            return SolvedAdvance(*parts, Solver(*parts))
-        # A method may have its own order of the physics (docs/add_a_time_integrator.md).
-        return getattr(method, "advance", Advance)(*parts)
 
     def load(self, model: Model, method: Method, max_speed: float, sleep: float = 0.0) -> None:
         """Take over a scene, at rest and at time zero; max_speed [m/s], sleep: see ``Scene``."""
@@ -105,8 +91,6 @@ class BlastEngine(Engine):
         self.schedule.load(model, method, sleep)
         if self.advance.solver is not None:
             self.advance.solver.load(model, method)
-        for driver in self.drivers.values():
-            driver.load()
 
     def _lengths(self, model):
         """Entries that a scene uses by those that a field has."""

@@ -7,21 +7,17 @@ A goal of one's own takes a line; its function gets a ``Result`` with a frame at
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any, Optional
 
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.kit.validation import (
     choice,
     finite,
     flag,
     instance,
-    positive,
     shown,
-    told_apart,
     whole,
     word,
 )
@@ -31,11 +27,6 @@ from taichi_dem.output.hole_monitor import HoleMonitor
 from taichi_dem.report.energy_balance import TERMS
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
-from taichi_dem.state.model import Model
-
-#: "value": at the end. "extreme": over the run, of which its Results then have a time series.
-#: "count": one that changes in leaps, as a whole number does.
-KINDS = ("value", "extreme", "count")
 
 
 @dataclass(frozen=True)
@@ -79,7 +70,7 @@ class Goal:
     def __post_init__(self) -> None:
         word("name of a goal", self.name)
         word("unit of a goal", self.unit)
-        choice("kind of a goal", self.kind, KINDS)
+        choice("kind of a goal", self.kind, ("value", "extreme", "count"))
         if not callable(self.function):
             raise InputError(
                 f"function of a goal must be a function of a Result, got {shown(self.function)}"
@@ -244,39 +235,6 @@ def peak_speed(body: int) -> Goal:
     return Goal(name, "m/s", lambda result: result.peak_speed[body], "extreme", check=check)
 
 
-def peak_particle_velocity(distance: float, group: str = "hole") -> Goal:
-    """Mean of the largest speeds of bodies at a distance from the axis of a hole.
-
-    Parameters
-    ----------
-    distance : float
-        Radius of the cylinder around the axis that cuts the bodies [m].
-    group : str, default "hole"
-        Face group of the wall of the hole.
-
-    Returns
-    -------
-    Goal
-        The speed [m/s].
-
-    Raises
-    ------
-    InputError
-        The distance is not positive. (``check_scene`` refuses one that cuts no body.)
-    """
-    positive("distance", distance)
-    bodies, has_group = partial(_cut_by_cylinder, distance, group), _has_group(group)
-
-    def found(result):
-        return result.peak_speed[bodies(result.model)].mean()
-
-    def check(scene):
-        has_group(scene)
-        bodies(Model(scene.mesh, scene.body_materials, scene.effects))
-
-    return Goal(f"peak velocity at {distance:g} m", "m/s", found, "extreme", check=check)
-
-
 def energy_share(term: str) -> Goal:
     """Share of the work put in that a term of the energy balance has.
 
@@ -342,21 +300,3 @@ def _has_body(body):
     """Check of a scene for a body."""
     whole("body", body, 0, 2**31 - 1)
     return lambda scene: whole("body", body, 0, scene.mesh.body_count - 1)
-
-
-def _cut_by_cylinder(radius, group, model):
-    """Bodies with corners on both sides of a cylinder around the axis of a hole."""
-    hole = HoleMonitor(model, group)
-    away = model.mesh.points - hole.axis_point
-    reach = length(away - dot(away, hole.axis)[:, None] * hole.axis)
-    corners = reach[model.mesh.tetrahedra]
-    nearest, farthest = corners.min(axis=1), corners.max(axis=1)
-    cut = np.flatnonzero((nearest < radius) & (radius < farthest))
-    if not len(cut):
-        is_near = radius <= nearest.min()
-        got, limit = told_apart(radius, nearest.min() if is_near else farthest.max())
-        raise InputError(
-            f"distance must be that of a body from the axis of {group}, "
-            f"{'above' if is_near else 'below'} {limit} m, got {got}"
-        )
-    return cut

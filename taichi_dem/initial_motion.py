@@ -1,20 +1,13 @@
 """Velocities and spins of the bodies of a scene at its start, as a user gives them; NumPy only."""
 
 from collections.abc import Mapping
-from typing import Any, Callable, Union
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import direction, real_numbers, shown
 from taichi_dem.mesh.mesh import Mesh, volumes
-
-#: A vector for all bodies, one for each body group by name, a row for each body, or a function
-#: that returns the rows, of the centres of the bodies.
-Motion = Union[ArrayLike, Mapping[str, ArrayLike], Callable[[np.ndarray], ArrayLike]]
-#: Bodies, and the vector that is given for all of them.
-_Shared = tuple[np.ndarray, np.ndarray]
 
 
 def initial_motion(mesh: Mesh, velocity: Any, spin: Any) -> dict[str, np.ndarray]:
@@ -48,8 +41,8 @@ def initial_motion(mesh: Mesh, velocity: Any, spin: Any) -> dict[str, np.ndarray
     return {"velocity": moves, "spin": turns}
 
 
-def _rows(name, given, mesh, centre) -> tuple[np.ndarray, list[_Shared]]:
-    """A row for each body, and the vectors that were given for several of them."""
+def _rows(name, given, mesh, centre) -> tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]]:
+    """A row for each body, and bodies with the vector that was given for all of them."""
     if given is None:
         return np.zeros_like(centre), []
     if isinstance(given, Mapping) and given:
@@ -70,7 +63,7 @@ def _rows(name, given, mesh, centre) -> tuple[np.ndarray, list[_Shared]]:
 def _by_group(name, given, mesh):
     """The same from vectors by body group; bodies in none are at rest."""
     rows, shared = np.zeros((mesh.body_count, 3)), []
-    taken: dict[int, str] = {}
+    taken = np.zeros(mesh.body_count, dtype=bool)
     for group, value in given.items():
         try:
             bodies = mesh.group_bodies(group)
@@ -79,13 +72,11 @@ def _by_group(name, given, mesh):
                 f"{name} must have names of body groups, got {shown(given)}: {error}"
             ) from None
         vector = np.array(direction(f"{name}[{group!r}]", value))
-        for body in bodies.tolist():
-            if body in taken:
-                raise InputError(
-                    f"{name} must have each body in one group at most, got body {body} in "
-                    f"{taken[body]} and in {group}"
-                )
-            taken[body] = group
-        rows[bodies] = vector
+        if taken[bodies].any():
+            raise InputError(
+                f"{name} must have each body in one group at most, got body "
+                f"{bodies[taken[bodies]][0]} in {group} and in another"
+            )
+        rows[bodies], taken[bodies] = vector, True
         shared.append((bodies, vector))
     return rows, shared

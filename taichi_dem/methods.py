@@ -2,60 +2,52 @@
 
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Any, Optional, Protocol, Union
+from typing import Any, Optional
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import between, choice, plain_fields, positive, shown
-from taichi_dem.laws.roles import members_of
 from taichi_dem.step_control import Displacement, FixedStep, StepControl
 
-NEIGHBOURS = ("held", "drifted")
-DASHPOTS = ("full", "limited")
 
+class Method:
+    """How bodies step; the base of the methods here and of one's own.
 
-class Method(Protocol):
-    """How bodies step; every member that the package reads.
+    A class of one's own gives at least ``dt0`` and ``name`` (docs/add_a_time_integrator.md). It may
+    also have ``advance``, a class derived from ``step.advance.Advance``, ``structure``, what its
+    kernels depend on beside its class (``structure_of``), and ``order``, that of its error
+    (``order_of``).
 
-    A method may also have ``advance``, a class derived from ``step.advance.Advance``,
-    ``structure``, what its kernels depend on beside its class (``structure_of``), and ``order``,
-    that of its error (``order_of``).
+    Attributes
+    ----------
+    dt0 : float
+        Largest step [s].
+    name : str
+        Short word for tables.
+    uniform : bool
+        Whether all bodies share one step.
+    neighbour : str
+        "held" or "drifted", see ``Multirate``.
+    control : StepControl or None
+        Further limits of the step.
+    dashpot : str
+        "full" or "limited", see ``Uniform``.
+    distance : float or None
+        Largest displacement of a body in a step [m]; None for no limit.
+    solves : bool
+        Whether dashpots are solved together.
+    steps_ahead : float
+        Number of steps of a body by which its contacts are counted before they touch.
     """
 
-    @property
-    def dt0(self) -> float:
-        """Largest step [s]."""
-
-    @property
-    def name(self) -> str:
-        """Short word for tables."""
-
-    @property
-    def uniform(self) -> bool:
-        """Whether all bodies share one step."""
-
-    @property
-    def neighbour(self) -> str:
-        """One of NEIGHBOURS."""
-
-    @property
-    def control(self) -> Optional[StepControl]:
-        """Further limits of the step."""
-
-    @property
-    def dashpot(self) -> str:
-        """One of DASHPOTS."""
-
-    @property
-    def distance(self) -> Optional[float]:
-        """Largest displacement of a body in a step [m]; None for no limit."""
-
-    @property
-    def solves(self) -> bool:
-        """Whether dashpots are solved together."""
-
-    @property
-    def steps_ahead(self) -> float:
-        """Number of steps of a body by which its contacts are counted before they touch."""
+    dt0: Any
+    name: Any
+    uniform: bool = True
+    neighbour: str = "held"
+    control: Optional[StepControl] = None
+    dashpot: str = "full"
+    distance: Optional[float] = None
+    solves: bool = False
+    steps_ahead: Any = 0.0
 
     def criterion(self) -> Any:
         """Rule for the level of a body.
@@ -63,34 +55,9 @@ class Method(Protocol):
         Returns
         -------
         FixedStep or Displacement
-            Rule of ``stability.step_control``.
+            Rule of ``taichi_dem.step_control``.
         """
-
-
-_MEMBERS = members_of(Method)
-
-
-def check_method(method: object) -> None:
-    """Refuse a method that does not keep the contract ``Method``.
-
-    Parameters
-    ----------
-    method : object
-        Object to check.
-
-    Raises
-    ------
-    InputError
-        It is no method, or lacks a member, which is named.
-    """
-    missing = [name for name in _MEMBERS if not hasattr(method, name)]
-    if isinstance(method, type) or len(missing) > len(_MEMBERS) // 2:
-        raise InputError(f"method must be one such as ImplicitDashpots(), got {shown(method)}")
-    if missing:
-        raise InputError(
-            f"method {type(method).__name__} must have a member {missing[0]}; methods have "
-            f"{', '.join(_MEMBERS)}"
-        )
+        return FixedStep() if self.distance is None else Displacement()
 
 
 def structure_of(method: Any) -> Hashable:
@@ -142,16 +109,8 @@ def order_of(method: Any, damped: bool, varying: bool) -> Optional[int]:
     return declared(method, damped, varying) if callable(declared) else None
 
 
-class _Explicit:
+class _Explicit(Method):
     """What explicit methods share, whether bodies step by one level or by levels of their own."""
-
-    dt0: float
-    distance: Optional[float]
-    control: Optional[StepControl]
-    neighbour: str
-    dashpot: str
-    uniform: bool
-    solves = False
 
     def __post_init__(self):
         plain_fields(self)
@@ -159,8 +118,8 @@ class _Explicit:
         # Without a limit of the way there is one level only.
         if self.distance is not None or not self.uniform:
             positive("distance", self.distance)
-        choice("neighbour", self.neighbour, NEIGHBOURS)
-        choice("dashpot", self.dashpot, DASHPOTS)
+        choice("neighbour", self.neighbour, ("held", "drifted"))
+        choice("dashpot", self.dashpot, ("full", "limited"))
         rule = self.control
         if rule is not None and not isinstance(rule, StepControl):
             raise InputError(f"control must be a StepControl or None, got {shown(rule)}")
@@ -202,10 +161,6 @@ class _Explicit:
             return None
         return 1 if damped or varying else 2
 
-    def criterion(self) -> Union[FixedStep, Displacement]:
-        """Step rule for the schedule."""
-        return FixedStep() if self.distance is None else Displacement()
-
 
 @dataclass(frozen=True)
 class Uniform(_Explicit):
@@ -243,9 +198,6 @@ class Uniform(_Explicit):
     distance: Optional[float] = None
     control: Optional[StepControl] = None
     dashpot: str = "full"
-
-    uniform = True
-    neighbour = "held"
 
 
 @dataclass(frozen=True)
@@ -293,7 +245,7 @@ class Multirate(_Explicit):
 
 
 @dataclass(frozen=True)
-class ImplicitDashpots:
+class ImplicitDashpots(Method):
     """One step for all bodies, with the dashpots of bonds and contacts solved together in it.
 
     Springs and loads are explicit; their stability bounds the step, not that of the dashpots.
@@ -335,11 +287,6 @@ class ImplicitDashpots:
     theta: float = 0.5
     refresh: float = 3e-5
 
-    uniform = True
-    neighbour = "held"
-    control = None
-    dashpot = "full"
-    distance = None
     solves = True
     # Spheres that may touch within the step are solved in it; slightly more, as a spin is rounded.
     steps_ahead = 1.01
@@ -379,7 +326,3 @@ class ImplicitDashpots:
             1 or 2.
         """
         return 1 if varying or (damped and self.theta != 0.5) else 2
-
-    def criterion(self) -> FixedStep:
-        """Step rule for the schedule."""
-        return FixedStep()

@@ -9,10 +9,9 @@ import numpy as np
 
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.kit.errors import InputError, SimulationDiverged
-from taichi_dem.kit.validation import fraction
+from taichi_dem.kit.validation import fraction, instance
 from taichi_dem.laws.chosen import ChosenEffects
 from taichi_dem.mesh.parts import parts_of
-from taichi_dem.report.report import Report
 from taichi_dem.result import Result
 from taichi_dem.simulate import run_simulation
 from taichi_dem.simulation import Simulation
@@ -21,17 +20,16 @@ from taichi_dem.simulation import Simulation
 ROUNDING = 1e-9
 
 
-def needed_effects(result: object, tolerance: float = ROUNDING) -> Advice:
+def needed_effects(result: Result, tolerance: float = ROUNDING) -> Advice:
     """Advice on the effects of a run: those to keep, to drop, and to add.
 
-    A run of a Result is repeated without the effects that seem to have had no part; of a report
-    alone, no effect can be shown droppable. Loads and supports define the problem and are always
-    kept.
+    The run is repeated without the effects that seem to have had no part; ``Report.advice`` is what
+    can be said without. Loads and supports define the problem and are always kept.
 
     Parameters
     ----------
-    result : Result or Report
-        Result of ``simulate``, or its report.
+    result : Result
+        Result of ``simulate``.
     tolerance : float, default ROUNDING
         Largest difference of all that was recorded that counts as equal, as a share of its largest
         value, from 0 to 1; by default what rounding explains. With a larger one, effects that took
@@ -51,13 +49,10 @@ def needed_effects(result: object, tolerance: float = ROUNDING) -> Advice:
     --------
     >>> print(needed_effects(result))  # doctest: +SKIP
     """
-    report = getattr(result, "report", result)
-    if not isinstance(report, Report):
-        kind = type(result).__name__
-        raise InputError(f"result must be a Result of simulate or its report, got {kind}")
-    uses, tolerance = report.effect_activity, fraction("tolerance", tolerance)
+    report, tolerance = instance("result", result, Result).report, fraction("tolerance", tolerance)
+    uses = report.effect_activity
     tried = [use.effect for use in uses if use.idle or use.negligible(tolerance)]
-    if isinstance(result, Result) and tried and not result.diverged:
+    if tried and not result.diverged:
         return report.advice(tolerance, _differences(result, tried, tolerance))
     return report.advice(tolerance)
 

@@ -6,7 +6,7 @@ from typing import Any, Callable, ClassVar, Optional, Protocol, Union
 
 import numpy as np
 
-from taichi_dem.kit.allocation import values
+from taichi_dem.kit.data_table import locked
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.uncopied import Uncopied
@@ -16,10 +16,20 @@ from taichi_dem.output.record import Frame, Recorder
 from taichi_dem.report.report import Report
 from taichi_dem.simulation import MOST_STEPS, Simulation
 from taichi_dem.state.model import Model
-from taichi_dem.state.timeline import MACRO_TICKS
 
-#: Calls of an observer in a run.
-_MOST_CALLS = 1_000_000
+#: Samples, frames and calls of an observer in a run, at most.
+MOST_CALLS = 1_000_000
+
+
+def macro_steps(until: float, dt0: float) -> int:
+    """Number of largest steps that reach a time [s]; InputError unless it can be counted to."""
+    steps = positive("until", until) / dt0
+    if steps > MOST_STEPS:
+        got, most = told_apart(until, MOST_STEPS * dt0)
+        raise InputError(
+            f"until must be at most {most} s, {MOST_STEPS} largest steps of {dt0:g} s, got {got}"
+        )
+    return max(1, math.ceil(steps - 1e-9))
 
 
 @dataclass(frozen=True)
@@ -98,10 +108,10 @@ class Every:
             return {round(last * k / samples) for k in range(0, samples, self.samples)} | {last}
         name, unit = ("steps", 1.0) if self.time_s is None else ("time_s", dt)
         distance = (self.time_s or float(self.steps or 1)) / unit
-        if last > _MOST_CALLS * distance:
-            least = last * unit / _MOST_CALLS
+        if last > MOST_CALLS * distance:
+            least = last * unit / MOST_CALLS
             got, bound = told_apart(distance * unit, least)
-            raise InputError(f"{name} must be at least {bound} for {_MOST_CALLS} calls, got {got}")
+            raise InputError(f"{name} must be at least {bound} for {MOST_CALLS} calls, got {got}")
         count = math.floor(last / distance * (1.0 + 1e-12))
         return {min(last, round(k * distance)) for k in range(count + 1)} | {last}
 
@@ -258,6 +268,11 @@ class Collector:
         return {**vars(self), "view": None}
 
 
+def _read(name, words) -> Any:
+    """A member of the simulation of a view, as a property."""
+    return property(lambda view: getattr(view._parts[0], name), doc=words)
+
+
 class RunView(Uncopied):
     """Read-only view of a run at its present step.
 
@@ -287,45 +302,22 @@ class RunView(Uncopied):
     def __setattr__(self, name, value):
         raise InputError(f"the view of a run must not be written to, got {name} = {shown(value)}")
 
-    @property
-    def time_s(self) -> float:
-        """Present time [s]."""
-        return self._parts[0].time_s
-
-    @property
-    def step(self) -> int:
-        """Number of largest steps done."""
-        return int(values(self._parts[0].state.tick)) // MACRO_TICKS
-
-    @property
-    def model(self) -> Model:
-        """Constants of the bodies and bonds, as arrays."""
-        return self._parts[0].model
-
-    @property
-    def method(self) -> Method:
-        """Method that steps."""
-        return self._parts[0].method
+    time_s: float = _read("time_s", "Present time [s].")
+    step: int = _read("macro_step", "Number of largest steps done.")
+    model: Model = _read("model", "Constants of the bodies and bonds, as arrays.")
+    method: Method = _read("method", "Method that steps.")
+    cpu_seconds: float = _read("run_cpu_seconds", "CPU time spent stepping so far [s].")
+    wall_seconds: float = _read("run_seconds", "Wall time spent stepping so far [s].")
 
     @property
     def broken(self) -> np.ndarray:
         """Whether each bond has been released, (bond_count,)."""
-        return _locked(self._parts[0].state.broken())
+        return locked(self._parts[0].state.broken())
 
     @property
     def evaluations(self) -> int:
         """Bonds and contact pairs evaluated so far."""
         return self._parts[0].evaluations()
-
-    @property
-    def cpu_seconds(self) -> float:
-        """CPU time spent stepping so far [s]."""
-        return self._parts[0].run_cpu_seconds
-
-    @property
-    def wall_seconds(self) -> float:
-        """Wall time spent stepping so far [s]."""
-        return self._parts[0].run_seconds
 
     def motion(self) -> dict:
         """Motion of the bodies.
@@ -336,7 +328,7 @@ class RunView(Uncopied):
             Arrays by name, as in ``State.motion``: position [m], velocity [m/s], spin [rad/s] and
             more.
         """
-        return {name: _locked(array) for name, array in self._parts[0].motion().items()}
+        return {name: locked(array) for name, array in self._parts[0].motion().items()}
 
     def energy_balance(self) -> dict:
         """Terms of the energy balance.
@@ -376,9 +368,4 @@ class RunView(Uncopied):
         dict of ndarray
             Columns by name, which ends in the unit.
         """
-        return {name: _locked(array) for name, array in self._parts[1].history().items()}
-
-
-def _locked(array):
-    array.flags.writeable = False
-    return array
+        return {name: locked(array) for name, array in self._parts[1].history().items()}

@@ -4,21 +4,21 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MethodType, SimpleNamespace
 from typing import Any, Optional
 
 import numpy as np
 
 from taichi_dem.kit.data_table import Table
-from taichi_dem.kit.display import counted, embedded, in_brief, table, titled, unfolded
+from taichi_dem.kit.display import counted, embedded, in_brief, titled, verbatim
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, remove_files, write_csv, write_text
-from taichi_dem.kit.validation import FileName, shown
+from taichi_dem.kit.validation import FileName
 from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.output.receivers import Received, write_receivers
 from taichi_dem.output.record import (
     Frame,
-    outward_columns,
     remove_series,
     series_name,
     write_bonds,
@@ -35,7 +35,7 @@ from taichi_dem.state.model import Model
 class Result(RunTables):
     """Result of a run.
 
-    As the last line of a notebook's cell it shows a picture and a table.
+    As the last line of a notebook's cell it shows a picture and the report.
 
     Parameters
     ----------
@@ -95,13 +95,9 @@ class Result(RunTables):
         from taichi_dem.plot.summary import picture_of_run
 
         words = "The block, its energy and what happened in it over time"
-        return titled(
-            f"Result: {self.report.outcome}",
-            embedded(picture_of_run(self), words),
-            table(self._figures()),
-            unfolded("All figures of the run", str(self.report)),
-            warning=self.diverged,
-        )
+        title = f"Result: {counted(self.model.body_count, 'body')}, {self.report.outcome}"
+        shown = embedded(picture_of_run(self), words), verbatim(str(self.report))
+        return titled(title, *shown, warning=self.diverged)
 
     @property
     def certificate(self) -> Optional[Certificate]:
@@ -113,66 +109,17 @@ class Result(RunTables):
         """One row for each effect: what it did, since when, what was left out, and advice."""
         return self.report.advice().table()
 
-    def mean_displacement(self, bodies: np.ndarray) -> np.ndarray:
-        """Mean displacement of some bodies.
-
-        Parameters
-        ----------
-        bodies : ndarray
-            Numbers of the bodies, or a mask of all.
-
-        Returns
-        -------
-        ndarray
-            Displacement [m], shape (frames, 3).
-
-        Raises
-        ------
-        InputError
-            There is no such body, or none is chosen.
-        """
-        numbers = np.arange(self.model.body_count)
-        try:
-            chosen = numbers[np.atleast_1d(bodies)]
-        except (IndexError, ValueError):
-            chosen = numbers[:0]
-        if not chosen.size:
-            raise InputError(
-                f"bodies must be numbers from 0 to {len(numbers) - 1} or a mask of "
-                f"{len(numbers)}, got {shown(bodies)}"
-            )
-        ways = (frame.displacement[chosen].T for frame in self.frames)
-        return np.array([[along.mean() for along in way] for way in ways]).reshape(-1, 3)
-
     @property
     def plot(self) -> Any:
-        """Pictures of the run, one function each: ``result.plot.energy(path="energy.png")``."""
+        """Pictures of the run, a function of ``taichi_dem.plot`` each.
+
+        ``result.plot.energy(path="energy.png")`` is ``plot_energy(result, path="energy.png")``.
+        """
         # Imported here, so that matplotlib loads only where a picture is drawn.
-        from taichi_dem.plot.result.plots import ResultPlots
+        from taichi_dem import plot
 
-        return ResultPlots(self)
-
-    def _figures(self):
-        """The main figures of the run, (name, text) each."""
-        report, model, history = self.report, self.model, self.history
-        parts = counted(model.body_count, "body"), counted(model.bond_count, "bond")
-        rows = [
-            ("simulated", f"{report.until_s:.4g} s"),
-            ("method", f"{report.method}, {report.driver} driver"),
-            ("smallest step", f"{report.smallest_step_s:.3g} s"),
-            ("scene", ", ".join(parts)),
-            ("effects", ", ".join(report.effects) or "none"),
-            ("broken bonds", f"{report.broken_faces:,}"),
-            ("largest speed", f"{np.fmax.reduce(self.peak_speed, initial=np.nan):.4g} m/s"),
-            ("work put in", f"{report.work_put_in:.4g} J"),
-            ("energy not explained", report.unexplained),
-            *((("energy injected", report.injected),) if report.injected else ()),
-            ("time", f"{report.compile_seconds:.1f} s compiling, {report.run_seconds:.1f} s run"),
-        ]
-        for hole, moved in outward_columns(history).items():
-            if len(moved):
-                rows.insert(7, (f"{hole}, mean outward displacement", f"{moved[-1]:.4g} mm"))
-        return [*rows, *(("warning", need) for need in report.needs)]
+        drawn = {name.removeprefix("plot_"): getattr(plot, name) for name in plot.__all__}
+        return SimpleNamespace(**{name: MethodType(one, self) for name, one in drawn.items()})
 
     def write(self, folder: FileName) -> None:
         """Write history.csv, bonds.csv, mesh.msh, report.json and a ParaView series to a folder.

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Optional
 import numpy as np
 
 from taichi_dem.initial_motion import initial_motion
+from taichi_dem.kit.data_table import locked
 from taichi_dem.kit.display import counted, embedded, in_brief, titled
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length
@@ -130,7 +131,6 @@ class Scene:
                 effect.check_material(material)
         for effect in self.effects:
             check_one_material(effect, laid)
-        for effect in self.effects:
             if hasattr(effect, "group"):
                 self.mesh.group_faces(effect.group)
                 check_free(self.mesh, effect.group)
@@ -262,18 +262,13 @@ def _motion_of(scene):
     for name in ("velocity", "spin"):
         given = getattr(scene, name)
         if isinstance(given, np.ndarray):
-            object.__setattr__(scene, name, _locked(given.copy()))
+            object.__setattr__(scene, name, locked(given.copy()))
     motion = initial_motion(scene.mesh, scene.velocity, scene.spin)
     fastest = length(motion["velocity"]).max() if motion else 0.0
     if fastest > scene.max_speed:
         got, most = told_apart(fastest, scene.max_speed, 6)
         raise InputError(f"velocity must be at most max_speed, {most} m/s, got {got} m/s")
-    return {name: _locked(rows) for name, rows in motion.items()}
-
-
-def _locked(array):
-    array.setflags(write=False)
-    return array
+    return {name: locked(rows) for name, rows in motion.items()}
 
 
 def _sleep_of(scene):

@@ -11,7 +11,7 @@ edge; planes are met exactly, and round walls by polygons whose corners lie on t
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Optional, Union
+from typing import Union
 
 import numpy as np
 
@@ -137,9 +137,8 @@ def plate(
     thickness: float,
     element: float,
     hole: Union[float, Sequence[float], None] = None,
-    notch: Optional[Sequence[float]] = None,
 ) -> Mesh:
-    """Make a plate from the origin, with a hole or a notch where asked for.
+    """Make a plate from the origin, with a hole where asked for.
 
     Parameters
     ----------
@@ -154,20 +153,17 @@ def plate(
     hole : float or sequence of float, optional
         Centre and diameter (x, y, diameter) of a round hole through the thickness [m]; one number
         is the diameter of a hole in the middle.
-    notch : sequence of float, optional
-        Middle, depth and opening (x, depth, opening) of a slot from the bottom edge upward [m]; at
-        least half an element wide.
 
     Returns
     -------
     Mesh
-        Groups left, right (x), bottom, top (y), back, front (z), hole and notch where they are.
+        Groups left, right (x), bottom, top (y), back, front (z), and hole where it is.
 
     Raises
     ------
     InputError
-        A length is no positive number, an element does not fit, or a hole or notch does not leave
-        an element of wall around it.
+        A length is no positive number, an element does not fit, or a hole does not leave an element
+        of wall around it.
 
     Examples
     --------
@@ -178,18 +174,12 @@ def plate(
     given = {"width": width, "height": height, "thickness": thickness}
     x, y, z = (positive(name, value) for name, value in given.items())
     element = _element(element, min(x, y, z), x * y * z)
-    outline, sides = _corners(x, y), _box_sides(x, y, element)
-    loops = []
+    loops, sides = [divided(_corners(x, y), element)], _box_sides(x, y, element)
     if hole is not None:
         middle = _checked_hole(hole, x, y, element)
         loops.append(circle(middle[:2], middle[2], element)[::-1])
         sides["hole"] = _on_circle(middle[:2], middle[2], element)
-    if notch is not None:
-        slot = _checked_notch(notch, x, y, element)
-        _check_apart(slot, loops, element)
-        outline = [outline[0], *slot, *outline[1:]]
-        sides["notch"] = _on_slot(slot, element)
-    return drawn_out([divided(outline, element), *loops], z, element, sides)
+    return drawn_out(loops, z, element, sides)
 
 
 def from_surface(path: FileName, *, element: float, scale: float = 1.0) -> Mesh:
@@ -260,19 +250,6 @@ def _on_circle(middle, diameter, element):
     return on
 
 
-def _on_slot(slot, element):
-    (left, _), (_, depth), (right, _) = slot[:3]
-    near = _ON * element
-
-    def on(points):
-        x, y = points[..., 0], points[..., 1]
-        on_wall = np.minimum(np.abs(x - left), np.abs(x - right)) < near
-        inside = (x > left - near) & (x < right + near) & (y < depth + near)
-        return inside & (on_wall | (np.abs(y - depth) < near))
-
-    return on
-
-
 def _checked_hole(hole, x, y, element):
     """Middle and diameter of a hole [m], which leaves an element on all sides."""
     given = (0.5 * x, 0.5 * y, hole) if finite(hole) else hole
@@ -285,26 +262,3 @@ def _checked_hole(hole, x, y, element):
             f"and as much between it and the edges, got {shown(hole)}"
         )
     return across, up, diameter
-
-
-def _checked_notch(notch, x, y, element):
-    """Corners of a slot from the bottom edge, clockwise about its empty inside."""
-    middle, depth, opening = direction("notch", notch)
-    left, right = middle - 0.5 * opening, middle + 0.5 * opening
-    room = min(left, x - right, y - depth, depth) - element
-    if not opening >= 0.5 * element or room < -_ON * element:
-        raise InputError(
-            f"notch must be (x, depth, opening) with a depth of an element, {element:g} m, at "
-            f"least, half of one as opening, and one between it and the edges, got {shown(notch)}"
-        )
-    return [(left, 0.0), (left, depth), (right, depth), (right, 0.0)]
-
-
-def _check_apart(slot, loops, element):
-    """Raise InputError for a notch that comes nearer than an element to a hole."""
-    (left, _), (_, depth), (right, _) = slot[:3]
-    for loop in loops:
-        aside = np.maximum(np.maximum(left - loop[:, 0], loop[:, 0] - right), 0.0)
-        above = np.maximum(loop[:, 1] - depth, 0.0)
-        if (aside**2 + above**2).min() < element**2 * (1.0 - _ON):
-            raise InputError(f"notch must stay an element, {element:g} m, away from the hole")

@@ -2,30 +2,31 @@
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any, Optional, Union
-
-import numpy as np
+from typing import Any, NamedTuple, Optional, Union
 
 from taichi_dem.kit.allocation import values
-from taichi_dem.kit.checkpoint import Checkpoint, digest, identity_of, version_text
+from taichi_dem.kit.checkpoint import Checkpoint
+from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError, SimulationDiverged
-from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.files import claiming, output_folder
-from taichi_dem.kit.progress.progress import Listener, compiling
+from taichi_dem.kit.progress.progress import Listener, Pace, Worded, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, Owner, RunSnapshot, opened
-from taichi_dem.kit.validation import AUTO, FileName, instance, told_apart, word
+from taichi_dem.kit.restart import NoCheckpointWriter
+from taichi_dem.kit.validation import AUTO, FileName, instance, progress_option, shown, whole, word
 from taichi_dem.loads.history import unresolved_histories
-from taichi_dem.methods import Method, check_method
-from taichi_dem.observers import Observer, RunView
+from taichi_dem.methods import Method
+from taichi_dem.observers import MOST_CALLS, At, Every, Observer, RunView, macro_steps
 from taichi_dem.output.hole_monitor import watched_groups
+from taichi_dem.output.receivers import Receivers
 from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
-from taichi_dem.run_plan import RunPlan
+from taichi_dem.saving import arrays_of, writer_of
 from taichi_dem.scene import Scene, scene_warnings
 from taichi_dem.simulation import Simulation
 from taichi_dem.state.timeline import MACRO_TICKS
+
+#: Progress is reported this often [s].
+_REPORT_SECONDS = 0.2
 
 
 @claiming()
@@ -62,7 +63,7 @@ def simulate(
         Number of evenly spaced snapshots after the one at the start.
     progress : callable or str or None, default "auto"
         ``"auto"``: a bar on a terminal and in Jupyter. None: silence. A function is called with a
-        Progress while kernels are compiled, and then with a RunProgress about five times a second;
+        Progress, also while kernels are compiled, about five times a second;
         ``print`` prints percent and time left.
     title : str, default "simulating"
         Title of the progress bar.
@@ -103,25 +104,29 @@ def simulate(
     >>> print(result.report)  # doctest: +SKIP
     """
     instance("scene", scene, Scene)
-    check_method(method)
+    instance("method", method, Method)
     word("title", title)
-    plan = RunPlan(scene, method, until, samples, frames, observers, progress)
-    arrays = _opened(scene, method, checkpoint, resume, plan)
+    plan = _Plan(scene, method, until, samples, frames, observers, progress)
+    arrays = arrays_of(scene, method, checkpoint, resume, plan.last)
     if output is not None:
         output_folder(output)
     for sentence in (*scene_warnings(scene), *unresolved_histories(scene.effects, method.dt0)):
         warnings.warn(sentence, stacklevel=2)
-    with reporting(progress, title) as report_progress:
+    with reporting(progress, title) as tell:
         simulation, recorder = _started(Simulation(scene, method, driver))
-        writer = _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays)
-        error = _run_saved(simulation, recorder, writer, plan, report_progress)
-        result = _result(simulation, recorder, error, plan)
+        writer = writer_of(simulation, recorder, checkpoint, resume, arrays)
+        result, error = _result(simulation, recorder, writer, plan, tell)
         if error is None:
             # Observers may keep their view of it.
             simulation.close()
     if output is not None:
-        _write(result, output, writer)
-    return _given(result, error)
+        try:
+            result.write(output)
+        except InputError as unwritten:
+            raise InputError(f"{unwritten}{writer.last_good()}") from None
+    if error is not None:
+        raise error
+    return result
 
 
 def run_simulation(
@@ -140,18 +145,13 @@ def run_simulation(
     brief: whether the report leaves out all that needs a comparison of the bodies at the end.
     """
     instance("simulation", simulation, Simulation)
-    plan = RunPlan(simulation.scene, simulation.method, until, samples, frames, observers, progress)
-    with reporting(progress, title) as report_progress:
+    scene, method = simulation.scene, simulation.method
+    plan = _Plan(scene, method, until, samples, frames, observers, progress)
+    with reporting(progress, title) as tell:
         simulation, recorder = _started(simulation)
-        error = _run_saved(simulation, recorder, NoCheckpointWriter(), plan, report_progress)
-    result = _result(simulation, recorder, error, plan, brief)
-    return _given(replace(result, start=simulation.first_motion), error)
-
-
-def _given(result, error):
-    """A result; of a run that left its bounds the exception that holds it."""
+        more = {"brief": brief, "start": simulation.first_motion}
+        result, error = _result(simulation, recorder, NoCheckpointWriter(), plan, tell, **more)
     if error is not None:
-        error.result = result
         raise error
     return result
 
@@ -167,6 +167,95 @@ def result_of(run: Callable[..., Result], *arguments: Any, **options: Any) -> Re
         return diverged.result
 
 
+class Call(NamedTuple):
+    """A function to call with a view at some of the largest steps, and whenever its pace says."""
+
+    observe: Callable[[RunView], object]
+    steps: set[int]
+    pace: Optional[Pace] = None
+
+
+class _Plan:
+    """When a run is sampled, photographed, observed and reported, checked before it begins.
+
+    last: number of largest steps. receivers: those among the observers. Raises InputError.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        method: Method,
+        until: float,
+        samples: int,
+        frames: int,
+        observers: Sequence[Observer],
+        progress: Union[Listener, str, None],
+    ):
+        self.dt0, self.last = method.dt0, macro_steps(until, method.dt0)
+        whole("samples", samples, 1, MOST_CALLS)
+        whole("frames", frames, 0, MOST_CALLS)
+        progress_option("progress", progress)
+        self.samples, self.frames = samples, frames
+        self.observed = [
+            (one, one.when.marks(self.last, self.dt0, samples)) for one in _checked(observers)
+        ]
+        for one in observers:
+            if hasattr(one, "check_scene"):
+                one.check_scene(scene)
+        self.receivers = _receivers_among(observers)
+
+    def calls(self, simulation: Simulation, recorder: Recorder, tell: Any) -> list[Call]:
+        """Calls of a run: samples and frames come before the user's observers."""
+
+        def sample(_):
+            with simulation.readings.held():
+                simulation.sample()
+                recorder.sample()
+
+        def progress(_):
+            time_s, seconds = simulation.time_s, simulation.run_seconds
+            rates = (time_s, "s/s"), (simulation.evaluations(), "evaluations/s")
+            words = ", ".join(prefixed(done / max(seconds, 1e-9), unit) for done, unit in rates)
+            tell(Worded(min(1.0, time_s / (self.last * self.dt0)), seconds, words))
+
+        made = [Call(sample, self._evenly(self.samples))]
+        if self.frames:
+            made.append(Call(lambda _: recorder.snapshot(), self._evenly(self.frames)))
+        for one, steps in self.observed:
+            wall_s = one.when.wall_s
+            made.append(Call(one.observe, steps, None if wall_s is None else Pace(wall_s)))
+        if tell is not None:
+            made.append(Call(progress, {self.last}, Pace(_REPORT_SECONDS)))
+        return made
+
+    def _evenly(self, count):
+        return Every(samples=1).marks(self.last, self.dt0, count)
+
+
+def _checked(observers):
+    """Observers as a tuple; InputError for one without a member, or with a wrong one."""
+    if not isinstance(observers, (list, tuple)):
+        raise InputError(f"observers must be a list of observers, got {shown(observers)}")
+    for place, one in enumerate(observers):
+        timed = isinstance(getattr(one, "when", None), (Every, At))
+        if isinstance(one, type) or not (timed and callable(getattr(one, "observe", None))):
+            raise InputError(
+                f"observers[{place}] must have a member when, an Every or an At, and a method "
+                f"observe(view), got {shown(one)}"
+            )
+    return observers
+
+
+def _receivers_among(observers):
+    """Receivers among observers; InputError where two have one name."""
+    found = [one for one in observers if isinstance(one, Receivers)]
+    names = [name for one in found for name in one.points]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f"observers must have receivers of different names, got {twice[0]} twice")
+    return found
+
+
 def _started(simulation):
     """A simulation ready to step and its recorder, with all kernels compiled."""
     recorder = Recorder(simulation, *watched_groups(simulation.scene))
@@ -176,86 +265,35 @@ def _started(simulation):
     return simulation, recorder
 
 
-def _opened(scene, method, checkpoint, resume, plan):
-    """Arrays by name to resume from, or None. Raises InputError for an unusable checkpoint."""
-    if isinstance(checkpoint, Checkpoint):
-        # Refuses too many of them, before anything is done.
-        checkpoint.marks(plan.last, plan.dt0)
-    arrays = opened(checkpoint, resume, lambda: run_identity(scene, method))
-    begin = int(np.asarray(arrays.get("field/state.tick", 0)).max(initial=0)) if arrays else 0
-    if begin > plan.last * MACRO_TICKS:
-        got, least = told_apart(plan.last * plan.dt0, begin * (plan.dt0 / MACRO_TICKS))
-        raise InputError(f"until must be at least {least} s, where {resume} begins, got {got}")
-    return arrays
+def _result(simulation, recorder, writer, plan, tell, brief=False, start=None):
+    """Run to the end, or as far as the run stays within its bounds.
 
-
-def _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays):
-    """Writer of checkpoints, after a resumed run has been restored."""
-    if arrays:
-        saved_run(simulation, recorder).restore(arrays, resume)
-    if checkpoint is None:
-        return NoCheckpointWriter()
-
-    def now():
-        """Present largest step, and time [s]."""
-        return int(values(simulation.state.tick)) // MACRO_TICKS, simulation.time_s
-
-    return CheckpointWriter(checkpoint, saved_run(simulation, recorder), now)
-
-
-def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
-    """All that a checkpoint holds of a started simulation, a ``restart.RunSnapshot``."""
-    parts: dict[str, Owner] = {"simulation": simulation, **simulation.followed}
-    parts["recorder"] = recorder
-    return RunSnapshot(
-        run_identity(simulation.scene, simulation.method), FieldMemory(simulation.engine), parts
-    )
-
-
-def run_identity(scene: Scene, method: Method) -> dict[str, str]:
-    """Properties that a resumed run must share with the saved one, in words by name.
-
-    Driver, threads, and how long a run goes and what it records may differ.
+    Returns the result, and the SimulationDiverged that holds it or None.
     """
-    mesh = scene.mesh
-    groups = [array for name in sorted(mesh.groups) for array in (list(name), mesh.groups[name])]
-    content = digest(mesh.points, mesh.tetrahedra, *groups)
-    return {
-        "version": version_text(),
-        "mesh": f"{mesh.body_count} tetrahedra ({content})",
-        "bonded shares": identity_of(mesh.bonded_shares),
-        "material": _material_identity(scene),
-        "effects": ", ".join(
-            f"{effect.name} {identity_of(vars(effect))}" for effect in scene.effects
-        ),
-        "max_speed": identity_of(scene.max_speed),
-        "initial motion": identity_of(scene.initial_motion) if scene.initial_motion else "nothing",
-        "on demand": identity_of((scene.on_demand, scene.sleep)),
-        "method": identity_of(method),
-    }
-
-
-def _material_identity(scene):
-    """Materials of a scene in words, and which body has which."""
-    laid = scene.body_materials
-    if laid.is_one:
-        return identity_of(laid.materials[0])
-    names = [identity_of(material) for material in laid.materials]
-    # In an order of their own, not that of the groups.
-    order = sorted(range(len(names)), key=names.__getitem__)
-    place = np.argsort(order)[laid.of_body]
-    return f"{'; '.join(names[k] for k in order)} ({digest(place)})"
-
-
-def _run_saved(simulation, recorder, writer, plan, report_progress):
-    """Run to the end, or as far as the run stays within its bounds: then the SimulationDiverged."""
-    calls = plan.calls(simulation, recorder, report_progress)
+    calls, error = plan.calls(simulation, recorder, tell), None
     try:
         with writer:
             _run(simulation, recorder, writer, plan, calls)
-    except SimulationDiverged as error:
-        return error
-    return None
+    except SimulationDiverged as diverged:
+        error = diverged
+    received = [one.received() for one in plan.receivers]
+    result = Result(
+        scene=simulation.scene,
+        method=simulation.method,
+        model=simulation.model,
+        history=recorder.history(),
+        frames=tuple(recorder.frames),
+        broken_time=recorder.broken_time(),
+        peak_speed=recorder.peak_speed,
+        report=simulation.report(brief),
+        diverged=str(error) if error else "",
+        start=start,
+        acting_since=simulation.acting_since(),
+        receivers={name: part for parts in received for name, part in parts.items()},
+    )
+    if error is not None:
+        error.result = result
+    return result, error
 
 
 def _run(simulation, recorder, writer, plan, calls):
@@ -284,27 +322,3 @@ def _run(simulation, recorder, writer, plan, calls):
                 call.observe(view)
         writer.save_if_needed()
     writer.save()
-
-
-def _write(result, folder, writer):
-    try:
-        result.write(folder)
-    except InputError as error:
-        raise InputError(f"{error}{writer.last_good()}") from None
-
-
-def _result(simulation, recorder, error, plan, brief=False):
-    received = [one.received() for one in plan.receivers]
-    return Result(
-        scene=simulation.scene,
-        method=simulation.method,
-        model=simulation.model,
-        history=recorder.history(),
-        frames=tuple(recorder.frames),
-        broken_time=recorder.broken_time(),
-        peak_speed=recorder.peak_speed,
-        report=simulation.report(brief),
-        diverged=str(error) if error else "",
-        acting_since=simulation.acting_since(),
-        receivers={name: part for parts in received for name, part in parts.items()},
-    )

@@ -18,16 +18,15 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, instance, shown, whole
-from taichi_dem.methods import Method, check_method
+from taichi_dem.methods import Method
 from taichi_dem.report.certificate import certificate_of
 from taichi_dem.report.divergence import DivergenceCheck
 from taichi_dem.report.effects import effect_uses, on_demand
 from taichi_dem.report.energy_balance import EnergyBalance, open_account
 from taichi_dem.report.missing_effects import MissingEffects
-from taichi_dem.report.readings import Readings
+from taichi_dem.report.readings import Kept, Readings, Run
 from taichi_dem.report.report import Report, known_error
 from taichi_dem.report.resolution import StepResolution
-from taichi_dem.report.run import Kept, Run
 from taichi_dem.report.shared_volume import SharedVolume
 from taichi_dem.scene import Scene
 from taichi_dem.state.capacity import capacity_of
@@ -37,8 +36,9 @@ from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.auto_driver import MEASURED, AutoDriver, driver_name
-from taichi_dem.step.drivers import DRIVERS, Step
+from taichi_dem.step.drivers import DRIVERS
 from taichi_dem.step.multirate.schedule import Schedule
+from taichi_dem.step.phases import Step
 from taichi_dem.step_control import CRITERIA
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
@@ -101,12 +101,12 @@ class Simulation(Uncopied):
 
     def __init__(self, scene: Scene, method: Method, driver: str = "auto"):
         instance("scene", scene, Scene)
-        check_method(method)
+        instance("method", method, Method)
         choice("driver", driver, ("auto", *DRIVERS))
         runtime.check_thread("simulation")
         started = time.perf_counter()
         compiling("set-up", 0.0)
-        self.scene, self.method, self.solves = scene, method, method.solves
+        self.scene, self.method = scene, method
         self.model = Model(scene.mesh, scene.body_materials, scene.effects)
         name = driver_name(driver, self.model.bond_count)
         structure = Structure(scene.effects, method, scene.on_demand)
@@ -190,8 +190,7 @@ class Simulation(Uncopied):
             The structure differs, or the scene finds no room.
         """
         scene = self.scene if scene is None else instance("scene", scene, Scene)
-        method = self.method if method is None else method
-        check_method(method)
+        method = self.method if method is None else instance("method", method, Method)
         same = scene is self.scene
         model = self.model if same else Model(scene.mesh, scene.body_materials, scene.effects)
         self._check_reset(scene, method, model)
@@ -215,6 +214,11 @@ class Simulation(Uncopied):
     def time_s(self) -> float:
         """Present time [s]."""
         return self.schedule.time_s
+
+    @property
+    def macro_step(self) -> int:
+        """Number of largest steps done."""
+        return int(values(self.state.tick)) // MACRO_TICKS
 
     def start(self) -> None:
         """Choose the first steps, evaluate the bonds and open the account; done once.
@@ -256,7 +260,6 @@ class Simulation(Uncopied):
         self._open_balance()
         self.sample()
         self.divergence_check.check()
-        self.evaluation_rate()
 
     def _open_balance(self):
         """Begin the energy balance and all else that is followed."""
@@ -381,22 +384,6 @@ class Simulation(Uncopied):
         solver = self.advance.solver
         return int(values(solver.total_sweeps)) if solver is not None else 0
 
-    def evaluation_rate(self) -> float:
-        """Bonds and pairs to evaluate in a simulated second, if all levels stay as they are.
-
-        Returns
-        -------
-        float
-            Rate [1/s].
-        """
-        members = self.schedule.members()
-        steps = 2.0 ** np.arange(len(members))
-        if self.schedule.uniform:
-            steps[:] = 2.0 ** int(values(self.schedule.finest))
-        if self.solves:
-            steps *= 1.0 + self.sweeps() / max(1, int(values(self.schedule.evaluations)[0]))
-        return float(members @ steps) / self.method.dt0
-
     def report(self, brief: bool = False) -> Report:
         """Report of the run so far.
 
@@ -425,8 +412,7 @@ class Simulation(Uncopied):
         if not brief:
             shared_volume.sample(self.time_s, finished=True)
         linear, angular = self.energy_balance.momentum_errors()
-        tables = self.energy_balance.tables()
-        account = self.energy_balance.account(tables)
+        account = self.energy_balance.account()
         bound = np.bincount(values(self.state.bound, here), minlength=len(CRITERIA))
         unconverged, worst = self.step_resolution.unconverged
         report = Report(
@@ -453,7 +439,7 @@ class Simulation(Uncopied):
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
-            effect_activity=effect_uses(self.parts, self.energy_balance, tables, account),
+            effect_activity=effect_uses(self.parts, self.energy_balance, account),
             missing_effects=() if brief else self.missing_effects.findings(shared_volume),
             unresolved=(
                 *self.step_resolution.findings(),
@@ -479,4 +465,4 @@ class Simulation(Uncopied):
         dict of ndarray
             Times [s], shape (body_count,), by name; NaN for never.
         """
-        return on_demand(self.parts).since
+        return on_demand(self.parts)[0]

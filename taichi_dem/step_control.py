@@ -84,9 +84,6 @@ class StepControl:
 class FixedStep:
     """Every body keeps the largest step."""
 
-    def load(self, distance: Optional[float], dt0: float) -> None:
-        """Nothing to take."""
-
     @ti.func
     def wanted(self, level, speed2, low):
         """Level 0, always."""

@@ -33,8 +33,8 @@ class BondProbe:
         self.centre = self.model.centre
         self._slots = values(self.tables.bond_slots, 0)
         fields = self.state.fields()
-        names = "softening_unit shear_slip mixed_mode broken_tick exposed_tick bond_heat".split()
-        self._changing = [(fields[n], values(fields[n])) for n in names if n in fields]
+        ends = "_unit", "_slip", "broken_tick", "exposed_tick", "bond_heat"
+        self._changing = [(f, values(f)) for name, f in fields.items() if name.endswith(ends)]
 
     def reset(self):
         """Undo all history of the bond."""

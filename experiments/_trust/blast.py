@@ -11,7 +11,6 @@ from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh
 from taichi_dem.kit.plot_style import BLACK, GREY, RED
 from taichi_dem.mesh.joined import in_space_order
 from taichi_dem.mesh.tetrahedra import all_faces, outer_rows
-from taichi_dem.output.attenuation import Attenuation
 
 #: Copies of the paper's block, one behind the other; end of a run [s].
 COPIES, UNTIL = 15, 1e-3
@@ -52,7 +51,7 @@ def blasted(seed):
     scene = Scene(block(seed), CONCRETE, paper_effects())
     looks = {"until": UNTIL, "samples": 200, "frames": 1, "progress": None}
     result = simulate(scene, method=ImplicitDashpots(BLOCK_STEP), **looks)
-    return Attenuation.of(result.model, result.peak_speed, HOLE_RADIUS), sieving(result)
+    return result.attenuation("hole", HOLE_RADIUS), sieving(result)
 
 
 def block(seed):

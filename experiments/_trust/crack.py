@@ -10,7 +10,6 @@ from taichi_dem import ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.plot_style import BLACK, RED
 from taichi_dem.mesh.face_groups import with_cut
-from taichi_dem.mesh.tetrahedra import components
 from taichi_dem.output.cracks import crack_areas
 
 #: Plate and depth of its notch [m], edges of elements [m].
@@ -87,9 +86,8 @@ def broken_bonds(simulation):
 
 def parted(simulation):
     """Whether no bonds lead from the left end to the right one any more."""
-    model, held = simulation.model, ~broken_bonds(simulation)
-    links = np.stack([model.topology.master, model.topology.slave], axis=1)[held]
-    piece, x = components(model.body_count, links), model.centre[:, 0]
+    model = simulation.model
+    piece, x = model.pieces(broken_bonds(simulation)), model.centre[:, 0]
     return piece[x.argmin()] != piece[x.argmax()]
 
 

@@ -16,8 +16,8 @@ from _page import png_like_the_first
 from taichi_dem.kit.plot_style import BLACK, GREY, RED, seconds, styled, styles_of
 from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
+from taichi_dem.observers import macro_steps
 from taichi_dem.plot.bodies import draw_bodies
-from taichi_dem.run_plan import macro_steps
 from taichi_dem.simulate import result_of, run_simulation
 
 LENGTH, WIDTH, CELLS = 0.4, 0.05, (12, 1, 1)
@@ -62,7 +62,7 @@ class Strike:
         )
         end, frames = result.model.centre[:, 0] > LENGTH * (1.0 - 1.0 / CELLS[0]), result.frames
         self.moved = np.full(SAMPLES + 1, np.nan)
-        self.moved[: len(frames)] = result.mean_displacement(end)[:, 0]
+        self.moved[: len(frames)] = [frame.displacement[end, 0].mean() for frame in frames]
         self.motion = frames[SHOWN] if len(frames) > SHOWN else None
 
     def error(self, truth):
@@ -87,8 +87,8 @@ def scene(rise=RISES[0]):
 
 def limits():
     """Longest stable explicit step of the worst body [s]: by its dashpots, and by its springs."""
-    report = dem.quality_report(scene().mesh, dem.CONCRETE)
-    return float(report.dashpot_step_s.min()), float(report.spring_step_s.min())
+    own = dem.step_report(scene()).limits
+    return float(own["bond_dashpot"].min()), float(own["bond_stiffness"].min())
 
 
 #: One scene a rise, so that another step finds the limits of its bodies there.

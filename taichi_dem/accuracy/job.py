@@ -2,12 +2,12 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
 
 from taichi_dem.elasticity.rates import bond_rates, springs_of
 from taichi_dem.goals import Goal
 from taichi_dem.mesh.topology import topology_of
-from taichi_dem.methods import ImplicitDashpots, Uniform
+from taichi_dem.methods import ImplicitDashpots, Method, Uniform
 from taichi_dem.scene import Scene
 from taichi_dem.stability.stable_step import spring_step
 from taichi_dem.stability.step_report import step_report
@@ -32,16 +32,24 @@ class Job:
     tolerance: float
     confidence: float
 
-    def methods(self) -> "Methods":
-        """The method for this scene, at any step."""
+    @cached_property
+    def solves(self) -> bool:
+        """Whether dashpots are solved together, in sweeps."""
+        return self.scene.damped()
+
+    @cached_property
+    def _coarsest(self):
+        """Steps at level 0, the fewest that are stable, and order of the error from there on."""
         change = min((effect.change_time() for effect in self.scene.effects), default=math.inf)
         longest = self._longest_step()
         step = max(min(longest, change), longest / _MOST_TIMES)
-        steps = max(_FEWEST, math.ceil(self.until / step))
         # A pulse within a step is a kick, which lies between the steps of two levels by chance.
-        order = 2.0 if step <= change else 1.0
-        kind = ImplicitDashpots if self.scene.damped() else Uniform
-        return Methods(kind, self.until, steps, order)
+        return max(_FEWEST, math.ceil(self.until / step)), 2.0 if step <= change else 1.0
+
+    @property
+    def declared(self) -> float:
+        """Order of the error of a smooth run."""
+        return self._coarsest[1]
 
     def _longest_step(self):
         """Longest step that all springs bear [s]: solved dashpots leave no other limit.
@@ -55,42 +63,25 @@ class Job:
             step = float(step_report(self.scene).borne("solved", "contact").min())
         return step
 
-    def rows(self, level: int) -> int:
-        """Rows of the time series of a run at a level, of which an extreme needs ever more."""
-        return min(_MOST_ROWS, _ROWS * 2**level) if self.goal.kind == "extreme" else _LOOKS
+    def method(self, level: int, tight: bool = False) -> Method:
+        """Method at a level, of the longest stable step over 2^level.
 
-
-@dataclass(frozen=True)
-class Methods:
-    """A method at falling steps: at level k the longest stable one, over 2^k.
-
-    make: of a step [s]. until: of the run [s]. steps: at level 0, the fewest that are stable.
-    """
-
-    make: Any
-    until: float
-    steps: int
-    declared: float = 2.0
-
-    @property
-    def solves(self) -> bool:
-        """Whether dashpots are solved together, in sweeps."""
-        return self.make is ImplicitDashpots
-
-    def at(self, level: int, tight: bool = False) -> Any:
-        """Method at a level; tight: whether its sweeps must agree 8 times as well.
-
-        Sweeps end at differences that fall with the step: one family goes to the exact solution.
+        tight: whether its sweeps must agree 8 times as well. Sweeps end at differences that fall
+        with the step: one family goes to the exact solution.
         """
-        method = self.make(self.until / (self.steps * 2**level))
+        step = self.until / (self._coarsest[0] * 2**level)
         if not self.solves:
-            return method
-        finer = 2**level * (_TIGHT if tight else 1)
-        fewest, most = method.sweeps
+            return Uniform(step)
+        finer, coarse = 2**level * (_TIGHT if tight else 1), ImplicitDashpots(step)
+        fewest, most = coarse.sweeps
         sweeps = fewest, min(_MOST_SWEEPS, most * finer)
-        return replace(method, tolerance=method.tolerance / finer, sweeps=sweeps)
+        return replace(coarse, tolerance=coarse.tolerance / finer, sweeps=sweeps)
 
     def in_words(self, level: int) -> str:
         """Method and step in words."""
         name = "solved dashpots" if self.solves else "one explicit step for all"
-        return f"{name}, {self.at(level).dt0:.2g} s"
+        return f"{name}, {self.method(level).dt0:.2g} s"
+
+    def rows(self, level: int) -> int:
+        """Rows of the time series of a run at a level, of which an extreme needs ever more."""
+        return min(_MOST_ROWS, _ROWS * 2**level) if self.goal.kind == "extreme" else _LOOKS

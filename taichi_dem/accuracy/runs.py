@@ -1,14 +1,13 @@
 """Runs of one question: by level of the step, and twins that differ by one rounding."""
 
 import math
-from dataclasses import dataclass
 from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem.accuracy.job import Job, Methods
+from taichi_dem.accuracy.job import Job
 from taichi_dem.kit.display import counted
-from taichi_dem.kit.progress.progress import Listener, Progress
+from taichi_dem.kit.progress.progress import Listener, Worded
 from taichi_dem.kit.study.timing import clock
 from taichi_dem.output.record import Frame
 from taichi_dem.result import Result
@@ -24,18 +23,6 @@ _GROWTH = 0.3
 _FRAMES = 32
 
 
-@dataclass(frozen=True)
-class Sought(Progress):
-    """Progress of a search, whose number of runs is not known: the share grows ever slower."""
-
-    runs: int
-
-    @property
-    def speed(self) -> str:
-        """How many runs were made."""
-        return counted(self.runs, "run")
-
-
 class Runs:
     """Runs that were made, each once.
 
@@ -44,23 +31,27 @@ class Runs:
     sentence of the last run that diverged.
     """
 
-    def __init__(self, job: Job, methods: Methods, listen: Optional[Listener]):
-        self.job, self.methods, self._listen = job, methods, listen
+    def __init__(self, job: Job, listen: Optional[Listener]):
+        self.job, self._listen = job, listen
         self.seconds, self.count, self.failure = 0.0, 0, ""
         self.results: dict[int, Result] = {}
         self.cost: dict[int, float] = {}
         self._simulation: Optional[Simulation] = None
         self._known: dict[tuple[int, int, bool], Optional[float]] = {}
 
-    def value(self, level: int, twin: int = 0, tight: bool = False) -> Optional[float]:
+    def value(self, level: int, twin: int = 0, tight: bool = False) -> Any:
         """Goal of a run at a level; None for one that diverged.
 
         twin: 0 for the scene as it is, else the seed of its disturbance. tight: see
-        ``Methods.at``.
+        ``Job.method``.
         """
         key = level, twin, tight
         if key not in self._known:
-            self._known[key] = self._run(*key)
+            result = self._timed(*key)
+            self.failure = result.diverged or self.failure
+            if not (twin or tight or result.diverged):
+                self.results[level] = result
+            self._known[key] = None if result.diverged else self.job.goal.value(result)
         return self._known[key]
 
     def parting(self, level: int) -> float:
@@ -100,15 +91,6 @@ class Runs:
         broken = (~np.isnan(self.results[level].broken_time) for level in (coarse, fine))
         return np.array_equal(*broken)
 
-    def _run(self, level, twin, tight):
-        result = self._timed(level, twin, tight)
-        if result.diverged:
-            self.failure = result.diverged
-            return None
-        if not (twin or tight):
-            self.results[level] = result
-        return self.job.goal.value(result)
-
     def _timed(self, level, twin, tight, frames=1):
         """Result of a run, whose CPU time is added to the sum."""
         started = clock()
@@ -122,12 +104,12 @@ class Runs:
         self.cost.setdefault(level, spent)
         if self._listen is not None:
             share = 1.0 - 1.0 / (1.0 + _GROWTH * self.count)
-            self._listen(Sought(share, self.seconds, self.count))
+            self._listen(Worded(share, self.seconds, counted(self.count, "run")))
         return result
 
     def _simulated(self, level, twin, tight, frames, brief):
         """Result of a run; the simulation of the first is used again, which is not set up anew."""
-        method = self.methods.at(level, tight)
+        method = self.job.method(level, tight)
         if self._simulation is None:
             self._simulation = Simulation(self.job.scene, method)
         else:

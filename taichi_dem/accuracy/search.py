@@ -44,8 +44,7 @@ class Search:
         self, job: Job, budget: float, listen: Optional[Callable[[Any], Any]], first: int = 0
     ):
         self.job, self.budget = job, budget
-        self.methods = job.methods()
-        self.runs = Runs(job, self.methods, listen)
+        self.runs = Runs(job, listen)
         self.levels, self.why = [first], ""
         # Twins so far, and their level.
         self.count, self.twins_at = 0, first
@@ -59,7 +58,8 @@ class Search:
             parts = self._parts()
         job, last = self.job, self.levels[-1]
         parting = self.runs.parting(self.twins_at) if parts.chance > self._allowed else math.inf
-        words, spent = self.methods.in_words(last), self.runs.seconds - pilot_s
+        words, spent = job.in_words(last), self.runs.seconds - pilot_s
+        short = f"{100.0 * job.tolerance:g} % was not reached: {self.why}" if self.why else ""
         made = Answer(
             goal=job.goal.name,
             unit=job.goal.unit,
@@ -70,7 +70,7 @@ class Search:
             plan=Plan(words, self.runs.count, pilot_s, spent, last - 1, parting),
             result=self.runs.results[last],
             cost_curve=tuple(self._cost_curve()),
-            shortfall=self._shortfall(),
+            shortfall=short,
         )
         made = self._branched(made) if parts.chance > self._allowed else made
         return doubted(made, *self._doubts(self.runs.results[last].report))
@@ -92,7 +92,7 @@ class Search:
 
     def _begin(self):
         """Find the longest step that is stable, and go on to half of it."""
-        while self._single(self.levels[0]) is None:
+        while self.runs.value(self.levels[0]) is None:
             self.levels[0] += 1
             if self.levels[0] > _MOST_COARSE:
                 raise SimulationDiverged(self.runs.failure)
@@ -100,7 +100,7 @@ class Search:
         if needed > self.budget:
             got, least = told_apart(self.budget, needed, 2)
             raise InputError(f"budget_s must leave time for two runs, {least} s here, got {got}")
-        if self._single(first + 1) is None:
+        if self.runs.value(first + 1) is None:
             raise SimulationDiverged(self.runs.failure)
         self.levels.append(first + 1)
         self.twins_at = first
@@ -109,18 +109,15 @@ class Search:
     def _allowed(self):
         return self.job.tolerance * abs(self._value(self.levels[-1]))
 
-    def _single(self, level, twin=0):
-        return self.runs.value(level, twin)
-
     def _sample(self, level):
         """Values of a run and its twins that did not diverge, as many as were asked for."""
-        found = (self._single(level, twin) for twin in range(self.count + 1))
+        found = (self.runs.value(level, twin) for twin in range(self.count + 1))
         return [value for value in found if value is not None]
 
     def _value(self, level):
         """Value at a level; where one run means little, the mean over a run and its twins."""
         if not self.job.goal.averaged:
-            return self._single(level)
+            return self.runs.value(level)
         return mean_and_deviation(self._sample(level))[0]
 
     def _step(self, count: Optional[int] = None) -> StepError:
@@ -135,7 +132,7 @@ class Search:
         smooth = self.job.goal.kind == "value" and not self._eventful
         return step_error(
             values,
-            self.methods.declared if smooth else 1.0,
+            self.job.declared if smooth else 1.0,
             [2.0**-level for level in levels],
             least=change(*levels[-2:]) * abs(values[-1]),
             smooth=smooth,
@@ -146,10 +143,10 @@ class Search:
         """Half-widths of the bar by source; that of sweeps once a second step was not enough."""
         step, first = self._step().error, self.levels[0]
         chance = self._spread() if self._eventful or self.job.goal.averaged else 0.0
-        if len(self.levels) == 2 or self.why or not self.methods.solves:
+        if len(self.levels) == 2 or self.why or not self.job.solves:
             return ErrorParts(step=step, chance=chance)
         tight = self.runs.value(first, 0, True)
-        sweeps = math.inf if tight is None else abs(tight - self._single(first))
+        sweeps = math.inf if tight is None else abs(tight - self.runs.value(first))
         sweeps = min(step, sweeps * 2.0 ** (first - self.levels[-1]))
         return ErrorParts(step=_beside(step, sweeps), solver=sweeps, chance=chance)
 
@@ -169,7 +166,7 @@ class Search:
                 return math.inf
             self.count = 1
         if self.count == 1 and not averaged:
-            here, twin = self._single(coarse), self._single(coarse, 1)
+            here, twin = self.runs.value(coarse), self.runs.value(coarse, 1)
             apart = math.inf if twin is None else _TWO * abs(twin - here)
             if apart <= _NEGLIGIBLE * self._allowed:
                 return apart
@@ -224,15 +221,15 @@ class Search:
         """Go on to half the step, or to the one that the order of a smooth run calls for."""
         last, more = self.levels[-1], 1
         if last - self.levels[0] >= _MOST_FINE:
-            self.why = f"half of a step of {self.methods.at(last).dt0:.2g} s changes as much"
+            self.why = f"half of a step of {self.job.method(last).dt0:.2g} s changes as much"
             return
         if not self._eventful:
-            wanted = _halvings(parts.total, self._allowed, self.methods.declared)
+            wanted = _halvings(parts.total, self._allowed, self.job.declared)
             more = int(min(_MOST_AT_ONCE, max(1, wanted)))
         while more > 1 and not self._affords(2.0**more, last):
             more, self.why = more - 1, ""
         if self._affords(2.0**more * (self.count + 1 if self.job.goal.averaged else 1), last):
-            if self._single(last + more) is None:
+            if self.runs.value(last + more) is None:
                 self.why = f"a smaller step diverged: {self.runs.failure}"
             else:
                 self.levels.append(last + more)
@@ -258,13 +255,8 @@ class Search:
         found = report.certificate
         if found is not None and not found.holds:
             seconds = self.runs.seconds / max(_LEAST_AWAKE, 1.0 - found.asleep)
-            yield (
-                f"the certificate of its run does not hold, as {found.failure}: {found.remedy}, "
-                f"about {seconds:.2g} s"
-            )
-
-    def _shortfall(self):
-        return f"{100.0 * self.job.tolerance:g} % was not reached: {self.why}" if self.why else ""
+            why = f"the certificate of its run does not hold, as {found.failure}"
+            yield f"{why}, about {seconds:.2g} s"
 
     def _cost_curve(self):
         """Cost of other tolerances: what the runs cost that were enough for them, or would be."""
@@ -275,7 +267,7 @@ class Search:
         for tolerance in sorted({*_TOLERANCES, self.job.tolerance}, reverse=True):
             enough = [seconds for step, seconds in stages if step.error <= tolerance * size]
             step, seconds = stages[-1]
-            unseen = 1.0 if self._eventful else self.methods.declared
+            unseen = 1.0 if self._eventful else self.job.declared
             order = step.order if step.regular else unseen
             more = _halvings(step.error, tolerance * size, order)
             predicted = seconds * (2.0**more if more < _BEYOND else math.inf)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.elasticity.rates import springs_of
-from taichi_dem.elasticity.statics import BondStatics
+from taichi_dem.elasticity.statics import motions_under
+from taichi_dem.elasticity.wave_moduli import PAIRS, STRAINS
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
@@ -17,15 +18,7 @@ from taichi_dem.materials.body_materials import AnyMaterial
 from taichi_dem.materials.bond_rules import BondGeometry, evaluated, per_bond
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.tetrahedra import area_vectors
-from taichi_dem.mesh.topology import (
-    body_properties,
-    face_vertices,
-    mean_density,
-    topology_of,
-)
-
-#: Components of stress and strain, in Voigt's order; strains yz, zx and xy are twice the tensor's.
-VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))
+from taichi_dem.mesh.topology import body_properties, face_vertices, topology_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,24 +141,17 @@ def mesh_stiffness(mesh: Mesh, material: AnyMaterial) -> MeshStiffness:
     if not hasattr(material, "normal_stiffness"):
         raise InputError(f"material must be a Material or BodyMaterials, got {shown(material)}")
     springs = per_bond(mesh, topology, material.density, springs_of(material))
-    statics = BondStatics(mesh, topology, springs)
     outer = _OuterFaces(mesh, material)
-    loads = np.stack([outer.wrenches(stress) for stress in _unit_stresses()], axis=2)
-    motions = statics.motions(loads)
-    total = float(volumes(mesh).sum())
-    strains = [
-        outer.strain(motions[:, :, k], stress) / total for k, stress in enumerate(_unit_stresses())
-    ]
-    compliance = np.array(strains).T
-    return MeshStiffness(0.5 * (compliance + compliance.T), mean_density(mesh, material.density))
-
-
-def _unit_stresses():
-    """Stresses of 1 Pa, one for each component, (6, 3, 3)."""
-    made = np.zeros((6, 3, 3))
-    for k, (i, j) in enumerate(VOIGT):
-        made[k, i, j] = made[k, j, i] = 1.0
-    return made
+    # Of 1 Pa, one for each component.
+    stresses = (STRAINS != 0.0).astype(float)
+    loads = np.stack([outer.wrenches(stress) for stress in stresses], axis=2)
+    motions = motions_under(mesh, topology, springs, loads)
+    volume, density = volumes(mesh), material.density
+    if isinstance(density, np.ndarray):
+        density = float((density * volume).sum() / volume.sum())
+    strains = [outer.strain(motions[:, :, k], stress) for k, stress in enumerate(stresses)]
+    compliance = np.array(strains).T / volume.sum()
+    return MeshStiffness(0.5 * (compliance + compliance.T), density)
 
 
 class _OuterFaces:
@@ -202,4 +188,4 @@ class _OuterFaces:
         moved = moved + along / normally + (traction - along) / across
         mean = self.vector.T @ moved
         mean = mean + mean.T
-        return np.array([0.5 * mean[i, i] if i == j else mean[i, j] for i, j in VOIGT])
+        return np.array([0.5 * mean[i, i] if i == j else mean[i, j] for i, j in PAIRS])

@@ -70,18 +70,10 @@ def subset_rates(
     rates = np.zeros((mesh.body_count, len(subsets)))
     for part in parts_in_cache(mesh.body_count):
         for column, subset in enumerate(subsets):
-            total = _sum_of(blocks[part], subset)
+            intact = [face for face in range(4) if subset >> face & 1]
+            total = blocks[part][:, intact].sum(axis=1)
             rates[part, column] = scaled_eigenvalues(root[part], total)
     return np.maximum(rates, 0.0)
-
-
-def _sum_of(blocks, subset):
-    """Sum of the blocks of the faces in a subset, in their order; blocks (n, 4, 6, 6)."""
-    total = np.zeros_like(blocks[:, 0])
-    for face in range(4):
-        if subset >> face & 1:
-            total += blocks[:, face]
-    return total
 
 
 def face_laws(
@@ -113,9 +105,9 @@ def contact_eigenvalues(
     root = inverse_root(mass, inertia)
     one, whole_face = np.zeros(len(mass)), np.zeros(len(mass))
     faces = geometry.all_faces(mesh.tetrahedra)
-    vectors = geometry.area_vectors(mesh.points, faces).reshape(-1, 4, 3)
+    normals = geometry.unit_normals(mesh.points, faces).reshape(-1, 4, 3)
     for face in range(4):
-        outward = vectors[:, face] / length(vectors[:, face])[:, None]
+        outward = normals[:, face]
         arms = spheres.centre[:, face] + spheres.radius[:, face, :, None] * outward[:, None]
         along = outward[:, :, None] * outward[:, None, :]
         law = np.broadcast_to(np.eye(3), along.shape) if friction else along

@@ -6,18 +6,18 @@ import numpy as np
 
 from taichi_dem.elasticity.rates import levers
 from taichi_dem.kit.fixed_order import dot, inverse, length, product, transposed
-from taichi_dem.mesh.tetrahedra import area_vectors, signed_volumes
+from taichi_dem.mesh.tetrahedra import area_vectors, signed_volumes, unit_normals
 
 #: Rings of bodies around a face over which its moduli are means.
 _RINGS = 2
 #: Share of the way to its own balance that each body goes where all go at once.
 _STEP = 0.7
-#: Unit strains, (6, 3, 3): those along x, y and z, and then those in yz, xz and xy.
-_PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
-_STRAINS = np.zeros((6, 3, 3))
-for _k, (_a, _b) in enumerate(_PAIRS):
-    _STRAINS[_k, _a, _b] += 0.5
-    _STRAINS[_k, _b, _a] += 0.5
+#: Unit strains, (6, 3, 3), and their components: those along x, y and z, then in yz, xz and xy.
+PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+STRAINS = np.zeros((6, 3, 3))
+for _k, (_a, _b) in enumerate(PAIRS):
+    STRAINS[_k, _a, _b] += 0.5
+    STRAINS[_k, _b, _a] += 0.5
 
 
 def wave_moduli(model: Any, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -45,8 +45,7 @@ def wave_moduli(model: Any, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     around = sum(at_points[faces[:, k]] for k in range(3))
     around[around[:, -1] == 0.0] = np.nan
     mean = (around[:, :-1] / around[:, -1:]).reshape(-1, 6, 6)
-    normal = area_vectors(mesh.points, faces)
-    normal = normal / length(normal)[:, None]
+    normal = unit_normals(mesh.points, faces)
     shear = sum(_modulus(mean, normal, tangent) for tangent in _tangents(normal))
     return _modulus(mean, normal, normal), 0.5 * shear
 
@@ -54,7 +53,7 @@ def wave_moduli(model: Any, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _modulus(stiffness, normal, way):
     """Twice the energy per volume [Pa] of the strain (n w + w n) / 2."""
     outer = normal[:, :, None] * way[:, None, :]
-    strain = np.stack([0.5 * (outer + transposed(outer))[:, a, b] for a, b in _PAIRS], axis=1)
+    strain = np.stack([0.5 * (outer + transposed(outer))[:, a, b] for a, b in PAIRS], axis=1)
     strain[:, 3:] *= 2.0
     return dot(strain, product(stiffness, strain[:, :, None])[:, :, 0])
 
@@ -80,7 +79,7 @@ def _body_sums(model, bodies):
     links = np.stack([top.master[bonds], top.slave[bonds]])
     maps, laws = _openings(model, bonds, links)
     opening = product(
-        _STRAINS[None], (model.centre[links[1]] - model.centre[links[0]])[:, None, :, None]
+        STRAINS[None], (model.centre[links[1]] - model.centre[links[0]])[:, None, :, None]
     )
     opening = np.repeat(transposed(opening[..., 0])[:, None], 3, axis=1)
     givers = bodies[(top.body_bond[bodies] >= 0).all(axis=1)]

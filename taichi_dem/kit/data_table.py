@@ -62,7 +62,7 @@ class Table(dict[str, np.ndarray]):
         instance("columns", columns, Mapping)
         instance("units", units, (Mapping, type(None)))
         super().__init__(
-            {word("name of a column", name): _locked(columns[name]) for name in columns}
+            {word("name of a column", name): locked(columns[name]) for name in columns}
         )
         shapes = {name: values.shape for name, values in self.items()}
         if len({*shapes.values()}) > 1 or any(len(shape) != 1 for shape in shapes.values()):
@@ -242,7 +242,7 @@ def _restored(kind, columns, attributes):
     return made
 
 
-def _locked(values):
+def locked(values: ArrayLike) -> np.ndarray:
     """A view of an array that refuses to be written."""
     view = np.asarray(values).view()
     view.flags.writeable = False

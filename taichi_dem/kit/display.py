@@ -67,13 +67,17 @@ def counted(count: int, what: str) -> str:
     return f"{count:,} {what if count == 1 else plural}"
 
 
+def scale(largest: float, unit: str) -> tuple[float, str]:
+    """Factor and name of the unit in which a value has one to three digits before the point."""
+    thousands = math.log10(largest) / 3.0 if 0.0 < largest < math.inf else 0.0
+    power = min(4, max(-4, math.floor(thousands + 1e-9)))
+    return 1e3**-power, f"{('p', 'n', 'µ', 'm', '', 'k', 'M', 'G', 'T')[power + 4]}{unit}"
+
+
 def prefixed(value: float, unit: str) -> str:
-    """A number with its unit, from nano to giga: "20 ms", "3.2 M evaluations/s"."""
-    thousands = math.log10(value) / 3.0 if 0.0 < value < math.inf else 0.0
-    power = min(3, max(-3, math.floor(thousands + 1e-9)))
-    prefix = ("n", "µ", "m", "", "k", "M", "G")[power + 3]
-    gap = " " if prefix and len(unit) > 3 else ""
-    return f"{value / 1e3**power:.3g} {prefix}{gap}{unit}"
+    """A number with its unit, from pico to tera: "20 ms", "3.2 M evaluations/s"."""
+    factor, name = scale(value, f" {unit}" if len(unit) > 3 else unit)
+    return f"{value * factor:.3g} {name.lstrip()}"
 
 
 def listed(values: Collection[float]) -> str:
@@ -111,5 +115,9 @@ def titled(title: str, *sections: str, warning: str = "") -> str:
 
 def unfolded(title: str, text: str) -> str:
     """HTML of text that appears, as it stands, when its title is clicked on."""
-    words, lines = html.escape(title), html.escape(text)
-    return f"<details><summary>{words}</summary><pre>{lines}</pre></details>"
+    return f"<details><summary>{html.escape(title)}</summary>{verbatim(text)}</details>"
+
+
+def verbatim(text: str) -> str:
+    """HTML of text as it stands."""
+    return f"<pre>{html.escape(text)}</pre>"

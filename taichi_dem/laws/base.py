@@ -10,7 +10,6 @@ contact spheres, loads push bodies, supports hold them, ground drags on them. Ro
 
 import copy
 import re
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ from taichi_dem.kit.products import dot
 from taichi_dem.kit.sealed import Sealed
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import float_array, shown
-from taichi_dem.materials import Material
+from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.materials.body_materials import MOST, BodyMaterials
 from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import MANY, Model
@@ -49,16 +48,17 @@ class Effect(Sealed):
 
     role = ""
     name = ""
-    #: Whether a friction law keeps a spring for each sphere pair (``roles.FrictionMemory``).
+    #: Each of the next four asks for members of its own (``laws.roles``).
+    #: Whether a friction law keeps a spring for each sphere pair.
     remembers = False
-    #: Whether a shear law keeps a residual slip of each unit (``roles.SlipMemory``).
+    #: Whether a shear law keeps a residual slip of each unit.
     remembers_slip = False
-    #: Whether a shear law may release a face (``roles.ShearFailure``).
+    #: Whether a shear law may release a face.
     releases = False
     #: Whether a law of bonds spends energy in slip, and whether it limits tension and shear alike.
     rubs = False
     is_whole = True
-    #: Whether a load acts by its mean from a time to a later one (``roles.VaryingLoad``).
+    #: Whether a load acts by its mean from a time to a later one.
     varies = False
     law: ti.Field
     tables: Tables
@@ -167,16 +167,6 @@ class Effect(Sealed):
             The scene lacks what the effect needs.
         """
 
-    def state(self) -> dict[str, ti.Field]:
-        """Fields that change in a run; a checkpoint holds them.
-
-        Returns
-        -------
-        dict
-            Fields by name.
-        """
-        return {}
-
     def stress(self, material: Material, size: float) -> float:
         """Stress that a load, support or ground may cause in a block, for estimates before a run.
 
@@ -263,7 +253,7 @@ class Effect(Sealed):
         bool
             True where they are valid.
         """
-        same = (_same(vars(given).get(name), value) for name, value in self._frozen.items())
+        same = (np.array_equal(getattr(given, k, np.nan), v) for k, v in self._frozen.items())
         return _count_of(given) == self._count and all(same)
 
     def __getattr__(self, name):
@@ -289,9 +279,8 @@ def bound(effect: Effect, tables: Tables) -> Any:
 
 
 def _count_of(effect):
-    """How many numbers an effect has."""
-    material: Any = _AnyMaterial()
-    return len(effect.numbers(material))
+    """How many numbers an effect has, with whatever material."""
+    return len(effect.numbers(CONCRETE))
 
 
 def _numbers_of(effect, materials):
@@ -331,20 +320,6 @@ def _checked_numbers(effect, material):
     return found
 
 
-class _AnyMaterial:
-    """Substitute for a material where only the number of constants matters."""
-
-    def __getattr__(self, name):
-        return 1.0
-
-
-def _same(first, second):
-    try:
-        return bool(np.array_equal(first, second))
-    except (TypeError, ValueError):
-        return first is second
-
-
 def check_sliding_energy(effect: Effect, option: str, material: Material) -> None:
     """Raise InputError for a material without cohesion, or too soft for a fracture energy G_II.
 
@@ -362,12 +337,6 @@ def check_sliding_energy(effect: Effect, option: str, material: Material) -> Non
             f"{option} of {effect.name} must be larger than cohesion^2 / (2 shear_stiffness) = "
             f"{least:.6g} J/m2, or a bond would fail at once, got {energy}"
         )
-
-
-def along(direction: Sequence[float]) -> Travel:
-    """Travel without end in a direction, for ``Effect.travel``."""
-    low = tuple(-np.inf if x < 0.0 else 0.0 for x in direction)
-    return low, tuple(np.inf if x > 0.0 else 0.0 for x in direction)
 
 
 @ti.data_oriented
@@ -394,13 +363,10 @@ class ElasticTension(Effect):
 
     @ti.func
     def spent(self, b, u):
-        """Nothing is spent by softening."""
+        """Nothing is spent, and no unit damaged."""
         return 0.0
 
-    @ti.func
-    def damage(self, b, u):
-        """An elastic unit is never damaged."""
-        return 0.0
+    damage = spent
 
 
 @ti.data_oriented

@@ -1,6 +1,6 @@
-"""The paper's law of bonds: softening in tension, Coulomb slip, and both together.
+"""The paper's law of bonds: softening in tension, Coulomb slip, both together, and dashpots.
 
-Source: Konno et al., section 2.1, eq. 1 and 2, Fig. 2 to 4.
+Source: Konno et al., section 2.1, eq. 1 and 2, Fig. 2 to 4; Table 1.
 """
 
 from typing import Any
@@ -10,7 +10,7 @@ import taichi as ti
 
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.products import dot, squared
-from taichi_dem.kit.types import vec2, vec3
+from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.laws.base import NEAR, Effect
 from taichi_dem.materials import Material
 from taichi_dem.physics.fracture import (
@@ -42,7 +42,6 @@ class Softening(Effect):
     """
 
     role = "tension"
-    name = "softening"
     activation = "a unit is opened to its tensile strength"
     may_be_silent = True
 
@@ -51,7 +50,7 @@ class Softening(Effect):
         return material.tensile_strength, material.failure_opening
 
     def declare(self, capacity: Capacity) -> None:
-        """Elastic limit and secant stiffness of every contact unit."""
+        """Elastic limit [m] and secant stiffness [Pa/m] of every contact unit."""
         self.unit = ti.Vector.field(2, ti.f64, shape=capacity.units)
 
     def load(self, model: Model) -> None:
@@ -60,10 +59,6 @@ class Softening(Effect):
         strength = model.of_bonds(lambda material: material.tensile_strength)
         onset = np.repeat(np.broadcast_to(strength, model.bond_count), 3) / stiffness
         assign(self.unit, np.stack([onset, stiffness], axis=1))
-
-    def state(self) -> dict[str, ti.Field]:
-        """Elastic limit [m] and secant stiffness [Pa/m] of every unit."""
-        return {"softening_unit": self.unit}
 
     @ti.func
     def _onset(self, b):
@@ -134,7 +129,6 @@ class ShearSlip(Effect):
     """
 
     role = "shear"
-    name = "shear_slip"
     activation = "a unit is sheared to its Coulomb limit"
     may_be_silent = True
     remembers_slip = True
@@ -144,12 +138,8 @@ class ShearSlip(Effect):
         return material.cohesion, material.friction
 
     def declare(self, capacity: Capacity) -> None:
-        """Residual slip of every contact unit."""
+        """Residual slip of every contact unit in the face frame [m]."""
         self.slip = ti.Vector.field(2, ti.f64, shape=capacity.units)
-
-    def state(self) -> dict[str, ti.Field]:
-        """Residual slip of every unit in the face frame [m]."""
-        return {"shear_slip": self.slip}
 
     @ti.func
     def begins(self, m, stiffness, sliding, pressure):
@@ -185,15 +175,43 @@ class ShearSlip(Effect):
     @ti.func
     def stored(self, b, u, sliding):
         """Elastic energy per area [J/m^2]."""
-        elastic = sliding - self.slip[u]
+        elastic = sliding - self.residual_slip(u)
         return 0.5 * self.tables.bond_stiffness[b][1] * dot(elastic, elastic)
+
+
+@ti.data_oriented
+class BondDamping(Effect):
+    """Normal and tangential dashpots of bonds, at full strength until the face is released.
+
+    References
+    ----------
+    Konno et al., section 2.1 and Table 1.
+    """
+
+    role = "dashpot"
+    activation = "bonds are strained at a rate"
+    may_be_silent = True
+
+    def declare(self, capacity: Capacity) -> None:
+        """Normal and tangential coefficient of every bond per area [Pa s/m]."""
+        self.coefficient = ti.Vector.field(2, real, shape=capacity.bonds)
+
+    def load(self, model: Model) -> None:
+        """Take the coefficients of the material."""
+        assign(self.coefficient, model.bond_damping)
+
+    @ti.func
+    def traction(self, b, velocity):
+        """Traction [Pa] of bond b at a relative velocity in the face frame [m/s]."""
+        c = self.coefficient[b]
+        return vec3(c[0] * velocity[0], c[1] * velocity[1], c[1] * velocity[2])
 
 
 @ti.data_oriented
 class Separable:
     """A normal and a tangential law, each for itself but for the pressure: the paper's.
 
-    tension, shear: bound effects of these roles. The rest is as of ``laws.roles.BondLaw``.
+    tension, shear: bound effects of these roles. The rest is as of the role bond.
     Source: Konno et al., section 2.1.
     """
 

@@ -6,12 +6,10 @@ from typing import Any
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
 from taichi_dem.laws.base import PARTS_OF_BOND, Effect
-from taichi_dem.laws.bond import ShearSlip, Softening
-from taichi_dem.laws.bond_damping import BondDamping
-from taichi_dem.laws.friction import Friction
+from taichi_dem.laws.bond import BondDamping, ShearSlip, Softening
+from taichi_dem.laws.friction import Friction, StickingFriction
 from taichi_dem.laws.roles import check_activation
 from taichi_dem.laws.sphere_contact import ONCE_BROKEN, SphereContact
-from taichi_dem.laws.sticking_friction import StickingFriction
 from taichi_dem.materials.body_materials import BodyMaterials
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import parts_of
@@ -32,9 +30,6 @@ class ChosenEffects(tuple):
         made = super().__new__(cls, effects)
         made.word = word
         return made
-
-    def __reduce__(self):
-        return ChosenEffects, (tuple(self), self.word)
 
 
 def chosen_effects(

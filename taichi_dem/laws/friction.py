@@ -1,10 +1,14 @@
-"""Sliding friction between contact spheres (Konno et al., 2.2)."""
+"""Friction between contact spheres that slide (Konno et al., 2.2), or stick until they slip."""
 
 import taichi as ti
 
+from taichi_dem.kit.products import dot, norm, squared
+from taichi_dem.kit.types import real, vec3
+from taichi_dem.kit.validation import between
 from taichi_dem.laws.base import Effect
 from taichi_dem.materials import Material
 from taichi_dem.physics.sphere_pair import friction_force
+from taichi_dem.state.pair_store import PairStore
 
 
 @ti.data_oriented
@@ -17,7 +21,6 @@ class Friction(Effect):
     """
 
     role = "friction"
-    name = "friction"
     activation = "spheres that touch slide"
     may_be_silent = True
 
@@ -34,3 +37,122 @@ class Friction(Effect):
     def force(self, m, damping, force_normal, slide):
         """Force [N] on the second sphere against its sliding velocity [m/s]."""
         return friction_force(self.law[m, 0], damping, force_normal, slide)
+
+
+@ti.data_oriented
+class StickingFriction(Friction):
+    """Friction with a tangential spring in each contact of two spheres, up to Coulomb's limit.
+
+    A body at rest on a slope below the friction angle stays there; with ``Friction`` it creeps. The
+    stretch of a spring turns with the first body and is lost when the spheres part.
+
+    Parameters
+    ----------
+    stiffness_ratio : float, default 0.8
+        Ratio of the stiffness of the spring to the material's contact stiffness, from 1e-6 to 1;
+        spheres of a Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
+
+    Raises
+    ------
+    InputError
+        The ratio is out of range.
+
+    Notes
+    -----
+    The effect is not in the paper.
+
+    References
+    ----------
+    Cundall and Strack, Geotechnique 29 (1979) 47.
+
+    Examples
+    --------
+    >>> StickingFriction(stiffness_ratio=0.85).stiffness_ratio
+    0.85
+    """
+
+    name = "sticking_friction"
+    activation = "spheres that touch slide"
+    remembers = True
+    #: Its springs let bodies that touch remember: without a limit they would still slip.
+    may_be_silent = False
+
+    def __init__(self, stiffness_ratio: float = 0.8):
+        self.stiffness_ratio = between("stiffness_ratio", stiffness_ratio, 1e-6, 1.0)
+
+    def numbers(self, material: Material) -> tuple[float, ...]:
+        """Friction coefficient, stiffness of the spring of spheres [N/m], and its ratio."""
+        spring = self.stiffness_ratio * float(material.contact_stiffness)
+        return material.friction, spring, self.stiffness_ratio
+
+    def declare_columns(self, store: PairStore) -> None:
+        """Keep the stretch [m] of the spring of each sphere pair, in the first body's frame."""
+        self.stretch = store.sphere_column("tangential_stretch", real, 3)
+        if self.tables.contact.meets_bodies:
+            self.area = store.sphere_column("tangential_area", real)
+
+    @ti.func
+    def stiffness(self, m, k):
+        """Stiffness of the spring of pair k [N/m]; that of bodies grows with their contact."""
+        found = self.law[m, 1]
+        if ti.static(self.tables.contact.meets_bodies):
+            found = self.law[m, 2] * self.tables.contact.elastic(m, 1.0) * self.area[k]
+        return found
+
+    @ti.func
+    def resize(self, m, k, area):
+        """Give the spring of pair k a new area of contact [m2]; energy [J] that this takes.
+
+        It keeps its force where the area grows, and its stretch where it shrinks: neither adds
+        energy.
+        """
+        before = self.stored(m, k)
+        if area > self.area[k]:
+            self.stretch[k] = self.stretch[k] * (self.area[k] / area)
+        self.area[k] = area
+        return before - self.stored(m, k)
+
+    @ti.func
+    def follow(self, k, normal, way):
+        """Turn the spring of sphere pair k into the plane of contact and stretch it by ``way`` [m].
+
+        normal: of the contact; way: of the second sphere against the first across the normal.
+        """
+        stretch = self.stretch[k]
+        flat = stretch - dot(stretch, normal) * normal
+        # Turned, not projected: to turn with the contact takes no energy.
+        self.stretch[k] = flat * (norm(stretch) / ti.max(norm(flat), 1e-300)) + way
+
+    @ti.func
+    def slip(self, m, k, limit, way):
+        """Shorten the spring of sphere pair k to a limit [N]; return the energy dissipated [J].
+
+        way: its stretch in this step [m]. The work of the stretch, at the mean of the forces before
+        and after, is the energy stored plus that dissipated by slipping.
+        """
+        trial = self.stretch[k]
+        stiffness = self.stiffness(m, k)
+        longest = limit / stiffness
+        size = norm(trial)
+        present = trial
+        if size > longest:
+            present = trial * (longest / size)
+        self.stretch[k] = present
+        return 0.5 * stiffness * dot(trial - way + present, trial - present)
+
+    @ti.func
+    def spring(self, m, k):
+        """Force of the spring of sphere pair k on the second sphere [N]."""
+        return -self.stiffness(m, k) * self.stretch[k]
+
+    @ti.func
+    def stored(self, m, k):
+        """Elastic energy in the spring of sphere pair k [J]."""
+        return 0.5 * self.stiffness(m, k) * squared(self.stretch[k])
+
+    @ti.func
+    def part(self, m, k):
+        """Reset the spring of sphere pair k, whose spheres have parted; return its energy [J]."""
+        energy = self.stored(m, k)
+        self.stretch[k] = vec3(0.0)
+        return energy

@@ -55,7 +55,6 @@ class MixedMode(Effect):
     """
 
     role = "bond"
-    name = "mixed_mode"
     activation = "a unit is opened and sheared to its limit"
     may_be_silent = True
 
@@ -79,12 +78,8 @@ class MixedMode(Effect):
         return (*strengths, *energies, self.exponent / _QUARTER)
 
     def declare(self, capacity: Capacity) -> None:
-        """Damage and spent energy of every contact unit."""
-        self.unit = ti.Vector.field(2, ti.f64, shape=capacity.units)
-
-    def state(self) -> dict[str, ti.Field]:
         """Damage [-] of every unit, and energy per area that it has spent [J/m^2]."""
-        return {"mixed_mode": self.unit}
+        self.unit = ti.Vector.field(2, ti.f64, shape=capacity.units)
 
     @ti.func
     def _limits(self, m, stiffness, jump):

@@ -1,281 +1,142 @@
-"""Roles of effects as typed contracts: the members that each must have.
+"""Members that an effect must have, by its role, and checks of them.
 
-All members are ``ti.func`` methods of the bound effect. b is a bond, u one of its three contact
-units (3 b, 3 b + 1, 3 b + 2), i a body, k a sphere pair, m a pair of materials, whose numbers a law
-reads as ``self.law[m, 0]`` and on.
+All are ``ti.func`` methods of the bound effect, but for attributes, which are written without
+arguments, and functions of the model. b is a bond, u one of its three contact units (3 b, 3 b + 1,
+3 b + 2), i a body, k a sphere pair, m a pair of materials, whose numbers a law reads as
+``self.law[m, 0]`` and on.
 """
 
 import inspect
-from typing import Any, Protocol
-
-import taichi as ti
+from typing import Any
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.physics.wrench import Block
-from taichi_dem.state.body_motion import BodyMotion
-
-
-class BondLaw(Protocol):
-    """Law of a bond's contact units, opening and sliding together; role "bond".
-
-    jump: normal opening and two components of the sliding [m]; stiffness: normal and shear [Pa/m].
-    Beside its members it says ``rubs``, whether slip may spend energy, ``remembers_slip``, whether
-    ``residual_slip(u)`` stays when the traction is gone, and ``is_whole``, whether it serves both
-    the limit in tension and that in shear.
-    """
-
-    def traction(
-        self, m: int, u: int, stiffness: ti.Vector, jump: ti.Vector
-    ) -> tuple[ti.Vector, float]:
-        """Traction [Pa], three components, and energy per area slipped away now [J/m^2]."""
-
-    def failed(self, m: int, u: int, traction: ti.Vector) -> int:
-        """1 once the unit transmits nothing any more at a traction [Pa], else 0."""
-
-    def stored(self, b: int, u: int, jump: ti.Vector) -> tuple[float, float]:
-        """Elastic energy per area of opening and of sliding [J/m^2]."""
-
-    def spent(self, b: int, u: int) -> float:
-        """Energy per area [J/m^2] that damage has spent in the unit."""
-
-    def damage(self, b: int, u: int) -> float:
-        """0 intact to 1 failed."""
-
-    def acted(self, b: int, u: int) -> int:
-        """Bits of the parts of the law that have changed the unit: 1, or 1 and 2."""
-
-    def begins(self, m: int, stiffness: ti.Vector, jump: ti.Vector) -> int:
-        """Bits of the parts near whose limit a unit comes that the law never changed.
-
-        Elsewhere the traction must be stiffness times jump to the bit, and nothing else may happen.
-        """
-
-
-class TensionLaw(Protocol):
-    """Normal law of a bond's contact units, for itself; role "tension".
-
-    For effects="auto" it also says in words when it acts, ``activation``, as laws of contact,
-    friction and damping do, and by ``begins(m, stiffness, opening)`` where a unit that it never
-    changed comes near its limit: below, the traction must be stiffness times opening, and nothing
-    else may happen. A shear law has ``begins(m, stiffness, sliding, pressure)``.
-    """
-
-    def traction(self, m: int, stiffness: float, u: int, opening: float) -> float:
-        """Traction [Pa] at a normal opening [m]."""
-
-    def failed(self, m: int, u: int) -> int:
-        """1 once the unit transmits nothing any more, else 0."""
-
-    def stored(self, b: int, u: int, opening: float) -> float:
-        """Elastic energy per area [J/m^2]."""
-
-    def spent(self, b: int, u: int) -> float:
-        """Energy per area [J/m^2] that has been spent in the unit."""
-
-    def damage(self, b: int, u: int) -> float:
-        """0 intact to 1 failed."""
-
-
-class ShearLaw(Protocol):
-    """Tangential law of a bond's contact units, for itself; role "shear".
-
-    One with ``remembers_slip = True`` also keeps the contract ``SlipMemory``, one with ``releases =
-    True`` the contract ``ShearFailure``.
-    """
-
-    def traction(
-        self, m: int, stiffness: float, u: int, sliding: ti.Vector, pressure: float
-    ) -> tuple[ti.Vector, float]:
-        """Traction [Pa], two components, and energy per area slipped away now [J/m^2]."""
-
-    def stored(self, b: int, u: int, sliding: ti.Vector) -> float:
-        """Elastic energy per area [J/m^2]."""
-
-
-class SlipMemory(Protocol):
-    """Slip that stays when the traction is gone."""
-
-    def residual_slip(self, u: int) -> ti.Vector:
-        """Residual slip in the face frame [m], two components."""
-
-
-class ShearFailure(Protocol):
-    """Failure of a bond's contact units in shear."""
-
-    def failed(self, m: int, u: int, pressure: float) -> int:
-        """1 once the unit transmits nothing any more at a pressure [Pa], else 0."""
-
-
-class DashpotLaw(Protocol):
-    """Damping of a bond's contact units; role "dashpot"."""
-
-    def traction(self, b: int, velocity: ti.Vector) -> ti.Vector:
-        """Traction [Pa] of a bond at a relative velocity in the face frame [m/s]."""
-
-
-class ContactLaw(Protocol):
-    """Normal law of contact spheres; role "contact"."""
-
-    def normal(self, m: int, overlap: float, opening_rate: float) -> float:
-        """Repulsion [N] at an overlap [m] of spheres that part at a rate [m/s]."""
-
-    def elastic(self, m: int, overlap: float) -> float:
-        """Part of it that is stored [N]."""
-
-    def damping(self, m: int) -> float:
-        """Coefficient of the dashpot [N s/m], which friction shares."""
-
-    def stored(self, m: int, overlap: float) -> float:
-        """Energy [J]."""
-
-    @property
-    def meets_faces(self) -> bool:
-        """Whether spheres meet faces, with ``corner`` of each in the frame of its body."""
-
-    def spheres(self, model: Any) -> Any:
-        """Contact spheres of a scene.
-
-        Parameters
-        ----------
-        model : Model
-            Arrays of the scene.
-
-        Returns
-        -------
-        ContactSpheres
-            Spheres of all faces.
-        """
-
-    def watch_faces(self, exposed_faces: ti.Field) -> None:
-        """Take note of the field with a bit for each face of a body that is free.
-
-        Parameters
-        ----------
-        exposed_faces : Field
-            Field of the bits of each body.
-        """
-
-    def nearest(self, a: int, b: int, turn: ti.Matrix, offset: ti.Vector) -> Any:
-        """Where two bodies are nearest by an entry of the pair store (``SphereContact``)."""
-
-    def face_of(self, a: int) -> int:
-        """Face of one side of an entry of the pair store."""
-
-
-class FrictionLaw(Protocol):
-    """Tangential law of contact spheres; role "friction".
-
-    One with ``remembers = True`` also keeps the contract ``FrictionMemory``.
-    """
-
-    def limit(self, m: int, force_normal: float) -> float:
-        """Largest friction [N] at a normal force [N]; of impulses likewise."""
-
-    def force(self, m: int, damping: float, force_normal: float, slide: ti.Vector) -> ti.Vector:
-        """Force [N] on the second sphere against its sliding velocity [m/s]."""
-
-
-class FrictionMemory(Protocol):
-    """Springs across contacts, of which each sphere pair keeps its own.
-
-    Vectors are in the first body's frame.
-    """
-
-    def follow(self, k: int, normal: ti.Vector, way: ti.Vector) -> None:
-        """Turn the spring of pair k into the plane of contact and stretch it by ``way`` [m]."""
-
-    def slip(self, m: int, k: int, limit: float, way: ti.Vector) -> float:
-        """Shorten the spring to a limit [N]; return the energy dissipated [J]."""
-
-    def spring(self, m: int, k: int) -> ti.Vector:
-        """Force [N] on the second sphere."""
-
-    def stored(self, m: int, k: int) -> float:
-        """Energy [J]."""
-
-    def part(self, m: int, k: int) -> float:
-        """Forget the spring as the spheres part; energy [J] that it had."""
-
-
-class Load(Protocol):
-    """Force on bodies; role "load".
-
-    One with ``varies = True`` also keeps the contract ``VaryingLoad``.
-    """
-
-    def acts_on(self, i: int) -> int:
-        """Nonzero for a body on which it acts."""
-
-    def wrench(self, i: int, motion: BodyMotion) -> tuple[ti.Vector, ti.Vector]:
-        """Force [N] and torque about the centre [N m]; motion: a ``body_motion.BodyMotion``."""
-
-
-class VaryingLoad(Protocol):
-    """A load whose ``wrench`` is its mean from motion.since to motion.until."""
-
-    def changes(self, since: float, until: float) -> int:
-        """Nonzero where it changes between two times [s]."""
-
-
-class Support(Protocol):
-    """Constraint of bodies; role "support"."""
-
-    def acts_on(self, i: int) -> int:
-        """Nonzero for a body that it holds."""
-
-    def held(
-        self,
-        i: int,
-        t: float,
-        step: float,
-        rotation: ti.Matrix,
-        velocity: ti.Vector,
-        angular_momentum: ti.Vector,
-    ) -> tuple[ti.Vector, ti.Vector]:
-        """Mean velocity [m/s] and angular momentum [kg m^2/s] that it allows in a step [s].
-
-        t: middle of the step [s]; a step of 0 asks for the values at that time.
-        """
-
-
-class Ground(Protocol):
-    """Dashpots between bodies and ground at rest; role "ground".
-
-    The step solves them in the body's own update, so that they limit no step.
-    """
-
-    def acts_on(self, i: int) -> int:
-        """Nonzero for a body that is joined to the ground."""
-
-    def resistance(self, i: int) -> Block:
-        """Force [N] and moment [N m] by which the ground resists velocity and spin, a ``Block``.
-
-        World axes, about the centre, positive semidefinite.
-        """
-
-
-#: Contract of each role.
-CONTRACTS = {
-    "bond": BondLaw,
-    "tension": TensionLaw,
-    "shear": ShearLaw,
-    "dashpot": DashpotLaw,
-    "contact": ContactLaw,
-    "friction": FrictionLaw,
-    "load": Load,
-    "support": Support,
-    "ground": Ground,
+from taichi_dem.state.model import ROLES
+
+#: Members of each role as they are called, then those of an effect that says so by an attribute.
+MEMBERS = {
+    # Law of a bond's contact units, opening and sliding together. jump: normal opening and two
+    # components of the sliding [m]; stiffness: normal and shear [Pa/m]. It also says ``rubs``,
+    # whether slip may spend energy, ``remembers_slip``, whether ``residual_slip(u)`` stays when the
+    # traction is gone, and ``is_whole``, whether it serves both the limit in tension and that in
+    # shear.
+    "bond": (
+        # Traction [Pa], three components, and energy per area slipped away now [J/m^2].
+        "traction(m, u, stiffness, jump)",
+        # 1 once the unit transmits nothing any more at a traction [Pa], else 0.
+        "failed(m, u, traction)",
+        # Elastic energy per area of opening and of sliding [J/m^2].
+        "stored(b, u, jump)",
+        # Energy per area [J/m^2] that damage has spent in the unit.
+        "spent(b, u)",
+        # 0 intact to 1 failed.
+        "damage(b, u)",
+        # Bits of the parts of the law that have changed the unit: 1, or 1 and 2.
+        "acted(b, u)",
+        # Bits of the parts near whose limit a unit comes that the law never changed. Elsewhere the
+        # traction must be stiffness times jump to the bit, and nothing else may happen.
+        "begins(m, stiffness, jump)",
+    ),
+    # Normal law of a bond's contact units, for itself. For effects="auto" it also says in words
+    # when it acts, ``activation``, as laws of contact, friction and damping do, and by
+    # ``begins(m, stiffness, opening)`` where a unit that it never changed comes near its limit:
+    # below, the traction must be stiffness times opening, and nothing else may happen. A shear law
+    # has ``begins(m, stiffness, sliding, pressure)``.
+    "tension": (
+        # Traction [Pa] at a normal opening [m].
+        "traction(m, stiffness, u, opening)",
+        # 1 once the unit transmits nothing any more, else 0.
+        "failed(m, u)",
+        # Elastic energy per area [J/m^2].
+        "stored(b, u, opening)",
+        # Energy per area [J/m^2] that has been spent in the unit.
+        "spent(b, u)",
+        # 0 intact to 1 failed.
+        "damage(b, u)",
+    ),
+    # Tangential law of a bond's contact units, for itself.
+    "shear": (
+        # Traction [Pa], two components, and energy per area slipped away now [J/m^2].
+        "traction(m, stiffness, u, sliding, pressure)",
+        # Elastic energy per area [J/m^2].
+        "stored(b, u, sliding)",
+    ),
+    # Damping of a bond's contact units: traction [Pa] at a relative velocity in the face frame
+    # [m/s].
+    "dashpot": ("traction(b, velocity)",),
+    # Normal law of contact spheres.
+    "contact": (
+        # Repulsion [N] at an overlap [m] of spheres that part at a rate [m/s].
+        "normal(m, overlap, opening_rate)",
+        # Part of it that is stored [N].
+        "elastic(m, overlap)",
+        # Coefficient of the dashpot [N s/m], which friction shares.
+        "damping(m)",
+        # Energy [J].
+        "stored(m, overlap)",
+        # Whether spheres meet faces, with ``corner`` of each in the frame of its body.
+        "meets_faces",
+        # The ``ContactSpheres`` of all faces of a ``Model``.
+        "spheres(model)",
+        # Take note of the field with a bit for each face of a body that is free.
+        "watch_faces(exposed_faces)",
+        # Where two bodies are nearest by an entry of the pair store (``SphereContact``).
+        "nearest(a, b, turn, offset)",
+        # Face of one side of an entry of the pair store.
+        "face_of(a)",
+    ),
+    # Tangential law of contact spheres.
+    "friction": (
+        # Largest friction [N] at a normal force [N]; of impulses likewise.
+        "limit(m, force_normal)",
+        # Force [N] on the second sphere against its sliding velocity [m/s].
+        "force(m, damping, force_normal, slide)",
+    ),
+    # Force on bodies.
+    "load": (
+        # Nonzero for a body on which it acts.
+        "acts_on(i)",
+        # Force [N] and torque about the centre [N m]; motion: a ``body_motion.BodyMotion``.
+        "wrench(i, motion)",
+    ),
+    # Constraint of bodies.
+    "support": (
+        # Nonzero for a body that it holds.
+        "acts_on(i)",
+        # Mean velocity [m/s] and angular momentum [kg m^2/s] that it allows in a step [s] with its
+        # middle at a time t [s]; a step of 0 asks for the values at that time.
+        "held(i, t, step, rotation, velocity, angular_momentum)",
+    ),
+    # Dashpots between bodies and ground at rest. The step solves them in the body's own update, so
+    # that they limit no step.
+    "ground": (
+        # Nonzero for a body that is joined to the ground.
+        "acts_on(i)",
+        # Force [N] and moment [N m] by which the ground resists velocity and spin, a ``Block``, in
+        # world axes, about the centre, positive semidefinite.
+        "resistance(i)",
+    ),
+    # Springs across contacts, of which each sphere pair keeps its own: of friction. Vectors are in
+    # the first body's frame.
+    "remembers": (
+        # Turn the spring of pair k into the plane of contact and stretch it by ``way`` [m].
+        "follow(k, normal, way)",
+        # Shorten the spring to a limit [N]; return the energy dissipated [J].
+        "slip(m, k, limit, way)",
+        # Force [N] on the second sphere.
+        "spring(m, k)",
+        # Energy [J].
+        "stored(m, k)",
+        # Forget the spring as the spheres part; energy [J] that it had.
+        "part(m, k)",
+    ),
+    # Slip of shear that stays when the traction is gone: in the face frame [m], two components.
+    "remembers_slip": ("residual_slip(u)",),
+    # Failure in shear: 1 once the unit transmits nothing any more at a pressure [Pa], else 0.
+    "releases": ("failed(m, u, pressure)",),
+    # A load whose ``wrench`` is its mean from motion.since to motion.until: nonzero where it
+    # changes between two times [s].
+    "varies": ("changes(since, until)",),
 }
-
-
-#: Contracts that an effect keeps beside that of its role, by the attribute that says so.
-FURTHER = {
-    "remembers": FrictionMemory,
-    "remembers_slip": SlipMemory,
-    "releases": ShearFailure,
-    "varies": VaryingLoad,
-}
-
 
 _OF_BONDS = ("bond", "tension", "shear")
 #: What a law does, by role: a class that changes it has to say anew when it begins to act.
@@ -297,16 +158,14 @@ def check_activation(effect: Any) -> None:
             f"theirs, got a silent {type(effect).name}: list the effects, or take 'all'"
         )
     rules = ("activation", "begins") if effect.role in _OF_BONDS else ("activation",)
-    order = [kind.__name__ for kind in type(effect).__mro__]
     for rule in rules if effect.role in _DOES else ():
         said = _first(type(effect), rule)
         changed = min(_first(type(effect), member) for member in _DOES[effect.role])
-        rightly = callable if rule == "begins" else lambda words: isinstance(words, str) and words
-        if not rightly(getattr(effect, rule, None)) or said > changed:
-            what = "the words activation" if rule == "activation" else "a function begins"
+        if not getattr(effect, rule, None) or said > changed:
             raise InputError(
-                f"effects 'auto' must have laws that say when they begin to act: {order[0]} has no "
-                f"{rule} of its own; give it {what}, or list the effects"
+                "effects 'auto' must have laws that say when they begin to act: "
+                f"{type(effect).__name__} has no {rule} of its own; give it one, or list the "
+                "effects"
             )
 
 
@@ -316,23 +175,31 @@ def _first(kind, member):
     return places[0] if places else len(kind.__mro__)
 
 
-def members_of(contract: type) -> tuple:
-    """Names of the members of a Protocol."""
-    return tuple(name for name in vars(contract) if not name.startswith("_"))
+def check_effect(effect: Any) -> None:
+    """Raise InputError unless an effect has a known role and every member that it asks for."""
+    if effect.role not in ROLES:
+        raise InputError(
+            f"role of effect {type(effect).__name__} must be one of {', '.join(ROLES)}, got "
+            f"{effect.role!r}"
+        )
+    further = [key for key in MEMBERS if key not in ROLES and getattr(effect, key, False)]
+    wanted = [member for key in (effect.role, *further) for member in MEMBERS[key]]
+    for member in wanted:
+        _check_member(effect, member, wanted)
 
 
-def _check_parameters(kind, contract, name):
-    """Raise InputError where a member of an effect takes other arguments than its contract says."""
-    wanted, given = (_parameters(getattr(owner, name, None)) for owner in (contract, kind))
-    if wanted is None or given is None or len(wanted) == len(given):
-        return
-    raise InputError(
-        f"effect {kind.__name__} must have a member {name}({', '.join(wanted)}), "
-        f"got {name}({', '.join(given)})"
-    )
+def _check_member(effect, member, wanted):
+    """Raise InputError where a member is missing, or takes another number of arguments."""
+    name, _, arguments = member.partition("(")
+    refused = f"effect {type(effect).__name__} must have a member {member}"
+    if not hasattr(type(effect), name):
+        raise InputError(f"{refused}, as its role {effect.role} asks for {', '.join(wanted)}")
+    given = _argument_names(getattr(type(effect), name))
+    if given is not None and len(given) != len(arguments.split(",")):
+        raise InputError(f"{refused}, got {name}({', '.join(given)})")
 
 
-def _parameters(member):
+def _argument_names(member):
     """Names of the arguments of a function beside self; None where any number is taken."""
     if not callable(member):
         return None
@@ -340,24 +207,3 @@ def _parameters(member):
     if any(each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD) for each in found):
         return None
     return [each.name for each in found[1:] if each.default is each.empty]
-
-
-def check_effect(effect: Any) -> None:
-    """Raise InputError unless an effect has a known role and every member of its contract."""
-    kind = type(effect).__name__
-    if effect.role not in CONTRACTS:
-        raise InputError(
-            f"role of effect {kind} must be one of {', '.join(CONTRACTS)}, got {effect.role!r}"
-        )
-    further = [contract for name, contract in FURTHER.items() if getattr(effect, name, False)]
-    contracts = CONTRACTS[effect.role], *further
-    wanted = [name for contract in contracts for name in members_of(contract)]
-    missing = [name for name in wanted if not hasattr(type(effect), name)]
-    if missing:
-        raise InputError(
-            f"effect {kind} must have a member {missing[0]}, as its role {effect.role} asks for "
-            f"{', '.join(wanted)}"
-        )
-    for contract in contracts:
-        for name in members_of(contract):
-            _check_parameters(type(effect), contract, name)

@@ -67,12 +67,8 @@ class SlipWeakening(ShearSlip):
         return material.cohesion, material.friction, critical, material.cohesion / critical
 
     def declare(self, capacity: Capacity) -> None:
-        """Residual and accumulated slip of every contact unit."""
+        """Residual slip of units in the face frame, two components, and accumulated slip [m]."""
         self.unit = ti.Vector.field(3, ti.f64, shape=capacity.units)
-
-    def state(self) -> dict[str, ti.Field]:
-        """Residual slip in the face frame, two components, and accumulated slip of units [m]."""
-        return {"slip_weakening": self.unit}
 
     @ti.func
     def traction(self, m, stiffness, u, sliding, pressure):
@@ -108,9 +104,3 @@ class SlipWeakening(ShearSlip):
     def residual_slip(self, u):
         """Residual slip of a unit in the face frame [m]."""
         return vec2(self.unit[u][0], self.unit[u][1])
-
-    @ti.func
-    def stored(self, b, u, sliding):
-        """Elastic energy per area [J/m^2]."""
-        elastic = sliding - self.residual_slip(u)
-        return 0.5 * self.tables.bond_stiffness[b][1] * dot(elastic, elastic)

@@ -13,14 +13,14 @@ from taichi_dem.loads.pressure import FacePressure
 from taichi_dem.materials import Material
 
 
-@ti.func
+@ti.pyfunc
 def pulse(peak, rise, decay_ratio, t):
     """Pressure [Pa] of eq. 4: a squared cosine up to the peak, a cosine down to zero."""
     pressure = 0.0
     s = t / rise - 1.0
     if 0.0 <= t and s <= 0.0:
         _, swing = sine_and_cosine(0.5 * math.pi * s)
-        pressure = peak * swing**2
+        pressure = peak * (swing * swing)
     elif 0.0 < s and s <= decay_ratio:
         _, swing = sine_and_cosine(0.5 * math.pi * s / decay_ratio)
         pressure = peak * swing
@@ -145,19 +145,6 @@ class GasPressure(FacePressure):
         ndarray
             Pressure [Pa].
         """
-        times = np.ascontiguousarray(real_numbers("times", times)) - self.start
-        pressure = np.zeros_like(times)
-        _sample(self.peak, self.rise, self.decay_ratio, times, pressure)
-        return pressure
-
-
-@ti.kernel
-def _sample(
-    peak: ti.f64,
-    rise: ti.f64,
-    decay_ratio: ti.f64,
-    times: ti.types.ndarray(dtype=ti.f64, ndim=1),
-    pressure: ti.types.ndarray(dtype=ti.f64, ndim=1),
-):
-    for k in range(times.shape[0]):
-        pressure[k] = pulse(peak, rise, decay_ratio, times[k])
+        since = real_numbers("times", times) - self.start
+        at = np.vectorize(pulse, otypes=[float])
+        return at(self.peak, self.rise, self.decay_ratio, since)

@@ -8,7 +8,7 @@ import taichi as ti
 from taichi_dem.kit.likely_units import ACCELERATION, in_unit
 from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import direction
-from taichi_dem.laws.base import Effect, Travel, along
+from taichi_dem.laws.base import Effect, Travel
 from taichi_dem.materials import Material
 
 
@@ -28,7 +28,6 @@ class Gravity(Effect):
     """
 
     role = "load"
-    name = "gravity"
 
     def __init__(self, acceleration: Sequence[float] = (0.0, -9.81, 0.0)):
         self._acceleration = direction("acceleration", acceleration)
@@ -44,7 +43,8 @@ class Gravity(Effect):
 
     def travel(self) -> Travel:
         """Without end along the acceleration."""
-        return along(self._acceleration)
+        low = tuple(-math.inf if x < 0.0 else 0.0 for x in self._acceleration)
+        return low, tuple(math.inf if x > 0.0 else 0.0 for x in self._acceleration)
 
     @ti.func
     def acts_on(self, i):

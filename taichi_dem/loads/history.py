@@ -9,7 +9,7 @@ import taichi as ti
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import real
-from taichi_dem.kit.validation import LARGEST, finite, shown
+from taichi_dem.kit.validation import real_numbers, shown
 
 #: Points that a history may have.
 MOST_POINTS = 4096
@@ -21,14 +21,16 @@ def history_points(times: Any, values: Any) -> tuple[tuple[float, ...], tuple[fl
     Raises InputError unless both are lists of finite numbers of one length, from 1 to
     ``MOST_POINTS``, and the times rise from 0 or later.
     """
-    first, second = _numbers("times", times), _numbers("values", values)
-    if len(first) != len(second):
+    t, v = (np.atleast_1d(real_numbers(*one)) for one in (("times", times), ("values", values)))
+    if t.ndim != 1 or not 1 <= len(t) <= MOST_POINTS:
+        raise InputError(f"times must be 1 to {MOST_POINTS} numbers in a row, got {shown(times)}")
+    if t.shape != v.shape:
+        raise InputError(f"values must be as many as times, {len(t)}, got {shown(values)}")
+    if t[0] < 0.0 or (np.diff(t) <= 0.0).any():
         raise InputError(
-            f"values must be as many as times, {len(first)}, got {len(second)}: {shown(values)}"
+            f"times must rise from 0 s or later, each above the last, got {shown(times)}"
         )
-    if first[0] < 0.0 or any(b <= a for a, b in zip(first, first[1:])):
-        raise InputError(f"times must rise from 0 s or later, each above the last, {_got(times)}")
-    return first, second
+    return tuple(t.tolist()), tuple(v.tolist())
 
 
 def shortest_piece(times: tuple[float, ...], values: tuple[float, ...]) -> float:
@@ -41,33 +43,13 @@ def unresolved_histories(effects: Any, step: float) -> tuple[str, ...]:
     """A sentence about each load or support that changes within less than a step [s]."""
     times = ((effect, effect.change_time()) for effect in effects)
     return tuple(
-        f"{effect.name}{_where(effect)} changes within {time:.3g} s, less than the largest step, "
-        f"{step:.3g} s: its shape over time may be lost, though loads keep their whole impulse and "
-        f"ramps their whole way; steps of at most {time:.3g} s resolve it"
+        f"{effect.name} ({getattr(effect, 'group', 'all bodies')}) changes within {time:.3g} s, "
+        f"less than the largest step, {step:.3g} s: its shape over time may be lost, though loads "
+        "keep their whole impulse and ramps their whole way; steps of at most "
+        f"{time:.3g} s resolve it"
         for effect, time in times
         if time < step
     )
-
-
-def _where(effect):
-    return f" on group {effect.group!r}" if hasattr(effect, "group") else ""
-
-
-def _numbers(name, given):
-    try:
-        found = list(given)
-    except TypeError:
-        found = []
-    if isinstance(given, (str, bytes, dict, set)) or not 1 <= len(found) <= MOST_POINTS:
-        raise InputError(f"{name} must be a list of 1 to {MOST_POINTS} numbers, {_got(given)}")
-    wrong = [value for value in found if not (finite(value) and abs(value) <= LARGEST)]
-    if wrong:
-        raise InputError(f"{name} must be a list of numbers of at most {LARGEST:g}, {_got(given)}")
-    return tuple(float(value) for value in found)
-
-
-def _got(given):
-    return f"got {shown(given)}"
 
 
 @ti.data_oriented

@@ -95,8 +95,7 @@ class Pressure(FacePressure):
 
     def __init__(self, group: str, values: Any, times: Any = (0.0,)):
         self.group = word("group", group)
-        points = (values,) if finite(values) else values
-        self.times, self.values = history_points(times, points)
+        self.times, self.values = history_points(times, values)
         in_unit("largest of values", max(self.values, key=abs), PRESSURE)
 
     @classmethod

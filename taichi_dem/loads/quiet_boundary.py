@@ -12,14 +12,14 @@ import taichi as ti
 from taichi_dem.elasticity.wave_moduli import wave_moduli
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.fixed_order import length
-from taichi_dem.kit.types import mat3, real, vec3
+from taichi_dem.kit.fixed_order import length, product, transposed
+from taichi_dem.kit.types import real
 from taichi_dem.kit.validation import positive, word
 from taichi_dem.laws.base import Effect
 from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
-from taichi_dem.physics.wrench import Block, point_block
+from taichi_dem.physics.wrench import Block
 from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import Model
 
@@ -62,7 +62,6 @@ class QuietBoundary(Effect):
     """
 
     role = "ground"
-    name = "quiet_boundary"
 
     def __init__(
         self, group: str, p_speed: Optional[float] = None, s_speed: Optional[float] = None
@@ -96,28 +95,17 @@ class QuietBoundary(Effect):
             for speed in self._speeds(model, corners, density)
         )
         laws = along * out + across * (np.eye(3) - out)
-        arms = model.mesh.points[corners] - model.centre[body][:, None]
         assign(self.faces, np.bincount(body, minlength=model.body_count))
-        self._add_up(body, np.ascontiguousarray(laws), np.ascontiguousarray(arms))
-
-    @ti.kernel
-    def _add_up(
-        self,
-        body: ti.types.ndarray(dtype=ti.i32, ndim=1),
-        laws: ti.types.ndarray(dtype=ti.f64, ndim=3),
-        arms: ti.types.ndarray(dtype=ti.f64, ndim=3),
-    ):
-        """Add the dashpots at the three points of every face to its body."""
-        ti.loop_config(serialize=True)
-        for k in range(body.shape[0]):
-            i, law = body[k], mat3(0.0)
-            for r, c in ti.static(ti.ndrange(3, 3)):
-                law[r, c] = laws[k, r, c]
-            for q in range(3):
-                block = point_block(vec3(arms[k, q, 0], arms[k, q, 1], arms[k, q, 2]), law)
-                self.a[i] = self.a[i] + block.a
-                self.b[i] = self.b[i] + block.b
-                self.c[i] = self.c[i] + block.c
+        # The dashpots at the three points of every face, [[a, b], [b^T, c]] as of ``point_block``.
+        arms = model.mesh.points[corners] - model.centre[body][:, None]
+        law = np.repeat(laws[:, None], 3, axis=1)
+        lever_arm = np.swapaxes(np.cross(arms[:, :, None], np.eye(3)), -1, -2)
+        lever = product(law, lever_arm)
+        blocks = law, -lever, product(transposed(lever_arm), lever)
+        for field, block in zip((self.a, self.b, self.c), blocks):
+            total = np.zeros((model.body_count, 3, 3))
+            np.add.at(total, np.repeat(body, 3), block.reshape(-1, 3, 3))
+            assign(field, total)
 
     def _speeds(self, model, corners, density):
         """Speeds of both waves at each face [m/s]."""

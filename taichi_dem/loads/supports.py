@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
+from taichi_dem.kit import fixed_order
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.products import dot, matvec, squared, transposed_matvec
 from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import direction, positive, shown, unit_vector, word
@@ -122,19 +122,22 @@ class Roller(_Support):
     def load(self, model: Model) -> None:
         """Share the directions that a body may not move in among the rollers that hold it."""
         super().load(model)
-        across = np.zeros((model.body_count, 3))
-        turns = np.zeros(model.body_count, dtype=np.int32)
-        planes: dict[int, set] = {}
-        for effect in model.supports:
-            if isinstance(effect, Roller):
-                for body in faces_of_group(model.mesh, model.topology, effect.group)[0].tolist():
-                    planes.setdefault(body, set()).add(_upward(effect._normal))
-        for body in faces_of_group(model.mesh, model.topology, self.group)[0].tolist():
-            shares = _right_angled(planes[body])
-            across[body] = shares[_upward(self._normal)]
-            turns[body] = sum(any(share) for share in shares.values()) == 1
-        assign(self.across, across)
-        assign(self.turns, turns)
+        rollers = [effect for effect in model.supports if isinstance(effect, Roller)]
+        shares: dict[tuple, np.ndarray] = {}
+        # In an order of the planes, so that it does not depend on that of the scene.
+        for plane in sorted({_upward(roller._normal) for roller in rollers}):
+            rest = np.zeros((model.body_count, 3))
+            for roller in rollers:
+                if _upward(roller._normal) == plane:
+                    rest[faces_of_group(model.mesh, model.topology, roller.group)[0]] = plane
+            for other in shares.values():
+                rest = rest - fixed_order.dot(rest, other)[:, None] * other
+            size = fixed_order.length(rest)[:, None]
+            # None is left where a plane is among those before it.
+            shares[plane] = np.divide(rest, size, out=0.0 * rest, where=size > _PARALLEL)
+        planes = sum(share.any(axis=1).astype(np.int32) for share in shares.values())
+        assign(self.across, shares[_upward(self._normal)])
+        assign(self.turns, (planes == 1).astype(np.int32))
 
     @ti.func
     def held(self, i, t, step, rotation, velocity, angular_momentum):
@@ -156,22 +159,6 @@ class Roller(_Support):
 def _upward(normal):
     """The later one of a normal and its opposite, in the order of their components."""
     return max(tuple(normal.tolist()), tuple((0.0 - normal).tolist()))
-
-
-def _right_angled(planes):
-    """Directions at right angles to each other that span the normals of planes, by plane.
-
-    In an order of the planes, so that it does not depend on that of the scene. Zero for a plane
-    that those before it contain.
-    """
-    found: dict[tuple, tuple] = {}
-    for plane in sorted(planes):
-        rest = np.array(plane)
-        for other in found.values():
-            rest = rest - sum(a * b for a, b in zip(rest.tolist(), other)) * np.array(other)
-        size = float(length(rest))
-        found[plane] = tuple((rest / size).tolist()) if size > _PARALLEL else (0.0, 0.0, 0.0)
-    return found
 
 
 @ti.data_oriented
@@ -257,7 +244,7 @@ class PrescribedMotion(_Support):
         times, shares = (np.array(points) for points in self._points)
         if not self._frequency:
             back, on = _reach(times, shares)
-            ways = [sorted((_times(x, back), _times(x, on))) for x in self._velocity]
+            ways = [sorted((x * back, x * on)) if x else (0.0, 0.0) for x in self._velocity]
             return tuple(way[0] for way in ways), tuple(way[1] for way in ways)
         # By parts: |integral of s cos| is at most (|s| + the variation of s) / (angular frequency).
         most = np.abs(shares).max() + np.abs(np.diff(shares)).sum()
@@ -276,13 +263,13 @@ def _shares(ramp, history):
     """Points of the history of a velocity: times [s] and shares of it."""
     if history is None:
         return history_points(*(((0.0, ramp), (0.0, 1.0)) if ramp else ((0.0,), (1.0,))))
-    refused = f"history must be a pair of times and shares, got {shown(history)}"
-    if not isinstance(history, (tuple, list)) or len(history) != 2:
-        raise InputError(refused)
     try:
-        return history_points(*history)
-    except InputError as error:
-        raise InputError(f"{refused}: {error}") from None
+        times, shares = history
+        return history_points(times, shares)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"history must be a pair of times and shares, got {shown(history)}: {error}"
+        ) from None
 
 
 def _reach(times, shares):
@@ -294,10 +281,6 @@ def _reach(times, shares):
     turns = (np.abs(shares).max() * np.diff(times))[turning].sum()
     low, high = ends.min() - turns, ends.max() + turns
     return low if shares[-1] >= 0.0 else -np.inf, high if shares[-1] <= 0.0 else np.inf
-
-
-def _times(speed, reach):
-    return speed * reach if speed else 0.0
 
 
 def _allows(effect, motion):

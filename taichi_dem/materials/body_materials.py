@@ -98,10 +98,9 @@ class BodyMaterials:
 
     def _on_mesh(self, k):
         """Material k with the numbers that contacts of its bodies have."""
-        material, bodies = self.materials[k], np.flatnonzero(self.of_body == k)
-        chosen: Any = slice(None) if self.is_one or not len(bodies) else bodies
+        material, bodies = self.materials[k], self.of_body == k
         numbers = {
-            name: rule.of_mesh(self.mesh, material.density, chosen)
+            name: rule.of_mesh(self.mesh, material.density, bodies)
             for name, rule in vars(material).items()
             if isinstance(rule, ContactRule)
         }
@@ -156,18 +155,13 @@ class BodyMaterials:
         elements, the softer their bonds, and the more energy they have stored when they reach their
         strength; and a bond between two materials has the lesser of both energies.
         """
-        ruled = any(
-            isinstance(getattr(each, name), BondRule)
-            for each in self.materials
-            for name in ("normal_stiffness", "shear_stiffness")
-        )
-        if self.is_one and not ruled:
+        springs = self.normal_stiffness, self.shear_stiffness
+        if not any(isinstance(each, BondRule) for each in springs):
             return self.materials
         topology = topology_of(self.mesh)
         if not topology.bond_count:
             return self.materials
         bodies = np.stack([topology.master, topology.slave], axis=1)
-        springs = self.normal_stiffness, self.shear_stiffness
         stiffness = per_bond(self.mesh, topology, self.density, springs)
         kinds = self.of_body[bodies]
         found = []

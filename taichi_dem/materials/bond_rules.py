@@ -22,9 +22,6 @@ from taichi_dem.mesh.topology import Density, Topology, body_properties
 
 #: Contact spheres that share the stiffness of a face: those of five divisions.
 FACE_SPHERES = 6
-#: Numbers of bodies, or all of them.
-Bodies = Union[np.ndarray, slice]
-ALL = slice(None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +39,7 @@ class BondGeometry:
     master_share: np.ndarray
     bodies: np.ndarray
 
-    def __repr__(self):
-        return by_fields(self)
+    __repr__ = by_fields
 
 
 def bond_geometry(mesh: Mesh, topology: Topology, density: Density) -> BondGeometry:
@@ -70,8 +66,7 @@ class Rule:
         for name, value in vars(self).items():
             positive(name, value)
 
-    def __repr__(self) -> str:
-        return by_fields(self)
+    __repr__ = by_fields
 
     def __float__(self) -> float:
         raise InputError(
@@ -90,8 +85,8 @@ class BondRule(Rule):
 class ContactRule(Rule):
     """Base of rules for a constant of sphere contacts, one number for all bodies of a material."""
 
-    def of_mesh(self, mesh: Mesh, density: float, bodies: Bodies = ALL) -> float:
-        """The constant for bodies of a mesh, all by default; density [kg/m3]."""
+    def of_mesh(self, mesh: Mesh, density: float, bodies: np.ndarray) -> float:
+        """The constant for some bodies of a mesh, (n,) truth values; density [kg/m3]."""
         raise NotImplementedError
 
 
@@ -140,7 +135,7 @@ class FaceStiffness(ContactRule):
 
     modulus: float
 
-    def of_mesh(self, mesh: Mesh, density: float, bodies: Bodies = ALL) -> float:
+    def of_mesh(self, mesh: Mesh, density: float, bodies: np.ndarray) -> float:
         """Stiffness of a contact of two bodies [N/m]."""
         faces = all_faces(mesh.tetrahedra[bodies])
         area = length(area_vectors(mesh.points, faces)).reshape(-1, 4)
@@ -160,7 +155,7 @@ class ContactShareOfCritical(ContactRule):
     ratio: float
     modulus: float
 
-    def of_mesh(self, mesh: Mesh, density: float, bodies: Bodies = ALL) -> float:
+    def of_mesh(self, mesh: Mesh, density: float, bodies: np.ndarray) -> float:
         """Dashpot of a contact of two bodies [N s/m]."""
         stiffness = FaceStiffness(self.modulus).of_mesh(mesh, density, bodies)
         mass = 0.5 * density * float(np.median(volumes(mesh)[bodies]))

@@ -9,7 +9,7 @@ from typing import Any
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import ANGLE, DENSITY, MODULUS, STRENGTH, in_unit
-from taichi_dem.kit.validation import finite, plain_fields, positive, shown
+from taichi_dem.kit.validation import between, plain_fields, positive
 from taichi_dem.materials.bond_rules import (
     BondRule,
     Constant,
@@ -41,6 +41,8 @@ RULES: dict[str, type] = {
 
 #: Times its strength that no bond reaches; a power of two, so that no digit changes.
 _BEYOND = 2.0**40
+#: Largest angle of friction [degrees].
+_STEEPEST = 89.9
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,7 @@ class Material:
         fracture_energy : float
             Fracture energy of mode I of a bond [J/m^2].
         friction_angle : float
-            Friction angle of bonds and of spheres [degrees].
+            Friction angle of bonds and of spheres, from 0 to 89.9 [degrees].
         cohesion : float
             Cohesion of a bond [Pa].
         damping_ratio : float, default 0.05
@@ -172,7 +174,9 @@ class Material:
         0.7
         """
         normal, shear = bond_moduli(young, poisson)
+        angle = between("friction_angle", friction_angle, 0.0, _STEEPEST)
         in_unit("young", young, MODULUS)
+        in_unit("friction_angle", angle, ANGLE)
         ratio = positive("damping_ratio", damping_ratio, zero_allowed=True)
         return cls(
             density=density,
@@ -182,7 +186,7 @@ class Material:
             shear_damping=ShareOfCritical(ratio, shear) if ratio else 0.0,
             tensile_strength=tensile_strength,
             cohesion=cohesion,
-            friction=math.tan(math.radians(_checked_angle(friction_angle))),
+            friction=math.tan(math.radians(angle)),
             fracture_energy=fracture_energy,
             contact_stiffness=FaceStiffness(normal),
             contact_damping=ContactShareOfCritical(ratio, normal) if ratio else 0.0,
@@ -248,15 +252,6 @@ def harmless(material: Material) -> Material:
         shear_damping=0.0,
         friction=0.0,
     )
-
-
-def _checked_angle(angle: Any) -> float:
-    """Angle of friction [degrees]; InputError unless it is a number from 0 and below 90."""
-    if not finite(angle) or not 0.0 <= float(angle) < 90.0:
-        raise InputError(
-            f"friction_angle must be a number from 0 to below 90 degrees, got {shown(angle)}"
-        )
-    return in_unit("friction_angle", float(angle), ANGLE)
 
 
 #: Concrete of Konno et al., Table 1; the adhesive stress is both tensile strength and cohesion.

@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import shown
 from taichi_dem.mesh.check import refuse_outside
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import LOCAL_EDGES, signed_volumes
@@ -158,16 +157,10 @@ def body_groups_in(raw: Any, bodies: Bodies) -> dict[str, np.ndarray]:
 def volumes_of(mesh: Mesh, first: int) -> tuple[list[str], np.ndarray]:
     """Names of physical volumes, which have numbers from ``first`` on, and that of every body.
 
-    Bodies in no group have the number 0; without any group one volume holds them all. Raises
-    InputError for the name of a group that stands for two.
+    Bodies in no group have the number 0; without any group one volume holds them all.
     """
     if not mesh.body_groups:
         return ["bodies"], np.full(mesh.body_count, first)
-    for name in mesh.body_groups:
-        if _BOTH in name:
-            raise InputError(
-                f"a body group must have a name without {_BOTH!r} in a file, got {name!r}"
-            )
     member = np.zeros((mesh.body_count, len(mesh.body_groups)), dtype=bool)
     for k, bodies in enumerate(mesh.body_groups.values()):
         member[bodies, k] = True
@@ -204,21 +197,19 @@ def _marked(raw, dimension) -> Iterator[tuple[str, int, np.ndarray]]:
         names = {key.tag: key.name for key in raw.field_data if key.dimension == dimension}
         for value, k, chosen in _values(raw, "gmsh:physical", dimension):
             if value > 0:  # 0: in no physical group
-                name = names.get(value) or _made_name("physical", value, names.values())
-                yield name, k, chosen
+                yield names.get(value) or f"physical_{value}", k, chosen
         # What is in two groups: Gmsh 4.1 keeps one number a cell, but the sets know of both.
         for key in raw.field_data:
             for k, chosen in _of_set(raw, key, dimension):
                 yield key.name, k, chosen
         return
-    sets = raw.cell_sets if dimension == 3 else {}
-    for name in sets:
+    for name in raw.cell_sets if dimension == 3 else ():
         yield from ((name, k, chosen) for k, chosen in _of_set(raw, name, dimension))
     for name in raw.cell_data:
         # Those of Gmsh are numbers of drawn entities, no choice of the user.
         if not name.startswith("gmsh:") and (dimension == 2 or _tells_parts(raw, name)):
             for value, k, chosen in _values(raw, name, dimension):
-                yield _made_name(name, value, sets), k, chosen
+                yield f"{name}_{value}", k, chosen
 
 
 def _values(raw, name, dimension):
@@ -245,14 +236,3 @@ def _tells_parts(raw, name):
     chosen = list(_values(raw, name, 3))
     cells = sum(int(members.sum()) for _, _, members in chosen)
     return 1 < len({value for value, _, _ in chosen}) < max(cells, 3)
-
-
-def _made_name(name, value, taken):
-    """The name "NAME_VALUE" of a group that has only a number; InputError where another has it."""
-    made = f"{name}_{value}"
-    if made in taken:
-        raise InputError(
-            f"the group of number {value} must have a name, as {shown(made)}, which stands for it, "
-            "must be that of one group only, got another group of this name"
-        )
-    return made

@@ -5,17 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import finite, shown, told_apart, word
+from taichi_dem.kit.validation import finite, shown, word
 from taichi_dem.mesh import tetrahedra as geometry
 
 #: Share of (longest edge)^3 below which a volume counts as zero, as it may be round-off.
 FLAT = 1e-12
 #: Points nearer than this share of the mesh's extent count as one and the same place.
 COINCIDENT = 1e-9
-#: The extent of a mesh lies between these [m]: a moment of inertia is its fifth power.
-_LEAST_EXTENT, _MOST_EXTENT = 1e-30, 1e30
+#: Largest coordinate [m]: a moment of inertia is its fifth power.
+_FARTHEST = 1e30
 
 
 def checked_arrays(
@@ -35,9 +34,6 @@ def checked_arrays(
     corners, faces = label[corners], {name: label[faces[name]] for name in faces}
     places, corners, faces = _without_loose_points(places, corners, faces, notes)
     extent = np.ptp(places, axis=0).max()
-    if extent < _LEAST_EXTENT:
-        got, least = told_apart(extent, _LEAST_EXTENT)
-        raise InputError(f"points must span at least {least} m, got {got} m")
     pairs = geometry.close_pairs(places, COINCIDENT * extent)
     if len(pairs) and not coincident:
         _refuse_coincident(places, pairs, extent)
@@ -60,11 +56,11 @@ def checked_points(points: Any) -> np.ndarray:
     found = _rows("points", points, 3, "iuf", "numbers")
     with np.errstate(over="ignore"):
         found = found.astype(np.float64)
-    bad = np.flatnonzero(~(np.abs(found) <= _MOST_EXTENT).all(axis=1))
+    bad = found[~(np.abs(found) <= _FARTHEST).all(axis=1)]
     if len(bad):
         raise InputError(
-            f"points must be finite, within {_MOST_EXTENT:g} m, but {len(bad)} are not, the first "
-            f"is number {bad[0]}: {found[bad[0]].tolist()}"
+            f"points must be finite, within {_FARTHEST:g} m, but {len(bad)} are not, the first is "
+            f"{bad[0].tolist()}"
         )
     return found
 
@@ -257,19 +253,8 @@ def joined_bodies(tetrahedra: np.ndarray) -> np.ndarray:
     return geometry.components(len(tetrahedra), geometry.shared_faces(tetrahedra) // 4)
 
 
-def unbonded_places(points: np.ndarray, tetrahedra: np.ndarray) -> str:
-    """A sentence on bodies that meet without a common face although their points are the same.
-
-    "" where there are none. points (n, 3) [m], tetrahedra (m, 4), two at most at a face.
-    """
-    crossed = _crossed_quadrangles(points, tetrahedra)
-    if len(crossed):
-        place = ", ".join(f"{x:g}" for x in points[list(crossed[0])].mean(axis=0))
-        return (
-            f"at {counted(len(crossed), 'quadrangle')}, the first around ({place}) m, the "
-            "tetrahedra of one side have the other diagonal than those of the other side: they "
-            "share no face there and are not bonded"
-        )
+def unbonded_places(tetrahedra: np.ndarray) -> str:
+    """A sentence on parts that meet in points without a common face, "" where there are none."""
     part = np.unique(joined_bodies(tetrahedra), return_inverse=True)[1]
     held = np.unique(np.stack([tetrahedra.ravel(), np.repeat(part, 4)]), axis=1)[0]
     count = int((np.bincount(held) > 1).sum())
@@ -279,21 +264,3 @@ def unbonded_places(points: np.ndarray, tetrahedra: np.ndarray) -> str:
             "no face and are not bonded"
         )
     return ""
-
-
-def _crossed_quadrangles(points, tetrahedra):
-    """Quadrangles that outer faces cut by both diagonals, their four points, a list."""
-    faces = geometry.all_faces(tetrahedra)
-    outer = geometry.outer_rows(faces)
-    faces, body = faces[outer], outer // 4
-    normal = geometry.area_vectors(points, faces)
-    first, second = geometry.pairs_at_edges(faces)
-    # In a hole of the shape of one tetrahedron, faces look at each other.
-    alike = np.einsum("ij,ij->i", normal[first], normal[second]) > 0.0
-    chosen = alike & (body[first] != body[second])
-    cut = set()
-    for one, other in zip(faces[first[chosen]].tolist(), faces[second[chosen]].tolist()):
-        four = frozenset(one + other)
-        if len(four) == 4:  # not two triangles on the same three points
-            cut.add((four, frozenset(one) & frozenset(other)))
-    return sorted({tuple(sorted(four)) for four, diagonal in cut if (four, four - diagonal) in cut})

@@ -48,11 +48,8 @@ def _chain(links, at, body, first, second):
 
 
 def _flip(links, colours, at, chain, first, second):
+    swapped = {first: second, second: first}
     for link in chain:
-        for body in links[link]:
-            at[body].pop(int(colours[link]), None)
-    for link in chain:
-        colours[link] = first + second - colours[link]
-    for link in chain:
-        for body in links[link]:
-            at[body][int(colours[link])] = link
+        colours[link] = swapped[int(colours[link])]
+    for body in {body for link in chain for body in links[link]}:
+        at[body] = {swapped.get(colour, colour): link for colour, link in at[body].items()}

@@ -39,8 +39,7 @@ class ContactSpheres:
     cluster: np.ndarray
     extent: np.ndarray
 
-    def __repr__(self):
-        return by_fields(self)
+    __repr__ = by_fields
 
     @property
     def per_face(self) -> int:

@@ -26,8 +26,6 @@ _FROM_OUTLINE, _SHIFT = 0.55, 1e-4
 _RADII = 0.95, 1.6
 #: Rounds of smoothing, and moves of a round.
 _ROUNDS, _MOVES = 3, 4
-#: Points whose triangles are found at a time.
-_CHUNK = 128
 #: Share of the area that may be missing.
 _AREA = 1e-9
 
@@ -127,35 +125,27 @@ def _inner_points(starts, ends, element):
     lattice = np.stack([x, row.ravel() * element * np.sqrt(0.75)], axis=1)
     lattice += 0.5 * (low + high - lattice.min(axis=0) - lattice.max(axis=0))
     lattice = lattice[_is_inside(lattice, starts, ends)]
-    near = _by_chunks(lattice, lambda some: _distance(some, starts, ends))
-    return lattice[near > _FROM_OUTLINE * element]
-
-
-def _by_chunks(points, function):
-    """A function of points applied to some of them at a time, (n,)."""
-    parts = [function(points[k : k + _CHUNK]) for k in range(0, len(points), _CHUNK)]
-    return np.concatenate([np.zeros(0), *parts])
+    return lattice[_distance(lattice, starts, ends) > _FROM_OUTLINE * element]
 
 
 def _distance(points, starts, ends):
     """Distance of points from the nearest of some sides [m], (n,)."""
-    side, arm = ends - starts, points[:, None] - starts
-    share = np.clip(dot(arm, side) / dot(side, side), 0.0, 1.0)
-    away = arm - share[..., None] * side
-    return np.sqrt(dot(away, away)).min(axis=1)
+    nearest = np.full(len(points), np.inf)
+    for start, side in zip(starts, ends - starts):
+        arm = points - start
+        share = np.clip(dot(arm, side) / dot(side, side), 0.0, 1.0)
+        away = arm - share[:, None] * side
+        nearest = np.minimum(nearest, np.sqrt(dot(away, away)))
+    return nearest
 
 
 def _is_inside(points, starts, ends):
     """Whether points lie inside the outline and outside its holes, (n,): rays to the right."""
-
-    def crossed(some):
-        x, y = some[:, :1], some[:, 1:]
-        between = (starts[:, 1] > y) != (ends[:, 1] > y)
-        rise = np.where(ends[:, 1] == starts[:, 1], 1.0, ends[:, 1] - starts[:, 1])
-        at = starts[:, 0] + (y - starts[:, 1]) * (ends[:, 0] - starts[:, 0]) / rise
-        return (between & (at > x)).sum(axis=1) % 2
-
-    return _by_chunks(points, crossed) == 1
+    (x, y), inside = points.T, np.zeros(len(points), dtype=bool)
+    for (x0, y0), (x1, y1) in zip(starts, ends):
+        between = (y0 > y) != (y1 > y)
+        inside[between] ^= x0 + (y[between] - y0) * (x1 - x0) / (y1 - y0) > x[between]
+    return inside
 
 
 def _delaunay(points, radius, shift, draw):

@@ -1,4 +1,4 @@
-"""Groups chosen by where they are: faces for loads, supports, notches; bodies (NumPy only)."""
+"""Groups of inner faces chosen by where they are, for notches and joints (NumPy only)."""
 
 from collections.abc import Sequence
 from typing import Optional
@@ -6,47 +6,10 @@ from typing import Optional
 import numpy as np
 
 from taichi_dem.kit.fixed_order import dot
-from taichi_dem.kit.validation import direction, instance, unit_vector
+from taichi_dem.kit.validation import direction, unit_vector
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.mesh_methods import Choice, choose, with_group
-
-
-def with_outer_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
-    """The mesh with one more group of outer faces: ``Mesh.group``."""
-    return instance("mesh", mesh, Mesh).group(name, chosen)
-
-
-def with_body_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
-    """Return the mesh with one more group of bodies, chosen by their centres.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Mesh.
-    name : str
-        Name of the new group, as for ``Scene(materials={name: ...})``.
-    chosen : callable
-        Function of the centres of the bodies [m], shape (body_count, 3), that returns body_count
-        truth values.
-
-    Returns
-    -------
-    Mesh
-        The mesh with this group in its ``body_groups``.
-
-    Raises
-    ------
-    InputError
-        The name is taken, no body is chosen, or the function returns other values.
-
-    Examples
-    --------
-    >>> mesh = with_body_group(read_mesh(PAPER_BLOCK), "upper", lambda x: x[:, 1] > 1.0)
-    >>> mesh.group_bodies("upper").size > 0
-    True
-    """
-    return instance("mesh", mesh, Mesh).body_group(name, chosen)
 
 
 def with_inner_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:

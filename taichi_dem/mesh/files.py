@@ -3,11 +3,9 @@
 import contextlib
 import io
 import os
-import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Optional
 from xml.sax.saxutils import quoteattr
 
 import meshio
@@ -18,19 +16,10 @@ from taichi_dem.kit.files import renamed_when_done, write_text
 from taichi_dem.kit.likely_units import EDGE, in_unit
 from taichi_dem.kit.timeout import run_with_timeout
 from taichi_dem.kit.validation import FileName, path_name, positive
-from taichi_dem.mesh.cells import (
-    blocks_of,
-    bodies_in,
-    body_groups_in,
-    corners_of,
-    face_groups_in,
-    shape_of,
-    unread_groups,
-    volumes_of,
-)
+from taichi_dem.mesh import cells
 from taichi_dem.mesh.check import checked_points, unbonded_places, weld_labels
 from taichi_dem.mesh.gmsh_files import keyed_by_dimension, read_gmsh
-from taichi_dem.mesh.mesh import Mesh, checked_mesh
+from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import edge_lengths
 
 #: Time that a reader may take [s], and what it reads at the slowest [byte/s]: some of meshio's wait
@@ -38,18 +27,9 @@ from taichi_dem.mesh.tetrahedra import edge_lengths
 _PATIENCE_S = 20.0
 _SLOWEST_BYTES_PER_S = 1e5
 _SPLIT = "split them into tetrahedra, for example by ParaView's filter Tetrahedralize"
-_UNKNOWN = "holds cells of a type that meshio does not know, such as voxels"
-_FOLDED = (
-    "tetrahedra are numbered after cells have been cut, and a cell folds over itself if it is "
-    "strongly twisted, or its corners are not in the order of the file's format"
-)
-_NEEDED = (
-    "loads and supports need groups of faces (physical surfaces in Gmsh), materials groups of "
-    "solid cells"
-)
-_IN_A_GROUP = (
-    "mesh in three dimensions (gmsh -3), and make a physical group of the volume too, as Gmsh "
-    "saves only what is in a group"
+_REMEDY = (
+    "mesh in three dimensions (gmsh -3) with a physical group of the volume too, without which "
+    "Gmsh does not save it, or fill a closed surface by taichi_dem.shapes.from_surface"
 )
 
 
@@ -109,16 +89,17 @@ def read_mesh(
         raise InputError(f"mesh file {path}: {error}") from None
     edge = np.median(edge_lengths(mesh.points, mesh.tetrahedra))
     in_unit(f"median edge of mesh file {path} at scale={scale:g}", float(edge), EDGE)
-    unread = unread_groups(raw, mesh)
-    notes = [f"the groups {', '.join(unread)} are not read: {_NEEDED}"] if unread else []
-    told = [_of_dropped_cells(printed), unbonded_places(mesh.points, mesh.tetrahedra)]
+    unread = cells.unread_groups(raw, mesh)
+    words = "are not read, as they hold no triangles or solid cells"
+    notes = [f"the groups {', '.join(unread)} {words}"] if unread else []
+    told = [_of_dropped_cells(printed), unbonded_places(mesh.tetrahedra)]
     # A set of all points is a program's own, one of some was meant for something.
     told += notes if any(len(some) < len(raw.points) for some in raw.point_sets.values()) else []
     told = [sentence for sentence in told if sentence]
     for sentence in told:
         warnings.warn(f"mesh file {path}: {sentence}", stacklevel=2)
     notes = [*dict.fromkeys((*notes, *told)), *mesh.notes]
-    return replace(mesh, notes=tuple(notes), source=path, unread=unread)
+    return replace(mesh, notes=tuple(notes), source=path)
 
 
 def write_mesh(path: FileName, mesh: Mesh) -> None:
@@ -128,7 +109,7 @@ def write_mesh(path: FileName, mesh: Mesh) -> None:
     several groups are in the volume "NAME|NAME", which ``read_mesh`` takes for both.
     """
     names, first = list(mesh.groups), 1 + len(mesh.groups)
-    volumes, tags = volumes_of(mesh, first)
+    volumes, tags = cells.volumes_of(mesh, first)
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames"]
     lines += [str(len(names) + len(volumes))]
     lines += [f'2 {tag} "{name}"' for tag, name in enumerate(names, start=1)]
@@ -144,18 +125,14 @@ def write_mesh(path: FileName, mesh: Mesh) -> None:
 
 
 def write_vtu(
-    path: FileName,
-    points: np.ndarray,
-    tetrahedra: np.ndarray,
-    point_data: Optional[Mapping[str, np.ndarray]] = None,
-    cell_data: Optional[Mapping[str, np.ndarray]] = None,
+    path: FileName, points: np.ndarray, tetrahedra: np.ndarray, cell_data: Mapping[str, np.ndarray]
 ) -> None:
     """Write tetrahedra with data as a compressed VTU file, for ParaView.
 
-    point_data: name -> (point_count, ...).  cell_data: name -> (body_count, ...).
+    cell_data: name -> (body_count, ...).
     """
-    of_cells = {name: [np.asarray(values)] for name, values in (cell_data or {}).items()}
-    content = meshio.Mesh(points, [("tetra", tetrahedra)], point_data or {}, of_cells)
+    of_cells = {name: [np.asarray(values)] for name, values in cell_data.items()}
+    content = meshio.Mesh(points, [("tetra", tetrahedra)], cell_data=of_cells)
     with renamed_when_done(path) as temporary:
         meshio.write(temporary, content, file_format="vtu", compression="zlib")
 
@@ -188,7 +165,7 @@ def _read_raw(path):
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             return run_with_timeout(seconds, lambda: _meshio_read(path), sentence), said.getvalue()
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
-        reason = _reason_of(error, said.getvalue())
+        reason = " ".join(f"{type(error).__name__} {error} {said.getvalue()}".split())
         raise InputError(f"mesh file {path} cannot be read: {reason}") from None
 
 
@@ -199,33 +176,24 @@ def _meshio_read(path):
         return keyed_by_dimension(meshio.read(path), {})
 
 
-def _reason_of(error, printed):
-    """Why a reader failed, in words: an exception may hold a number only."""
-    text = " ".join(str(error).split())
-    if isinstance(error, SystemExit):
-        text = " ".join(printed.replace("Error: ", "").split())
-    named = text if re.search(r"[^\W\d]", text) else f"{type(error).__name__} {text}"
-    return _of_dropped_cells(text) or named.strip()
-
-
 def _of_dropped_cells(printed):
     """A sentence about cells that meshio ignores, or ""; printed: its message."""
     if "cells that meshio cannot handle" not in " ".join(printed.split()):
         return ""
-    return f"it {_UNKNOWN}, and these are not read: {_SPLIT}"
+    unknown = "it holds cells of a type that meshio does not know, such as voxels"
+    return f"{unknown}, and these are not read: {_SPLIT}"
 
 
 def _refuse_unreadable(raw, path, printed):
     """Refuse solid cells that cannot be cut, which would leave holes, and files without any."""
     held = {block.type: block.dim for block in raw.cells if len(block.data)}
-    others = sorted(kind for kind in held if held[kind] == 3 and not shape_of(kind))
+    others = sorted(kind for kind in held if held[kind] == 3 and not cells.shape_of(kind))
     if others:
         raise InputError(
             f"mesh file {path} holds {', '.join(others)} cells, which cannot be read: {_SPLIT}"
         )
-    if not blocks_of(raw, 3):
-        remedy = f"{_IN_A_GROUP}, or fill a closed surface by taichi_dem.shapes.from_surface"
-        remedy = _of_dropped_cells(printed) or remedy
+    if not cells.blocks_of(raw, 3):
+        remedy = _of_dropped_cells(printed) or _REMEDY
         kinds = ", ".join(sorted(held)) or "no cells"
         raise InputError(f"mesh file {path} holds no tetrahedra (it holds: {kinds}): {remedy}")
 
@@ -235,18 +203,13 @@ def _mesh(raw, scale, weld_tolerance, keep_coincident):
     with np.errstate(over="ignore"):  # numbers that are not finite are refused
         points = checked_points(scale * np.asarray(raw.points, dtype=np.float64))
     welding: list[str] = []
-    bodies = bodies_in(raw, points)
+    bodies = cells.bodies_in(raw, points)
     label = weld_labels(points, bodies.tetrahedra, weld_tolerance, welding)
     if welding:
-        for _, block in (*blocks_of(raw, 2), *blocks_of(raw, 3)):
-            corners = corners_of(block, len(points))
+        for _, block in (*cells.blocks_of(raw, 2), *cells.blocks_of(raw, 3)):
+            corners = cells.corners_of(block, len(points))
             block.data = np.hstack([label[corners], block.data[:, corners.shape[1] :]])
-        bodies = bodies_in(raw, points)
-    kept = {"keep_coincident": keep_coincident, "body_groups": body_groups_in(raw, bodies)}
-    try:
-        mesh = checked_mesh(points, bodies.tetrahedra, face_groups_in(raw), **kept)
-    except InputError as error:
-        is_cut = any(shape_of(block.type) != "tetra" for _, block in blocks_of(raw, 3))
-        fault = f"; {_FOLDED}" if is_cut and "tetrahedra " in str(error) else ""
-        raise InputError(f"{error}{fault}") from None
-    return replace(mesh, notes=(*welding, *mesh.notes))
+        bodies = cells.bodies_in(raw, points)
+    kept = {"keep_coincident": keep_coincident, "body_groups": cells.body_groups_in(raw, bodies)}
+    arrays = points, bodies.tetrahedra, cells.face_groups_in(raw)
+    return Mesh(*arrays, notes=tuple(welding), **kept)

@@ -1,28 +1,19 @@
-"""Meshes made with Gmsh: a block with a hole, and drawn solids; the only importer of gmsh."""
+"""Drawn solids filled by Gmsh; the only importer of gmsh."""
 
 from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import renamed_when_done
-from taichi_dem.kit.fixed_order import dot, length
-from taichi_dem.kit.validation import (
-    FileName,
-    finite,
-    path_name,
-    positive,
-    shown,
-    told_apart,
-    whole,
-)
+from taichi_dem.kit.fixed_order import dot
+from taichi_dem.kit.validation import FileName, path_name, positive, told_apart
 from taichi_dem.mesh import tetrahedra as geometry
-from taichi_dem.mesh.mesh import Mesh, checked_mesh
+from taichi_dem.mesh.mesh import Mesh
 
 #: Options that could make two runs of the same Gmsh differ, or change the elements.
 _OPTIONS = {
@@ -42,8 +33,6 @@ _OPTIONS = {
     "Mesh.MshFileVersion": 4.1,
     "Mesh.Binary": 0,
 }
-#: Chords around the hole.
-_MOST_SEGMENTS = 10000
 #: Angle between triangles of an STL from which on an edge parts two surfaces [degrees].
 _EDGE_DEG = 40.0
 #: Most elements of a mesh: ten million tetrahedra take some ten GiB to check.
@@ -52,66 +41,6 @@ _MOST_BODIES = 10_000_000
 _PER_CUBE = 8.7
 #: Endings of files, by how they are read.
 _DRAWN, _TRIANGLES = (".step", ".stp"), (".stl",)
-
-
-def block_with_hole(
-    path: FileName,
-    *,
-    width: float = 2.0,
-    height: float = 2.0,
-    depth: float = 0.2,
-    hole: Sequence[float] = (1.6, 1.0),
-    hole_diameter: float = 0.05,
-    hole_segments: int = 8,
-    size_hole: float = 0.055,
-    size_far: float = 0.5,
-    distance_far: float = 1.11,
-) -> None:
-    """Write a block with a round hole through its depth as a Gmsh 4.1 text file.
-
-    The block fills [0, width] x [0, height] x [0, depth] (x right, y up, z to the viewer), the
-    hole's axis runs along z through ``hole`` = (x, y); all lengths in m.  The hole is a polygon of
-    ``hole_segments`` chords, its wall regular triangles in layers of about ``size_hole``; elements
-    grow linearly from there to ``size_far`` at the distance ``distance_far``.
-    Physical groups: volume block; faces hole, left, right, bottom, top, back, front.
-    The same Gmsh writes the same file every time.
-
-    path ends in .msh.  Raises InputError for a shape that cannot be, a path that cannot be
-    written, and when gmsh is not installed or fails.
-    Source of the defaults: Konno et al., section 4.1 and Fig 10.
-    """
-    path = path_name("path", path)
-    if not path.endswith(".msh"):
-        raise InputError(f"the name of the mesh file must end in .msh, got {path}")
-    sizes = {"width": width, "height": height, "depth": depth, "hole_diameter": hole_diameter}
-    grading = {"size_hole": size_hole, "size_far": size_far, "distance_far": distance_far}
-    box = [positive(name, value) for name, value in sizes.items()]
-    near, far, distance = (positive(name, value) for name, value in grading.items())
-    centre = _checked_hole(hole, *box)
-    chords, rest = divmod(whole("hole_segments", hole_segments, 4, _MOST_SEGMENTS), 4)
-    if rest:
-        raise InputError(f"hole_segments must be 4, 8, 12, ..., got {hole_segments}")
-    with session("block_with_hole") as gmsh:
-        walls = _add_geometry(gmsh.model, centre, *box)
-        _divide_walls(gmsh.model, walls, chords, max(1, round(box[2] / near)))
-        _add_sizes(gmsh.model.mesh.field, centre, 0.5 * box[3], near, far, distance)
-        gmsh.model.mesh.generate(3)
-        with renamed_when_done(path) as temporary:
-            gmsh.write(temporary)
-
-
-def _checked_hole(hole, width, height, depth, diameter):
-    """Place of the hole's axis, which leaves a wall on all four sides."""
-    margin = 0.5 * diameter
-    right, top = width - margin, height - margin
-    two = isinstance(hole, (tuple, list)) and len(hole) == 2 and all(map(finite, hole))
-    if not (two and margin < hole[0] < right and margin < hole[1] < top):
-        raise InputError(
-            f"hole must be (x, y) with x in ({margin:g}, {right:g}) m and "
-            f"y in ({margin:g}, {top:g}) m, got {shown(hole)}"
-        )
-    # Gmsh ends the process on a number that it cannot read, such as np.float64(0.5).
-    return float(hole[0]), float(hole[1])
 
 
 @contextlib.contextmanager
@@ -141,48 +70,6 @@ def session(name: str) -> Iterator[Any]:
             gmsh.finalize()
 
 
-def _add_geometry(model, hole, width, height, depth, diameter):
-    """Front view with its hole, drawn at z = 0 and drawn out along z; groups. The hole's walls."""
-    geo, (x, y), r = model.geo, hole, 0.5 * diameter
-    corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
-    quarters = [(x + r, y), (x, y + r), (x - r, y), (x, y - r)]
-    corners = [geo.addPoint(*place, 0.0) for place in corners]
-    middle = geo.addPoint(x, y, 0.0)
-    ends = [geo.addPoint(*place, 0.0) for place in quarters]
-    # Anticlockwise from the lower left corner: bottom, right, top, left.
-    outline = [geo.addLine(corners[k], corners[(k + 1) % 4]) for k in range(4)]
-    circle = [geo.addCircleArc(ends[k], middle, ends[(k + 1) % 4]) for k in range(4)]
-    back = geo.addPlaneSurface([geo.addCurveLoop(outline), geo.addCurveLoop(circle)])
-    front, volume, *sides = [tag for _, tag in geo.extrude([(2, back)], 0.0, 0.0, depth)]
-    geo.synchronize()
-    faces = dict(zip(("bottom", "right", "top", "left"), ([tag] for tag in sides[:4])))
-    faces.update(hole=sides[4:], back=[back], front=[front])
-    model.addPhysicalGroup(3, [volume], name="block")
-    for name, tags in faces.items():
-        model.addPhysicalGroup(2, tags, name=name)
-    return sides[4:]
-
-
-def _divide_walls(model, walls, chords, layers):
-    """Regular triangles on the hole's walls: chords of each around it, layers along it."""
-    for wall in walls:
-        for _, curve in model.getBoundary([(2, wall)], combined=False):
-            arc = model.getType(1, abs(curve)) == "Circle"
-            model.mesh.setTransfiniteCurve(abs(curve), (chords if arc else layers) + 1)
-        # Alternating diagonals: all of one hand would give the block a twist.
-        model.mesh.setTransfiniteSurface(wall, "AlternateRight")
-
-
-def _add_sizes(field, hole, radius, near, far, distance):
-    """Element size: linear in the distance from the hole's wall."""
-    (x, y), growth = hole, (far - near) / distance
-    away = f"Max(Sqrt((x-{x!r})^2+(y-{y!r})^2)-{radius!r}, 0)"
-    low, high = sorted((near, far))
-    tag = field.add("MathEval")
-    field.setString(tag, "F", f"Min(Max({near!r}+{growth!r}*{away}, {low!r}), {high!r})")
-    field.setAsBackgroundMesh(tag)
-
-
 def filled_surface(path: FileName, element: float, scale: float = 1.0) -> Mesh:
     """The solid inside a drawn surface, see ``shapes.from_surface``."""
     name = path_name("path", path)
@@ -198,8 +85,6 @@ def filled_surface(path: FileName, element: float, scale: float = 1.0) -> Mesh:
             gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
             gmsh.model.occ.importShapes(name)
             gmsh.model.occ.synchronize()
-            if not gmsh.model.getEntities(3):
-                raise InputError(f"surface file {name} must hold a closed surface, got none")
         else:
             _draw_triangles(gmsh, name)
         refuse_too_many(element, _drawn_volume(gmsh, drawn) * scale**3)
@@ -233,7 +118,6 @@ def _draw_triangles(gmsh: Any, name: str) -> None:
     """Read triangles, part them at their edges, and make a volume of what they enclose."""
     gmsh.merge(name)
     gmsh.model.mesh.removeDuplicateNodes()
-    _refuse_open(gmsh, name)
     angle = np.radians(_EDGE_DEG)
     gmsh.model.mesh.classifySurfaces(angle, True, True, np.pi)
     gmsh.model.mesh.createGeometry()
@@ -242,29 +126,17 @@ def _draw_triangles(gmsh: Any, name: str) -> None:
     gmsh.model.geo.synchronize()
 
 
-def _refuse_open(gmsh, name):
-    """Raise InputError unless every edge of the triangles belongs to two of them."""
-    _, nodes = gmsh.model.mesh.getElementsByType(2)
-    if not len(nodes):
-        raise InputError(f"surface file {name} must hold triangles, got none")
-    corners = nodes.reshape(-1, 3)[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
-    count = np.unique(np.sort(corners, axis=1), axis=0, return_counts=True)[1]
-    wrong = int((count != 2).sum())
-    if wrong:
-        raise InputError(
-            f"surface file {name} must be closed, each edge between two triangles, but {wrong} of "
-            f"its {len(count)} edges are not: close its holes, or join its points"
-        )
-
-
 def _mesh_of(gmsh, scale, name, drawn):
     """The mesh that Gmsh has made; a group for each surface."""
     points, tetrahedra = _places_and_rows(gmsh, 4)
     if not len(tetrahedra):
-        raise InputError(f"surface file {name} must enclose a solid, but Gmsh filled none")
+        raise InputError(
+            f"surface file {name} must be closed, each edge between two faces, but Gmsh found no "
+            "solid in it: close its holes, or join its points"
+        )
     points *= scale
     groups = _drawn_groups(gmsh) if drawn else _smooth_parts(points, tetrahedra)
-    return checked_mesh(points, tetrahedra, groups, source=name)
+    return Mesh(points, tetrahedra, groups, source=name)
 
 
 def _places_and_rows(gmsh, kind, tag=-1):
@@ -290,10 +162,9 @@ def _drawn_groups(gmsh):
 def _smooth_parts(points, tetrahedra):
     """Outer faces in groups that end at sharp edges: Gmsh cuts smooth surfaces into patches."""
     outer = geometry.outer_faces(tetrahedra)
-    normal = geometry.area_vectors(points, outer)
-    normal /= length(normal)[:, None]
-    first, second = geometry.pairs_at_edges(outer)
-    smooth = dot(normal[first], normal[second]) > np.cos(np.radians(_EDGE_DEG))
-    label = geometry.components(len(outer), np.stack([first[smooth], second[smooth]], axis=1))
+    normal = geometry.unit_normals(points, outer)
+    pairs = geometry.equal_rows(outer[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)) // 3
+    smooth = dot(normal[pairs[:, 0]], normal[pairs[:, 1]]) > np.cos(np.radians(_EDGE_DEG))
+    label = geometry.components(len(outer), pairs[smooth])
     parts = (outer[label == first] for first in np.unique(label))
     return {f"surface_{k}": part for k, part in enumerate(parts, 1)}

@@ -13,7 +13,7 @@ from typing import Optional
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import flag, instance, shown, word
+from taichi_dem.kit.validation import flag, instance, several, shown, word
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.check import COINCIDENT, joined_bodies, weld_labels
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
@@ -75,11 +75,10 @@ def _checked_names(names, count):
     """A name for each mesh."""
     if count < 2:
         raise InputError(f"join must have at least two meshes, got {count}")
-    given = _NAMES[:count] if names is None else names
-    several = isinstance(given, (list, tuple)) and len(given) == count
-    if not several or len(set(map(str, given))) < count:
+    given = several("names", _NAMES[:count] if names is None else names, word)
+    if len(given) != count or len(set(given)) < count:
         raise InputError(f"names must be {count} different names, got {shown(names)}")
-    return [word("names", name) for name in given]
+    return given
 
 
 def _refuse_clashes(parts):

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from types import MappingProxyType
 from typing import Any, ClassVar, Optional
 
@@ -11,20 +11,17 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import FileName, flag, fraction, instance, path_name, shown
+from taichi_dem.kit.validation import flag, fraction, instance, shown
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.check import checked_arrays, checked_body_groups, joined_bodies
 from taichi_dem.mesh.mesh_methods import MeshMethods
 
-#: First words of the notes on what has been mended.
-_MENDING = ("welded", "dropped", "turned")
-
 
 @dataclass(frozen=True, eq=False)
 class Mesh(MeshMethods):
-    """Tetrahedra and named groups of faces, as ``checked_mesh`` makes them; immutable.
+    """Tetrahedra and named groups of faces; immutable.
 
-    Made directly from arrays, a mesh is checked alike but not repaired. ``dataclasses.replace``
+    Made from arrays it is checked and mended as ``checked_mesh`` says; ``dataclasses.replace``
     gives another mesh.
 
     Parameters
@@ -40,13 +37,13 @@ class Mesh(MeshMethods):
         Sentences about what the checks repaired or found remarkable.
     source : str, default ""
         Name of the file; ``""`` for a mesh built in memory.
-    unread : tuple of str, default ()
-        Names of the groups of the file that are neither of faces nor of bodies.
     keep_coincident : bool, default False
         Whether points that coincide stay apart, and with them the faces on them, as at a joint or a
         crack.
     body_groups : mapping, optional
         Numbers of bodies (n,) by name, in rising order, as for ``Scene(materials=...)``.
+    weld_tolerance : float, default 0.0
+        Points not farther apart than this become one [m]; 0 welds nothing.
 
     Attributes
     ----------
@@ -59,7 +56,7 @@ class Mesh(MeshMethods):
     Raises
     ------
     InputError
-        The arrays are such as ``checked_mesh`` would refuse or repair.
+        The arrays are such as ``checked_mesh`` refuses.
 
     Examples
     --------
@@ -73,31 +70,27 @@ class Mesh(MeshMethods):
     groups: Mapping[str, np.ndarray]
     notes: tuple[str, ...] = ()
     source: str = ""
-    unread: tuple[str, ...] = ()
     keep_coincident: bool = False
     body_groups: Mapping[str, np.ndarray] = field(default_factory=dict)
+    weld_tolerance: InitVar[float] = 0.0
 
-    def __post_init__(self) -> None:
-        notes: list[str] = []
+    def __post_init__(self, weld_tolerance: float) -> None:
         flag("keep_coincident", self.keep_coincident)
-        for name in ("notes", "unread"):
-            instance(name, getattr(self, name), tuple)
+        notes = list(instance("notes", self.notes, tuple))
         instance("source", self.source, (str, os.PathLike))
-        self._hold(self.points, self.tetrahedra, self.groups, self.body_groups, 0.0, notes)
-        mended = [note for note in notes if note.split()[0] in _MENDING]
-        if mended:
-            raise InputError(f"a Mesh takes what checked_mesh gives, which here {mended[0]}")
+        kept = weld_tolerance, self.keep_coincident
+        arrays = checked_arrays(self.points, self.tetrahedra, self.groups, *kept, notes)
+        parts = len(np.unique(joined_bodies(arrays[1])))
+        if parts > 1:
+            notes.append(f"the mesh has {parts} parts that share no face with each other")
+        bodies = checked_body_groups(self.body_groups, len(arrays[1]))
+        names = "points", "tetrahedra", "groups", "inner_groups", "body_groups", "notes"
+        found = zip(names, (*arrays, bodies, tuple(dict.fromkeys(notes))))
+        self.__setstate__({**vars(self), **dict(found)})
 
     #: Not among the options: see ``bonded_by``.
     bonded_shares: ClassVar[tuple[tuple[str, float], ...]] = ()
     inner_groups: ClassVar[tuple[str, ...]] = ()
-
-    def _hold(self, points, tetrahedra, groups, body_groups, tolerance, notes):
-        """Keep checked arrays; notes: a list to which sentences on repairs are added."""
-        arrays = checked_arrays(points, tetrahedra, groups, tolerance, self.keep_coincident, notes)
-        names = "points", "tetrahedra", "groups", "inner_groups", "body_groups"
-        bodies = checked_body_groups(body_groups, len(arrays[1]))
-        self.__setstate__({**vars(self), **dict(zip(names, (*arrays, bodies)))})
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "groups": dict(self.groups), "body_groups": dict(self.body_groups)}
@@ -148,7 +141,7 @@ class Mesh(MeshMethods):
         InputError
             There is no such group.
         """
-        return self._members("face", self.groups, name, (*self.body_groups, *self.unread))
+        return self._members("face", self.groups, name)
 
     def group_bodies(self, name: str) -> np.ndarray:
         """Bodies of a group.
@@ -168,18 +161,13 @@ class Mesh(MeshMethods):
         InputError
             There is no such group.
         """
-        return self._members("body", self.body_groups, name, self.groups)
+        return self._members("body", self.body_groups, name)
 
-    def _members(self, kind, groups, name, others):
+    def _members(self, kind, groups, name):
         if isinstance(name, str) and name in groups:
             return groups[name]
         known = ", ".join(sorted(groups)) or "none"
-        why = (
-            f" ({name} is one of another kind)" if isinstance(name, str) and name in others else ""
-        )
-        raise InputError(
-            f"mesh has no {kind} group {shown(name)}{why}; its {kind} groups are: {known}"
-        )
+        raise InputError(f"mesh has no {kind} group {shown(name)}; its {kind} groups are: {known}")
 
     def bonded_by(self, shares: Mapping[str, float]) -> "Mesh":
         """Return the mesh with only a share of the area of some inner faces bonded.
@@ -229,7 +217,6 @@ def checked_mesh(
     points: ArrayLike,
     tetrahedra: ArrayLike,
     groups: Mapping[str, ArrayLike],
-    source: FileName = "",
     weld_tolerance: float = 0.0,
     keep_coincident: bool = False,
     *,
@@ -246,8 +233,6 @@ def checked_mesh(
     groups : mapping
         Point indices (k, 3) by name, in either orientation: of outer faces, or of inner ones that
         two bodies share.
-    source : path, default ""
-        Name of the file.
     weld_tolerance : float, default 0.0
         Points not farther apart than this become one [m]; 0 welds nothing.
     keep_coincident : bool, default False
@@ -277,16 +262,7 @@ def checked_mesh(
     >>> checked_mesh(corners, [[0, 1, 2, 3]], {"base": [[0, 1, 2]]}).body_count
     1
     """
-    notes: list[str] = []
-    flag("keep_coincident", keep_coincident)
-    if source != "":
-        path_name("source", source)
-    made = object.__new__(Mesh)
-    made.__dict__.update(source=str(source), unread=(), keep_coincident=keep_coincident)
+    made: Any = Mesh
+    options = {"weld_tolerance": weld_tolerance, "keep_coincident": keep_coincident}
     bodies = {} if body_groups is None else body_groups
-    made._hold(points, tetrahedra, groups, bodies, weld_tolerance, notes)
-    parts = len(np.unique(joined_bodies(made.tetrahedra)))
-    if parts > 1:
-        notes.append(f"the mesh has {parts} parts that share no face with each other")
-    made.__dict__.update(notes=tuple(notes))
-    return made
+    return made(points, tetrahedra, groups, body_groups=bodies, **options)

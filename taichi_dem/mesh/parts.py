@@ -36,13 +36,11 @@ def part_boxes(corners: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.nd
 def any_overlap(low: np.ndarray, high: np.ndarray) -> bool:
     """Whether two boxes overlap; touching is not enough.
 
-    Sorted by where they begin along an axis, a box is compared with those that begin before its
-    end; the axis is the one with the fewest of them.
+    Sorted by where they begin along x, a box is compared with those that begin before its end.
     """
-    begun = [np.searchsorted(np.sort(low[:, axis]), high[:, axis]) for axis in range(3)]
-    axis = int(np.argmin([count.sum() for count in begun]))
-    order = np.argsort(low[:, axis], kind="stable")
-    low, high, ends = low[order], high[order], begun[axis][order]
+    order = np.argsort(low[:, 0], kind="stable")
+    low, high = low[order], high[order]
+    ends = np.searchsorted(low[:, 0], high[:, 0])
     return any(
         ((low[k + 1 : end] < high[k]) & (low[k] < high[k + 1 : end])).all(axis=1).any()
         for k, end in enumerate(ends.tolist())

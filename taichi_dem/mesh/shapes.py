@@ -7,29 +7,21 @@ from typing import Optional
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import positive, shown
+from taichi_dem.kit.validation import positive, several, shown, whole
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
 
-#: Groups of a bar: name -> (axis, 0 low or 1 high end).
-_SIDES = {
-    "left": (0, 0),
-    "right": (0, 1),
-    "bottom": (1, 0),
-    "top": (1, 1),
-    "back": (2, 0),
-    "front": (2, 1),
-}
-
+#: Groups of a bar: its low and high end along each axis.
+_SIDES = ("left", "right"), ("bottom", "top"), ("back", "front")
 #: Boxes of a bar: ten million tetrahedra take some ten GiB to check.
 _MOST_BOXES = 1_666_666
 
 
-def single(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
-    """One tetrahedron: equilateral base of ``edge`` [m] in the plane x = 0, apex at x = -height.
+def single(edge: float = 0.05) -> Mesh:
+    """One regular tetrahedron of ``edge`` [m]: base in the plane x = 0, apex at x < 0.
 
-    height: [m]; None makes the tetrahedron regular.  Groups: base, sides.
+    Groups: base, sides.
     """
-    base, height = _base(edge, height)
+    base, height = _base(edge)
     points = np.vstack([[-height, 0.0, 0.0], base])
     groups = {"base": [[1, 2, 3]], "sides": [[0, 1, 2], [0, 2, 3], [0, 3, 1]]}
     return checked_mesh(points, [[0, 1, 2, 3]], groups)
@@ -38,9 +30,11 @@ def single(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
 def pair(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
     """Two equal tetrahedra that share the face in x = 0; body 0 lies at x < 0, body 1 at x > 0.
 
-    edge, height: as in ``single``.  Groups: left and right, the free faces of either body.
+    edge, height: [m]; regular ones where no height is given.  Groups: left and right, the free
+    faces of either body.
     """
-    base, height = _base(edge, height)
+    base, regular = _base(edge)
+    height = regular if height is None else positive("height", height)
     points = np.vstack([base, [-height, 0.0, 0.0], [height, 0.0, 0.0]])
     around = [(0, 1), (1, 2), (2, 0)]
     groups = {
@@ -100,27 +94,23 @@ def _bodies_together(parts):
     return {**groups, **dict(zip(parts, np.split(np.arange(firsts[-1]), firsts[1:-1])))}
 
 
-def _base(edge, height):
+def _base(edge):
     """Equilateral triangle in x = 0 about the origin, normal +x, and the apex height [m]."""
     edge = positive("edge", edge)
-    height = positive("height", edge * np.sqrt(2.0 / 3.0) if height is None else height)
     radius, half = edge / np.sqrt(3.0), 0.5 * edge
     triangle = [[0.0, radius, 0.0], [0.0, -0.5 * radius, half], [0.0, -0.5 * radius, -half]]
-    return np.array(triangle), height
+    return np.array(triangle), edge * np.sqrt(2.0 / 3.0)
 
 
 def _checked_cells(length, width, cells):
     """Numbers of boxes as an array (3,)."""
     for name, value in (("length", length), ("width", width)):
         positive(name, value)
-    try:
-        numbers = np.asarray(cells)
-    except ValueError:
-        numbers = np.zeros(0)
-    if numbers.shape != (3,) or numbers.dtype.kind not in "iu" or numbers.min() < 1:
-        raise InputError(f"cells must be three integers of at least 1, got {shown(cells)}")
-    if np.prod(numbers.astype(float)) > _MOST_BOXES:
-        raise InputError(f"cells must make at most {_MOST_BOXES} boxes, got {shown(cells)}")
+    numbers = np.array(several("cells", cells, lambda name, n: whole(name, n, 1, _MOST_BOXES)))
+    if len(numbers) != 3 or np.prod(numbers.astype(float)) > _MOST_BOXES:
+        raise InputError(
+            f"cells must be three numbers that make at most {_MOST_BOXES} boxes, got {shown(cells)}"
+        )
     return numbers
 
 
@@ -146,7 +136,7 @@ def _sides(grid, cells, tetrahedra):
     """Faces of the tetrahedra in the six outer planes: a face with all its points in the plane."""
     faces = tetrahedra[:, list(itertools.combinations(range(4), 3))].reshape(-1, 3)
     groups = {}
-    for name, (axis, end) in _SIDES.items():
-        inside = grid[faces, axis] == end * cells[axis]
-        groups[name] = faces[inside.all(axis=1)]
+    for axis, names in enumerate(_SIDES):
+        for name, end in zip(names, (0, cells[axis])):
+            groups[name] = faces[(grid[faces, axis] == end).all(axis=1)]
     return groups

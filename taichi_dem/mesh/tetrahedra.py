@@ -49,6 +49,12 @@ def area_vectors(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
+def unit_normals(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Right-hand unit normals of triangles, shape (n, 3); faces: point indices, (n, 3)."""
+    vectors = area_vectors(points, faces)
+    return vectors / length(vectors)[:, None]
+
+
 def all_faces(tetrahedra: np.ndarray) -> np.ndarray:
     """Every face of every body, outward order, shape (4 * body_count, 3); row 4 * body + f."""
     return tetrahedra[:, LOCAL_FACES].reshape(-1, 3)
@@ -83,7 +89,12 @@ def shared_faces(tetrahedra: np.ndarray) -> np.ndarray:
 
     Call it only where no face is shared by three bodies.
     """
-    number = face_numbers(all_faces(tetrahedra))
+    return equal_rows(all_faces(tetrahedra))
+
+
+def equal_rows(rows: np.ndarray) -> np.ndarray:
+    """Numbers of rows on the same points, each with the next such one, (n, 2)."""
+    number = face_numbers(rows)
     order = np.argsort(number, kind="stable")
     same = number[order[1:]] == number[order[:-1]]
     return np.column_stack([order[:-1][same], order[1:][same]])
@@ -144,18 +155,13 @@ def close_pairs(points: np.ndarray, distance: float) -> np.ndarray:
     cell = 4.0 * distance
     low = points.min(axis=0)
     for shift in np.ndindex(2, 2, 2):
-        first, second = _equal_rows(np.floor((points - low) / cell + 0.5 * np.array(shift)))
+        first, second = _in_one_cell(np.floor((points - low) / cell + 0.5 * np.array(shift)))
         near = length(points[first] - points[second]) <= distance
         found.append(np.sort(np.column_stack([first[near], second[near]]), axis=1))
     return np.unique(np.vstack(found), axis=0)
 
 
-def pairs_at_edges(faces: np.ndarray) -> np.ndarray:
-    """Numbers of each two faces (n, 3) that have an edge in common, (2, pairs)."""
-    return _equal_rows(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)) // 3
-
-
-def _equal_rows(rows):
+def _in_one_cell(rows):
     """Numbers of each two equal rows (n, ...), (2, pairs)."""
     order = np.lexsort(rows.T)
     rows, found = rows[order], [np.empty((2, 0), dtype=np.int64)]

@@ -47,8 +47,7 @@ class Topology:
     is_open: np.ndarray
     bonded_share: np.ndarray
 
-    def __repr__(self):
-        return by_fields(self)
+    __repr__ = by_fields
 
     @property
     def bond_count(self) -> int:
@@ -154,14 +153,6 @@ def check_free(mesh: Mesh, name: str) -> None:
         )
 
 
-def mean_density(mesh: Mesh, density: Density) -> float:
-    """Mass over volume of a mesh [kg/m3]; density: as for ``body_properties``."""
-    if not isinstance(density, np.ndarray):
-        return density
-    volume = geometry.signed_volumes(mesh.points, mesh.tetrahedra)
-    return float((density * volume).sum() / volume.sum())
-
-
 def body_properties(mesh: Mesh, density: Density) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass [kg] (n,), centre of mass [m] (n, 3), inertia about it [kg m2] (n, 3, 3).
 
@@ -194,10 +185,9 @@ def body_at(mesh: Mesh, name: str, point: np.ndarray) -> int:
     InputError
         For a point in no body, with the nearest body and the distance of its centre.
     """
-    corners = mesh.points[geometry.all_faces(mesh.tetrahedra)]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= length(normal)[:, None]
-    outside = dot(point - corners[:, 0], normal).reshape(-1, 4).max(axis=1)
+    faces = geometry.all_faces(mesh.tetrahedra)
+    normal = geometry.unit_normals(mesh.points, faces)
+    outside = dot(point - mesh.points[faces[:, 0]], normal).reshape(-1, 4).max(axis=1)
     holding = np.flatnonzero(outside <= _ROUNDING * np.ptp(mesh.points, axis=0).max())
     if len(holding):
         return int(holding[0])

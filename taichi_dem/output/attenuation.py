@@ -34,40 +34,7 @@ class Attenuation:
     speed: np.ndarray
     inner: np.ndarray
 
-    def __repr__(self) -> str:
-        return by_fields(self)
-
-    @classmethod
-    def of(
-        cls,
-        model: Model,
-        peak_speed: np.ndarray,
-        radius: Optional[float] = None,
-        group: str = "hole",
-    ) -> "Attenuation":
-        """Measure the attenuation in a run.
-
-        Parameters
-        ----------
-        model : Model
-            Arrays of the scene, ``result.model``.
-        peak_speed : ndarray
-            Largest speed of each body [m/s], shape (body_count,).
-        radius : float, optional
-            Radius of the hole [m]; that of the points of its wall by default.
-        group : str
-            Face group of the hole's wall.
-
-        Returns
-        -------
-        Attenuation
-        """
-        hole, points = HoleMonitor(model, group), model.mesh.points
-        radius = hole.radius if radius is None else positive("radius", radius)
-        away = model.centre - hole.axis_point
-        away = np.linalg.norm(away - np.outer(away @ hole.axis, hole.axis), axis=1)
-        ends = model.centre - points.min(axis=0), points.max(axis=0) - model.centre
-        return cls(away / radius, peak_speed, away < np.minimum(*ends).min(axis=1))
+    __repr__ = by_fields
 
     @property
     def table(self) -> Table:
@@ -104,3 +71,30 @@ class Attenuation:
             return np.nan, np.nan
         slope, level = np.polyfit(np.log(self.distance[taken]), np.log(self.speed[taken]), 1)
         return float(slope), float(np.exp(level))
+
+
+def attenuation_of(
+    model: Model, peak_speed: np.ndarray, group: str, radius: Optional[float] = None
+) -> Attenuation:
+    """Measure the attenuation in a run.
+
+    Parameters
+    ----------
+    model : Model
+    peak_speed : ndarray
+        Largest speed of each body [m/s], shape (body_count,).
+    group : str
+        Face group of the hole's wall.
+    radius : float, optional
+        Radius of the hole [m]; that of the points of its wall by default.
+
+    Returns
+    -------
+    Attenuation
+    """
+    hole, points = HoleMonitor(model, group), model.mesh.points
+    radius = hole.radius if radius is None else positive("radius", radius)
+    away = model.centre - hole.axis_point
+    away = np.linalg.norm(away - np.outer(away @ hole.axis, hole.axis), axis=1)
+    ends = model.centre - points.min(axis=0), points.max(axis=0) - model.centre
+    return Attenuation(away / radius, peak_speed, away < np.minimum(*ends).min(axis=1))

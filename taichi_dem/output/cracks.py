@@ -7,7 +7,7 @@ import numpy as np
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.validation import unit_vector, whole
-from taichi_dem.mesh.tetrahedra import area_vectors
+from taichi_dem.mesh.tetrahedra import area_vectors, unit_normals
 from taichi_dem.state.model import Model
 
 #: Sine of the angle between a face and a plane below which they count as parallel.
@@ -80,7 +80,7 @@ def cracks_of(model: Model, broken_time: np.ndarray) -> Table:
     bond = np.flatnonzero(np.isfinite(broken_time))
     bond = bond[np.argsort(broken_time[bond], kind="stable")]
     points, corners = model.mesh.points, model.topology.vertices[bond]
-    place, normal = points[corners].mean(axis=1), _normals(model, bond)
+    place, normal = points[corners].mean(axis=1), unit_normals(points, corners)
     area = crack_areas(model)[bond]
     strike, dip = strike_and_dip(normal)
     columns = {
@@ -128,7 +128,7 @@ def rose_of(
     """
     axis, sectors = unit_vector("axis", axis), whole("sectors", sectors, 2, 360)
     bond = np.flatnonzero(broken)
-    trace = np.cross(axis, _normals(model, bond))
+    trace = np.cross(axis, unit_normals(model.mesh.points, model.topology.vertices[bond]))
     area, width = crack_areas(model)[bond], 180.0 / sectors
     seen = np.linalg.norm(trace, axis=1) > _PARALLEL
     right, up = picture_axes(axis)
@@ -142,9 +142,3 @@ def rose_of(
     made = Rose(columns, index="angle_deg")
     made.width_deg, made.parallel_m2, made.axis = width, float(area[~seen].sum()), axis
     return made
-
-
-def _normals(model, bond):
-    """Unit normals of faces, out of their masters, (n, 3)."""
-    vectors = area_vectors(model.mesh.points, model.topology.vertices[bond])
-    return vectors / length(vectors)[:, None]

@@ -3,9 +3,9 @@
 import numpy as np
 
 from taichi_dem.kit.data_table import Table
-from taichi_dem.mesh.tetrahedra import components, signed_volumes
+from taichi_dem.mesh.tetrahedra import signed_volumes
 from taichi_dem.output.record import Frame
-from taichi_dem.state.model import Model
+from taichi_dem.state.model import Model, centres, sums
 
 _AXES = "xyz"
 
@@ -62,9 +62,7 @@ def fragment_of_body(model: Model, broken: np.ndarray) -> np.ndarray:
     ndarray of int, shape (body_count,)
         Fragment of each body.
     """
-    links = np.stack([model.topology.master, model.topology.slave], axis=1)[~broken]
-    first = components(model.body_count, links)
-    heads, number = np.unique(first, return_inverse=True)
+    heads, number = np.unique(model.pieces(broken), return_inverse=True)
     order = np.lexsort((heads, -np.bincount(number.reshape(-1), model.body_mass)))
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
@@ -100,18 +98,6 @@ def fragments_of(model: Model, frame: Frame, broken_time: np.ndarray) -> Fragmen
     made = Fragments(columns, index="fragment")
     made.of_body, made.time_s = of_body, frame.time_s
     return made
-
-
-def sums(of_body: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Sums over the bodies of each fragment; values (body_count, ...)."""
-    flat = values.reshape(len(values), -1)
-    columns = [np.bincount(of_body, column) for column in flat.T]
-    return np.stack(columns, axis=1).reshape(-1, *values.shape[1:])
-
-
-def centres(of_body: np.ndarray, body_mass: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Centres of mass of fragments [m], (fragments, 3); position (body_count, 3) [m]."""
-    return sums(of_body, body_mass[:, None] * position) / sums(of_body, body_mass)[:, None]
 
 
 def _motion(model, frame, of_body, mass):

@@ -4,7 +4,7 @@ import numpy as np
 
 from taichi_dem.kit.fixed_order import dot, length, weakest_direction
 from taichi_dem.loads.gas_pressure import GasPressure
-from taichi_dem.mesh.tetrahedra import area_vectors
+from taichi_dem.mesh.tetrahedra import area_vectors, unit_normals
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
 from taichi_dem.scene import Scene
 from taichi_dem.state.model import Model
@@ -53,8 +53,7 @@ class HoleMonitor:
         outer = 4 * topology.outer_body + topology.outer_face
         free = ~np.isin(outer, 4 * hole_body + hole_face)
         corners = face_vertices(mesh, topology.outer_body[free], topology.outer_face[free])
-        normal = area_vectors(mesh.points, corners)
-        normal /= length(normal)[:, None]
+        normal = unit_normals(mesh.points, corners)
         distance = dot(mesh.points[corners[:, 0]] - self.axis_point, normal)
         distance[np.abs(dot(normal, self.axis)) > 0.5] = np.inf
         depth = np.abs(dot(self.first - self.axis_point, self.axis))

@@ -39,8 +39,7 @@ class Received:
     displacement: np.ndarray
     velocity: np.ndarray
 
-    def __repr__(self) -> str:
-        return by_fields(self)
+    __repr__ = by_fields
 
 
 class Receivers:

@@ -22,21 +22,10 @@ from taichi_dem.state.model import Model
 from taichi_dem.state.timeline import MAX_LEVEL, NEVER
 
 #: Energy terms that have a column of their own in the time series, in its order.
-ENERGY_COLUMNS = (
-    "kinetic",
-    "bond_strain",
-    "sphere_strain",
-    "gas_work",
-    "bond_dashpot",
-    "softening",
-    "release",
-    "slip",
-    "sphere_dashpot",
-    "friction",
-    "injected",
-    "residual",
+ENERGY_COLUMNS = tuple(
+    "kinetic bond_strain sphere_strain gas_work bond_dashpot softening release slip sphere_dashpot "
+    "friction injected residual".split()
 )
-
 
 #: End of the name of a column with the mean displacement of a hole's bodies outward.
 _OUTWARD = "_radial_displacement_mm"
@@ -81,8 +70,7 @@ class Frame:
     bound: np.ndarray
     angular_momentum: np.ndarray
 
-    def __repr__(self):
-        return by_fields(self)
+    __repr__ = by_fields
 
     @property
     def speed(self) -> np.ndarray:
@@ -123,9 +111,10 @@ class Recorder:
         account["gas_work"] = sum(map(sim.energy_balance.load_work, self.gas))
         row = {"time_s": sim.time_s}
         for group, hole in self.holes.items():
-            outward, way = hole_columns(group, len(self.holes))
-            row[outward] = 1e3 * hole.radial_displacement(motion["position"])
-            row[way] = 1e3 * hole.monitored_displacement(motion["position"])
+            name, body = ("hole", "") if len(self.holes) == 1 else (group, f"{group}_")
+            row[f"{name}{_OUTWARD}"] = 1e3 * hole.radial_displacement(motion["position"])
+            way = hole.monitored_displacement(motion["position"])
+            row[f"{body}monitor_displacement_mm"] = 1e3 * way
         row["broken_faces"] = int(sim.state.broken().sum())
         row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})
         if self.model.ground:
@@ -196,16 +185,6 @@ class Recorder:
         tick = values(self.simulation.state.broken_tick, bonds)
         seconds = tick * (self.simulation.method.dt0 / 2.0**MAX_LEVEL)
         return np.where(tick == NEVER, np.nan, seconds)
-
-
-def hole_columns(group: str, holes: int = 1) -> tuple[str, str]:
-    """Columns of the time series of a hole: mean displacement outward, and of the monitored body.
-
-    group: of its faces. holes: how many are followed.
-    """
-    if holes == 1:
-        return "hole_radial_displacement_mm", "monitor_displacement_mm"
-    return f"{group}{_OUTWARD}", f"{group}_monitor_displacement_mm"
 
 
 def outward_columns(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -348,5 +327,5 @@ def write_paraview(
         names.append(f"{name}_{number:04d}.vtu")
         points = body_corners(model, frame).reshape(-1, 3)
         data = cell_data(model, frame, acting_since or {})
-        write_vtu(os.path.join(folder, names[-1]), points, cells, {}, data)
+        write_vtu(os.path.join(folder, names[-1]), points, cells, data)
     write_pvd(os.path.join(folder, f"{name}.pvd"), [frame.time_s for frame in frames], names)

@@ -7,7 +7,7 @@ import numpy as np
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, whole
-from taichi_dem.output.attenuation import Attenuation
+from taichi_dem.output.attenuation import Attenuation, attenuation_of
 from taichi_dem.output.cracks import Rose, cracks_of, rose_of
 from taichi_dem.output.export.gltf import write_gltf
 from taichi_dem.output.export.particles import write_particles
@@ -15,13 +15,9 @@ from taichi_dem.output.export.vtkhdf import write_vtkhdf
 from taichi_dem.output.fragments import Fragments, fragments_of
 from taichi_dem.output.hole_monitor import watched_groups
 from taichi_dem.output.record import Frame
-from taichi_dem.report.energy_balance import TERMS
+from taichi_dem.report.energy_balance import GIVEN, HELD, TERMS
 from taichi_dem.scene import Scene
 from taichi_dem.state.model import Model
-
-#: Terms of the energy balance that are given; and of which some may be there at the start.
-_GIVEN = ("load_work", "support_work", "injected")
-_HELD = ("kinetic", "bond_strain", "sphere_strain")
 
 
 class RunTables:
@@ -138,10 +134,10 @@ class RunTables:
             NaN.
         """
         history, time_s = self.history, self.history["time_s"]
-        held = sum(history[f"{name}_J"][:1].sum() for name in _HELD)
-        given = sum((history[f"{name}_J"] for name in _GIVEN), np.full(len(time_s), held))
+        held = sum(history[f"{name}_J"][:1].sum() for name in HELD)
+        given = sum((history[f"{name}_J"] for name in GIVEN), np.full(len(time_s), held))
         safe = np.where(given > 0.0, given, np.nan)
-        terms = [n for n in TERMS if n not in _GIVEN and f"{n}_J" in history]
+        terms = [n for n in TERMS if n not in GIVEN and f"{n}_J" in history]
         shares = {f"{name}_share": history[f"{name}_J"] / safe for name in terms}
         return Table({"time_s": time_s, "given_J": given, **shares}, index="time_s")
 
@@ -172,7 +168,7 @@ class RunTables:
             raise InputError(
                 "group must name the wall of a hole, as this scene has no gas pressure"
             )
-        return Attenuation.of(self.model, self.peak_speed, radius, group)
+        return attenuation_of(self.model, self.peak_speed, group, radius)
 
     def write_vtkhdf(self, path: FileName) -> None:
         """Write all frames as one VTKHDF file for ParaView, with the data of the PVD series.

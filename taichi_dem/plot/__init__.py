@@ -1,23 +1,33 @@
-"""Pictures of a run; the only part of the package that imports matplotlib."""
+"""Pictures of a run; the only part of the package that imports matplotlib.
+
+Each function returns a matplotlib figure, which a notebook shows, and writes it as PNG where a
+``path`` is given (InputError where it cannot). ``plot_energy(result)`` is ``result.plot.energy()``.
+"""
 
 from taichi_dem.plot.block import plot_acting, plot_cracks, plot_steps
-from taichi_dem.plot.film import save_animation
-from taichi_dem.plot.result.pictures import plot_attenuation
-from taichi_dem.plot.series import (
-    plot_energy,
+from taichi_dem.plot.film import plot_film
+from taichi_dem.plot.series import plot_energy
+from taichi_dem.plot.tables import (
+    plot_attenuation,
+    plot_block,
+    plot_crack_area,
+    plot_energy_shares,
+    plot_fragments,
     plot_history,
-    plot_levels,
-    plot_pressure,
+    plot_rose,
 )
 
 __all__ = [
     "plot_acting",
     "plot_attenuation",
+    "plot_block",
+    "plot_crack_area",
     "plot_cracks",
     "plot_energy",
+    "plot_energy_shares",
+    "plot_film",
+    "plot_fragments",
     "plot_history",
-    "plot_levels",
-    "plot_pressure",
+    "plot_rose",
     "plot_steps",
-    "save_animation",
 ]

@@ -1,7 +1,7 @@
 """Pictures of the block: cracks (Konno et al., Fig 12), steps (Fig 13), where effects act."""
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Optional
 
 import numpy as np
@@ -9,8 +9,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from taichi_dem.kit.plot_style import area_key, picture
-from taichi_dem.kit.validation import FileName
-from taichi_dem.output.record import Frame
+from taichi_dem.kit.validation import FileName, positive, unit_vector
+from taichi_dem.output.run_tables import RunTables
 from taichi_dem.plot.bodies import (
     ALONG_Z,
     JOINT,
@@ -40,38 +40,48 @@ TITLES = {
 
 
 def plot_cracks(
-    path: Optional[FileName],
-    model: Model,
-    frame: Frame,
-    broken_time: np.ndarray,
+    result: RunTables,
+    frame: int = -1,
+    *,
     magnify: float = 5.0,
     axis: Sequence[float] = ALONG_Z,
+    path: Optional[FileName] = None,
 ) -> Figure:
-    """Broken faces by time of breaking, in the block at rest and as it is (Konno et al., Fig 12).
+    """Draw broken faces by time of breaking, at rest and as the block is in a frame (Fig 12).
 
-    frame: the block at one time. broken_time: (bond_count,) [s], NaN while a bond holds. magnify:
-    of the displacement in the middle panel; the last one shows the most broken part, true to scale.
-    axis: towards the viewer.
+    The last panel shows the most broken part, true to scale.
+
+    Parameters
+    ----------
+    result : Result
+    frame : int
+        Number of the frame.
+    magnify : float
+        Factor of the displacement in the middle panel.
+    axis : sequence of 3 floats
+        Towards the viewer.
+    path : str or path, optional
     """
-    view = View(axis)
-    broken_time = np.where(broken_time <= frame.time_s, broken_time, np.nan)
+    now, magnify = result.frame(frame), positive("magnify", magnify)
+    view, model = View(unit_vector("axis", axis).tolist()), result.model
+    broken_time = np.where(result.broken_time <= now.time_s, result.broken_time, np.nan)
     with picture(path, 1, 3, size=(9.2, 3.6)) as (figure, panels):
         drawn = draw_breaks(panels[0], view, model, broken_time)
         panels[0].set_title(f"{np.sum(~np.isnan(broken_time))} broken faces, block at rest")
         for axes, factor in ((panels[1], magnify), (panels[2], 1.0)):
-            lines = _deformed(axes, view, model, displaced(model, frame, factor), broken_time)
+            lines = _deformed(axes, view, model, displaced(model, now, factor), broken_time)
             for collection in (drawn, lines):
-                collection.set_clim(0.0, 1e3 * frame.time_s or 1.0)
+                collection.set_clim(0.0, 1e3 * now.time_s or 1.0)
         scale = "true scale" if magnify == 1.0 else f"displacement × {magnify:g}"
         marks = [area_key("outer faces", fc=STONE, ec=JOINT)]
         marks.append(area_key("crack faces, seen where cracks open", fc=_INSIDE))
         figure.legend(handles=marks, loc="outside lower left", ncols=2)
-        panels[1].set_title(f"t = {1e3 * frame.time_s:.3g} ms, {scale}")
-        panels[2].set_title(f"t = {1e3 * frame.time_s:.3g} ms, close up, true scale")
+        panels[1].set_title(f"t = {1e3 * now.time_s:.3g} ms, {scale}")
+        panels[2].set_title(f"t = {1e3 * now.time_s:.3g} ms, close up, true scale")
         for axes in panels:
             frame_block(axes, view, model)
             axes.set(xlabel=view.labels()[0], ylabel=view.labels()[1])
-        _close_up(panels[2], view, model, frame, broken_time)
+        _close_up(panels[2], view, model, broken_time)
         figure.colorbar(drawn, ax=panels, label="time of breaking [ms]", shrink=0.8, aspect=25)
     return figure
 
@@ -97,7 +107,7 @@ def _deformed(axes, view, model, corners, broken_time):
     return draw_lines(axes, segments, 1e3 * time_s[order], linewidth=1.1)
 
 
-def _close_up(axes, view, model, frame, broken_time):
+def _close_up(axes, view, model, broken_time):
     """Limits around the first half of the breaks, where the block is crushed."""
     broken = np.flatnonzero(~np.isnan(broken_time))
     if len(broken) == 0:
@@ -134,20 +144,14 @@ def _panels(path, view, model, columns, extra, names) -> Iterator[Any]:
 
 
 def plot_steps(
-    path: FileName,
-    model: Model,
-    frames: Sequence[Frame],
-    dt0: float,
-    broken_time: np.ndarray,
-    axis: Sequence[float] = ALONG_Z,
-) -> None:
-    """Step of every body at several times (Konno et al., Fig 13).
+    result: Any, *, axis: Sequence[float] = ALONG_Z, path: Optional[FileName] = None
+) -> Figure:
+    """Draw the step of every body at several times (Konno et al., Fig 13).
 
-    frames: of more than six, six are drawn, evenly up to the last. dt0: step of level 0 [s].
-    broken_time: (bond_count,) [s], NaN while a bond holds; lets one see into open cracks. axis:
-    towards the viewer.
+    Of more than six frames, six are drawn, evenly up to the last.
     """
-    view = View(axis)
+    view, model = View(axis), result.model
+    frames = result.frames[1:] or result.frames
     if len(frames) > 6:
         picked = np.linspace(0, len(frames), 7).round().astype(int)[1:] - 1
         frames = [frames[k] for k in picked]
@@ -161,27 +165,21 @@ def plot_steps(
     with _panels(path, view, model, columns, (0.1, 1.2, 0.6), names) as (figure, panels):
         figure.get_layout_engine().set(h_pad=0.08)
         for axes, frame in zip(panels.flat, frames):
-            seen = broken_time <= frame.time_s
+            seen = result.broken_time <= frame.time_s
             drawn = draw_bodies(axes, model, frame, frame.level, broken=seen, **look)
         bar = figure.colorbar(drawn, ax=panels, ticks=range(top + 1), pad=0.02, aspect=30)
-        bar.ax.set_yticklabels(level_names(dt0, top + 1))
+        bar.ax.set_yticklabels(level_names(result.method.dt0, top + 1))
         bar.ax.tick_params(length=0)
         bar.ax.invert_yaxis()
         bar.set_label("step of a body")
+    return figure
 
 
 def plot_acting(
-    path: FileName,
-    model: Model,
-    acting_since: Mapping[str, np.ndarray],
-    until: float,
-    axis: Sequence[float] = ALONG_Z,
-) -> None:
-    """Bodies of the block at rest, coloured by the time from which an effect acts; a panel each.
-
-    acting_since: times [s] by name, (body_count,), NaN where an effect never acts
-    (``Result.acting_since``). until: end of the run [s]. axis: towards the viewer.
-    """
+    result: RunTables, *, axis: Sequence[float] = ALONG_Z, path: Optional[FileName] = None
+) -> Figure:
+    """Draw the bodies at rest, coloured by the time from which an effect acts; a panel each."""
+    model, acting_since, until = result.model, result.acting_since, result.frames[-1].time_s
     view, names = View(axis), [name for name in TITLES if name in acting_since]
     extent = np.ptp(view.project(model.mesh.points), axis=0)
     columns = min(3, len(names)) if extent[1] > 0.3 * extent[0] else 1
@@ -199,3 +197,4 @@ def plot_acting(
         figure.colorbar(drawn, ax=panels, label="acts from [ms]", pad=0.02, aspect=30)
         never = area_key("never", fc=STONE, ec=_EDGE)
         figure.legend(handles=[never], loc="outside lower left")
+    return figure

@@ -11,6 +11,7 @@ from matplotlib.colors import BoundaryNorm
 from taichi_dem.kit.plot_style import STYLE, filming, write_gif
 from taichi_dem.kit.validation import FileName
 from taichi_dem.output.record import Frame
+from taichi_dem.output.run_tables import RunTables
 from taichi_dem.plot.bodies import (
     ALONG_Z,
     displaced,
@@ -20,27 +21,25 @@ from taichi_dem.plot.bodies import (
     shades,
 )
 from taichi_dem.plot.view import View, traces
-from taichi_dem.state.model import Model
 
 #: Half decades of speed that are told apart; what is slower has one colour.
 _STEPS = 7
 
 
-def save_animation(
+def plot_film(
+    result: RunTables,
     path: FileName,
-    model: Model,
-    frames: Sequence[Frame],
-    broken_time: np.ndarray,
+    *,
     magnify: float = 5.0,
     axis: Sequence[float] = ALONG_Z,
 ) -> None:
     """Write the deforming block, coloured by speed, as a GIF below a megabyte.
 
-    frames: at least one. broken_time: (bond_count,) [s], NaN while a bond holds; its cracks are
-    drawn and open. magnify: of the displacement. One palette for all frames, no dithering and
-    few colours keep 40 frames small.
+    Needs a frame. magnify: of the displacement. axis: towards the viewer. One palette for all
+    frames, no dithering and few colours keep 40 frames small.
     """
-    view = View(axis)
+    view, model, frames = View(axis), result.model, result.frames
+    broken_time = result.broken_time
     edges = speed_edges(frames)
     norm = BoundaryNorm(edges, len(edges), extend="min")
     look = {"cmap": shades("magma_r", 0.04, 0.9, len(edges)), "norm": norm, "linewidth": 0}

@@ -1,7 +1,6 @@
 """Picture of a mesh before a run: its outer faces, coloured by group, seen from two sides."""
 
 from collections.abc import Mapping, Sequence
-from typing import Optional
 
 import numpy as np
 from matplotlib.collections import PolyCollection
@@ -30,7 +29,7 @@ _TRIAD, _ARROW = (-30.0, 24.0), 18.0
 _MOST = 24
 
 
-def picture_of_groups(mesh: Mesh, acting: Optional[Mapping[str, str]] = None) -> bytes:
+def picture_of_groups(mesh: Mesh, acting: Mapping[str, Sequence[str]]) -> bytes:
     """The outer faces of a mesh as PNG, from the front and from behind, coloured by group.
 
     A face in several groups has the colour of the smallest. Without groups of faces, colours are
@@ -39,8 +38,8 @@ def picture_of_groups(mesh: Mesh, acting: Optional[Mapping[str, str]] = None) ->
     Parameters
     ----------
     mesh : Mesh
-    acting : dict, optional
-        Group to what acts on it, in words for the legend.
+    acting : dict
+        Group to what acts on it, words for the legend.
     """
     faces = geometry.all_faces(mesh.tetrahedra)
     rows = geometry.outer_rows(faces)
@@ -68,7 +67,7 @@ def _keys(mesh, names, member, acting):
     if len(names) > _MOST:
         keys.append(area_key(f"and {len(names) - _MOST} more groups", facecolor="white"))
     if (member < 0).any():
-        keys.append(area_key(_label("no group", (member < 0).sum(), None), facecolor=_NONE))
+        keys.append(area_key(_label("no group", (member < 0).sum(), {}), facecolor=_NONE))
     return keys
 
 
@@ -134,5 +133,4 @@ def _draw_axes(axes, view):
 
 def _label(name, count, acting):
     """Name of a group with its number of faces, and what acts on it."""
-    words = (acting or {}).get(name, "")
-    return f"{name}: {counted(int(count), 'face')}{', ' if words else ''}{words}"
+    return ", ".join([f"{name}: {counted(int(count), 'face')}", *acting.get(name, ())])

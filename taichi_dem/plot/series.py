@@ -1,15 +1,15 @@
-"""Curves over time: pressure (Konno et al., Fig 11), motion, energy, levels."""
+"""Curves over time: energy, levels."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any, Optional
 
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
-from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, seconds
+from taichi_dem.kit.plot_style import PURPLE, RED, picture, seconds
 from taichi_dem.kit.validation import FileName
-from taichi_dem.output.record import outward_columns
+from taichi_dem.output.run_tables import RunTables
 from taichi_dem.plot.bodies import shades
 
 #: Energy terms from the bottom of the stack up, with colours and dashes: blue is held, orange lost
@@ -32,67 +32,14 @@ _GIVEN = {
 }
 
 
-_AT_HOLE = {
-    "monitor_displacement_mm": "body of the hole nearest to the free face",
-    "hole_radial_displacement_mm": "outward, mean over the hole's bodies",
-}
-
-
 def _span(axes, time):
     """Limit an axis to the times there are; a run that ended at its start has but one."""
     axes.set_xlim(0.0, time[-1] if time[-1] > 0.0 else 1.0)
 
 
-def plot_pressure(
-    path: FileName, time_s: np.ndarray, pressure_pa: np.ndarray, until_s: Optional[float] = None
-) -> None:
-    """Pressure of the blast gas over time (Konno et al., Fig 11); until_s: end of the run."""
-    time_ms, pressure = 1e3 * np.asarray(time_s), 1e-6 * np.asarray(pressure_pa)
-    peak = int(pressure.argmax())
-    place, words = (time_ms[peak], pressure[peak]), "{1:.4g} MPa at {0:.3g} ms"
-    with picture(path, size=(5.6, 3.2)) as (_, axes):
-        axes.plot(time_ms, pressure, color=RED)
-        axes.annotate(words.format(*place), place, (6, 6), textcoords="offset points")
-        if until_s is not None:
-            axes.axvline(1e3 * until_s, color="black", lw=0.8, ls=":", label="end of the run")
-            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
-        axes.set(xlabel="time [ms]", ylabel="pressure on the hole [MPa]")
-        axes.set(xlim=(0.0, time_ms[-1]), ylim=(0.0, 1.12 * pressure[peak]))
-
-
-def plot_history(path: Optional[FileName], history: Mapping[str, np.ndarray]) -> Figure:
-    """Displacement at the hole, broken faces and the smallest step over time."""
-    time = 1e3 * history["time_s"]
-    with picture(path, 3, 1, size=(6.2, 6.6), sharex=True) as (figure, (top, middle, bottom)):
-        lines = {f"{hole}, outward": moved for hole, moved in outward_columns(history).items()}
-        looks: Any = ({},) * len(lines)
-        if "hole_radial_displacement_mm" in history:
-            lines = {words: history[name] for name, words in _AT_HOLE.items()}
-            looks = {"color": RED}, {"color": BLUE, "linestyle": "--"}
-        for (label, moved), look in zip(lines.items(), looks):
-            top.plot(time, moved, label=label, **look)
-        if lines:
-            top.legend(loc="upper left")
-        top.set(ylabel="displacement [mm]", ylim=(0.0, None))
-        middle.step(time, history["broken_faces"], where="post", color=BLUE)
-        middle.set(ylabel="broken faces [1]", ylim=(0.0, None))
-        _smallest_step(bottom, time, 1e9 * history["smallest_step_s"])
-    return figure
-
-
-def _smallest_step(axes, time, step_ns):
-    """Steps that differ by powers of two on a logarithm; one step for all from zero on."""
-    axes.step(time, step_ns, where="post", color=GREEN)
-    axes.set(xlabel="time [ms]", ylabel="smallest step [ns]")
-    if np.ptp(step_ns) > 0.0:
-        axes.set_yscale("log")
-    else:
-        axes.set_ylim(0.0, 1.5 * step_ns[0])
-    _span(axes, time)
-
-
-def plot_energy(path: Optional[FileName], history: Mapping[str, np.ndarray]) -> Figure:
-    """Energy account: where the work went, every term by size, and what is unexplained."""
+def plot_energy(result: RunTables, *, path: Optional[FileName] = None) -> Figure:
+    """Draw the terms of the energy balance over time, and what is unexplained."""
+    history = result.history
     time = 1e3 * history["time_s"]
     present = {key: look for key, look in ENERGY_TERMS.items() if key in history}
     terms = {key: look for key, look in present.items() if np.abs(history[key]).max() > 0.0}

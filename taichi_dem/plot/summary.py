@@ -1,11 +1,11 @@
 """One picture of a run for a notebook: the block, and energy and events over time."""
 
-import math
 from typing import Any
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from taichi_dem.kit.display import scale
 from taichi_dem.kit.plot_style import BLACK, BLUE, png_of, styled
 from taichi_dem.output.record import outward_columns
 from taichi_dem.output.run_tables import RunTables
@@ -17,12 +17,7 @@ from taichi_dem.plot.view import View
 _LONG = 2.2
 #: Elongation along z from which on a block is seen from the side and not along z.
 _DEEP = 2.0
-#: Share of the block's size that the largest displacement has in the picture.
-_VISIBLE = 0.08
-#: Displacements below this share of the block's size are round-off, and not magnified.
-_ROUND_OFF = 1e-12
 _BROKEN = "broken bonds"
-_PREFIXES = ("p", "n", "µ", "m", "", "k", "M", "G", "T")
 #: Energies by what they are: terms of the account that add up to them, and look; the colours are
 #: near those of ``series.plot_energy``.
 _ENERGIES: dict[str, Any] = {
@@ -90,16 +85,12 @@ def _draw_block(axes, view, result):
         axes.set_title("no broken bonds, block undeformed")
         speeds = factor * np.ma.masked_invalid(result.peak_speed)
         return draw_bodies(axes, model, None, speeds, **look), f"largest speed [{unit}]"
-    magnify = 1.0
-    if _ROUND_OFF < moved.max() / extent < _VISIBLE:
-        magnify = _round_down(_VISIBLE * extent / moved.max())
     factor, unit = scale(moved.max(), "m")
-    look.update(magnify=magnify, clim=(0.0, factor * moved.max() or 1.0))
+    look["clim"] = 0.0, factor * moved.max() or 1.0
     drawn = draw_bodies(axes, model, frames[-1], factor * moved, **look)
     axes.autoscale()
-    words = f", displacement × {magnify:,.0f}" if magnify > 1.0 else ""
     time, time_unit = scale(frames[-1].time_s, "s")
-    axes.set_title(f"t = {time * frames[-1].time_s:.3g} {time_unit}{words}")
+    axes.set_title(f"t = {time * frames[-1].time_s:.3g} {time_unit}")
     return drawn, f"displacement [{unit}]"
 
 
@@ -152,16 +143,3 @@ def _largest(values):
     """Largest finite size of values, 0 where there is none."""
     values = np.abs(np.asarray(values, dtype=float))
     return float(values[np.isfinite(values)].max(initial=0.0))
-
-
-def scale(largest: float, unit: str) -> Any:
-    """Factor and name of the unit in which a value has one to three digits before the point."""
-    power = math.floor(math.log10(largest) / 3.0 + 1e-9) if largest > 0.0 else 0
-    power = min(max(power, -4), len(_PREFIXES) - 5)
-    return 1e3**-power, f"{_PREFIXES[power + 4]}{unit}"
-
-
-def _round_down(factor):
-    """The largest of 1, 2, 5, 10, 20, ... that is no larger than a factor."""
-    decade = 10.0 ** math.floor(math.log10(factor) + 1e-9)
-    return max(step for step in (1.0, 2.0, 5.0) if step * decade <= factor * (1.0 + 1e-9)) * decade

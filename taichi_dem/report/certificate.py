@@ -76,20 +76,17 @@ class Certificate:
 
     @property
     def failure(self) -> str:
-        """Why the certificate does not hold, in words; ``""`` where it holds."""
+        """Why the certificate does not hold, and what settles it; ``""`` where it holds."""
         missed = [audit.failure for audit in self.audits if audit.misses]
         if not self.impulse <= self.sleep:
             missed.append(
                 f"sleep left out {self.impulse:.2g} of a part's impulse, {self.sleep:g} asked"
             )
-        return ", and ".join([*missed, *(one.what for one in self.missing)])
-
-    @property
-    def remedy(self) -> str:
-        """What settles what it leaves open, in words."""
-        if not self.missing:
-            return "run the scene with effects='all'"
-        return f"list {', '.join(one.effect for one in self.missing)}"
+        missed += [one.what for one in self.missing]
+        remedy = "run the scene with effects='all'"
+        if self.missing:
+            remedy = f"list {', '.join(one.effect for one in self.missing)}"
+        return f"{', and '.join(missed)}: {remedy}" if missed else ""
 
     def __repr__(self):
         return in_brief(self, *self._acted(), "" if self.holds else "does not hold")
@@ -133,7 +130,7 @@ class Certificate:
             *(f"audit: {audit}" for audit in self.audits if audit.skipped),
         ]
         if not self.holds:
-            lines.append(f"this certificate does not hold, as {self.failure}: {self.remedy}")
+            lines.append(f"this certificate does not hold, as {self.failure}")
         return lines
 
     def _acted(self):
@@ -149,8 +146,8 @@ def certificate_of(simulation: Any, report: Any) -> Certificate:
     simulation: the ``Simulation``, started. report: its ``Report`` without a certificate.
     """
     run, now = simulation.parts, simulation.time_s
-    demand, schedule = on_demand(run), run.schedule
-    awake = np.nan_to_num(demand.since["awake"], nan=now)
+    schedule = run.schedule
+    awake = np.nan_to_num(on_demand(run)[0]["awake"], nan=now)
     links = np.stack([run.model.topology.master, run.model.topology.slave])
     # Evaluations of bonds that sleep has spared, at the largest step.
     until = awake[links].max(axis=0, initial=0.0)

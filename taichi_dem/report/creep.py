@@ -10,7 +10,7 @@ that slide on as fast after many times as much are pushed by a load.
 import numpy as np
 
 from taichi_dem.kit.allocation import values
-from taichi_dem.report.run import Kept, Run
+from taichi_dem.report.readings import Kept, Run
 
 #: Share of its limit below which friction would hold; a contact near it may slide next.
 _HELD = 0.98
@@ -42,7 +42,8 @@ class Creep(Kept):
     def sample(self, time_s: float) -> np.ndarray:
         """Bodies that creep at a recording time [s]."""
         count = self.run.model.body_count
-        bodies, (force, bound, power) = self.run.readings.rubbing()
+        force, bound, power = self.run.readings.contacts_now()[:, 14:17].T
+        bodies = self.run.contacts.store.near_bodies()
         slides = (force > 0.0) & (force < _HELD * bound)
         bodies, force, bound = bodies[slides], force[slides], bound[slides]
         place = values(self.run.state.position, slice(count))
@@ -74,7 +75,8 @@ class Creep(Kept):
 
     def _is_pushed(self, bodies, table):
         """Whether the drag between two pieces would have stopped them many times over."""
-        model, piece = self.run.model, self.run.pieces()
+        model = self.run.model
+        piece = model.pieces(self.run.state.broken())
         mass = np.bincount(piece, model.body_mass, minlength=model.body_count)
         ends = np.sort(piece[bodies], axis=1)
         _, group = np.unique(ends, axis=0, return_inverse=True)

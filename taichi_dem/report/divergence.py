@@ -9,7 +9,7 @@ from taichi_dem.contact.contacts import FARTHEST
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.report.energy_balance import EnergyBalance, unexplained_share
-from taichi_dem.report.run import Run
+from taichi_dem.report.readings import Run
 from taichi_dem.report.shared_volume import SharedVolume
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
 from taichi_dem.stability.step_report import bond_steps
@@ -156,11 +156,11 @@ class DivergenceCheck:
 
     def _beside(self, body):
         """Bodies that a body is tied to or near."""
-        top, contacts, broken = self.run.model.topology, self.run.contacts, self.run.state.broken()
-        own = [b for b in top.body_bond[body] if b >= 0 and not broken[b]]
+        model, contacts = self.run.model, self.run.contacts
+        holds = ~np.append(self.run.state.broken(), True)[model.topology.body_bond[body]]
         pairs = contacts.store.near_table()[0] if contacts is not None else np.zeros((0, 2), int)
         near = pairs[(pairs == body).any(axis=1)].sum(axis=1) - body
-        return [*(top.master[own] + top.slave[own] - body).tolist(), *near.tolist()]
+        return [*model.neighbours[body][holds].tolist(), *near.tolist()]
 
     def _shorter_step(self, body, to_blame=False):
         """A shorter step as a remedy, or None where the step is not to blame.

@@ -1,16 +1,15 @@
 """Effects of a run: what acted, since when, and with what share of the energy."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
-from taichi_dem.report.energy_balance import EnergyBalance, EnergyTables
+from taichi_dem.report.energy_balance import EnergyBalance
 from taichi_dem.report.missing_effects import bond_rounding
-from taichi_dem.report.run import Run
+from taichi_dem.report.readings import Run
 from taichi_dem.state.activity import LATER
 from taichi_dem.state.timeline import NEVER
 
@@ -31,24 +30,16 @@ _WITHOUT_WORK = ", and holds without doing work"
 _OWN = "the account need not show what an effect of your own does"
 
 
-class OnDemand(NamedTuple):
-    """Where and when laws acted on demand; empty and zero where all are evaluated.
+def on_demand(run: Run) -> tuple[dict[str, np.ndarray], int, int]:
+    """Where and when laws acted on demand so far; empty and zero where all are evaluated.
 
-    since: by name, time from which an effect acted on each body [s], NaN where never; awake: since
-    it was evaluated. Laws of bonds: on one of its bonds, as soon as it came near a limit.
-    evaluated, skipped: evaluations of the law of bonds, a unit each.
+    By name, times from which an effect acted on each body [s], NaN where never; "awake": since it
+    was evaluated. Laws of bonds: on one of its bonds, as soon as it came near a limit. Also how
+    often the law of bonds was evaluated, a unit each, and how often that was skipped.
     """
-
-    since: dict[str, np.ndarray]
-    evaluated: int
-    skipped: int
-
-
-def on_demand(run: Run) -> OnDemand:
-    """What acted on demand in a run so far."""
     activity, schedule, model = run.state.activity, run.schedule, run.model
     if activity is None:
-        return OnDemand({}, 0, 0)
+        return {}, 0, 0
     n, bonds, seconds = model.body_count, model.bond_count, schedule.tick_seconds
     begun = _times(values(activity.since, slice(bonds)), NEVER, seconds)
     own = np.append(begun, [[np.nan, np.nan]], axis=0)[model.topology.body_bond]
@@ -59,7 +50,7 @@ def on_demand(run: Run) -> OnDemand:
     times = dict(zip((*laws, "contact", "friction"), (*first.T[: len(laws)], *touched.T)))
     evaluated = int(values(activity.evaluated, slice(bonds)).sum())
     units = 3 * (int(values(schedule.evaluations)[5]) + bonds)
-    return OnDemand({**times, "awake": awake}, evaluated, units - evaluated)
+    return {**times, "awake": awake}, evaluated, units - evaluated
 
 
 def _times(ticks, never, tick_seconds):
@@ -67,32 +58,32 @@ def _times(ticks, never, tick_seconds):
 
 
 def effect_uses(
-    run: Run, balance: EnergyBalance, tables: EnergyTables, account: Mapping[str, float]
+    run: Run, balance: EnergyBalance, account: Mapping[str, float]
 ) -> tuple[EffectUse, ...]:
     """An EffectUse for every listed effect, in the model's order.
 
     Events are counted where effects act: one is idle only if not a bit of the run depends on it.
-    tables, account: from the methods of that name of the energy balance. Effects are judged by
-    role, so that user-defined ones are judged like those of the package; they are never called idle
-    where only their own code could tell.
+    account: of the energy balance. Effects are judged by role, so that user-defined ones are judged
+    like those of the package; they are never called idle where only their own code could tell.
     """
-    uses = _Uses(run, balance, tables[1][:, 1], account)
+    uses = _Uses(run, balance, account)
     return tuple(uses.of(effect) for effect in run.model.effects if effect.name)
 
 
 class _Uses:
-    """Makes the EffectUse of an effect; heat: of the dashpots of each bond [J]."""
+    """Makes the EffectUse of an effect."""
 
-    def __init__(self, run, balance, heat, account):
+    def __init__(self, run, balance, account):
         self.run, self.account, self.works = run, account, balance.works()
         self.given = abs(account["load_work"]) + abs(account["support_work"]) + balance.start_energy
         self.bits = values(run.state.active_effects, slice(run.model.body_count))
-        self.demand, marks = on_demand(run), run.readings.active_bonds()
+        self.since, self.evaluated, self.skipped = on_demand(run)
+        marks = run.readings.active_bonds()
         self.marks = {
             "bond": marks.any(axis=1),
             "tension": marks[:, 0],
             "shear": marks[:, 1],
-            "dashpot": heat > bond_rounding(run),
+            "dashpot": run.readings.bonds()[:, 1] > bond_rounding(run),
             "contact": self.bits & np.int64(CONTACT),
             "friction": self.bits & np.int64(RUBBED),
         }
@@ -142,13 +133,13 @@ class _Uses:
         kept = f"{article} {effect.role} is part of the question"
         drives = *model.loads, *model.supports, *model.ground
         place = drives.index(effect)
-        marks = self.bits & np.int64(1 << place)
-        if effect.role == "load":
-            return "bodies loaded", marks, np.abs(self.works[:, place]).sum(), kept
-        if effect.role == "ground":
-            column = place + 1 - len(model.supports)
-            return "bodies braked", marks, np.abs(self.works[:, column]).sum(), kept
-        done = np.where(marks != 0, np.abs(self.works[:, len(model.loads)]), 0.0).sum()
+        marks, loads = self.bits & np.int64(1 << place), len(model.loads)
+        accounts = {"load": place, "support": loads, "ground": place + 1 - len(model.supports)}
+        works = np.abs(self.works[:, accounts[effect.role]])
+        if effect.role != "support":
+            what = "bodies loaded" if effect.role == "load" else "bodies braked"
+            return what, marks, works.sum(), kept
+        done = np.where(marks != 0, works, 0.0).sum()
         rounds = done <= int(values(self.run.schedule.evaluations)[0]) * _EPSILON * self.given
         is_driven = not rounds and np.any(effect.travel())
         kept += _WITHOUT_WORK if rounds else ""
@@ -157,10 +148,10 @@ class _Uses:
     def _demanded(self, role, events):
         """When and where an effect that acted on demand began, and its evaluations."""
         found, name = {}, _LAWS[role][2] if role in _LAWS else ""
-        times = self.demand.since.get(name, np.zeros(0))
+        times = self.since.get(name, np.zeros(0))
         if events and np.isfinite(times).any():
             first = int(np.nanargmin(times))
             found = {"since_s": float(times[first]), "where": f"body {first}"}
         if role in ("bond", "tension", "shear"):
-            found.update(evaluations=self.demand.evaluated, skipped=self.demand.skipped)
+            found.update(evaluations=self.evaluated, skipped=self.skipped)
         return found

@@ -6,14 +6,11 @@ work of loads and supports + energy at the start = kinetic + bond strain + spher
 """
 
 from collections.abc import Callable, Mapping
-from typing import Optional
 
 import numpy as np
 
-from taichi_dem.report.run import Kept, Run
+from taichi_dem.report.readings import Kept, Run
 
-#: Tables of bodies, bonds and pairs that the terms are summed from.
-EnergyTables = tuple[np.ndarray, np.ndarray, np.ndarray]
 #: Terms of the account in the order of tables and files, all in J.
 TERMS = tuple(
     "kinetic bond_strain sphere_strain bond_dashpot softening release slip sphere_dashpot friction "
@@ -26,9 +23,9 @@ _COLUMNS = (
     "sphere_strain sphere_dashpot friction injected".split(),
 )
 #: Terms that the bodies hold; all others are booked as they are given or taken.
-_HELD = ("kinetic", "bond_strain", "sphere_strain")
+HELD = ("kinetic", "bond_strain", "sphere_strain")
 #: Terms of the energy put in and injected; all others are what it goes into.
-_GIVEN = ("load_work", "support_work", "injected")
+GIVEN = ("load_work", "support_work", "injected")
 #: Share of the energy beyond which an account counts as open.
 OPEN = 0.5
 #: Share of the energy put in from which on injected energy is told.
@@ -52,7 +49,7 @@ def injected_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
     Put in: work of loads and supports, and the energy at the start, which the residual leaves.
     round_off: energy [J] up to which all may be rounding.
     """
-    start = sum(-value if name in _GIVEN else value for name, value in account.items())
+    start = sum(-value if name in GIVEN else value for name, value in account.items())
     put_in = abs(account["load_work"]) + abs(account["support_work"]) + abs(start)
     if account["injected"] < NOTED * put_in or account["injected"] <= round_off:
         return ""
@@ -87,29 +84,26 @@ class EnergyBalance(Kept):
         self.run, self.start_energy, self.start = run, 0.0, np.zeros(len(TERMS))
         self.start_works = np.zeros(1)
         first = self.account()
-        self.start_energy = sum(first[name] for name in _HELD)
+        self.start_energy = sum(first[name] for name in HELD)
         # Half a step of what acts from the start is booked at time zero.
-        held = *_HELD, "residual"
+        held = *HELD, "residual"
         self.start = np.array([0.0 if name in held else first[name] for name in TERMS])
         self.start_works = self.works()
-        self.start_momentum = self.momentum()
+        self.start_momentum = _own(run.readings.momentum())
 
-    def account(self, tables: Optional[EnergyTables] = None) -> dict[str, float]:
-        """All terms in J by name; residual is the unexplained remainder.
-
-        tables: those of ``tables``, if they have been read already.
-        """
+    def account(self) -> dict[str, float]:
+        """All terms in J by name; residual is the unexplained remainder."""
         terms = {name: 0.0 for name in TERMS if name != "residual"}
-        for names, table in zip(_COLUMNS, self.tables() if tables is None else tables):
+        for names, table in zip(_COLUMNS, self.tables()):
             for name, column in zip(names, table.T):
                 terms[name] += column.sum()
         for name, start in zip(terms, self.start):
             terms[name] -= start
         given = terms["load_work"] + terms["support_work"] + terms["injected"] + self.start_energy
-        terms["residual"] = given - sum(terms[name] for name in terms if name not in _GIVEN)
+        terms["residual"] = given - sum(terms[name] for name in terms if name not in GIVEN)
         return {name: float(value) for name, value in terms.items()}
 
-    def tables(self) -> EnergyTables:
+    def tables(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Tables that the terms are summed from [J].
 
         A row a body: kinetic, loads, supports, sphere dashpots, friction, injected, ground. A row a
@@ -130,14 +124,6 @@ class EnergyBalance(Kept):
     def load_work(self, index: int) -> float:
         """Work of one load [J], by its place in the scene's list of loads."""
         return float(self.works()[:, index].sum())
-
-    def ground_heats(self, index: int) -> np.ndarray:
-        """Heat [J] in the dashpots of one ground at every body, (body_count,), by its place."""
-        return 0.0 - self.works()[:, len(self.run.model.loads) + 1 + index]
-
-    def momentum(self) -> np.ndarray:
-        """Linear [N s] and angular momentum about the origin [N m s], less external impulses."""
-        return _own(self.run.readings.momentum())
 
     def momentum_errors(self) -> tuple[float, float]:
         """Errors of linear and angular momentum, relative to the momentum exchanged.
@@ -164,7 +150,7 @@ class EnergyBalance(Kept):
 
 
 def _own(rows):
-    """Linear and angular momentum of all bodies less what loads and supports gave, (6,)."""
+    """Linear [N s] and angular momentum [N m s] less what loads and supports gave, (6,)."""
     return rows[:, :6].sum(axis=0) - rows[:, 6:12].sum(axis=0)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from taichi_dem.kit.validation import instance, positive
 from taichi_dem.mesh.parts import may_meet, part_boxes, parts_of, parts_under
 from taichi_dem.scene import Scene
-from taichi_dem.state.model import Model
+from taichi_dem.state.model import Model, centres, sums
 
 NEGLIGIBLE, NEEDED, UNCLEAR = "negligible", "needed", "unclear"
 #: Groups below which an effect is negligible, and from which on it is needed.
@@ -163,9 +163,9 @@ class PartScales:
     def _extents(self):
         """Longest and shortest side [m] of the box with the second moments of each part."""
         mass, inertia = self.model.body_mass, self.model.body_inertia
-        arm = _arms(self.model, self.part)
+        arm = self.model.centre - centres(self.part, mass, self.model.centre)[self.part]
         own = 0.5 * np.trace(inertia, axis1=1, axis2=2)[:, None, None] * np.eye(3) - inertia
-        second = _sums(self.part, own + mass[:, None, None] * arm[:, :, None] * arm[:, None])
+        second = sums(self.part, own + mass[:, None, None] * arm[:, :, None] * arm[:, None])
         squares = np.linalg.eigvalsh(second / self.mass[:, None, None])
         sides = np.sqrt(12.0 * np.maximum(squares, 0.0))
         return sides[:, 2], sides[:, 0]
@@ -179,18 +179,6 @@ class PartScales:
             k, p = np.argwhere(np.isnan(values))[0]
         part = f"part of body {self.first[p]}: " if self.count > 1 else ""
         return Estimate(effect, float(values[k, p]), part + groups[k][1])
-
-
-def _sums(group, rows):
-    """Sums over groups of bodies of an array of each, (count, ...)."""
-    columns = [np.bincount(group, column) for column in rows.reshape(len(rows), -1).T]
-    return np.stack(columns, axis=1).reshape(-1, *rows.shape[1:])
-
-
-def _arms(model, group):
-    """Places of the bodies from the centre of mass of their group [m], (n, 3)."""
-    mass = model.body_mass[:, None]
-    return model.centre - (_sums(group, mass * model.centre) / _sums(group, mass))[group]
 
 
 def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
@@ -270,10 +258,11 @@ def _speeds(model, velocity, group):
     found = np.zeros((3, int(group.max()) + 1))
     if velocity is None:
         return found
-    mass, arm = model.body_mass[:, None], _arms(model, group)
-    mean = (_sums(group, mass * velocity) / _sums(group, mass))[group]
-    momentum = _sums(group, mass * np.cross(arm, velocity))
-    second = _sums(group, mass[:, :, None] * arm[:, :, None] * arm[:, None])
+    mass = model.body_mass[:, None]
+    mean = centres(group, model.body_mass, velocity)[group]
+    arm = model.centre - centres(group, model.body_mass, model.centre)[group]
+    momentum = sums(group, mass * np.cross(arm, velocity))
+    second = sums(group, mass[:, :, None] * arm[:, :, None] * arm[:, None])
     inertia = np.eye(3) * np.trace(second, axis1=1, axis2=2)[:, None, None] - second
     rate = np.einsum("pij,pj->pi", np.linalg.pinv(inertia, hermitian=True), momentum)
     rim = np.cross(rate[group], arm)

@@ -9,7 +9,7 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.mesh.tetrahedra import penetration
 from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.report.creep import Creep
-from taichi_dem.report.run import Kept, Run
+from taichi_dem.report.readings import Kept, Run
 from taichi_dem.report.shared_volume import SharedVolume
 from taichi_dem.state.model import Model
 from taichi_dem.state.timeline import NEVER
@@ -76,36 +76,27 @@ def unserved(model: Model) -> dict[str, MissingEffect]:
     """By name, every need that no effect of a model serves, nothing found yet."""
     roles = {effect.role for effect in model.effects if effect.name}
     material, touch = model.materials, "contact" in roles
-    rubs = material.friction > 0.0
+    rubs, damps = material.friction > 0.0, material.has_bond_damping
     # Friction is a dashpot's force up to a limit: without a dashpot springs alone hold.
     friction = "Friction" if material.friction_has_dashpots else "StickingFriction"
     drags = any(e.role == "friction" and e.name and not e.remembers for e in model.effects)
+    stretched = "bonds are stretched past their tensile strength"
+    sheared = "bonds are sheared past their Coulomb limit"
+    strained = "the material has damping and bonds are strained"
     overlap = "bodies overlap where a bond has been released"
     press = "the material has friction and bodies press on each other"
-    strained = "the material has damping and bonds are strained"
-    needs = {
-        "tension": ("Softening", "bonds are stretched past their tensile strength", "bond"),
-        "shear": ("ShearSlip", "bonds are sheared past their Coulomb limit", "bond"),
-        "dashpot": ("BondDamping", strained, "bond"),
-        "contact": ("SphereContact", overlap, "bond"),
-        "friction": (friction, press, "body"),
+    within = "pairs of bodies are within each other"
+    needs: dict[str, tuple[Any, ...]] = {
+        "tension": (roles.isdisjoint(("bond", "tension")), "Softening", stretched),
+        "shear": (roles.isdisjoint(("bond", "shear")), "ShearSlip", sheared),
+        "dashpot": (damps and "dashpot" not in roles, "BondDamping", strained),
+        "contact": (not touch, "SphereContact", overlap),
+        "friction": (touch and rubs and "friction" not in roles, friction, press, "body"),
         # The words tell the figures, once they are known.
-        "creep": ("StickingFriction", "", "body"),
-        "bodies": ("SphereContact", "pairs of bodies are within each other", "body"),
+        "creep": (rubs and drags, "StickingFriction", "", "body"),
+        "bodies": (not touch, "SphereContact", within, "body"),
     }
-    served = {
-        "tension": not roles.isdisjoint(("bond", "tension")),
-        "shear": not roles.isdisjoint(("bond", "shear")),
-        "dashpot": "dashpot" in roles or not material.has_bond_damping,
-        "friction": "friction" in roles or not (touch and rubs),
-        "creep": not (rubs and drags),
-        "bodies": touch,
-    }
-    return {
-        name: MissingEffect(*need)
-        for name, need in needs.items()
-        if not served.get(name, name in roles)
-    }
+    return {name: MissingEffect(*need) for name, (missed, *need) in needs.items() if missed}
 
 
 class MissingEffects(Kept):
@@ -163,7 +154,8 @@ class MissingEffects(Kept):
         """First bodies of pairs of two pieces within each other, those that share most first."""
         pairs = volume.pairs[np.argsort(-volume.share, kind="stable")]
         if len(pairs):
-            pairs = pairs[np.diff(self.run.pieces()[pairs], axis=1)[:, 0] != 0]
+            piece = self.run.model.pieces(self.run.state.broken())
+            pairs = pairs[np.diff(piece[pairs], axis=1)[:, 0] != 0]
         return pairs[:, 0]
 
     def _touching(self):

@@ -1,20 +1,23 @@
-"""Readings of a run: tables of energy, momentum and shares that kernels fill for the host."""
+"""What reports read of a run, by tables that kernels fill, and what they keep of it."""
 
 import contextlib
-from collections.abc import Iterator
-from typing import Any, Optional
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, NamedTuple, Optional
 
 import numpy as np
 import taichi as ti
 
+from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.products import norm
 from taichi_dem.kit.types import vec3
 from taichi_dem.state.activity import PARTS
+from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.multirate.half_step import HalfStep
+from taichi_dem.step.multirate.schedule import Schedule
 
 
 @ti.data_oriented
@@ -39,46 +42,39 @@ class Readings:
         finally:
             self._held = outer
 
-    def _once(self, name, read):
-        """Result of read(), which inside of ``held`` is called once under a name."""
-        if self._held is None:
-            return read()
-        if name not in self._held:
-            self._held[name] = read()
-        return self._held[name]
+    def _once(self, name, shape, fill):
+        """A table that a kernel fills, which inside of ``held`` is asked once under a name."""
+        held = {} if self._held is None else self._held
+        if name not in held:
+            held[name] = np.zeros(shape)
+            if shape[0]:
+                fill(held[name])
+        return held[name]
 
-    def rubbing(self) -> tuple[np.ndarray, np.ndarray]:
-        """Both bodies of every pair near each other, (pairs, 2), and of their contacts, (3, pairs).
-
-        Sums of friction, of its limit [N], and of its power [W].
-        """
-        _, table = self.pushes()
-        bodies = self.contacts.store.near_bodies() if len(table) else np.zeros((0, 2), np.int32)
-        return bodies, table[:, 2:5].T
-
-    def pushes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
-
-        Summed in the order of the pairs, so that no thread changes a bit. Also the heat of each
-        pair's dashpots and friction by which the booked one is behind [J], the sums of
-        ``rubbing``, and the pair's strain and booked heats [J], (pairs, 9).
-        """
-        return self._once("pushes", self._pushes)
+    def contacts_now(self) -> np.ndarray:
+        """All that ``_push`` finds of the contacts of every pair, (pairs, 21)."""
+        count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
+        return self._once("contacts", (count, 21), self._push)
 
     def _pushes(self):
-        pushed = np.zeros((int(values(self.tables.body_count)), 6))
-        count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
-        table = np.zeros((count, 21))
-        if count:
+        """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
+
+        Summed in the order of the pairs, so that no thread changes a bit.
+        """
+        pushed, table = np.zeros((int(values(self.tables.body_count)), 6)), self.contacts_now()
+        if len(table):
             bodies = self.contacts.store.near_bodies()
-            self._push(table)
             for side in range(2):
                 np.add.at(pushed, bodies[:, side], table[:, 6 * side : 6 * side + 6])
-        return pushed, table[:, 12:]
+        return pushed
 
     @ti.kernel
     def _push(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Impulse and moment of every pair's contacts on both bodies in half a step, and heats."""
+        """Impulse [N s] and moment [N m s] of every pair's contacts on both bodies in half a step.
+
+        Also the heat of its dashpots and friction by which the booked one is behind [J], sums of
+        friction, of its limit [N] and of its power [W], its strain and booked heats [J].
+        """
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
             found, half = self.advance.forces_now(p), self.half_step.pair_step(p)
@@ -106,16 +102,12 @@ class Readings:
 
     def step_back(self) -> None:
         """Set the velocities, which are given at time zero, half a step back."""
-        self._table(back=1)
+        pushed = self._pushes()
+        self._visit(pushed, 1, np.zeros((len(pushed), 16 + len(self.tables.drives))))
 
     def _present(self):
-        return self._once("table", self._table)
-
-    def _table(self, back=0):
-        pushed, _ = self.pushes()
-        table = np.zeros((len(pushed), 16 + len(self.tables.drives)))
-        self._visit(pushed, back, table)
-        return table
+        shape = int(values(self.tables.body_count)), 16 + len(self.tables.drives)
+        return self._once("bodies", shape, lambda table: self._visit(self._pushes(), 0, table))
 
     @ti.kernel
     def _visit(
@@ -164,12 +156,8 @@ class Readings:
         return self._bonds()[:, 8]
 
     def _bonds(self):
-        return self._once("bonds", self._bond_table)
-
-    def _bond_table(self):
-        table = np.zeros((int(values(self.tables.bond_count)), 9))
-        self._visit_bonds(table)
-        return table
+        shape = int(values(self.tables.bond_count)), 9
+        return self._once("bonds", shape, self._visit_bonds)
 
     @ti.kernel
     def _visit_bonds(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
@@ -204,8 +192,8 @@ class Readings:
 
     def pairs(self) -> np.ndarray:
         """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""
-        table = self.pushes()[1][:, 5:].copy()
-        table[:, 1:3] += self.pushes()[1][:, :2]
+        table = self.contacts_now()[:, 17:].copy()
+        table[:, 1:3] += self.contacts_now()[:, 12:14]
         return table
 
     def momentum(self) -> np.ndarray:
@@ -224,9 +212,10 @@ class Readings:
         """Bound of impulse [N s] and energy [J] that each bond has left out while it slept."""
         for b in range(self.tables.bond_count[None]):
             slots = self.tables.bond_slots[b]
-            found = self.advance.schedule.sleeping.left_out[b]
-            if not self.advance.schedule.sleeping.both_awake(slots[0] >> 2, slots[1] >> 2):
-                found = self.advance.schedule.woken.left_out(b, False)
+            schedule = self.advance.schedule
+            found = schedule.sleeping.left_out[b]
+            if not schedule.sleeping.both_awake(slots[0] >> 2, slots[1] >> 2):
+                found = schedule.sleeping.left_out_now(b, schedule.seconds(1), False)
             table[b, 0], table[b, 1] = found[0], found[1]
 
     @ti.kernel
@@ -258,3 +247,29 @@ class Readings:
                     rate = count * self.contacts.law.damping(self.tables.pair(i, j))
                     rate *= 1.0 / self.tables.mass[i] + 1.0 / self.tables.mass[j]
                     ti.atomic_max(taken[i], rate * self.advance.schedule.pair_step(i, j))
+
+
+class Run(NamedTuple):
+    """What a report reads of a simulation; contacts is None without contact."""
+
+    model: Model
+    state: State
+    schedule: Schedule
+    advance: Advance
+    readings: Readings
+    contacts: Optional[Contacts]
+
+
+class Kept:
+    """What is followed over a run: a checkpoint holds its attributes of the names ``kept``."""
+
+    kept: ClassVar[tuple[str, ...]] = ()
+
+    def saved(self) -> dict[str, np.ndarray]:
+        """Data for a checkpoint, arrays by name."""
+        return {name: np.array(getattr(self, name)) for name in self.kept}
+
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Restore the data that ``saved`` returned."""
+        for name in self.kept:
+            setattr(self, name, saved[name].copy()[()])

@@ -152,11 +152,6 @@ class Report:
         return self.uniform_evaluations / max(1, self.contact_evaluations)
 
     @property
-    def work_put_in(self) -> float:
-        """Work of loads and supports [J]."""
-        return self.energy_balance["load_work"] + self.energy_balance["support_work"]
-
-    @property
     def energy_residual_fraction(self) -> float:
         """Unexplained energy as a share of the work put in or of the energy held."""
         return abs(self.energy_balance["residual"]) / max(*self._given_and_held(), 1e-300)
@@ -174,11 +169,6 @@ class Report:
             return f"{abs(self.energy_balance['residual']):.2g} J; all energies are round-off"
         whole = "the energy held" if held > given else "it"
         return f"{100.0 * self.energy_residual_fraction:.3g} % of {whole}"
-
-    @property
-    def injected(self) -> str:
-        """Energy that breaking faces injected, in words, where it counts; else ``""``."""
-        return injected_words(self.energy_balance, self.round_off_J)
 
     def advice(self, tolerance: float = 0.0, shown: Optional[Mapping[str, float]] = None) -> Advice:
         """Advice on the effects, of which runs without some have shown a difference, by name.
@@ -215,8 +205,8 @@ class Report:
         derived = "contact_evaluations ideal_gain boundary_gain energy_residual_fraction needs"
         return {**figures, **{name: getattr(self, name) for name in derived.split()}}
 
-    def _rows(self):
-        """Names, and the lines of each; none for what there is nothing to say of."""
+    def rows(self) -> dict[str, str]:
+        """Lines by name; ``""`` for what there is nothing to say of."""
         varies = self.body_updates != self.body_count * self.substeps
         gain = f"{self.ideal_gain:.2f} ideal, {self.boundary_gain:.2f} with pairs at the finer step"
         swept = f"{self.sweeps:,}, {self.sweeps / max(1, self.substeps):.2f} a substep"
@@ -227,6 +217,7 @@ class Report:
         momentum = f"{self.linear_momentum_error:.1e} linear, {self.angular_momentum_error:.1e}"
         run = f"{self.run_seconds:.1f} s run ({self.run_cpu_seconds:.1f} s of CPU)"
         left_out = self.certificate.left_out_lines() if self.certificate else ()
+        work_J = self.energy_balance["load_work"] + self.energy_balance["support_work"]
         return {
             "method": f"{self.method}, {self.driver} driver",
             "effects": "\n".join(f"{use.effect}: {use}" for use in self.effect_activity) or "none",
@@ -240,9 +231,9 @@ class Report:
             "sweeps": f"{swept}, {unconverged}" if self.sweeps else "",
             "contact searches": f"{self.searches:,}",
             "interpenetration": str(self.interpenetration or "not looked for"),
-            "work put in": f"{self.work_put_in:.6g} J",
+            "work put in": f"{work_J:.6g} J",
             "energy residual": self.unexplained,
-            "injected": self.injected,
+            "injected": injected_words(self.energy_balance, self.round_off_J),
             "known of the error": self.known_error.replace("; ", "\n"),
             "certificate": "\n".join(left_out),
             "momentum error": f"{momentum} angular",
@@ -253,7 +244,7 @@ class Report:
         """A table of some twenty lines, then one line for every effect that was missed."""
         lines = [
             f"{'' if k else name:18s} {text}"
-            for name, texts in self._rows().items()
+            for name, texts in self.rows().items()
             for k, text in enumerate(texts.splitlines())
         ]
         return "\n".join([*lines, *(f"warning: {need}" for need in self.needs)])

@@ -6,7 +6,7 @@ import numpy as np
 
 from taichi_dem.kit.allocation import values
 from taichi_dem.report.missing_effects import MissingEffect, middle_of_bond
-from taichi_dem.report.run import Kept, Run
+from taichi_dem.report.readings import Kept, Run
 from taichi_dem.state.timeline import MAX_LEVEL
 
 #: Largest slip over the shortest edge at which a bond still represents its face. Of a triangle that

@@ -13,7 +13,7 @@ import taichi as ti
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.tetrahedra import points_of_parts
-from taichi_dem.report.run import Kept, Run
+from taichi_dem.report.readings import Kept, Run
 from taichi_dem.scene import remedy
 
 #: Share of the smaller body beyond which two bodies count as within each other.
@@ -132,12 +132,10 @@ class SharedVolume(Kept):
 
     def _compare(self, corners):
         """Find all pairs and their shares; corners (n, 4, 3) [m]."""
-        top = self.run.model.topology
         # Bond -1 stands for an outer face, which is as free as a broken one.
-        free = np.append(self.run.state.broken(), True)[top.body_bond]
+        free = np.append(self.run.state.broken(), True)[self.run.model.topology.body_bond]
         surface = np.flatnonzero(free.any(axis=1))
-        other = np.append(top.master + top.slave, 0)[top.body_bond]
-        tied = np.where(free, -1, other - np.arange(len(free))[:, None])
+        tied = np.where(free, -1, self.run.model.neighbours)
         order, last = _in_rows(corners[surface])
         body = surface[order].astype(np.int32)
         own = np.ascontiguousarray(corners[body])

@@ -41,7 +41,7 @@ class StabilityLimits:
     limit_level, limit_by: level of the longest stable step, and the criterion that sets it.
     displacement, turn, leap: levels for speed, spin and acceleration. listed, listed_count: bodies
     to look at; events: why, as bits. woken: how many were brought to the present between their
-    times. control: a StepControl, None for a method that only limits dashpots. rule: dt0 [s],
+    times. controlled: not by a method that only limits dashpots. rule: dt0 [s],
     safety and dashpot floor [s]. jump: levels between neighbours, where they are limited.
 
     Limited dashpots share 1.7 by need. With X = 2 dt rate for bonds (b) and contacts (c) of a body
@@ -71,8 +71,7 @@ class StabilityLimits:
 
     def __init__(self, tables: Tables, state: State, contacts: Optional[Contacts], method: Method):
         self.tables, self.state, self.contacts = tables, state, contacts
-        self.control, rule = method.control, method.control or StepControl()
-        self.controlled = self.control is not None
+        rule, self.controlled = method.control or StepControl(), method.control is not None
         self.has_contact = contacts is not None
         self.has_distance = method.distance is not None
         self.limited = method.dashpot == "limited"
@@ -87,16 +86,11 @@ class StabilityLimits:
         self.jump = ti.field(ti.i32, shape=())
         self.rule = ti.field(real, shape=3)
         n = tables.capacity.bodies
-        self.dashpot_table = ti.field(real, shape=(n, 16))
-        self.spring_table = ti.field(real, shape=(n, 16))
-        self.bond_damping = ti.field(real, shape=n)
-        self.contact_damping = ti.field(real, shape=n)
-        self.limit_by = ti.field(ti.i32, shape=n)
-        self.limit_level = ti.field(ti.i32, shape=n)
-        self.events = ti.field(ti.i32, shape=n)
-        self.listed = ti.field(ti.i32, shape=n)
-        self.listed_count = ti.field(ti.i32, shape=())
-        self.woken = ti.field(ti.i32, shape=())
+        self.dashpot_table, self.spring_table = (ti.field(real, shape=(n, 16)) for _ in range(2))
+        self.bond_damping, self.contact_damping = (ti.field(real, shape=n) for _ in range(2))
+        self.limit_by, self.limit_level = (ti.field(ti.i32, shape=n) for _ in range(2))
+        self.events, self.listed = (ti.field(ti.i32, shape=n) for _ in range(2))
+        self.listed_count, self.woken = (ti.field(ti.i32, shape=()) for _ in range(2))
 
     def load(self, model: Model, method: Method) -> None:
         """Load the bonds of a model and the numbers of a method."""

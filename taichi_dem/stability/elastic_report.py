@@ -2,7 +2,7 @@
 
 import contextlib
 from dataclasses import dataclass
-from typing import Optional, Union
+from typing import Optional
 
 import numpy as np
 
@@ -32,9 +32,9 @@ class ElasticReport:
     asked : tuple of (float, float) or None
         Young's modulus [Pa] and Poisson's ratio for which the material was made; None for a
         material of constants per area, and for several materials.
-    crack_length : float or ndarray
-        Characteristic length E G_f / tensile_strength^2 of the tip of a crack [m]; with several
-        materials that of each body's, (body_count,), by the E of a mesh of this material alone.
+    crack_length : ndarray
+        Characteristic length E G_f / tensile_strength^2 of the tip of a crack [m] at each body,
+        (body_count,); with several materials by the E of a mesh of the body's material alone.
     element_size : ndarray
         Edge of the regular tetrahedron of the volume of each body [m], shape (body_count,).
     steps : StepReport
@@ -43,7 +43,7 @@ class ElasticReport:
 
     stiffness: MeshStiffness
     asked: Optional[tuple[float, float]]
-    crack_length: Union[float, np.ndarray]
+    crack_length: np.ndarray
     element_size: np.ndarray
     steps: StepReport
 
@@ -54,11 +54,7 @@ class ElasticReport:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences about the scene: elements too large for its cracks, and those of its steps."""
-        return (*self._coarse(), *self.steps.warnings)
-
-    def _coarse(self):
-        """A sentence where elements are too large for cracks."""
+        """A sentence where elements are too large for cracks; those of ``steps`` are its own."""
         coarse = int((self.elements < ELEMENTS).sum())
         words = (
             f"the characteristic length E G_f / tensile_strength^2 = {self._crack_words()} m is "
@@ -88,7 +84,7 @@ class ElasticReport:
             f"characteristic length of cracks {self._crack_words()} m: {fewest:.2g} of the "
             f"largest element, {median:.2g} of the median one"
         )
-        lines += [f"warning: {words}" for words in self._coarse()]
+        lines += [f"warning: {words}" for words in self.warnings]
         return "\n".join([*lines, str(self.steps)])
 
 
@@ -119,16 +115,12 @@ def elastic_report(scene: Scene) -> ElasticReport:
     mesh, laid = scene.mesh, scene.body_materials
     stiffness = mesh_stiffness(mesh, laid)
     steps, sizes = step_report(scene), element_sizes(mesh)
-    if laid.is_one:
-        material = laid.materials[0]
-        return ElasticReport(stiffness, _asked(material), _crack(stiffness, material), sizes, steps)
-    lengths = np.array([_crack(mesh_stiffness(mesh, each), each) for each in laid.materials])
-    return ElasticReport(stiffness, None, lengths[laid.of_body], sizes, steps)
-
-
-def _crack(stiffness, material):
-    """Characteristic length of a crack's tip [m]."""
-    return stiffness.young * material.fracture_energy / material.tensile_strength**2
+    alone, asked = [stiffness], _asked(laid.materials[0])
+    if not laid.is_one:
+        alone, asked = [mesh_stiffness(mesh, each) for each in laid.materials], None
+    pairs = zip(alone, laid.materials)
+    lengths = [own.young * one.fracture_energy / one.tensile_strength**2 for own, one in pairs]
+    return ElasticReport(stiffness, asked, np.array(lengths)[laid.of_body], sizes, steps)
 
 
 def element_sizes(mesh: Mesh) -> np.ndarray:

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 from taichi_dem.elasticity.rates import bond_rates, contact_eigenvalues, dashpots_of, springs_of
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.terminal import aligned
-from taichi_dem.kit.validation import instance, whole
+from taichi_dem.kit.validation import instance
 from taichi_dem.materials.body_materials import AnyMaterial
+from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.scene import Scene, scene_warnings
@@ -36,25 +37,25 @@ class StepReport:
     ----------
     limits : dict
         Largest steps [s] by criterion, shape (body_count,) each: bond_stiffness, bond_dashpot,
-        contact_stiffness and contact_dashpot (every sphere of the worst face in one contact),
-        contact_dashpot_single (one sphere in contact, which binds nothing by itself). A criterion
-        whose effect a scene leaves out is missing.
+        contact_stiffness and contact_dashpot (every sphere of the worst face in one contact). A
+        criterion whose effect a scene leaves out is missing.
+    altitude_m : ndarray
+        Smallest altitude of each body [m], (body_count,).
+    aspect_ratio : ndarray
+        Longest edge over smallest altitude [-]; 1.22 for a regular tetrahedron.
     warnings : tuple of str
         Sentences about the scene.
     """
 
     limits: dict[str, np.ndarray]
+    altitude_m: np.ndarray
+    aspect_ratio: np.ndarray
     warnings: tuple[str, ...]
-
-    @property
-    def _strict(self):
-        """The limits that bind a step."""
-        return {name: steps for name, steps in self.limits.items() if not name.endswith("single")}
 
     @property
     def step_s(self) -> np.ndarray:
         """Smallest of the limits of each body [s], (body_count,)."""
-        return np.min([*self._strict.values()], axis=0)
+        return np.min([*self.limits.values()], axis=0)
 
     @property
     def binding(self) -> np.ndarray:
@@ -62,8 +63,8 @@ class StepReport:
 
         "nothing" for a body whose step nothing limits.
         """
-        place = np.argmin([*self._strict.values()], axis=0)
-        return np.where(np.isfinite(self.step_s), np.array([*self._strict])[place], "nothing")
+        place = np.argmin([*self.limits.values()], axis=0)
+        return np.where(np.isfinite(self.step_s), np.array([*self.limits])[place], "nothing")
 
     def borne(self, dashpots: str, link: str = "bond") -> np.ndarray:
         """Largest stable step of each body under a method.
@@ -93,41 +94,8 @@ class StepReport:
         # Of the stability limit 2 of an explicit step, limited dashpots take at most LIMITED.
         return np.maximum(together, springs * np.sqrt(1.0 - 0.5 * LIMITED))
 
-    def worst(self, count: int = WORST) -> np.ndarray:
-        """Bodies of the smallest step, the worst first.
-
-        Parameters
-        ----------
-        count : int, default WORST
-            How many.
-
-        Returns
-        -------
-        ndarray
-            Numbers of the bodies, shape (count,).
-        """
-        return np.argsort(self.step_s, kind="stable")[: whole("count", count, 0, 2**31 - 1)]
-
-    def price(self, count: int = WORST) -> np.ndarray:
-        """Gain in the step of all without the k + 1 worst bodies, k < count.
-
-        Parameters
-        ----------
-        count : int, default WORST
-            How many.
-
-        Returns
-        -------
-        ndarray
-            Factors of at least 1, as many as there are bodies to leave out; infinite where nothing
-            else limits the step, 1 where nothing limited it before.
-        """
-        steps = np.append(self.step_s[self.worst(len(self.step_s))], np.inf)
-        gained = steps[1 : whole("count", count, 0, 2**31 - 1) + 1]
-        return gained / steps[0] if np.isfinite(steps[0]) else np.ones_like(gained)
-
     def __repr__(self):
-        worst = self.worst(1)[0]
+        worst = int(np.argmin(self.step_s))
         step = f"smallest step {self.step_s[worst]:.3g} s by {self.binding[worst]}"
         return in_brief(self, counted(len(self.step_s), "body"), step, "print it for the table")
 
@@ -141,28 +109,33 @@ class StepReport:
         for dashpots, words in METHODS.items():
             bond, contact = (self.borne(dashpots, link).min() for link in ("bond", "contact"))
             methods.append([words, f"{bond:.3g}", f"{contact:.3g}"])
-        step, binding = self.step_s, self.binding
+        binding = self.binding
         criteria = [["step bound by", "bodies", "smallest s", "median s"]]
         for name, own in self.limits.items():
             figures = f"{own.min():.3g}", f"{np.median(own):.3g}"
             criteria.append([name, f"{(binding == name).sum()}", *figures])
-        worst = [["worst body", "step s", "bound by"]]
-        worst += [[f"{body}", f"{step[body]:.3g}", binding[body]] for body in self.worst()]
-        lines = [line for table in (methods, criteria, worst) for line in [*aligned(table), ""]]
+        lines = [line for table in (methods, criteria) for line in [*aligned(table), ""]]
         explained = (
             "in contact: every sphere of the worst face at once; Multirate: of the worst body, as "
             "each has its own; a StepControl keeps to its safety's share of them"
         )
-        return "\n".join([*lines, explained, *self._prices(), *warnings])
+        return "\n".join([*lines, *self._worst(), explained, *warnings])
 
-    def _prices(self):
-        """Cost of the worst bodies, where the step of others is limited too."""
-        price = self.price()[-1]
-        updates = 1.0 / self.step_s
-        taken = float(updates[self.worst()].sum() / max(updates.sum(), 1e-300))
-        share = f"{100 * taken:.3g} % of the updates"
-        words = f"without the worst {WORST} the step of all would be {price:.3g} times as long"
-        return [f"{words}; with steps of their own they take {share}"] if price < np.inf else []
+    def _worst(self):
+        """Lines about the bodies of the smallest steps, and what they cost."""
+        step, binding = self.step_s, self.binding
+        order = np.argsort(step, kind="stable")
+        prices = np.append(step[order], np.inf)[1:] / step[order[0]]
+        rows = [["worst body", "step s", "bound by", "altitude m", "aspect", "price"]]
+        for body, price in zip(order[:WORST], prices):
+            shape = f"{self.altitude_m[body]:.3g}", f"{self.aspect_ratio[body]:.3g}"
+            rows.append([f"{body}", f"{step[body]:.3g}", binding[body], *shape, f"{price:.3g}"])
+        taken = 100.0 * float((1.0 / step[order[:WORST]]).sum() / (1.0 / step).sum())
+        words = (
+            "price: how much larger the step of all would be without this body and those above; "
+            f"with steps of their own they take {taken:.3g} % of the updates"
+        )
+        return [*aligned(rows), "", words]
 
 
 def stable_together(springs: ArrayLike, drags: ArrayLike) -> np.ndarray:
@@ -212,11 +185,14 @@ def step_report(scene: Scene) -> StepReport:
         del limits["bond_dashpot"]
     if contact is not None:
         stiffness, damping = map(material.of_contacts, ("contact_stiffness", "contact_damping"))
-        one, whole_face = contact_eigenvalues(mesh, material.density, contact.divisions, friction)
+        _, whole_face = contact_eigenvalues(mesh, material.density, contact.divisions, friction)
         limits["contact_stiffness"] = spring_step(stiffness * whole_face)
         limits["contact_dashpot"] = dashpot_step(damping * whole_face)
-        limits["contact_dashpot_single"] = dashpot_step(damping * one)
-    return StepReport(limits, scene_warnings(scene))
+    vectors = geometry.area_vectors(mesh.points, geometry.all_faces(mesh.tetrahedra))
+    volume = geometry.signed_volumes(mesh.points, mesh.tetrahedra)
+    altitude = 3.0 * volume / np.linalg.norm(vectors, axis=1).reshape(-1, 4).max(axis=1)
+    longest = geometry.edge_lengths(mesh.points, mesh.tetrahedra).max(axis=1)
+    return StepReport(limits, altitude, longest / altitude, scene_warnings(scene))
 
 
 def bond_steps(mesh: Mesh, material: AnyMaterial) -> dict[str, np.ndarray]:

@@ -17,7 +17,7 @@ from taichi_dem.materials.material import harmless
 from taichi_dem.mesh.colouring import edge_colours
 from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.tetrahedra import area_vectors
+from taichi_dem.mesh.tetrahedra import area_vectors, components
 from taichi_dem.mesh.topology import body_properties, topology_of
 
 #: Roles that take one effect, in the order in which effects are listed, bound and reported.
@@ -105,6 +105,21 @@ class Model:
         return subset_rates(self.mesh, self.topology, self.materials.density, coefficients)
 
     @cached_property
+    def neighbours(self) -> np.ndarray:
+        """Body behind each local face of every body, -1 where it is outer, (body_count, 4)."""
+        top = self.topology
+        both = np.append(top.master + top.slave, 0)[top.body_bond]
+        return np.where(top.body_bond < 0, -1, both - np.arange(self.body_count)[:, None])
+
+    def pieces(self, broken: np.ndarray) -> np.ndarray:
+        """First body of the piece of each body, which unbroken bonds keep together, (body_count,).
+
+        broken: whether each bond has been released, (bond_count,).
+        """
+        ends = np.column_stack([self.topology.master, self.topology.slave])
+        return components(self.body_count, ends[~broken])
+
+    @cached_property
     def bond_colours(self) -> np.ndarray:
         """Colour of every bond, (n,): bonds of one colour share no body."""
         links = np.stack([self.topology.master, self.topology.slave], axis=1)
@@ -149,3 +164,18 @@ class Model:
 
     def _per_bond(self, constants):
         return per_bond(self.mesh, self.topology, self.materials.density, constants)
+
+
+def sums(group: np.ndarray, of_bodies: np.ndarray) -> np.ndarray:
+    """Sums over groups of bodies of an array of each; group: number of that of each body.
+
+    of_bodies: (body_count, ...). Returns (groups, ...).
+    """
+    flat = of_bodies.reshape(len(of_bodies), -1)
+    columns = [np.bincount(group, column) for column in flat.T]
+    return np.stack(columns, axis=1).reshape(-1, *of_bodies.shape[1:])
+
+
+def centres(group: np.ndarray, body_mass: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Centres of mass of groups of bodies [m], (groups, 3); position (body_count, 3) [m]."""
+    return sums(group, body_mass[:, None] * position) / sums(group, body_mass)[:, None]

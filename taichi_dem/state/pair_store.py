@@ -10,11 +10,49 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import real, vec3
-from taichi_dem.state.pair_columns import Columns
 
 #: Sphere pairs that may be out of use, beside as many as are in use, before the rest is packed.
 SLACK = 4096
+
+
+@ti.data_oriented
+class Columns:
+    """Data of effects and methods for a pair or a sphere pair, by name; zero for a new one."""
+
+    def __init__(self, entries: int):
+        self.entries = entries
+        self.by_name: dict[str, ti.Field] = {}
+        self.members: tuple[ti.Field, ...] = ()
+
+    def __len__(self):
+        return len(self.members)
+
+    def declare(self, name: str, kind: Any, width: int = 0) -> ti.Field:
+        """Field of a new column; width: components, 0 for a number.
+
+        Raises InputError for a name that is in use.
+        """
+        if name in self.by_name:
+            raise InputError(f"a column of the pair store must have a new name, got {name!r}")
+        n = self.entries
+        column = ti.Vector.field(width, kind, shape=n) if width else ti.field(kind, shape=n)
+        self.by_name[name] = column
+        self.members += (column,)
+        return column
+
+    @ti.func
+    def clear(self, k):
+        """Set all columns of entry k to zero."""
+        for column in ti.static(self.members):
+            column[k] = 0
+
+    @ti.func
+    def copy(self, source, k):
+        """Copy an entry of all columns to entry k."""
+        for column in ti.static(self.members):
+            column[k] = column[source]
 
 
 @ti.data_oriented

@@ -32,9 +32,8 @@ def unserved_limits(model: Model) -> np.ndarray:
     for a, row in enumerate(model.materials.pairs):
         for b, pair in enumerate(row):
             strength = np.inf if served & {"bond", "tension"} else pair.tensile_strength
-            cohesion = np.inf if served & {"bond", "shear"} else pair.cohesion
-            friction = 0.0 if served & {"bond", "shear"} else pair.friction
-            rows[MOST * a + b] = strength, cohesion, friction
+            slides = (np.inf, 0.0) if served & {"bond", "shear"} else (pair.cohesion, pair.friction)
+            rows[MOST * a + b] = strength, *slides
     return rows
 
 
@@ -72,14 +71,11 @@ class State:
         n, bonds = tables.capacity.bodies, tables.capacity.bonds
         self.tables = tables
         self.activity = Activity(tables) if tables.on_demand else None
-        self.position = ti.Vector.field(3, real, shape=n)
         self.orientation = ti.Vector.field(4, real, shape=n)
         self.rotation = ti.Matrix.field(3, 3, real, shape=n)
-        self.velocity = ti.Vector.field(3, real, shape=n)
-        self.spin = ti.Vector.field(3, real, shape=n)
-        self.angular_momentum = ti.Vector.field(3, real, shape=n)
-        self.level = ti.field(ti.i32, shape=n)
-        self.bound = ti.field(ti.i32, shape=n)
+        self.position, self.velocity = (ti.Vector.field(3, real, shape=n) for _ in range(2))
+        self.spin, self.angular_momentum = (ti.Vector.field(3, real, shape=n) for _ in range(2))
+        self.level, self.bound = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.last_tick = ti.field(ti.i64, shape=n)
         if tables.loads:
             self.lag = ti.Vector.field(len(tables.loads), real, shape=n)
@@ -130,10 +126,10 @@ class State:
         """
         given = (position, orientation, velocity, spin)
         rest = ([0.0] * 3, [1.0, 0.0, 0.0, 0.0], [0.0] * 3, [0.0] * 3)
-        rows = [still if part is None else part for part, still in zip(given, rest)]
-        shapes = [(self.body_count, len(still)) for still in rest]
-        shaped = [np.broadcast_to(part, shape) for part, shape in zip(rows, shapes)]
-        whole = [np.ascontiguousarray(part, dtype=np.float64) for part in shaped]
+        whole = [np.tile(still, (self.body_count, 1)) for still in rest]
+        for rows, part in zip(whole, given):
+            if part is not None:
+                rows[:] = part
         inertia = values(self.tables.inertia, slice(self.body_count))
         found = turned_bodies(whole[1], whole[3], inertia)
         names = (*_GIVEN, "rotation", "angular_momentum")
@@ -216,8 +212,11 @@ class State:
         return found
 
     def fields(self) -> dict[str, ti.Field]:
-        """Every field that changes, by name, the bound effects' state included."""
-        own = {k: v for k, v in vars(self).items() if isinstance(v, (ti.Field,))}
-        for effect in self.tables.effects:
-            own.update(effect.state())
-        return own
+        """Every field that changes, and those of the bound effects, by name."""
+        owners = [("", self), *((f"{effect.name}_", effect) for effect in self.tables.effects)]
+        return {
+            prefix + name: field
+            for prefix, owner in owners
+            for name, field in vars(owner).items()
+            if isinstance(field, ti.Field)
+        }

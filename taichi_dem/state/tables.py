@@ -47,7 +47,7 @@ class Tables:
 
     def __init__(self, capacity: Capacity, on_demand: bool = False):
         self.capacity, self.on_demand = capacity, on_demand
-        self.body_count, self.bond_count = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
+        self.body_count, self.bond_count = (ti.field(ti.i32, shape=()) for _ in range(2))
         self._declare_bodies(capacity.bodies)
         self._declare_bonds(capacity)
 
@@ -58,26 +58,22 @@ class Tables:
         self.contact = by_role["contact"][0] if by_role["contact"] else None
         self.loads, self.supports, self.ground = (tuple(by_role[role]) for role in MANY)
         self.effects = tuple(effect for role in ROLES for effect in by_role[role])
-        self.drives = self._drives()
         self.has_contact = self.contact is not None
         self.has_bond_heat = bool(self.dashpot.name) or not bond.is_null
         if self.has_contact:
             self._declare_spheres(self.capacity)
 
-    def _drives(self):
+    @property
+    def drives(self) -> tuple[tuple[Any, int, int, int], ...]:
         """Loads and ground with the row of their impulse, account of work, and bit of activity."""
         loads, held = len(self.loads), len(self.supports)
-        pushes = [(effect, e, e, e) for e, effect in enumerate(self.loads)]
-        drags = [
-            (effect, loads + e, loads + 1 + e, loads + held + e)
-            for e, effect in enumerate(self.ground)
-        ]
-        return (*pushes, *drags)
+        drives = [(effect, e, e, e) for e, effect in enumerate(self.loads)]
+        for row, effect in enumerate(self.ground, loads):
+            drives.append((effect, row, 1 + row, held + row))
+        return tuple(drives)
 
     def _declare_bodies(self, n):
-        self.mass = ti.field(real, shape=n)
-        self.mass_inverse = ti.field(real, shape=n)
-        self.radius = ti.field(real, shape=n)
+        self.mass, self.mass_inverse, self.radius = (ti.field(real, shape=n) for _ in range(3))
         self.material = ti.field(ti.i32, shape=n)
         self.inertia = ti.Matrix.field(3, 3, real, shape=n)
         self.inertia_inverse = ti.Matrix.field(3, 3, real, shape=n)
@@ -130,14 +126,9 @@ class Tables:
 
     def _load_bonds(self, model):
         bonds = model.bonds
-        slots, first = bonds["slots"], np.arange(model.bond_count, dtype=np.int32)
-        neighbour = np.full((2, 4 * model.body_count), -1, dtype=np.int32)
-        for side in range(2):
-            neighbour[0, slots[:, side]] = slots[:, 1 - side] >> 2
-            neighbour[1, slots[:, side]] = first
-        assign(self.neighbour, neighbour[0])
-        assign(self.face_bond, neighbour[1])
-        assign(self.bond_slots, slots)
+        assign(self.neighbour, model.neighbours.reshape(-1))
+        assign(self.face_bond, model.topology.body_bond.reshape(-1))
+        assign(self.bond_slots, bonds["slots"])
         assign(self.bond_frame, bonds["frame"])
         assign(self.bond_stiffness, model.bond_stiffness)
         assign(self.unit_area, bonds["area"])

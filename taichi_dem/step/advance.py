@@ -1,34 +1,30 @@
 """Advance one bond, one contact pair, one body: the only class that composes the physics.
 
-Its bonds are in ``bond``, its pairs in ``contact_force``. Drivers choose the active members and
-call these functions; nothing else applies a force or moves a body. A bond or pair evaluated at a
-tick applies the impulse F * (smaller of their steps) to both bodies, with opposite signs; a body
-takes the sum at its own time (Konno et al., 3.1, eq. 3): v += S / m, L += T, then x += dt v and q =
-exp(dt w) q, with the spin w in the middle of the turn.
+Its bonds are in ``bond``, its pairs in ``contact_force``, its loads in ``body_loads``. Drivers
+choose the active members and call these functions; nothing else applies a force or moves a body. A
+bond or pair evaluated at a tick applies the impulse F * (smaller of their steps) to both bodies,
+with opposite signs; a body takes the sum at its own time (Konno et al., 3.1, eq. 3): v += S / m, L
++= T, then x += dt v and q = exp(dt w) q, with the spin w in the middle of the turn.
 """
 
 from typing import Optional
 
 import taichi as ti
 
-from taichi_dem.contact.contacts import Contacts
-from taichi_dem.kit.products import cross, dot, norm, squared, stacked
-from taichi_dem.kit.types import real, vec2, vec3
+from taichi_dem.kit.products import dot, squared
+from taichi_dem.kit.types import vec3
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned
-from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
+from taichi_dem.step.body_loads import BodyLoads
 from taichi_dem.step.bond import BondStep
 from taichi_dem.step.contact_force import ContactForce
-from taichi_dem.step.ground import GroundDashpots
 from taichi_dem.step.implicit.solver import Solver
-from taichi_dem.step.load_times import LoadTimes
 from taichi_dem.step.multirate.schedule import Schedule
 from taichi_dem.step.sleeping import ASLEEP
 from taichi_dem.step.tangential_springs import TangentialSprings
 
 
 @ti.data_oriented
-class Advance(BondStep, ContactForce):
+class Advance(BondStep, ContactForce, BodyLoads):
     """The order in which physics and effects act; see the module.
 
     staggered: whether velocities are half a step behind positions, as the leapfrog's are. An order
@@ -37,25 +33,18 @@ class Advance(BondStep, ContactForce):
 
     staggered = True
 
-    def __init__(
-        self,
-        tables: Tables,
-        state: State,
-        schedule: Schedule,
-        contacts: Optional[Contacts],
-        solver: Optional[Solver] = None,
-    ):
-        self.tables, self.state, self.schedule = tables, state, schedule
-        self.activity = state.activity
+    def __init__(self, schedule: Schedule, solver: Optional[Solver] = None):
+        self.schedule, self.tables, self.state = schedule, schedule.tables, schedule.state
+        tables = self.tables
         self.on_demand = tables.on_demand and not tables.bond.is_null
         # Where all laws act on demand, none is missing and none is to be watched for.
         self.notes_limits = not (self.on_demand and tables.bond.is_whole)
-        self.load_times, self.ground = LoadTimes(tables, state), GroundDashpots(tables, state)
+        self.has_ground = bool(tables.ground)
         self.solver, self.solves = solver, solver is not None
         self.solves_bonds = self.solves and solver.has_bonds
-        self.contacts, self.has_contact = contacts, contacts is not None
+        self.contacts, self.has_contact = schedule.contacts, schedule.has_contact
         if not self.solves:
-            self.springs = TangentialSprings(schedule, contacts)
+            self.springs = TangentialSprings(schedule)
         # Without fast_math a product with zero is not folded: absent terms must not be written.
         self.has_dashpot = bool(tables.dashpot.name)
         self.limits, self.has_limits = schedule.limits, schedule.has_limits
@@ -110,7 +99,7 @@ class Advance(BondStep, ContactForce):
         self.state.position[i] = self.state.position[i] + elapsed * velocity
         self.state.last_tick[i] = self.state.tick[None]
         if ti.static(self.tables.on_demand):
-            self.schedule.sleeping.stir(i, self, elapsed, velocity, momentum)
+            self.schedule.sleeping.stir(i, elapsed, velocity, momentum)
         if ti.static(self.has_contact):
             self.contacts.moved(i, velocity, spin, elapsed)
         speed2 = squared(velocity)
@@ -146,47 +135,13 @@ class Advance(BondStep, ContactForce):
     @ti.func
     def _kicked(self, i, elapsed, linear, angular):
         """Velocity and angular momentum after all impulses, as the supports allow; books work."""
-        linear, angular, kick = self.loaded(i, elapsed, linear, angular, self.load_times.of_step)
-        if ti.static(self.ground.present):
-            rows = self.ground.impulses(i, elapsed, linear, angular)
-            linear, angular, kick = self.ground.added(rows, linear, angular, kick)
+        linear, angular, kick = self.loaded(i, elapsed, linear, angular, self.load_of_step)
+        if ti.static(self.has_ground):
+            rows = self.ground_impulses(i, elapsed, linear, angular)
+            linear, angular, kick = self.with_ground(rows, linear, angular, kick)
         velocity = self.state.velocity[i] + linear * self.tables.mass_inverse[i]
         momentum = self.state.angular_momentum[i] + angular
         return self._supported(i, elapsed, kick, velocity, momentum)
-
-    @ti.func
-    def loaded(self, i, step, linear, angular, times: ti.template()):
-        """Impulse and moment with those of the loads added, and a row for each of ``drives``.
-
-        times: a function of ``LoadTimes``, and the step [s] that it takes.
-        """
-        kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.drives))), 6)
-        now = self.schedule.seconds(self.state.tick[None])
-        for e in ti.static(range(len(self.tables.loads))):
-            if self.tables.loads[e].acts_on(i):
-                motion, length = times(i, e, now, step)
-                force, torque = self.tables.loads[e].wrench(i, motion)
-                linear += force * length
-                angular += torque * length
-                for k in ti.static(range(3)):
-                    kick[e, k], kick[e, 3 + k] = force[k] * length, torque[k] * length
-        return linear, angular, kick
-
-    def _support_bit(self, effect):
-        """Bit of a support in ``State.active_effects``."""
-        return 1 << len(self.tables.loads) + self.tables.supports.index(effect)
-
-    @ti.func
-    def _book_loads(self, i, kick, velocity, momentum):
-        """Book loads and ground of body i at a mean velocity and angular momentum."""
-        for effect, e, account, bit in ti.static(self.tables.drives):
-            if effect.acts_on(i):
-                push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
-                twist = vec3(kick[e, 3], kick[e, 4], kick[e, 5])
-                if squared(push) + squared(twist) > 0.0:
-                    self.state.note_active(i, ti.i64(1 << bit))
-                work = dot(push, velocity) + dot(twist, self.spin(i, momentum))
-                self._book(i, account, work, push, twist)
 
     @ti.func
     def spin(self, i, momentum):
@@ -216,7 +171,7 @@ class Advance(BondStep, ContactForce):
         """
         free, free_momentum, held = velocity, momentum, 0
         half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
-        for effect in ti.static(self.tables.supports):
+        for k, effect in ti.static(enumerate(self.tables.supports)):
             if effect.acts_on(i):
                 before, spun = velocity, momentum
                 velocity, momentum = effect.held(
@@ -224,7 +179,7 @@ class Advance(BondStep, ContactForce):
                 )
                 held = 1
                 if squared(velocity - before) + squared(momentum - spun) > 0.0:
-                    self.state.note_active(i, ti.i64(ti.static(self._support_bit(effect))))
+                    self.state.note_active(i, ti.i64(ti.static(1 << len(self.tables.loads) + k)))
         mean = 0.5 * (self.state.velocity[i] + velocity)
         mean_momentum = 0.5 * (self.state.angular_momentum[i] + momentum)
         self._book_loads(i, kick, mean, mean_momentum)
@@ -234,11 +189,3 @@ class Advance(BondStep, ContactForce):
                 work = dot(push, mean) + dot(twist, self.spin(i, mean_momentum))
                 self._book(i, ti.static(len(self.tables.loads)), work, push, twist)
         return velocity, momentum
-
-    @ti.func
-    def _book(self, i, account, work, push, twist):
-        """Book work [J] to an account, and impulse and moment about the origin to body i."""
-        self.state.load_work[i][account] = self.state.load_work[i][account] + work
-        twist += cross(self.state.position[i], push)
-        self.state.load_impulse[i] = self.state.load_impulse[i] + stacked(push, twist)
-        self.state.impulse_sizes[i] = self.state.impulse_sizes[i] + vec2(norm(push), norm(twist))

@@ -6,8 +6,8 @@ result decides what is looked at, and nothing that the audit does remains.
 
 import taichi as ti
 
-from taichi_dem.step.advance import Advance
 from taichi_dem.step.multirate.lists import Places
+from taichi_dem.step.multirate.schedule import Schedule
 
 #: One bond in so many is looked at; a power of two.
 RATE = 1024
@@ -34,9 +34,9 @@ class Audit(Places):
 
     scratch_fields = ("first",)
 
-    def __init__(self, advance: Advance):
-        self.tables, self.state, self.advance = advance.tables, advance.state, advance
-        self.schedule, self.sleeping = advance.schedule, advance.schedule.sleeping
+    def __init__(self, schedule: Schedule):
+        self.tables, self.state = schedule.tables, schedule.state
+        self.schedule, self.sleeping = schedule, schedule.sleeping
         self.first = ti.field(ti.i32, shape=())
         self.audited, self.misses = (ti.field(ti.i64, shape=()) for _ in range(2))
 
@@ -60,5 +60,5 @@ class Audit(Places):
         if self.state.broken_tick[b] < 0:
             if not self.sleeping.both_awake(i, j):
                 ti.atomic_add(self.audited[None], 1)
-                if self.sleeping.leaves_out(b, i, j, self.advance):
+                if self.sleeping.leaves_out(b, i, j):
                     ti.atomic_add(self.misses[None], 1)

@@ -11,7 +11,8 @@ from typing import Any
 from taichi_dem.kit import runtime
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.errors import InputError
-from taichi_dem.step.drivers import Driver, Parallel, Resident, Step
+from taichi_dem.step.drivers import Parallel, Resident
+from taichi_dem.step.phases import Step
 
 #: Reason why the resident driver cannot run, for a sentence.
 CPU_ONLY = "runs on a CPU only"
@@ -34,17 +35,12 @@ def driver_name(name: str, bond_count: int) -> str:
     """
     settings: Any = runtime.settings()
     if name == "auto":
-        return "parallel" if settings.arch == "cuda" else _by_size(settings.threads, bond_count)
+        if settings.arch != "cuda" and (settings.threads == 1 or bond_count < RESIDENT_BELOW):
+            return "resident"
+        return "parallel" if settings.arch == "cuda" or bond_count >= PARALLEL_FROM else MEASURED
     if name == "resident" and settings.arch == "cuda":
         raise InputError(f"driver 'resident' {CPU_ONLY}: use 'parallel' with arch 'cuda'")
     return name
-
-
-def _by_size(threads, bond_count):
-    """Driver of a CPU."""
-    if threads == 1 or bond_count < RESIDENT_BELOW:
-        return "resident"
-    return "parallel" if bond_count >= PARALLEL_FROM else MEASURED
 
 
 class AutoDriver:
@@ -57,7 +53,7 @@ class AutoDriver:
     def __init__(
         self,
         step: Step,
-        drivers: Mapping[str, Driver],
+        drivers: Mapping[str, Any],
         clock: Callable[[], float] = time.perf_counter,
     ):
         self.step, self.clock = step, clock

@@ -8,6 +8,22 @@ from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_ve
 from taichi_dem.stability.body_limits import RELEASE
 
 
+@ti.func
+def motion_of(step, b):
+    """Relative motion of the bodies of a bond now, a ``BondMotion``; step has tables and state."""
+    slots = step.tables.bond_slots[b]
+    i, j = slots[0] >> 2, slots[1] >> 2
+    return bond_motion(
+        step.tables.bond_frame[b],
+        step.state.position[j] - step.state.position[i],
+        step.state.rotation[i],
+        step.state.rotation[j],
+        step.state.velocity[j] - step.state.velocity[i],
+        step.state.spin[i],
+        step.state.spin[j],
+    )
+
+
 @ti.data_oriented
 class BondStep:
     """What a bond does when it is due: the part of ``Advance``, which owns all that is used here.
@@ -19,11 +35,8 @@ class BondStep:
     def bond(self, b):
         """Evaluate the three contact units of a bond; release it when one of them fails."""
         if self._is_pending(b):
-            slots = self.tables.bond_slots[b]
-            scale = 1.0
-            if ti.static(self.limited):
-                scale = self.bond_share(b)
-            motion = self.motion_of(b)
+            slots, scale = self.tables.bond_slots[b], self.bond_share(b)
+            motion = motion_of(self, b)
             if ti.static(self.solves_bonds):
                 motion = self.solver.bonds.mean(b, motion)
             stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
@@ -39,9 +52,7 @@ class BondStep:
                     self.state.note_passed(m, b, traction[0], squared(across))
                 if ti.static(self.has_dashpot):
                     velocity = unit_velocity(motion, arm)
-                    drag = self.tables.dashpot.traction(b, velocity)
-                    if ti.static(self.limited):
-                        drag *= scale
+                    drag = scale * self.tables.dashpot.traction(b, velocity)
                     traction += drag
                     dragged += dot(drag, velocity)
                 force += traction
@@ -58,13 +69,18 @@ class BondStep:
                 if ti.static(self.has_heat):
                     heat = area * vec3(dragged * dt, slipped, 0.0)
                     self.state.bond_heat[b] = self.state.bond_heat[b] + heat
+                if ti.static(self.solves_bonds):
+                    self.solver.bonds.begin(b, i, j, motion.branch)
             else:
                 if ti.static(self.tables.has_bond_heat):
                     heat = area * vec3(0.0, slipped, self._stored(b, motion))
+                    if ti.static(self.solves_bonds):
+                        # Booked for the step before: it was full, though a unit fails now.
+                        heat[0] = dragged * (area * dt)
                     self.state.bond_heat[b] = self.state.bond_heat[b] + heat
                 self._release(b, slots)
-            if ti.static(self.solves_bonds):
-                self._renew(b, slots, motion, failed, dragged * (area * dt))
+                if ti.static(self.solves_bonds):
+                    self.solver.bonds.end(b)
 
     @ti.func
     def by_law(self, m, b, u, stiffness, opening):
@@ -77,23 +93,12 @@ class BondStep:
         slipped, failed, acts = 0.0, 0, True
         if ti.static(self.on_demand):
             near = self.tables.bond.begins(m, stiffness, opening)
-            acts = self.activity.is_active(b, near, self.state.tick[None])
+            acts = self.state.activity.is_active(b, near, self.state.tick[None])
         if ti.static(not self.tables.bond.is_null):
             if acts:
                 traction, slipped = self.tables.bond.traction(m, u, stiffness, opening)
                 failed = self.tables.bond.failed(m, u, traction)
         return traction, slipped, failed
-
-    @ti.func
-    def _renew(self, b, slots, motion, failed, dragged):
-        """Pass the present twist of a bond to the solver, or remove the bond; dragged [J]."""
-        if failed == 0:
-            self.solver.bonds.begin(b, slots[0] >> 2, slots[1] >> 2, motion.branch)
-        else:
-            self.solver.bonds.end(b)
-            if ti.static(self.tables.has_bond_heat):
-                # Dashpots are booked for the step before: it was full, though a unit fails now.
-                self.state.bond_heat[b][0] = self.state.bond_heat[b][0] + dragged
 
     @ti.func
     def _is_pending(self, b):
@@ -107,25 +112,13 @@ class BondStep:
 
     @ti.func
     def bond_share(self, b):
-        """Share of its coefficient that a bond's limited dashpot keeps: the smaller of two."""
-        i, j = self.tables.bond_slots[b][0] >> 2, self.tables.bond_slots[b][1] >> 2
-        first = self.limits.bond_share(i, self.schedule.own_step(i))
-        return ti.min(first, self.limits.bond_share(j, self.schedule.own_step(j)))
-
-    @ti.func
-    def motion_of(self, b):
-        """Relative motion of the two bodies of a bond now, a ``BondMotion``."""
-        slots = self.tables.bond_slots[b]
-        i, j = slots[0] >> 2, slots[1] >> 2
-        return bond_motion(
-            self.tables.bond_frame[b],
-            self.state.position[j] - self.state.position[i],
-            self.state.rotation[i],
-            self.state.rotation[j],
-            self.state.velocity[j] - self.state.velocity[i],
-            self.state.spin[i],
-            self.state.spin[j],
-        )
+        """Share of its coefficient that a limited dashpot of a bond keeps: the smaller of two."""
+        share = 1.0
+        if ti.static(self.limited):
+            for side in ti.static(range(2)):
+                i = self.tables.bond_slots[b][side] >> 2
+                share = ti.min(share, self.limits.bond_share(i, self.schedule.own_step(i)))
+        return share
 
     @ti.func
     def _pull_together(self, slots, motion, impulse, moment):
@@ -157,16 +150,13 @@ class BondStep:
         """Elastic energy stored in a bond now [J]; zero once it is released."""
         energy = 0.0
         if self.state.broken_tick[b] < 0:
-            energy = self.tables.unit_area[b] * self._stored(b, self.motion_of(b))
+            energy = self.tables.unit_area[b] * self._stored(b, motion_of(self, b))
         return energy
 
     @ti.func
     def bond_power(self, b):
         """Power that the dashpots of an intact bond take now [W]."""
-        power, scale = 0.0, 1.0
-        motion = self.motion_of(b)
-        if ti.static(self.limited):
-            scale = self.bond_share(b)
+        power, scale, motion = 0.0, self.bond_share(b), motion_of(self, b)
         if ti.static(self.solves_bonds):
             motion = self.solver.bonds.mean(b, motion)
         for q in range(3):

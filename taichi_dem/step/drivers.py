@@ -5,20 +5,11 @@ every item writes its own slots, and every sum has a fixed order.
 """
 
 import time
-from typing import Optional
+from typing import Any
 
 import taichi as ti
 
-from taichi_dem.contact.search import BroadPhase
-from taichi_dem.kit.allocation import values
-from taichi_dem.step.advance import Advance
-from taichi_dem.step.audit import Audit
-from taichi_dem.step.begin import Begin, Phases, SolvedBegin
-from taichi_dem.step.implicit.bonds import BOND_COLOURS
-from taichi_dem.step.implicit.pairs import COLOURS
-from taichi_dem.step.multirate.lists import Colour, Once
-from taichi_dem.step.multirate.schedule import Schedule
-from taichi_dem.step.multirate.wake_up import Chunks
+from taichi_dem.step.phases import Step
 
 #: The parallel driver is called for about this long [s] between two checks of divergence, progress
 #: and Ctrl-C.
@@ -31,175 +22,18 @@ _SEARCH = 2
 
 
 @ti.data_oriented
-class Step:
-    """Phases of a substep, pairs of an active list and a function of a member.
-
-    A substep begins with the contacts of the present tick, whose bonds are evaluated already, and
-    ends with the bonds of the next: between substeps the contact lists can be renewed.
-
-    search: the ``BroadPhase`` that does so, None for a scene without contact. start_phases: those
-    of the start of a run before its bonds, and after them.
-    """
-
-    begin: type[Begin] = Begin
-
-    def __init__(self, advance: Advance, schedule: Schedule, search: Optional[BroadPhase]):
-        self.advance, self.schedule, self.search = advance, schedule, search
-        self.has_contact = search is not None
-        self.state = advance.state
-        self.audit = Audit(advance) if schedule.sleeps else None
-        self.parts = self._parts()
-        self.phases = self._phases()
-        begin = self.begin(advance)
-        self.start_phases = begin.before(), begin.after()
-
-    def _phases(self):
-        """All phases of a substep in a row, for one serial kernel."""
-        return self.parts[0]
-
-    def _parts(self):
-        """The same in parts of which one may be called for again."""
-        schedule = self.schedule
-        touching = ((schedule.pairs, self.advance.contact),) if self.has_contact else ()
-        return (
-            (
-                *self._retimed(),
-                *touching,
-                (Once(), schedule.advance_clock),
-                *self._rested(),
-                *self._moved(),
-            ),
-        )
-
-    def _moved(self):
-        """Phases of the bodies, of the bonds at the next time, and of the audit."""
-        schedule, audit = self.schedule, self.audit
-        audited = ((Once(), audit.choose), (audit, audit.visit)) if audit is not None else ()
-        return (
-            (schedule.bodies, self.advance.body),
-            (Once(), schedule.reorder),
-            (schedule.bonds, self.advance.bond),
-            *audited,
-        )
-
-    def _rested(self):
-        """Phases that find the momentum at which bodies wake others, where some may sleep."""
-        if not self.schedule.sleeps:
-            return ()
-        chunks = Chunks(self.schedule)
-        return (chunks, self.schedule.sleeping.chunk), (Once(), chunks.end)
-
-    def repeats(self, part: int) -> bool:
-        """Whether a part of the phases is called for once more: never here."""
-        return False
-
-    def _retimed(self):
-        """Phases that update rates and wake bodies, where the method requires it."""
-        limits = self.schedule.limits
-        if limits is None:
-            return ()
-        phases: Phases = ((limits, limits.refresh),)
-        if self.schedule.controlled:
-            phases += ((limits, self.advance.wake_up),)
-        return (*phases, (Once(), self.schedule.apply_changes))
-
-    def is_of_start(self, item: object) -> bool:
-        """Whether a phase also belongs to the start of a run: that of the bonds does."""
-        return item == self.advance.bond
-
-    @ti.kernel
-    def start(self, last: ti.template()):
-        """Run the phases of the start before the bonds, or the last, after them."""
-        for members, item in ti.static(self.start_phases[last]):
-            for a in range(members.count(0)):
-                item(members.pick(a))
-
-    @ti.func
-    def halted(self):
-        """1 when the host must act: a body left its bounds, or a list its room."""
-        halt = ti.cast(self.state.bad_body[None] < self.advance.tables.body_count[None], ti.i32)
-        if ti.static(self.has_contact):
-            halt |= self.search.overflows()
-        return halt
-
-
-@ti.data_oriented
-class SolvedStep(Step):
-    """The phases of a substep in which all dashpots are solved together."""
-
-    begin = SolvedBegin
-
-    def _phases(self):
-        before, _, after = self.parts
-        return (*before, (Once(), self.advance.solver.solve), *after)
-
-    def _parts(self):
-        advance, schedule, solver = self.advance, self.schedule, self.advance.solver
-        before: Phases = ()
-        after: Phases = ()
-        if self.has_contact:
-            before = (schedule.pairs, solver.pairs.begin), (Once(), solver.pairs.sort)
-            after = ((schedule.pairs, solver.pairs.book),)
-        before += (Once(), schedule.advance_clock), *self._rested(), (Once(), solver.begin)
-        before += ((schedule.bodies, advance.predict),)
-        return (before, self._sweep(solver), (*after, *self._moved()))
-
-    def _sweep(self, solver):
-        """One sweep, colour by colour."""
-        phases: Phases = ()
-        if solver.has_bonds:
-            first = solver.bonds.colour_first
-            phases += tuple((Colour(first, c), solver.bonds_of) for c in range(BOND_COLOURS))
-        if self.has_contact:
-            first = solver.pairs.colour_first
-            phases += tuple((Colour(first, c), solver.pair) for c in range(COLOURS))
-            phases += ((Once(), solver.last_pairs),)
-        if solver.has_ground:
-            phases += ((self.schedule.bodies, solver.joined),)
-        return (*phases, (Once(), solver.check_convergence))
-
-    def repeats(self, part: int) -> bool:
-        """Whether a part, the sweep, is called for once more."""
-        return part == 1 and values(self.advance.solver.unsolved) == 1
-
-
-class Driver:
-    """One way to run the phases of a ``Step``; all ways give the same bits."""
-
-    name: str
-
-    def __init__(self, step: Step):
-        self.step = step
-        self.load()
-
-    def load(self) -> None:
-        """Begin with another scene."""
-
-    def begin(self) -> None:
-        """Run the phases of the start; compiles their kernels."""
-
-    def prepare(self) -> None:
-        """Make a requested search, without a step; compiles the kernels."""
-
-    def few(self, end_tick: int, substeps: int) -> None:
-        """Advance some substeps, or to a tick or the next halt."""
-
-    def run(self, end_tick: int) -> None:
-        """Advance to a tick, to the next halt, or for about the time of a call."""
-
-
-@ti.data_oriented
-class Resident(Driver):
+class Resident:
     """Many substeps in one serial kernel: the choice for small systems on a CPU."""
 
     name = "resident"
 
-    def load(self) -> None:
-        """Begin with short calls, as the cost of a step is not known yet."""
-        self.substeps = 4
+    def __init__(self, step: Step):
+        self.step = step
 
     def begin(self) -> None:
         """Run the phases of the start; compiles the kernel."""
+        # Calls are short first, as the cost of a step is not known yet.
+        self.substeps = 4
         self.step.start(0)
         self._run(1, 0, 1)
         self.step.start(1)
@@ -248,10 +82,13 @@ class Resident(Driver):
 
 
 @ti.data_oriented
-class Parallel(Driver):
+class Parallel:
     """One substep a kernel, every phase a parallel loop: for large systems and for GPUs."""
 
     name = "parallel"
+
+    def __init__(self, step: Step):
+        self.step = step
 
     def begin(self) -> None:
         """Run the phases of the start; compiles their kernels."""
@@ -307,4 +144,4 @@ class Parallel(Driver):
 
 
 #: Drivers by name.
-DRIVERS: dict[str, type[Driver]] = {driver.name: driver for driver in (Resident, Parallel)}
+DRIVERS: dict[str, Any] = {driver.name: driver for driver in (Resident, Parallel)}

@@ -19,6 +19,8 @@ from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS, NEVER
+from taichi_dem.step.bond import motion_of
+from taichi_dem.step.multirate.lists import Places
 
 ASLEEP, AWAKE, STIRRED = range(3)
 #: Bodies whose momenta are summed one after the other.
@@ -37,8 +39,8 @@ def beyond(opening, rounding):
 
 
 @ti.data_oriented
-class Sleeping:
-    """State of sleep of the bodies.
+class Sleeping(Places):
+    """State of sleep of the bodies, and the list of their chunks when momenta are summed.
 
     awake: ASLEEP, AWAKE, or STIRRED once the body has woken its neighbours. since: tick at which it
     woke, NEVER while asleep. stride: step [s] in which it woke others. woken: bodies that wait to
@@ -83,14 +85,14 @@ class Sleeping:
         assign(self.chunk_first, np.append(first, len(part)))
 
     @ti.func
-    def at_rest(self, b, factor, rounding, advance):
+    def at_rest(self, b, factor, rounding):
         """Energy that the springs of a bond hold [J], and nonzero where its law would begin.
 
         Of what the bond is opened beyond a rounding [m]; the law begins at this opening times a
         factor, pressed as pulled.
         """
         stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
-        motion, energy, begins = advance.motion_of(b), 0.0, 0
+        motion, energy, begins = motion_of(self, b), 0.0, 0
         for u in range(3 * b, 3 * b + 3):
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = beyond(unit_opening(motion, arm, self.tables.vertex_master[u]), rounding)
@@ -102,7 +104,27 @@ class Sleeping:
         return self.tables.unit_area[b] * energy, begins
 
     @ti.func
-    def withheld(self, b, elapsed, last, rounding, advance):
+    def left_out_now(self, b, seconds, moved: ti.template()):
+        """Bound of the impulse [N s] and the energy [J] that a bond has left out so far.
+
+        One body moved while the other slept, since it woke. seconds: of a tick [s]. moved: whether
+        it has gone on since the bond would last have been evaluated, as it does in the step in
+        which it wakes others.
+        """
+        slots = self.tables.bond_slots[b]
+        i, j = slots[0] >> 2, slots[1] >> 2
+        if self.since[i] < 0 or (self.since[j] >= 0 and self.since[j] < self.since[i]):
+            i = j
+        last, found = 0.0, vec2(0.0, 0.0)
+        if ti.static(moved):
+            last = self.stride[i]
+        ticks = self.state.tick[None] - self.since[i]
+        if 0 <= self.since[i] and 0 < ticks:
+            found = self._withheld(b, ti.cast(ticks, real) * seconds, last, self.rounding(i))
+        return found
+
+    @ti.func
+    def _withheld(self, b, elapsed, last, rounding):
         """Impulse [N s] and energy [J] of a bond that was not evaluated for a time [s].
 
         last: time [s] since the last evaluation that it missed. The springs' force has grown to
@@ -110,7 +132,7 @@ class Sleeping:
         hold now, less the work of a leapfrog's coming step. Of what exceeds a rounding [m].
         """
         stiffness, force, energy = self.tables.bond_stiffness[b], vec3(0.0), 0.0
-        motion = advance.motion_of(b)
+        motion = motion_of(self, b)
         for u in range(3 * b, 3 * b + 3):
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
@@ -121,7 +143,7 @@ class Sleeping:
         return self.tables.unit_area[b] * vec2(elapsed * norm(force), ti.abs(energy))
 
     @ti.func
-    def begin(self, i, advance):
+    def begin(self, i):
         """Wake body i at the start where something acts on it or it moves, or none may sleep.
 
         Bodies may also be at rest with strained bonds, and these act at once.
@@ -130,7 +152,7 @@ class Sleeping:
         for f in range(4):
             b = self.tables.face_bond[4 * i + f]
             if b >= 0:
-                energy, _ = self.at_rest(b, 1.0, self.rounding(i), advance)
+                energy, _ = self.at_rest(b, 1.0, self.rounding(i))
                 if energy > 0.0:
                     stirred = True
         for effect in ti.static(self.acting):
@@ -149,8 +171,7 @@ class Sleeping:
                 j = self.tables.neighbour[4 * i + f]
                 # Not in one condition: "and" evaluates both sides.
                 if j >= 0:
-                    if ti.atomic_max(self.awake[j], AWAKE) == ASLEEP:
-                        self.since[j] = 0
+                    self.awaken(j)
 
     @ti.func
     def both_awake(self, i, j):
@@ -164,15 +185,15 @@ class Sleeping:
         return ti.static(_ROUNDINGS * np.finfo(float).eps) * place
 
     @ti.func
-    def stir(self, i, advance, elapsed, velocity, angular_momentum):
-        """Wake the neighbours of a body that moves by more than may be left out.
+    def stir(self, i, elapsed, velocity, angular_momentum):
+        """Wake the neighbours of a body that has moved by more than may be left out.
 
-        advance: with the new position of the body. elapsed: its step [s].
+        elapsed: its step [s].
         """
         if self.awake[i] == AWAKE:
             spin = norm(angular_momentum) * self.tables.mass_inverse[i] / self.tables.radius[i]
             is_fast = squared(velocity) + spin * spin > self.bound2[self.part[i]]
-            if self._opens(i, is_fast, advance):
+            if self._opens(i, is_fast):
                 self.awake[i], self.stride[i] = STIRRED, elapsed
                 for f in range(4):
                     b = self.tables.face_bond[4 * i + f]
@@ -181,7 +202,7 @@ class Sleeping:
                             self.awaken(self.tables.neighbour[4 * i + f])
 
     @ti.func
-    def _opens(self, i, is_fast, advance):
+    def _opens(self, i, is_fast):
         """Whether body i opens a bond to a body that slept until now by more than is allowed.
 
         is_fast: whether any opening beyond rounding is.
@@ -194,27 +215,27 @@ class Sleeping:
                 # Whether another thread has woken it in this substep must not matter.
                 slept = self.since[j] < 0 or self.since[j] == self.state.tick[None]
                 if slept and self.state.broken_tick[b] < 0:
-                    energy, is_more = self._held(b, i, j, self.bound2[self.part[i]], advance)
+                    energy, is_more = self._held(b, i, j, self.bound2[self.part[i]])
                     if is_more or (is_fast and energy > 0.0):
                         found = True
         return found
 
     @ti.func
-    def leaves_out(self, b, i, j, advance):
+    def leaves_out(self, b, i, j):
         """Whether the springs of a sleeping bond hold more than is allowed."""
         speed = self.share[None] * self.mean[self.part[i]]
-        _, is_more = self._held(b, i, j, speed * speed, advance)
+        _, is_more = self._held(b, i, j, speed * speed)
         return is_more
 
     @ti.func
-    def _held(self, b, i, j, speed2, advance):
+    def _held(self, b, i, j, speed2):
         """Energy that the springs of a bond hold [J], and whether that is more than allowed.
 
         It is where a law would begin at the opening over the share, or the lighter body would get
         more than a speed from it; speed2: its square [(m/s)^2].
         """
         rounding = self.rounding(i)
-        energy, begins = self.at_rest(b, 1.0 / self.share[None], rounding, advance)
+        energy, begins = self.at_rest(b, 1.0 / self.share[None], rounding)
         lighter = ti.min(self.tables.mass[i], self.tables.mass[j])
         return energy, begins != 0 or 2.0 * energy > lighter * speed2
 
@@ -233,6 +254,14 @@ class Sleeping:
         step = tick // MACRO_TICKS
         due = tick % MACRO_TICKS == 0 and (step < _EARLY or step % _EVERY == 0)
         return due and self.share[None] > 0.0
+
+    @ti.func
+    def count(self, low):
+        """Number of chunks, at the ticks at which their momenta are summed."""
+        count = 0
+        if self.is_due():
+            count = self.chunk_count[None]
+        return count
 
     @ti.func
     def chunk(self, c):

@@ -1,10 +1,7 @@
 """Tangential springs between contact spheres, for friction laws with memory."""
 
-from typing import Optional
-
 import taichi as ti
 
-from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.products import matvec, transposed_matvec
 from taichi_dem.step.multirate.schedule import Schedule
 
@@ -16,12 +13,12 @@ class TangentialSprings:
     evaluated: of a pair, one more than the tick at which it was last evaluated, 0 for never.
     """
 
-    def __init__(self, schedule: Schedule, contacts: Optional[Contacts]):
+    def __init__(self, schedule: Schedule):
         self.friction, self.schedule = schedule.tables.friction, schedule
-        self.present = contacts is not None and contacts.remembers
-        self.by_area = contacts is not None and contacts.law.meets_bodies
-        if contacts is not None and self.present:
-            self.evaluated = contacts.store.column("evaluated", ti.i64)
+        self.present = schedule.has_contact and schedule.contacts.remembers
+        self.by_area = schedule.has_contact and schedule.contacts.law.meets_bodies
+        if self.present:
+            self.evaluated = schedule.store.column("evaluated", ti.i64)
 
     @ti.func
     def elapsed(self, p):

@@ -17,7 +17,7 @@ class MadeUpRuns:
     formula, change_between, events = None, staticmethod(lambda a, b: 0.0), False
     certificate, residual = None, 0.0
 
-    def __init__(self, job, methods, listen):
+    def __init__(self, job, listen):
         self.seconds, self.count, self.failure = 0.0, 0, "it diverged"
         self.results, self.cost, self.known = {}, {}, {}
 

@@ -19,7 +19,7 @@ ENERGY = goals.kinetic_energy()
 def finer(scene, until, goal, answer, levels=3):
     """Value of a goal with the step of an answer over 2^levels."""
     job = Job(scene, until, goal, answer.tolerance, answer.confidence)
-    return Runs(job, job.methods(), None).value(answer.plan.begin + 1 + levels)
+    return Runs(job, None).value(answer.plan.begin + 1 + levels)
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,9 @@ pytestmark = pytest.mark.slow
 
 
 @ti.func
-def too_deep(self, i, is_fast, advance):
+def too_deep(self, i, is_fast):
     """Whether a body is a million times as fast as one that wakes others."""
-    return squared(advance.state.velocity[i]) > 1e12 * self.bound2[self.part[i]]
+    return squared(self.state.velocity[i]) > 1e12 * self.bound2[self.part[i]]
 
 
 def test_sleep_that_is_too_deep_is_found(monkeypatch, compiled_anew):

@@ -36,16 +36,13 @@ from taichi_dem import (
     in_space_order,
     join,
     mesh_stiffness,
-    methods,
     needed_effects,
-    quality_report,
     read_mesh,
     runtime,
     shapes,
     simulate,
     solve,
     step_report,
-    with_body_group,
     write_paraview,
 )
 from taichi_dem.mesh.face_groups import with_inner_group
@@ -114,8 +111,6 @@ def _scenes():
     yield "Mesh.group", PAIR.group, chosen
     yield "Mesh.body_group", PAIR.body_group, chosen
     yield "Mesh.moved", PAIR.moved, {}
-    yield "with_body_group", with_body_group, {"mesh": PAIR, **chosen}
-    yield "methods.check_method", methods.check_method, {"method": METHOD}
     yield "Multirate", Multirate, {"control": StepControl()}
     yield "Uniform", Uniform, {"distance": 1e-5, "control": StepControl()}
     yield "StepControl", StepControl, {}
@@ -163,12 +158,10 @@ def _questions():
     yield "goals.displacement", goals.displacement, {"group": "left"}
     yield "goals.energy_share", goals.energy_share, {"term": "kinetic"}
     yield "goals.hole_displacement", goals.hole_displacement, {}
-    yield "goals.peak_particle_velocity", goals.peak_particle_velocity, {"distance": 0.5}
     yield "goals.peak_speed", goals.peak_speed, {"body": 0}
     yield "elastic_report", elastic_report, {"scene": Scene(BAR, rock)}
     yield "estimated_effects", estimated_effects, {"scene": SCENE, "until": 1e-5}
     yield "mesh_stiffness", mesh_stiffness, {"mesh": BAR, "material": rock}
-    yield "quality_report", quality_report, {"mesh": BAR, "material": CONCRETE}
     yield "step_report", step_report, {"scene": SCENE}
     yield "Simulation", Simulation, {"scene": ALONE, "method": METHOD}
     moving = simulation()
@@ -193,7 +186,6 @@ def _results():
     series = {"folder": path("pv"), "model": done.model, "frames": done.frames}
     yield "write_paraview", write_paraview, series
     where = "result.Result"
-    yield f"{where}.mean_displacement", done.mean_displacement, {"bodies": np.arange(2)}
     yield f"{where}.write", run().write, {"folder": path("o")}
     page = {"path": path("v.html"), "open_browser": False}
     yield f"{where}.show", run(frames=1).show, page
@@ -206,7 +198,3 @@ def _results():
     yield f"{where}.attenuation", done.attenuation, {"group": "left", "radius": 0.01}
     law = done.attenuation(group="left", radius=0.01).power_law
     yield "output.attenuation.Attenuation.power_law", law, {"nearest": 0.01}
-    quality, step = quality_report(BAR, CONCRETE), step_report(ALONE)
-    for name in ("worst", "price"):
-        yield f"stability.quality.QualityReport.{name}", getattr(quality, name), {}
-        yield f"stability.step_report.StepReport.{name}", getattr(step, name), {}

@@ -45,7 +45,7 @@ def test_a_kept_result_that_is_none_is_refused_and_left_alone(tmp_path, content)
 
 WRITERS = {
     "mesh": lambda path: write_mesh(path, BAR),
-    "vtu": lambda path: write_vtu(path, BAR.points, BAR.tetrahedra),
+    "vtu": lambda path: write_vtu(path, BAR.points, BAR.tetrahedra, {}),
     "csv": lambda path: write_csv(path, {"a": [1.0], "b": [2.0]}),
     "text": lambda path: write_text(path, "x"),
     "checkpoint": lambda path: write_checkpoint(path, IDENTITY, ARRAYS),

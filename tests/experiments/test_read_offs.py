@@ -29,7 +29,7 @@ from taichi_dem.kit.study.work_precision import Point, answers, cheapest
 from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import topology_of
-from taichi_dem.output.attenuation import Attenuation
+from taichi_dem.output.attenuation import Attenuation, attenuation_of
 from taichi_dem.state.model import Model
 
 # The package has functions of these names.
@@ -149,7 +149,7 @@ def test_peaks_fall_by_the_power_of_the_distance_from_the_axis_of_the_hole():
     x, y, z = model.centre.T
     away = np.hypot(x - 1.6, y - 1.0)
     inner = away < np.min([x, 2.0 - x, y, 2.0 - y, z, 0.2 - z], axis=0)
-    made = Attenuation.of(model, np.ones(model.body_count), 0.025)
+    made = attenuation_of(model, np.ones(model.body_count), "hole", 0.025)
     assert made.distance == pytest.approx(away / 0.025, rel=1e-9)
     assert np.array_equal(made.inner, inner)
     distance = np.linspace(2.0, 60.0, 200)

@@ -15,9 +15,9 @@ from taichi_dem import (
     Uniform,
     checked_mesh,
     effects,
-    quality_report,
 )
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
+from taichi_dem.stability.step_report import bond_steps
 from tests.fuzz.draws import Draws
 
 
@@ -155,8 +155,10 @@ class BlastScene:
     def drawn_method(self, mesh, material):
         """The method of the kind at a step about the longest stable one."""
         draws, name = self.draws, self.kind.method
-        limits = quality_report(mesh, material)
-        damped = limits.spring_step_s if name in ("solved", "limited") else limits.step_s
+        limits = bond_steps(mesh, material)
+        damped = limits["bond_stiffness"]
+        if name not in ("solved", "limited"):
+            damped = np.minimum(damped, limits["bond_dashpot"])
         longest = float(damped.min()) if np.isfinite(damped.min()) else 1e-6
         dt = draws.given(longest * draws.power(-2.0, 0.7))
         way = draws.given(float(np.ptp(mesh.points)) * draws.power(-8.0, -2.0))

@@ -11,7 +11,6 @@ from taichi_dem import (
     Scene,
     effects,
     step_report,
-    with_body_group,
 )
 from taichi_dem.materials.body_materials import joined
 from taichi_dem.materials.bond_rules import bond_geometry
@@ -19,7 +18,7 @@ from taichi_dem.materials.moduli import bond_moduli
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import body_properties, topology_of
 from taichi_dem.methods import Uniform
-from taichi_dem.simulate import run_identity
+from taichi_dem.saving import run_identity
 from taichi_dem.state.model import Model
 from tests.material.blocks import NU, ORE, E, random_block, rock
 
@@ -28,7 +27,7 @@ HALF = ("half", lambda x: x[:, 0] > 0.5)
 
 def halves(first=CONCRETE, second=ORE, effects_=(), mesh=None, **options):
     """A scene of a mesh of 1 m whose right half has the second material."""
-    mesh = with_body_group(mesh or bar(1.0, 0.25, (4, 1, 1)), *HALF)
+    mesh = (mesh or bar(1.0, 0.25, (4, 1, 1))).body_group(*HALF)
     return Scene(mesh, first, effects_, materials={"half": second}, **options)
 
 
@@ -47,7 +46,7 @@ def test_what_joins_two_materials_is_in_series_and_as_weak_as_the_weaker():
 
 def test_a_bond_of_two_moduli_gives_way_by_the_part_of_its_distance_in_each():
     """1 / k = d_1 / E_1 + d_2 / E_2, d the distances of the centres from the face."""
-    mesh = with_body_group(random_block(2, seed=1), *HALF)
+    mesh = random_block(2, seed=1).body_group(*HALF)
     scene = Scene(mesh, rock(), materials={"half": rock(young=3 * E, damping_ratio=0.2)})
     model, top = Model(mesh, scene.body_materials, []), topology_of(mesh)
     kinds = scene.body_materials.of_body[np.stack([top.master, top.slave])]
@@ -86,8 +85,8 @@ def test_masses_and_contacts_are_those_of_each_material():
 
 
 def test_a_checkpoint_belongs_to_materials_in_any_order_and_equal_ones_are_one():
-    mesh = with_body_group(bar(1.0, 0.25, (8, 1, 1)), "a", lambda x: x[:, 0] < 0.3)
-    mesh = with_body_group(mesh, "b", lambda x: x[:, 0] > 0.6)
+    mesh = bar(1.0, 0.25, (8, 1, 1)).body_group("a", lambda x: x[:, 0] < 0.3)
+    mesh = mesh.body_group("b", lambda x: x[:, 0] > 0.6)
 
     def identity(**given):
         return run_identity(Scene(mesh, CONCRETE, materials=given), Uniform(1e-8))
@@ -118,8 +117,8 @@ def test_steps_are_those_of_the_stricter_material():
 
 
 def test_a_body_in_two_groups_of_different_materials_is_refused():
-    mesh = with_body_group(bar(1.0, 0.25, (4, 1, 1)), *HALF)
-    mesh = with_body_group(mesh, "low", lambda x: x[:, 1] < 0.13)
+    mesh = bar(1.0, 0.25, (4, 1, 1)).body_group(*HALF)
+    mesh = mesh.body_group("low", lambda x: x[:, 1] < 0.13)
     with pytest.raises(InputError, match="is in the groups half and low, which have different"):
         Scene(mesh, CONCRETE, materials={"half": ORE, "low": CONCRETE})
 

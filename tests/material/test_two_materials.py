@@ -13,7 +13,6 @@ from taichi_dem import (
     Uniform,
     effects,
     in_space_order,
-    with_body_group,
 )
 from taichi_dem.materials.body_materials import BodyMaterials, joined
 from taichi_dem.mesh.shapes import bar, pair
@@ -32,7 +31,7 @@ def thrown(materials, twin=False):
     Velocities of 40 m/s and more, outward and across. twin: whether its group "ore" has a second
     material of equal constants, which a scene would merge with the first.
     """
-    mesh = with_body_group(BAR, "ore", lambda x: x[:, 0] + 0.5 * x[:, 1] > 0.06)
+    mesh = BAR.body_group("ore", lambda x: x[:, 0] + 0.5 * x[:, 1] > 0.06)
     scene = Scene(mesh, CONCRETE, LAWS, materials=materials)
     if twin:
         of_body = np.zeros(mesh.body_count, dtype=np.int32)
@@ -88,7 +87,7 @@ def test_numbers_of_bodies_change_results_by_the_turn_alone():
     40 mm/s, bodies of 25 mm and 5e-6 s at most 1e-5.
     """
     method = ImplicitDashpots(4e-7, tolerance=1e-12, sweeps=(2, 500))
-    mesh = with_body_group(BAR, "ore", lambda x: x[:, 0] + x[:, 1] > 0.08)
+    mesh = BAR.body_group("ore", lambda x: x[:, 0] + x[:, 1] > 0.08)
     other = in_space_order(mesh)
     order = [
         int(np.flatnonzero((other.tetrahedra == corners).all(axis=1))[0])
@@ -118,7 +117,7 @@ def stretched(mesh, material, materials, speed):
 def test_two_bodies_of_two_materials_move_as_if_both_had_what_joins_them(speed):
     """Bond and contact, with equal masses: the same bits. Apart the bond breaks; else it holds."""
     other = replace(ORE, density=CONCRETE.density)
-    mesh = with_body_group(pair(0.05), "right", lambda x: x[:, 0] > 0.0)
+    mesh = pair(0.05).body_group("right", lambda x: x[:, 0] > 0.0)
     mixed = stretched(mesh, CONCRETE, {"right": other}, speed)
     found, broken = mixed.state.motion(), mixed.state.broken_tick[0] >= 0
     account = mixed.energy_balance.account()
@@ -139,7 +138,7 @@ def test_a_wave_is_reflected_and_transmitted_by_the_impedances(heavier, stiffer)
     """
     base = rock(damping_ratio=0.0)
     other = rock(damping_ratio=0.0, density=heavier * base.density, young=stiffer * E)
-    mesh = with_body_group(bar(1.0, 0.01, (100, 1, 1)), "half", lambda x: x[:, 0] > 0.5)
+    mesh = bar(1.0, 0.01, (100, 1, 1)).body_group("half", lambda x: x[:, 0] > 0.5)
     sides = {"bottom": (0, 1, 0), "top": (0, 1, 0), "back": (0, 0, 1), "front": (0, 0, 1)}
     held = [effects.Roller(name, normal) for name, normal in sides.items()]
     simulation = Simulation(Scene(mesh, base, held, materials={"half": other}), Uniform(1e-7))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from _meshes import mirrored_copies
-from taichi_dem import read_mesh, with_body_group
+from taichi_dem import read_mesh
 from taichi_dem.mesh.face_groups import with_cut
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.mesh.joined import in_space_order
@@ -16,7 +16,7 @@ LOW = ("low", lambda x: x[:, 1] < 0.15)
 
 def grouped():
     """A bar with two groups of bodies that have some in common."""
-    return with_body_group(with_body_group(bar(1.0, 0.3, (4, 2, 2)), *ORE), *LOW)
+    return bar(1.0, 0.3, (4, 2, 2)).body_group(*ORE).body_group(*LOW)
 
 
 def assert_by_place(mesh, names=(ORE, LOW)):

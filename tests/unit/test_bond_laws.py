@@ -54,7 +54,7 @@ class Asked:
 
     def fields(self):
         """What the law remembers, a row a unit."""
-        return [field for effect in self.tables.effects for field in effect.state().values()]
+        return [f for name, f in self.state.fields().items() if name.endswith(("_unit", "_slip"))]
 
     def make_intact(self):
         """Every unit as those of the pair are."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, needed_effects
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import pair
 from taichi_dem.report.resolution import MOST_SLIP
@@ -24,7 +24,7 @@ def slid(share):
 
 def write_slip(simulation, share):
     """Let the second unit of the bond have slipped by a share of an edge, oblique to the axes."""
-    field = simulation.state.fields()["shear_slip"]
+    field = simulation.state.fields()["shear_slip_slip"]
     slip = values(field)
     slip[1, :2] = share * EDGE * np.array([0.6, -0.8])
     assign(field, slip)
@@ -41,7 +41,7 @@ def test_share_is_that_of_the_shortest_edge():
 def test_far_slip_is_warned_of_and_an_effect_that_weakens_is_missed():
     report = slid(2.0 * MOST_SLIP).report()
     assert any("bond 0 " in need and "by 10 %" in need for need in report.needs)
-    advice = needed_effects(report)
+    advice = report.advice()
     assert [one.effect for one in advice.missing] == ["SlipWeakening"]
     table = advice.table()
     assert table["effect"].tolist() == ["shear_slip", "SlipWeakening"]

@@ -66,5 +66,5 @@ def test_laws_by_other_names_lose_no_criterion_of_the_step_report():
     mesh = bar(0.2, 0.1, (2, 1, 1))
     known = step_report(Scene(mesh, CONCRETE, listed))
     own = step_report(Scene(mesh, CONCRETE, [renamed(effect) for effect in listed]))
-    assert list(own.limits) == list(known.limits) and len(own.limits) == 5
+    assert list(own.limits) == list(known.limits) and len(own.limits) == 4
     assert all(np.array_equal(own.limits[name], known.limits[name]) for name in known.limits)

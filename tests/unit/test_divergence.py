@@ -15,11 +15,11 @@ from taichi_dem import (
     SimulationDiverged,
     Uniform,
     effects,
-    quality_report,
     simulate,
 )
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
+from taichi_dem.stability.step_report import bond_steps
 
 STEP, UNTIL = 1e-6, 2e-4
 
@@ -105,7 +105,7 @@ def uneven_pair():
     points = pair().points.copy()
     points[4] *= 0.1
     mesh = checked_mesh(points, pair().tetrahedra, {})
-    return mesh, quality_report(mesh, CONCRETE).dashpot_step_s
+    return mesh, bond_steps(mesh, CONCRETE)["bond_dashpot"]
 
 
 def test_the_tightest_limit_near_the_body_is_quoted_with_its_body():

@@ -20,7 +20,7 @@ from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.report.effects import effect_uses
 from taichi_dem.report.energy_balance import TERMS
-from taichi_dem.report.run import Run
+from taichi_dem.report.readings import Run
 from taichi_dem.state.model import Model
 
 #: Far below the strength of concrete: a block of some 1 kg that falls from rest for 1e-5 s.
@@ -73,12 +73,12 @@ def used(listed, bits=0, marked=0, heat=0.0, **account):
     state, schedule = simulation.state, simulation.schedule
     assign(state.active_effects, [bits, 0])
     assign(schedule.evaluations, [100])
-    tables = np.zeros((2, 6)), np.full((1, 5), heat), None
     balance = SimpleNamespace(start_energy=0.0, works=lambda: np.zeros((2, 4)))
-    readings = SimpleNamespace(active_bonds=lambda: np.full((1, 2), marked > 0))
+    bonds = {"active_bonds": np.full((1, 2), marked > 0), "bonds": np.full((1, 5), heat)}
+    readings = SimpleNamespace(**{name: lambda one=one: one for name, one in bonds.items()})
     filled = {**dict.fromkeys(TERMS, 0.0), **account}
     run = Run(model, state, schedule, None, readings, None)
-    return {use.effect: use for use in effect_uses(run, balance, tables, filled)}
+    return {use.effect: use for use in effect_uses(run, balance, filled)}
 
 
 @pytest.mark.parametrize(

@@ -143,5 +143,3 @@ def test_a_slice_has_the_mean_motion_of_its_bodies():
     for row, frame in enumerate(made.frames):
         mean = frame.displacement[:, 0].reshape(2, 6).mean(axis=1)
         assert profile.displacement[row, 0] == pytest.approx(mean, rel=1e-12, abs=1e-20)
-    half = made.mean_displacement(np.arange(6))
-    assert half[:, 0] == pytest.approx(profile.displacement[:, 0, 0], rel=1e-12, abs=1e-20)

@@ -10,8 +10,8 @@ LAYERS = {
         kit | meshes mesh shapes | materials | elasticity | physics | state
         | laws | loads | effects initial_motion | scene | step_control | methods | contact
         | stability | step | report | engine | simulation
-        | output measured_speedup observers run_plan | plot | viewer
-        | result scene_pictures | simulate needed_effects | goals
+        | output observers | plot | viewer
+        | result scene_pictures | saving simulate needed_effects | goals
         | accuracy | solve | demo | __init__ | __main__""",
     "ca_damper": """
         errors random_numbers progress measures report contracts certificate checked_range

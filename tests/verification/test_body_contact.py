@@ -85,7 +85,7 @@ def touching(placed, random, count):
 def test_the_force_is_the_gradient_of_the_energy_and_conserves_momentum():
     """Central differences of the way h are off by h / depth squared of themselves."""
     placed, random = Placed(single(0.05), single(0.06)), np.random.default_rng(2)
-    h, dt = 1e-9, 1e-12
+    h = 1e-9
     for place, orientation in touching(placed, random, 6):
         slope = np.zeros(3)
         for axis in range(3):

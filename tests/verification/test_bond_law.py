@@ -153,7 +153,7 @@ def test_slip_follows_equation_2_on_any_path(pair):
         found = pair.open([-5e6 / K_N, *sliding])[1:]
         # Slip remembers every rounding of the way; each is one opening error.
         assert np.abs(found - expected).max() < count * SHEAR_ERROR
-    found = pair.simulation.values(pair.state.fields()["shear_slip"])
+    found = pair.simulation.values(pair.state.fields()["shear_slip_slip"])
     assert np.abs(found - slip).max() < len(path) * SHEAR_ERROR / K_S
     assert np.hypot(*slip) > limit / K_S
 
@@ -184,7 +184,7 @@ def test_strained_and_slipped_pair_turns_with_its_force(pair):
     orientation = np.array([still[0], tilt])
     position = pair.centre + np.outer([0, 1], shift)
     pair.move(position, orientation)
-    slip = pair.simulation.values(pair.state.fields()["shear_slip"])
+    slip = pair.simulation.values(pair.state.fields()["shear_slip_slip"])
     assert np.abs(slip).max() > 1e-5 and not pair.broken
     resting = pair.move(position, orientation)
     q = quaternion([1.0, -2.0, 0.7], 2.0)

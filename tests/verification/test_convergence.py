@@ -12,10 +12,11 @@ from taichi_dem import (
     Simulation,
     Uniform,
     effects,
-    quality_report,
 )
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar
+from taichi_dem.methods import Method
+from taichi_dem.stability.step_report import bond_steps
 from taichi_dem.state.timeline import MAX_LEVEL
 from tests.scenes import brisk_scene
 
@@ -34,11 +35,10 @@ class Unchanged:
         return level
 
 
-class FixedLevels:
+class FixedLevels(Method):
     """Multirate without a rule: the order of a scheme shows where its steps do not jump."""
 
-    name, uniform, solves, steps_ahead = "fixed_levels", False, False, 0.0
-    control, dashpot, distance = None, "full", None
+    name, uniform = "fixed_levels", False
 
     def __init__(self, neighbour):
         self.neighbour, self.dt0 = neighbour, UNTIL / STEPS[0]
@@ -104,8 +104,8 @@ def slack(moving, damped):
     It is smaller than the first by a step times the fastest rate, of a spring or a dashpot, both
     from the stability limit 2 / rate.
     """
-    limits = quality_report(moving.simulation.model.mesh, CONCRETE)
-    limit = limits.dashpot_step_s.min() if damped else limits.spring_step_s.min()
+    limits = bond_steps(moving.simulation.model.mesh, CONCRETE)
+    limit = limits["bond_dashpot" if damped else "bond_stiffness"].min()
     return np.log2(1.0 + 2.0 / limit * UNTIL / STEPS[-2])
 
 

@@ -31,7 +31,7 @@ def built():
 def bonded(built):
     """The same pair without history."""
     built.reset()
-    assign(built.state.fields()["slip_weakening"], 0.0)
+    assign(built.state.fields()["slip_weakening_unit"], 0.0)
     return built
 
 
@@ -115,7 +115,7 @@ def test_slip_to_and_fro_accumulates(bonded):
     bonded.open([-pressure / K_N, size + limit / K_S, 0.0])
     limit -= SLOPE * size
     bonded.open([-pressure / K_N, -limit / K_S, 0.0])
-    unit = bonded.simulation.values(bonded.state.fields()["slip_weakening"])
+    unit = bonded.simulation.values(bonded.state.fields()["slip_weakening_unit"])
     assert np.abs(unit[:, 0]).max() < 99 * OPENING_ERROR
     assert unit[:, 2] == pytest.approx([2 * size] * 3, abs=99 * OPENING_ERROR)
 
@@ -138,7 +138,7 @@ def test_energy_stored_plus_spent_is_the_work_done_on_any_way(bonded):
     """Work of a jump is the change of the spring's energy before it slips: exact at any step."""
     draw = np.random.default_rng(3)
     way = np.cumsum(draw.normal(scale=0.4 * CRITICAL, size=(60, 2)), axis=0)
-    unit = bonded.state.fields()["slip_weakening"]
+    unit = bonded.state.fields()["slip_weakening_unit"]
     normal = -5e6 / K_N
     bonded.open([normal, 0.0, 0.0])
     work = bonded.stored()

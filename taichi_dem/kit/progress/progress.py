@@ -59,6 +59,18 @@ class Counted(Progress):
 
 
 @dataclass(frozen=True)
+class Worded(Progress):
+    """Progress of a job that says in words how fast it is, or how much is done."""
+
+    words: str
+
+    @property
+    def speed(self) -> str:
+        """The words."""
+        return self.words
+
+
+@dataclass(frozen=True)
 class Compiling(Progress):
     """Progress of compiling kernels before the first step. part: which of them, in words."""
 

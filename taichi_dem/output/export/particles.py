@@ -7,12 +7,7 @@ import numpy as np
 from taichi_dem.kit.extended_xyz import XyzFrame, write_extended_xyz
 from taichi_dem.kit.validation import FileName, choice
 from taichi_dem.mesh.tetrahedra import signed_volumes
-from taichi_dem.output.fragments import (
-    fragment_of_body,
-    fragments_of,
-    quaternions_of,
-    rigid_motion,
-)
+from taichi_dem.output.fragments import fragment_of_body, fragments_of, quaternions_of, rigid_motion
 
 
 def write_particles(path: FileName, result: Any, of: str) -> None:

@@ -4,12 +4,12 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit import products
-from taichi_dem.kit.allocation import assign, values
-from taichi_dem.kit.lanes import LANES, by_lane, cross, dot, product, transposed_product
+from taichi_dem.kit.allocation import assign, raise_to
+from taichi_dem.kit.lanes import LANES, cross, dot, product, transposed_product
 from taichi_dem.kit.products import matmul_transposed, matvec, stacked, transposed_matmul
 from taichi_dem.kit.types import real, vec3, vec6
 from taichi_dem.methods import ImplicitDashpots
-from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
+from taichi_dem.physics.wrench import inverse, plus, point_block, zero_block
 from taichi_dem.state.model import Model
 from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.implicit.velocities import Velocities
@@ -78,16 +78,6 @@ class BondDashpots:
         for bodies in (self.masters, self.slaves):
             assign(bodies, self.velocities.spare)
 
-    def read(self) -> dict[str, np.ndarray]:
-        """Arrays by place: masters, slaves (n,), branch (n, 3), last (n, 6), block (n, 6, 6)."""
-        names = ("masters", "slaves", "branch", "last")
-        found = {name: by_lane(values(getattr(self, name))) for name in names}
-        a, b, c = (
-            np.stack([by_lane(values(row)) for row in rows], axis=1)
-            for rows in (self.a, self.b, self.c)
-        )
-        return {**found, "block": np.block([[a, b], [b.swapaxes(1, 2), c]])}
-
     @ti.func
     def mean(self, b, motion):
         """A bond's motion with the twist that its dashpots answered in the step before."""
@@ -149,7 +139,7 @@ class BondDashpots:
 
     @ti.func
     def visit(self, g):
-        """Solve the bonds of group g against their bodies; largest squared velocity it changed."""
+        """Solve the bonds of group g against their bodies."""
         i, j, branch = self.masters[g], self.slaves[g], self.branch[g]
         velocity_i, spin_i = self.velocities.of_lanes(i)
         velocity_j, spin_j = self.velocities.of_lanes(j)
@@ -170,7 +160,7 @@ class BondDashpots:
         self.last[g] = last
         self.velocities.assign_lanes(i, velocity_i, spin_i, force, around)
         self.velocities.assign_lanes(j, velocity_j, spin_j, -force, -moment)
-        return change2
+        raise_to(self.velocities.change2, change2)
 
     @ti.func
     def _refresh(self, b, g, n, i, j, branch):
@@ -188,14 +178,7 @@ class BondDashpots:
         for q in range(3):
             arm = matvec(self.state.rotation[j], self.tables.vertex_slave[3 * b + q])
             block = plus(block, point_block(arm, law))
-        free = mobility(
-            self.velocities.slack(i),
-            self.velocities.turn[i],
-            self.velocities.slack(j),
-            self.velocities.turn[j],
-            branch,
-        )
-        solved = inverse(plus(inverse(block), free))
+        solved = inverse(plus(inverse(block), self.velocities.mobility(i, j, branch)))
         for r, c in ti.static(ti.ndrange(3, 3)):
             self.a[r][g][c, n] = solved.a[r, c]
             self.b[r][g][c, n] = solved.b[r, c]

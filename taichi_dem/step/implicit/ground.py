@@ -2,7 +2,8 @@
 
 import taichi as ti
 
-from taichi_dem.kit.products import matvec, squared
+from taichi_dem.kit.allocation import raise_to
+from taichi_dem.kit.products import matvec, squared, stacked
 from taichi_dem.kit.types import real
 from taichi_dem.physics.ground import braked_twist, twist_of
 from taichi_dem.physics.rotation import world_tensor
@@ -15,7 +16,7 @@ class GroundSweeps:
     """Impulses of the ground, one row of impulse and moment for each effect of a body.
 
     impulse: [N s] and [N m s], that of the step before as a first guess. They are those of the mean
-    of the velocities at both ends of the step, as of every ``GroundDashpots``.
+    of the velocities at both ends of the step, as of every ground.
     """
 
     def __init__(self, schedule: Schedule, velocities: Velocities):
@@ -26,12 +27,10 @@ class GroundSweeps:
 
     @ti.func
     def visit(self, i):
-        """Solve the dashpots of body i; square of the velocity it changed."""
-        change2 = 0.0
+        """Solve the dashpots of body i."""
         for e in ti.static(range(len(self.tables.ground))):
             if self.tables.ground[e].acts_on(i):
-                change2 = ti.max(change2, self._visit(i, e))
-        return change2
+                self._visit(i, e)
 
     @ti.func
     def _visit(self, i, e: ti.template()):
@@ -48,14 +47,12 @@ class GroundSweeps:
             0.5 * (self.state.velocity[i] + twist[0:3]),
             0.5 * (self.state.spin[i] + twist[3:6]),
         )
-        force, moment = -dt * force, -dt * moment
-        for k in ti.static(range(3)):
-            force[k] -= self.impulse[i][e, k]
-            moment[k] -= self.impulse[i][e, 3 + k]
-        velocity, spin = braked_twist(mass, inertia, resistance, force, moment, dt)
-        force, moment = mass * velocity, matvec(inertia, spin)
-        self.velocities.push(i, force, moment)
-        for k in ti.static(range(3)):
-            self.impulse[i][e, k] = self.impulse[i][e, k] + force[k]
-            self.impulse[i][e, 3 + k] = self.impulse[i][e, 3 + k] + moment[k]
-        return squared(velocity)
+        missing = -dt * stacked(force, moment)
+        for k in ti.static(range(6)):
+            missing[k] -= self.impulse[i][e, k]
+        velocity, spin = braked_twist(mass, inertia, resistance, missing[0:3], missing[3:6], dt)
+        change = stacked(mass * velocity, matvec(inertia, spin))
+        self.velocities.push(i, change[0:3], change[3:6])
+        for k in ti.static(range(6)):
+            self.impulse[i][e, k] = self.impulse[i][e, k] + change[k]
+        raise_to(self.velocities.change2, squared(velocity))

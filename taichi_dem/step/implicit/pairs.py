@@ -3,7 +3,7 @@
 import taichi as ti
 
 from taichi_dem.contact.cell_grid import group
-from taichi_dem.contact.contacts import Contacts
+from taichi_dem.kit.allocation import raise_to
 from taichi_dem.kit.products import cross, dot, matvec, norm, squared
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import place_in, unit3
@@ -41,12 +41,12 @@ class PairDashpots:
         *("active", "order", "colour", "taken", "colour_first"),
     )
 
-    def __init__(self, schedule: Schedule, contacts: Contacts, velocities: Velocities):
+    def __init__(self, schedule: Schedule, velocities: Velocities):
         self.tables, self.state, self.schedule = schedule.tables, schedule.state, schedule
-        self.contacts, self.velocities = contacts, velocities
+        self.contacts, self.store = schedule.contacts, schedule.store
+        self.velocities = velocities
         self.has_friction = bool(self.tables.friction.name)
-        self.store = contacts.store
-        self.springs = TangentialSprings(schedule, contacts)
+        self.springs = TangentialSprings(schedule)
         if self.springs.present:
             self.elapsed = ti.field(real, shape=self.store.slots)
             self.pull = ti.Vector.field(3, real, shape=self.store.spheres)
@@ -223,26 +223,27 @@ class PairDashpots:
         return ti.Vector([along, across])
 
     @ti.func
-    def visit(self, p):
-        """Solve a pair's contacts, one after the other; largest squared velocity it changed."""
-        change2 = 0.0
+    def visit(self, a):
+        """Solve the contacts of the pair at place a of the order, one after the other."""
+        p, change2 = self.active[self.order[a]], 0.0
         pair = self.store.body[p]
         m = self.tables.pair(pair[0], pair[1])
         start = self.store.first[p]
         for c in range(start, start + self.touching[p]):
-            found = self._visit(m, c, pair[0], pair[1], self.branch[p])
-            change2 = ti.max(change2, found)
-        return change2
+            k, share = self.entry[c], self.share[c]
+            linear, angular = self.velocities.apart(pair[0], pair[1], self.branch[p])
+            found = self._answer(m, c, linear, angular)
+            step = self.impulse[k] - found
+            self.impulse[k] = found
+            self.velocities.pull(pair[0], pair[1], self.branch[p], step, self._moment(c, step))
+            change2 = ti.max(change2, share[0] * share[0] * squared(step))
+        raise_to(self.velocities.change2, change2)
 
     @ti.func
-    def _visit(self, m, c, i, j, branch):
-        k, share = self.entry[c], self.share[c]
-        linear, angular = self.velocities.apart(i, j, branch)
-        found = self._answer(m, c, linear, angular)
-        step = self.impulse[k] - found
-        self.impulse[k] = found
-        self.velocities.pull(i, j, branch, step, self._moment(c, step))
-        return share[0] * share[0] * squared(step)
+    def visit_last(self, one):
+        """Visit the pairs that found no colour, one after the other."""
+        for a in range(self.colour_first[COLOURS], self.count[None]):
+            self.visit(a)
 
     @ti.func
     def _answer(self, m, c, linear, angular):

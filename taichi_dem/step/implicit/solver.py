@@ -1,20 +1,15 @@
 """Sweeps over the dashpots of all bonds and contacts until their impulses agree."""
 
-from typing import Optional
-
 import numpy as np
 import taichi as ti
 
-from taichi_dem.contact.contacts import Contacts
-from taichi_dem.kit.allocation import assign, raise_to
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.state.model import Model
-from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
 from taichi_dem.step.implicit.bonds import BOND_COLOURS, BondDashpots
 from taichi_dem.step.implicit.ground import GroundSweeps
-from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
+from taichi_dem.step.implicit.pairs import PairDashpots
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.multirate.schedule import Schedule
 
@@ -27,32 +22,30 @@ class Solver:
     bit. So one core and many cores run the same sweeps to the same bits.
 
     bounds: fewest and most sweeps of a step. tolerance: of the velocities. sweeps: number in the
-    present step. change2: largest squared change of a velocity in the present sweep [m2/s2],
-    residual2 that of the last. speed2: largest squared speed of a body at the beginning of the
-    step. unsolved: 1 while another sweep is required. unconverged: steps whose sweeps ended without
-    agreement; worst: largest residual of them, over the fastest body's speed or, where that is
-    larger, over the change by the first sweep.
+    present step. residual2: largest squared change of a velocity in the last sweep [m2/s2]. speed2:
+    largest squared speed of a body at the beginning of the step. unsolved: 1 while another sweep is
+    required. unconverged: steps whose sweeps ended without agreement; worst: largest residual of
+    them, over the fastest body's speed or, where that is larger, over the change by the first
+    sweep.
     """
 
-    def __init__(
-        self, tables: Tables, state: State, schedule: Schedule, contacts: Optional[Contacts]
-    ):
-        self.schedule = schedule
+    def __init__(self, schedule: Schedule):
+        self.schedule, tables = schedule, schedule.tables
         self.bounds = ti.field(ti.i32, shape=2)
         self.tolerance = ti.field(real, shape=())
-        self.velocities = Velocities(tables, state)
+        self.velocities = Velocities(tables)
         self.has_bonds, self.has_ground = bool(tables.dashpot.name), bool(tables.ground)
-        self.has_contact = contacts is not None
+        self.has_contact = schedule.has_contact
         if self.has_bonds:
             self.bonds = BondDashpots(schedule, self.velocities)
         if self.has_ground:
             self.ground = GroundSweeps(schedule, self.velocities)
-        if contacts is not None:
-            self.pairs = PairDashpots(schedule, contacts, self.velocities)
+        if self.has_contact:
+            self.pairs = PairDashpots(schedule, self.velocities)
         self.sweeps, self.unsolved = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.total_sweeps, self.unconverged = (ti.field(ti.i64, shape=()) for _ in range(2))
-        self.change2, self.first_change2 = (ti.field(real, shape=()) for _ in range(2))
-        self.residual2, self.speed2, self.worst = (ti.field(real, shape=()) for _ in range(3))
+        self.first_change2, self.residual2 = (ti.field(real, shape=()) for _ in range(2))
+        self.speed2, self.worst = (ti.field(real, shape=()) for _ in range(2))
 
     def load(self, model: Model, method: ImplicitDashpots) -> None:
         """Load the numbers of a method, and the bonds of a model."""
@@ -66,7 +59,7 @@ class Solver:
         """Reset the residual and the count of sweeps; the spare body is at rest."""
         self.sweeps[None] = 0
         self.unsolved[None] = 1
-        self.change2[None], self.speed2[None] = 0.0, 0.0
+        self.velocities.change2[None], self.speed2[None] = 0.0, 0.0
         self.velocities.twist[self.velocities.spare] = vec6(0.0)
 
     @ti.func
@@ -75,44 +68,22 @@ class Solver:
         while self.unsolved[None] == 1:
             if ti.static(self.has_bonds):
                 for g in range(self.bonds.colour_first[BOND_COLOURS]):
-                    self.bonds_of(g)
+                    self.bonds.visit(g)
             if ti.static(self.has_contact):
                 for a in range(self.pairs.count[None]):
-                    self.pair(a)
+                    self.pairs.visit(a)
             if ti.static(self.has_ground):
                 for a in range(self.schedule.bodies.count(0)):
-                    self.joined(self.schedule.bodies.pick(a))
+                    self.ground.visit(self.schedule.bodies.pick(a))
             self.check_convergence(0)
-
-    @ti.func
-    def bonds_of(self, g):
-        """Visit the bonds of group g."""
-        raise_to(self.change2, self.bonds.visit(g))
-
-    @ti.func
-    def pair(self, a):
-        """Visit the touching spheres of the pair at place a of their order."""
-        raise_to(self.change2, self.pairs.visit(self.pairs.active[self.pairs.order[a]]))
-
-    @ti.func
-    def joined(self, i):
-        """Visit the dashpots between body i and the ground."""
-        raise_to(self.change2, self.ground.visit(i))
-
-    @ti.func
-    def last_pairs(self, one):
-        """Visit the pairs that found no colour, one after the other."""
-        first = self.pairs.colour_first[COLOURS]
-        for a in range(first, self.pairs.count[None]):
-            self.pair(a)
 
     @ti.func
     def check_convergence(self, one):
         """End a sweep, and decide whether another one is required."""
         self.sweeps[None] = self.sweeps[None] + 1
         self.total_sweeps[None] = self.total_sweeps[None] + 1
-        self.residual2[None] = self.change2[None]
-        self.change2[None] = 0.0
+        self.residual2[None] = self.velocities.change2[None]
+        self.velocities.change2[None] = 0.0
         bound = self.tolerance[None] * self.tolerance[None] * self.speed2[None]
         settled = self.sweeps[None] >= self.bounds[0] and self.residual2[None] <= bound
         if self.sweeps[None] == 1:

@@ -2,18 +2,11 @@
 
 import taichi as ti
 
-from taichi_dem.kit.lanes import (
-    LANES,
-    gathered,
-    gathered_numbers,
-    gathered_product,
-    row_of,
-    scaled,
-)
-from taichi_dem.kit.products import cross, matvec, stacked, transposed_matvec
+from taichi_dem.kit.lanes import LANES, gathered, gathered_numbers, gathered_product, row_of, scaled
+from taichi_dem.kit.products import cross, matvec, stacked
 from taichi_dem.kit.types import real
-from taichi_dem.physics.rotation import unit3, world_tensor
-from taichi_dem.state.state import State
+from taichi_dem.physics.rotation import unit3
+from taichi_dem.physics.wrench import mobility
 from taichi_dem.state.tables import Tables
 
 
@@ -26,16 +19,18 @@ class Velocities:
     contiguously, 128 bytes a body: a sweep visits bodies out of order, and large blocks wait for
     memory. With supports, hold: velocity per impulse [1/kg], and given: total impulse and moment on
     a body in the step [N s, N m s].
+    change2: largest squared change of a velocity in the present sweep [m2/s2].
     spare: number of a body that is none and stays at rest, for lanes without a bond.
     """
 
     scratch_fields = ("twist", "given")
 
-    def __init__(self, tables: Tables, state: State):
-        self.tables, self.state, self.spare = tables, state, tables.capacity.bodies
+    def __init__(self, tables: Tables):
+        self.tables, self.spare = tables, tables.capacity.bodies
         n = self.spare + 1
         self.twist, self.turn = ti.Vector.field(6, real), ti.Matrix.field(3, 3, real)
         self.lightness = ti.field(real)
+        self.change2 = ti.field(real, shape=())
         ti.root.dense(ti.i, n).place(self.twist, self.turn, self.lightness)
         self.has_supports = bool(tables.supports)
         if self.has_supports:
@@ -51,57 +46,9 @@ class Velocities:
         return slack
 
     @ti.func
-    def update_inertia(self, i, advance):
-        """Compute the velocity per impulse of body i in its present orientation."""
-        rotation = self.state.rotation[i]
-        self.lightness[i] = self.tables.mass_inverse[i]
-        self.turn[i] = world_tensor(rotation, self.tables.inertia_inverse[i])
-        if ti.static(self.has_supports):
-            self._support(i, advance)
-
-    @ti.func
-    def _support(self, i, advance):
-        """Apply the supports, which are linear, to the unit impulses and moments."""
-        unit, turn = unit3(), self.turn[i]
-        rest, rest_turn = advance.allowed_in_step(i, 0.0 * unit[0, :], 0.0 * unit[0, :])
-        for k in ti.static(range(3)):
-            axis = unit[:, k]
-            velocity, _ = advance.allowed_in_step(i, self.tables.mass_inverse[i] * axis, 0.0 * axis)
-            _, momentum = advance.allowed_in_step(i, 0.0 * axis, axis)
-            spin = matvec(turn, momentum - rest_turn)
-            for r in ti.static(range(3)):
-                self.hold[i][r, k] = velocity[r] - rest[r]
-                self.turn[i][r, k] = spin[r]
-
-    @ti.func
-    def predict(self, i, advance, linear, angular):
-        """Apply an impulse [N s] and a moment [N m s] to body i, as its supports allow."""
-        velocity = self.state.velocity[i] + self.tables.mass_inverse[i] * linear
-        spin = self.state.spin[i] + matvec(self.turn[i], angular)
-        if ti.static(self.has_supports):
-            momentum = self.state.angular_momentum[i] + angular
-            self.given[i] = stacked(linear, angular)
-            velocity, momentum = advance.allowed_in_step(i, velocity, momentum)
-            spin = advance.spin(i, momentum)
-        self.twist[i] = stacked(velocity, spin)
-
-    @ti.func
-    def found(self, i):
-        """Velocity and angular momentum at the end of the step, before supports act.
-
-        The momentum follows from the change of the spin: without impulses it stays, to the bit.
-        """
-        twist, rotation = self.twist[i], self.state.rotation[i]
-        velocity = twist[0:3]
-        change = transposed_matvec(rotation, twist[3:6] - self.state.spin[i])
-        momentum = self.state.angular_momentum[i] + matvec(
-            rotation, matvec(self.tables.inertia[i], change)
-        )
-        if ti.static(self.has_supports):
-            given = self.given[i]
-            velocity = self.state.velocity[i] + self.tables.mass_inverse[i] * given[0:3]
-            momentum = self.state.angular_momentum[i] + given[3:6]
-        return velocity, momentum
+    def mobility(self, i, j, branch):
+        """Twist of body j against i per wrench between them at j's centre, a ``Block``."""
+        return mobility(self.slack(i), self.turn[i], self.slack(j), self.turn[j], branch)
 
     @ti.func
     def apart(self, i, j, branch):

@@ -42,8 +42,8 @@ class HalfStep:
     def impulse(self, i, linear, angular, back):
         """Impulse and moment on body i by which it is behind, and a row for each of ``drives``.
 
-        linear [N s], angular [N m s]: of its contacts, from ``Readings.pushes``. A bond adds half
-        of what waits in its slot, also where the other body steps finer: the impulses of all but
+        linear [N s], angular [N m s]: of its contacts, from ``Readings``. A bond adds half of what
+        waits in its slot, also where the other body steps finer: the impulses of all but
         the last of its steps have been taken. back: 1 where the body is to be set back.
         """
         for f in range(4):
@@ -51,15 +51,15 @@ class HalfStep:
             angular += 0.5 * self.state.slot[4 * i + f][3:6]
         step = self.schedule.own_step(i)
         linear, angular, kick = self.advance.loaded(
-            i, step, linear, angular, self.advance.load_times.up_to
+            i, step, linear, angular, self.advance.load_up_to
         )
-        if ti.static(self.advance.ground.present):
-            rows = 0.5 * self.advance.ground.impulses(i, step, 2.0 * linear, 2.0 * angular)
+        if ti.static(self.advance.has_ground):
+            rows = 0.5 * self.advance.ground_impulses(i, step, 2.0 * linear, 2.0 * angular)
             if back == 1:
                 # Of a step around the present: its mean motion is the present one.
                 velocity, spin = self.state.velocity[i], self.state.spin[i]
-                rows = self.advance.ground.shares(i, 0.5 * step, velocity, spin)
-            linear, angular, kick = self.advance.ground.added(rows, linear, angular, kick)
+                rows = self.advance.ground_shares(i, 0.5 * step, velocity, spin)
+            linear, angular, kick = self.advance.with_ground(rows, linear, angular, kick)
         return linear, angular, kick
 
     @ti.func
@@ -75,7 +75,7 @@ class HalfStep:
         velocity, momentum = before, spun
         if ti.static(self.staggered):
             if back == 1:
-                self.advance.load_times.start(i, 0.5 * self.schedule.own_step(i))
+                self.advance.start_loads(i, 0.5 * self.schedule.own_step(i))
         if self.is_due(i) == 1:
             linear, angular, kick = self.impulse(i, pushed, turned, back)
             linear *= self.tables.mass_inverse[i]

@@ -1,20 +1,11 @@
 """Lists of members for a phase: those active at a tick, by falling level; all; one."""
 
+from collections.abc import Callable
+from typing import Any, Optional
+
 import taichi as ti
 
 from taichi_dem.state.timeline import MAX_LEVEL
-
-
-@ti.func
-def itself(a):
-    """Member function of lists whose members are 0 .. count - 1."""
-    return a
-
-
-@ti.func
-def first_key(member):
-    """Key function of lists in which all are active at the start."""
-    return 0
 
 
 @ti.data_oriented
@@ -38,16 +29,27 @@ class Once(Places):
 
 
 @ti.data_oriented
-class Everyone(Places):
-    """List of all bodies or bonds of a scene, active or not. number: field of how many."""
+class Everyone:
+    """List of all bodies, bonds or near pairs of a scene, active or not.
 
-    def __init__(self, number: ti.Field):
-        self.number = number
+    number: field of how many. slots: field of their numbers, None for 0 .. number - 1.
+    """
+
+    def __init__(self, number: ti.Field, slots: Optional[ti.Field] = None):
+        self.number, self.slots, self.has_slots = number, slots, slots is not None
 
     @ti.func
     def count(self, low):
         """Number of all."""
         return self.number[None]
+
+    @ti.func
+    def pick(self, a):
+        """Member at place a."""
+        member = a
+        if ti.static(self.has_slots):
+            member = self.slots[a]
+        return member
 
 
 @ti.data_oriented
@@ -72,11 +74,14 @@ class Colour:
 class ActiveList:
     """Indices in order of falling key; end[k] counts the members with a key of at least k.
 
-    order: the members; index: where in it each one is; key: each one's key, -1 for one that is
-    not listed. The order within a key does not matter: nothing that is computed depends on it.
+    everyone: all members. key_of: function that gives a member's key, negative for one that is not
+    to be listed. order: the members; index: where in it each one is; key: each one's key, -1 for
+    one that is not listed. The order within a key does not matter: nothing that is computed depends
+    on it.
     """
 
-    def __init__(self, capacity: int):
+    def __init__(self, capacity: int, everyone: Everyone, key_of: Callable[..., Any]):
+        self.everyone, self.key_of = everyone, key_of
         self.order, self.index, self.key = (ti.field(ti.i32, shape=capacity) for _ in range(3))
         self.end = ti.field(ti.i32, shape=MAX_LEVEL + 2)
 
@@ -91,17 +96,14 @@ class ActiveList:
         return self.order[a]
 
     @ti.func
-    def fill(self, count, member_of: ti.template(), key_of: ti.template()):
-        """List those members whose key is not negative.
-
-        member_of: function of 0 .. count - 1, ``itself`` where members are just these. key_of:
-        function of a member.
-        """
+    def fill(self, alike: ti.template()):
+        """List all members by their keys, or all alike, with the lowest."""
         for k in range(MAX_LEVEL + 2):
             self.end[k] = 0
-        for a in range(count):
-            m = member_of(a)
-            key = key_of(m)
+        for a in range(self.everyone.count(0)):
+            m, key = self.everyone.pick(a), 0
+            if ti.static(not alike):
+                key = self.key_of(m)
             self.key[m] = key
             if key >= 0:
                 self.end[key] = self.end[key] + 1
@@ -110,20 +112,20 @@ class ActiveList:
             members = self.end[MAX_LEVEL - back]
             self.end[MAX_LEVEL - back] = total
             total += members
-        for a in range(count):
-            m = member_of(a)
+        for a in range(self.everyone.count(0)):
+            m = self.everyone.pick(a)
             key = self.key[m]
             if key >= 0:
                 self._put(m, self.end[key])
                 self.end[key] = self.end[key] + 1
 
     @ti.func
-    def move(self, m, key):
-        """Change the key of a listed member; a negative one removes it.
+    def renew(self, m):
+        """Move a listed member to its present key; a negative one removes it.
 
         It changes places with the first, or last, of each key that it passes.
         """
-        present = self.key[m]
+        present, key = self.key[m], self.key_of(m)
         self.key[m] = key
         while present < key and present >= 0:
             present += 1
@@ -135,13 +137,15 @@ class ActiveList:
             present -= 1
 
     @ti.func
-    def insert(self, m, key):
-        """List a member that is not listed, unless its key is negative."""
-        if key >= 0 and self.key[m] < 0:
+    def insert(self, m):
+        """List a member that is not listed, unless its key is negative; whether that was done."""
+        new = self.key[m] < 0 and self.key_of(m) >= 0
+        if new:
             self._put(m, self.end[0])
             self.end[0] = self.end[0] + 1
             self.key[m] = 0
-            self.move(m, key)
+            self.renew(m)
+        return new
 
     @ti.func
     def _swap(self, m, place):

@@ -1,24 +1,11 @@
 """What bodies that touch owe each other: how far their levels differ, how far impulses reach."""
 
-from typing import Optional
+from typing import Any
 
 import taichi as ti
 
-from taichi_dem.contact.contacts import Contacts
-from taichi_dem.stability.body_limits import CLOSE, StabilityLimits
-from taichi_dem.state.pair_store import PairStore
-from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
+from taichi_dem.stability.body_limits import CLOSE
 from taichi_dem.state.timeline import ticks_of
-
-
-def beside(store: PairStore) -> tuple[tuple[ti.Field, ti.Field, int], ...]:
-    """Where the pairs of a body begin, their slots, and the place of the other body in them.
-
-    Of those whose first body it is, then of those whose second.
-    """
-    firsts = store.first_of, store.near_slot, 1
-    return firsts, (store.second_start, store.second_slot, 0)
 
 
 @ti.data_oriented
@@ -29,30 +16,15 @@ class LevelLimit:
     levels at the last ordering of the lists, so that no result depends on the order of bodies.
     """
 
-    def __init__(
-        self,
-        tables: Tables,
-        state: State,
-        contacts: Optional[Contacts],
-        limits: StabilityLimits,
-    ):
-        self.tables, self.state, self.limits = tables, state, limits
-        self.store = None if contacts is None else contacts.store
-        self.beside = () if contacts is None else beside(contacts.store)
-        self.listed_level = ti.field(ti.i32, shape=tables.capacity.bodies)
+    def __init__(self, schedule: Any):
+        self.tables, self.state, self.limits = schedule.tables, schedule.state, schedule.limits
+        self.store, self.beside = schedule.store, schedule.beside
+        self.listed_level = ti.field(ti.i32, shape=self.tables.capacity.bodies)
 
     @ti.func
     def least(self, i):
         """Coarsest level that body i may have beside those it touches; negative for any."""
-        finest = -1
-        for f in range(4):
-            if self._bonded(4 * i + f):
-                finest = ti.max(finest, self.listed_level[self.tables.neighbour[4 * i + f]])
-        for first, slots, other in ti.static(self.beside):
-            for k in range(first[i], first[i + 1]):
-                if self.limits.contact_limits.count[slots[k]] > 0:
-                    finest = ti.max(finest, self.listed_level[self.store.body[slots[k]][other]])
-        return self.least_beside(finest)
+        return self.least_beside(self._visit(i, 0, False))
 
     @ti.func
     def least_beside(self, finest):
@@ -62,15 +34,33 @@ class LevelLimit:
     @ti.func
     def spread(self, i):
         """Note the level of body i, and list those it touches that are too coarse."""
-        level = self.state.level[i]
-        self.listed_level[i] = level
+        self.listed_level[i] = self.state.level[i]
+        self._visit(i, self.state.level[i], True)
+
+    @ti.func
+    def _visit(self, i, level, lists: ti.template()):
+        """Finest listed level of the bodies that body i touches, -1 for none.
+
+        lists: whether to list those that are too coarse beside a level.
+        """
+        finest = -1
         for f in range(4):
             if self._bonded(4 * i + f):
-                self._notify(self.tables.neighbour[4 * i + f], level)
+                j = self.tables.neighbour[4 * i + f]
+                finest = ti.max(finest, self._visit_one(j, level, lists))
         for first, slots, other in ti.static(self.beside):
             for k in range(first[i], first[i + 1]):
                 if self.limits.contact_limits.count[slots[k]] > 0:
-                    self._notify(self.store.body[slots[k]][other], level)
+                    j = self.store.body[slots[k]][other]
+                    finest = ti.max(finest, self._visit_one(j, level, lists))
+        return finest
+
+    @ti.func
+    def _visit_one(self, j, level, lists: ti.template()):
+        if ti.static(lists):
+            if self.state.level[j] < self.least_beside(level):
+                self.limits.notice(j, CLOSE)
+        return self.listed_level[j]
 
     @ti.func
     def _bonded(self, face):
@@ -78,11 +68,6 @@ class LevelLimit:
         if self.tables.neighbour[face] >= 0:
             bonded = self.state.broken_tick[self.tables.face_bond[face]] < 0
         return bonded
-
-    @ti.func
-    def _notify(self, j, level):
-        if self.state.level[j] < level - self.limits.jump[None]:
-            self.limits.notice(j, CLOSE)
 
 
 @ti.data_oriented
@@ -96,11 +81,11 @@ class AppliedUntil:
     bond, pair: that tick for every bond, and for every slot of the pair store.
     """
 
-    def __init__(self, tables: Tables, state: State, contacts: Optional[Contacts]):
-        self.state = state
-        self.bond = ti.field(ti.i64, shape=tables.capacity.bonds)
-        if contacts is not None:
-            self.pair = contacts.store.column("applied_until", ti.i64)
+    def __init__(self, schedule: Any):
+        self.state = schedule.state
+        self.bond = ti.field(ti.i64, shape=schedule.tables.capacity.bonds)
+        if schedule.has_contact:
+            self.pair = schedule.store.column("applied_until", ti.i64)
 
     @ti.func
     def until(self, i, j):

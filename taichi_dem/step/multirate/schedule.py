@@ -17,63 +17,60 @@ from taichi_dem.stability.body_limits import StabilityLimits
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
-from taichi_dem.state.timeline import (
-    MACRO_TICKS,
-    MAX_LEVEL,
-    coarsest_active,
-    ticks_of,
-)
-from taichi_dem.step.multirate.lists import ActiveList, first_key, itself
-from taichi_dem.step.multirate.neighbours import AppliedUntil, LevelLimit, beside
-from taichi_dem.step.sleeping import ASLEEP, Sleeping
+from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL, coarsest_active, ticks_of
+from taichi_dem.step.multirate.lists import ActiveList, Everyone
+from taichi_dem.step.multirate.members import Members
+from taichi_dem.step.multirate.neighbours import AppliedUntil, LevelLimit
+from taichi_dem.step.sleeping import Sleeping
 from taichi_dem.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 
 
 @ti.data_oriented
-class Schedule:
+class Schedule(Members):
     """Clock and active lists of a run.
 
-    criterion: rule from ``step_control``. uniform: all bodies share the finest level wanted.
-    drifted: neighbours of an active body are brought to its time too, else only active bodies move.
+    criterion: the method's rule from ``step_control``. uniform: all bodies share the finest level
+    wanted. drifted: neighbours of an active body are brought to its time too, else only active ones
+    move.
     finest: finest level present. undivided: 1 once it was the last one, below which no step is
     divided further. low: coarsest level active now. changed: bodies whose own level or
     bonds changed since the lists were ordered.
     limits: the ``StabilityLimits`` of the bodies, None where the rule needs none. controlled:
     whether they choose the steps, and bodies may be brought to the present between their own times;
     applied_until then holds the time up to which bonds and pairs have applied their impulses.
+    beside: where the pairs of a body begin, their slots, and the place of the other body in them.
     level_limit: largest difference of levels between neighbours. evaluations: substeps, bodies
     advanced, bonds and pairs evaluated, and the bonds and pairs that one step for all would have
     evaluated in the same substeps, and the bonds whose laws were called.
     """
 
-    def __init__(
-        self,
-        tables: Tables,
-        state: State,
-        contacts: Optional[Contacts],
-        criterion: Any,
-        uniform: bool,
-        drifted: bool,
-        limits: Optional[StabilityLimits] = None,
-    ):
-        self.tables, self.state, self.contacts, self.limits = tables, state, contacts, limits
-        self.has_limits = limits is not None
-        self.sleeps, self.woken = tables.on_demand, None
+    def __init__(self, tables: Tables, state: State, contacts: Optional[Contacts], method: Method):
+        self.tables, self.state, self.contacts = tables, state, contacts
+        self.has_limits = method.control is not None or method.dashpot == "limited"
+        self.limits: Any = None
+        if self.has_limits:
+            self.limits = StabilityLimits(tables, state, contacts, method)
+        self.sleeps = tables.on_demand
         self.sleeping = Sleeping(tables, state) if self.sleeps else None
-        self.controlled = self.has_limits and limits.control is not None
+        self.controlled, self.uniform = method.control is not None, method.uniform
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
-        self.applied_until = AppliedUntil(tables, state, contacts) if self.controlled else None
-        self.spreads = self.controlled and not uniform and limits.spreads
-        if limits is not None and self.spreads:
-            self.level_limit = LevelLimit(tables, state, contacts, limits)
-        self.criterion, self.uniform, self.drifted = criterion, uniform, drifted
-        self.has_contact = contacts is not None
-        self.store = None if contacts is None else contacts.store
-        self.beside = () if contacts is None else beside(contacts.store)
+        self.store, self.has_contact = getattr(contacts, "store", None), contacts is not None
+        self.beside: tuple = ()
+        self.pairs = ActiveList(1, Everyone(tables.body_count), self.pair_key)
+        if self.store is not None:
+            # Pairs of which a body is the first, then those of which it is the second.
+            as_second = self.store.second_start, self.store.second_slot, 0
+            self.beside = (self.store.first_of, self.store.near_slot, 1), as_second
+            near = Everyone(self.store.near_count, self.store.near_slot)
+            self.pairs = ActiveList(self.store.slots, near, self.pair_key)
+        self.applied_until = AppliedUntil(self) if self.controlled else None
+        self.spreads = self.controlled and not self.uniform and self.limits.spreads
+        if self.spreads:
+            self.level_limit = LevelLimit(self)
+        self.criterion, self.drifted = method.criterion(), method.neighbour == "drifted"
         capacity = tables.capacity
-        self.bodies = ActiveList(capacity.bodies)
-        self.bonds = ActiveList(capacity.bonds)
-        self.pairs = ActiveList(self.store.slots if self.has_contact else 1)
+        self.bodies = ActiveList(capacity.bodies, Everyone(tables.body_count), self.body_key)
+        self.bonds = ActiveList(capacity.bonds, Everyone(tables.bond_count), self.bond_key)
         self.low, self.finest, self.undivided = (ti.field(ti.i32, shape=()) for _ in range(3))
         self.wanted, self.changed_count = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.changed = ti.field(ti.i32, shape=2 * capacity.bodies + 2 * capacity.bonds + 1)
@@ -103,11 +100,6 @@ class Schedule:
     def time_s(self) -> float:
         """Present time [s]."""
         return int(values(self.state.tick)) * self.tick_seconds
-
-    def members(self) -> np.ndarray:
-        """How many bonds and pairs are evaluated at the step of each level, (MAX_LEVEL + 1,)."""
-        ends = values(self.bonds.end) + values(self.pairs.end)
-        return ends[:-1] - ends[1:]
 
     @ti.func
     def pair_step(self, i, j):
@@ -198,32 +190,13 @@ class Schedule:
         if ti.static(self.uniform):
             self._level_all()
         if ti.static(self.sleeps):
-            self.woken.admit(True)
+            self.admit_woken(True)
         for a in range(self.changed_count[None]):
-            self._move_entries(self.changed[a])
+            self.move_entries(self.changed[a])
             if ti.static(self.spreads):
                 self.level_limit.spread(self.changed[a])
         self.changed_count[None] = 0
         self._find_finest()
-
-    @ti.func
-    def _move_entries(self, i):
-        """Move body i, its bonds and its pairs to their present keys."""
-        self.bodies.move(i, self.body_key(i))
-        for f in range(4):
-            b = self.tables.face_bond[4 * i + f]
-            if b >= 0:
-                if self.bonds.key[b] >= 0:
-                    self.bonds.move(b, self.bond_key(b))
-                if ti.static(self.drifted):
-                    j = self.tables.neighbour[4 * i + f]
-                    self.bodies.move(j, self.body_key(j))
-        for first, slots, other in ti.static(self.beside):
-            for k in range(first[i], first[i + 1]):
-                self.pairs.move(slots[k], self._pair_key(slots[k]))
-                if ti.static(self.drifted):
-                    j = self.store.body[slots[k]][other]
-                    self.bodies.move(j, self.body_key(j))
 
     @ti.func
     def start_all(self, one):
@@ -237,16 +210,10 @@ class Schedule:
         self.list_members(0)
         if ti.static(self.sleeps):
             # Those that sleep act once.
-            self.bonds.fill(self.tables.bond_count[None], itself, first_key)
+            self.bonds.fill(True)
         if ti.static(self.has_contact):
-            self._list_pairs()
+            self.pairs.fill(False)
         self._find_finest()
-
-    @ti.func
-    def list_members(self, one):
-        """Fill the lists of bodies and bonds, in their order."""
-        self.bodies.fill(self.tables.body_count[None], itself, self.body_key)
-        self.bonds.fill(self.tables.bond_count[None], itself, self.bond_key)
 
     @ti.func
     def start_pairs(self):
@@ -260,18 +227,10 @@ class Schedule:
                 for side in ti.static(range(2)):
                     pair = self.store.body[self.store.near_slot[a]]
                     self.sleeping.awaken(pair[side])
-            self.woken.admit(False)
-        self._list_pairs()
+            self.admit_woken(False)
+        self.pairs.fill(False)
         if ti.static(not self.uniform):
             self.list_members(0)
-
-    @ti.func
-    def _list_pairs(self):
-        self.pairs.fill(self.store.near_count[None], self._near_pair, self._pair_key)
-
-    @ti.func
-    def _near_pair(self, a):
-        return self.store.near_slot[a]
 
     @ti.func
     def _level_all(self):
@@ -303,49 +262,3 @@ class Schedule:
             self.evaluations[3] = self.evaluations[3] + self.pairs.end[0]
             visits += self.pairs.end[0]
         self.evaluations[4] = self.evaluations[4] + visits
-
-    @ti.func
-    def bond_key(self, b):
-        """Finer level of the bodies of an intact bond, -1 for one that is not evaluated."""
-        key = -1
-        if self.state.broken_tick[b] < 0:
-            slots = self.tables.bond_slots[b]
-            i, j = slots[0] >> 2, slots[1] >> 2
-            key = self._key(i, j)
-            if ti.static(self.sleeps):
-                if not self.sleeping.both_awake(i, j):
-                    key = -1
-        return key
-
-    @ti.func
-    def _pair_key(self, p):
-        pair = self.store.body[p]
-        return self._key(pair[0], pair[1])
-
-    @ti.func
-    def body_key(self, i):
-        """Own level, or the finest level among those it touches where neighbours drift along.
-
-        -1 for a body that sleeps.
-        """
-        key = self._key(i, i)
-        if ti.static(self.drifted):
-            for f in range(4):
-                j = self.tables.neighbour[4 * i + f]
-                if j >= 0:
-                    if self.state.broken_tick[self.tables.face_bond[4 * i + f]] < 0:
-                        key = ti.max(key, self.state.level[j])
-            if ti.static(self.has_contact):
-                key = ti.max(key, self.contacts.finest_partner(i))
-        if ti.static(self.sleeps):
-            if self.sleeping.awake[i] == ASLEEP:
-                key = -1
-        return key
-
-    @ti.func
-    def _key(self, i, j):
-        """Finer level of two bodies; where all step alike, all are active at every tick."""
-        key = MAX_LEVEL
-        if ti.static(not self.uniform):
-            key = ti.max(self.state.level[i], self.state.level[j])
-        return key

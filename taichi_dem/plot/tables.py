@@ -1,6 +1,6 @@
 """Pictures of what a result has calculated: columns, shares, fragments, cracks, the block."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Optional
 
 import numpy as np
@@ -9,30 +9,51 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.display import scale
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, SPARE_COLOURS, area_key, picture
 from taichi_dem.kit.units import without_unit
-from taichi_dem.kit.validation import FileName, choices
+from taichi_dem.kit.validation import FileName, choices, positive, unit_vector
 from taichi_dem.output.body_values import COLOURS, body_values, scale_end
-from taichi_dem.output.cracks import Rose
-from taichi_dem.output.fragments import Fragments
-from taichi_dem.output.record import Frame
 from taichi_dem.output.run_tables import RunTables
 from taichi_dem.plot.bodies import ALONG_Z, JOINT, draw_bodies, frame_block
 from taichi_dem.plot.series import ENERGY_TERMS
-from taichi_dem.plot.summary import scale
 from taichi_dem.plot.view import View
 
 #: Fragments of a colour of their own; lighter ones are grey.
 _NAMED = 6
 #: What columns of a unit are called together.
 _KINDS = {"J": "energy", "m/s": "speed", "m": "length", "mm": "displacement", "s": "time"}
+_SCALED = ("s", "m", "J", "m/s", "N", "Pa")
+_AT_HOLE = ("monitor_displacement_mm", "hole_radial_displacement_mm")
+
+
+def plot_history(
+    result: RunTables, names: Optional[Sequence[str]] = None, *, path: Optional[FileName] = None
+) -> Figure:
+    """Draw columns of the history over time.
+
+    Parameters
+    ----------
+    result : Result
+    names : sequence of str, optional
+        Columns of ``result.history``; by default displacement of the hole or largest speed,
+        broken faces, smallest step.
+    path : str or path, optional
+    """
+    history = result.history
+    if names is None:
+        moved = [name for name in _AT_HOLE if name in history] or ["largest_speed_m_s"]
+        names = [*moved, "broken_faces", "smallest_step_s"]
+    return plot_columns(path, history, names)
+
+
+def plot_crack_area(result: RunTables, *, path: Optional[FileName] = None) -> Figure:
+    """Draw the area of all cracks over time."""
+    return plot_columns(path, result.crack_area(), ["crack_area_m2"])
 
 
 def plot_columns(path: Optional[FileName], table: Table, names: Sequence[str]) -> Figure:
-    """Draw columns over time; those of one unit share a panel.
-
-    names: of columns of the table, which has one called time_s. InputError for others.
-    """
+    """Draw columns of a table over its time_s; those of one unit share a panel."""
     names = choices("names", names, [name for name in table if name != "time_s"])
     units = list(dict.fromkeys(table.units[name] for name in names))
     factor, unit = scale(float(np.abs(table["time_s"]).max(initial=0.0)), "s")
@@ -49,12 +70,13 @@ def _draw(axes, time, table, names, unit):
     """A panel of columns of one unit, scaled to one that is readable."""
     largest = max(float(np.abs(table[name]).max(initial=0.0)) for name in names)
     # Numbers take no prefix, and what has one in its name keeps it.
-    factor, words = scale(largest, unit) if unit in ("s", "m", "J", "m/s", "N") else (1.0, unit)
+    factor, words = scale(largest, unit) if unit in _SCALED else (1.0, unit)
     words = words.replace("^2", "²").replace("^3", "³")
     for k, name in enumerate(names):
         colour, line = SPARE_COLOURS[k % len(SPARE_COLOURS)], ("-", "--")[k % 2]
         label = without_unit(name).replace("_", " ")
-        axes.plot(time, factor * table[name], line, color=colour, label=label)
+        steps = "steps-post" if unit == "1" else "default"
+        axes.plot(time, factor * table[name], line, color=colour, label=label, drawstyle=steps)
     if len(names) == 1:
         axes.set(ylabel=f"{label} [{words}]")
     else:
@@ -62,8 +84,12 @@ def _draw(axes, time, table, names, unit):
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def plot_energy_shares(path: Optional[FileName], shares: Mapping[str, np.ndarray]) -> Figure:
-    """Stack the shares of ``Result.energy_shares``; what is missing to 100 % is unexplained."""
+def plot_energy_shares(result: RunTables, *, path: Optional[FileName] = None) -> Figure:
+    """Draw every term of the energy balance as a share of the energy given, over time.
+
+    What is missing to 100 % is unexplained.
+    """
+    shares = result.energy_shares()
     factor, unit = scale(float(shares["time_s"].max(initial=0.0)), "s")
     looks = {key.replace("_J", "_share"): look for key, look in ENERGY_TERMS.items()}
     terms = {name: look for name, look in looks.items() if name in shares and shares[name].any()}
@@ -82,11 +108,14 @@ def plot_energy_shares(path: Optional[FileName], shares: Mapping[str, np.ndarray
     return figure
 
 
-def plot_fragments(path: Optional[FileName], fragments: Fragments) -> Figure:
-    """Draw the share of all mass in fragments that pass a sieve, over its opening.
+def plot_fragments(
+    result: RunTables, frame: int = -1, *, path: Optional[FileName] = None
+) -> Figure:
+    """Draw the share of the mass that passes a sieve over its opening, in a frame.
 
     Shaded: the sizes of single bodies, below which the mesh and not the material decides.
     """
+    fragments = result.fragments(frame)
     order = np.argsort(fragments["sieve_m"], kind="stable")
     size, mass = 1e3 * fragments["sieve_m"][order], fragments["mass_kg"][order]
     passing = 100.0 * np.cumsum(mass) / mass.sum()
@@ -105,8 +134,18 @@ def plot_fragments(path: Optional[FileName], fragments: Fragments) -> Figure:
     return figure
 
 
-def plot_rose(path: Optional[FileName], rose: Rose) -> Figure:
-    """Draw crack area by the direction of the cracks, which has no sense: both ends are shown."""
+def plot_rose(
+    result: RunTables,
+    axis: Sequence[float] = ALONG_Z,
+    *,
+    sectors: int = 36,
+    path: Optional[FileName] = None,
+) -> Figure:
+    """Draw crack area by direction in a plane; arguments as of ``Result.rose``.
+
+    The direction of a crack has no sense: both ends are shown.
+    """
+    rose = result.rose(axis, sectors)
     angle, width = np.radians(rose["angle_deg"]), np.radians(rose.width_deg)
     view = View(rose.axis.tolist())
     with picture(path, size=(5.0, 4.6), subplot_kw={"projection": "polar"}) as (figure, axes):
@@ -139,12 +178,28 @@ def _emptiest(rose):
     return float(rose["angle_deg"][smooth.argmin()])
 
 
-def plot_attenuation(path: Optional[FileName], attenuation: Any, nearest: float) -> Figure:
-    """Peak speed of every body, and the power law fitted from the nearest distance on [radii].
+def plot_attenuation(
+    result: RunTables,
+    group: Optional[str] = None,
+    *,
+    nearest: float = 4.0,
+    path: Optional[FileName] = None,
+) -> Figure:
+    """Draw peak velocities over the distance from a hole, with a power law.
 
-    attenuation: an ``Attenuation``. Where too few bodies are nearer to the hole than to a side, as
-    in a thin plate, all are fitted; where too few are far enough, no law is drawn.
+    Where too few bodies are nearer to the hole than to a side, as in a thin plate, all are fitted;
+    where too few are far enough, no law is drawn.
+
+    Parameters
+    ----------
+    result : Result
+    group : str, optional
+        Face group of the hole's wall, as of ``Result.attenuation``.
+    nearest : float
+        Distance from which on the law is fitted [radii of the hole], beyond the crushed zone.
+    path : str or path, optional
     """
+    attenuation, nearest = result.attenuation(group), positive("nearest", nearest)
     distance, speed, inner = attenuation.distance, attenuation.speed, attenuation.inner
     slope, level = attenuation.power_law(nearest)
     fitted, words = inner, "fitted"
@@ -161,13 +216,13 @@ def plot_attenuation(path: Optional[FileName], attenuation: Any, nearest: float)
             label = f"power {slope:.2f} ({words})".replace("-", "−")
             axes.plot(ends, fit, color=BLACK, label=label)
             axes.plot(ends, fit[0] * wave, ":", color=BLACK, label="power −0.5 (cylindrical wave)")
-        positive = speed[speed > 0.0]
+        moving = speed[speed > 0.0]
         axes.set(
             xscale="log",
             yscale="log",
             xlabel="distance from the axis / radius of the hole [1]",
             ylabel="peak particle velocity [m/s]",
-            ylim=(0.5 * np.percentile(positive, 0.1), 2.0 * positive.max()),
+            ylim=(0.5 * np.percentile(moving, 0.1), 2.0 * moving.max()),
         )
         for handle in axes.legend(loc="upper right", markerscale=4).legend_handles:
             handle.set_alpha(1.0)
@@ -175,25 +230,38 @@ def plot_attenuation(path: Optional[FileName], attenuation: Any, nearest: float)
 
 
 def plot_block(
-    path: Optional[FileName],
     result: RunTables,
-    frame: Frame,
+    frame: int = -1,
+    *,
     colour: str = "speed",
     magnify: float = 1.0,
     axis: Sequence[float] = ALONG_Z,
+    path: Optional[FileName] = None,
 ) -> Figure:
-    """Draw the bodies where they are, coloured by one of ``body_values.COLOURS``.
+    """Draw the bodies in a frame where they are, coloured by a value.
 
-    magnify: of the displacement. axis: towards the viewer.
+    Parameters
+    ----------
+    result : Result
+    frame : int
+        Number of the frame.
+    colour : {"speed", "peak_speed", "displacement", "damage", "level", "fragment"}
+        ``taichi_dem.output.body_values.COLOURS``.
+    magnify : float
+        Factor of the displacement.
+    axis : sequence of 3 floats
+        Towards the viewer.
+    path : str or path, optional
     """
-    values, view, model = body_values(result, frame, colour), View(axis), result.model
-    broken = result.broken_time <= frame.time_s
+    magnify, axis = positive("magnify", magnify), unit_vector("axis", axis).tolist()
+    one, view, model = result.frame(frame), View(axis), result.model
+    values, broken = body_values(result, one, colour), result.broken_time <= one.time_s
     options: dict[str, Any] = {"magnify": magnify, "axis": axis, "broken": broken}
     with picture(path, size=(6.2, 4.8)) as (figure, axes):
         if colour == "fragment":
             look: dict[str, Any] = {"cmap": ListedColormap([*SPARE_COLOURS[:_NAMED], JOINT])}
             look["clim"] = (0, _NAMED)
-            draw_bodies(axes, model, frame, np.minimum(values, _NAMED), **options, **look)
+            draw_bodies(axes, model, one, np.minimum(values, _NAMED), **options, **look)
             _name_fragments(figure, model.body_mass, values)
         else:
             unit, words = COLOURS[colour]
@@ -201,14 +269,14 @@ def plot_block(
             top = float(values.max()) if unit == "1" else scale_end(values)
             factor, unit = scale(top, unit) if unit != "1" else (1.0, unit)
             look = {"cmap": "viridis", "clim": (0.0, factor * top or 1.0)}
-            drawn = draw_bodies(axes, model, frame, factor * values, **options, **look)
+            drawn = draw_bodies(axes, model, one, factor * values, **options, **look)
             beyond = "max" if values.max() > top else "neither"
             label = f"{words} [{unit}]"
             figure.colorbar(drawn, ax=axes, label=label, aspect=25, extend=beyond)
         frame_block(axes, view, model, 0.1)
         axes.set(xlabel=view.labels()[0], ylabel=view.labels()[1])
         note = "" if magnify == 1.0 else f", displacement × {magnify:g}"
-        axes.set_title(f"t = {1e3 * frame.time_s:.3g} ms{note}")
+        axes.set_title(f"t = {1e3 * one.time_s:.3g} ms{note}")
     return figure
 
 

@@ -1,1 +1,0 @@
-"""Pictures of a result, one function each."""

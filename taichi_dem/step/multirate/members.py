@@ -1,0 +1,113 @@
+"""Keys of bodies, bonds and pairs by which they are listed, and how listed members move."""
+
+import taichi as ti
+
+from taichi_dem.state.timeline import MAX_LEVEL
+from taichi_dem.step.sleeping import ASLEEP
+
+
+@ti.data_oriented
+class Members:
+    """Base of ``Schedule``, which owns all that is used here."""
+
+    @ti.func
+    def bond_key(self, b):
+        """Finer level of the bodies of an intact bond, -1 for one that is not evaluated."""
+        key = -1
+        if self.state.broken_tick[b] < 0:
+            slots = self.tables.bond_slots[b]
+            i, j = slots[0] >> 2, slots[1] >> 2
+            key = self._key(i, j)
+            if ti.static(self.sleeps):
+                if not self.sleeping.both_awake(i, j):
+                    key = -1
+        return key
+
+    @ti.func
+    def pair_key(self, p):
+        """Finer level of the bodies of a pair."""
+        pair = self.store.body[p]
+        return self._key(pair[0], pair[1])
+
+    @ti.func
+    def body_key(self, i):
+        """Own level, or the finest level among those it touches where neighbours drift along.
+
+        -1 for a body that sleeps.
+        """
+        key = self._key(i, i)
+        if ti.static(self.drifted):
+            for f in range(4):
+                j = self.tables.neighbour[4 * i + f]
+                if j >= 0:
+                    if self.state.broken_tick[self.tables.face_bond[4 * i + f]] < 0:
+                        key = ti.max(key, self.state.level[j])
+            if ti.static(self.has_contact):
+                key = ti.max(key, self.contacts.finest_partner(i))
+        if ti.static(self.sleeps):
+            if self.sleeping.awake[i] == ASLEEP:
+                key = -1
+        return key
+
+    @ti.func
+    def _key(self, i, j):
+        """Finer level of two bodies; where all step alike, all are active at every tick."""
+        key = MAX_LEVEL
+        if ti.static(not self.uniform):
+            key = ti.max(self.state.level[i], self.state.level[j])
+        return key
+
+    @ti.func
+    def list_members(self, one):
+        """Fill the lists of bodies and bonds, in their order."""
+        self.bodies.fill(False)
+        self.bonds.fill(False)
+
+    @ti.func
+    def admit_woken(self, moved: ti.template()):
+        """List the bodies woken since the last call, and the bonds that now act.
+
+        moved: whether bodies have moved since bonds were evaluated.
+        """
+        sleeping = self.sleeping
+        for a in range(sleeping.woken_count[None]):
+            i = sleeping.woken[a]
+            self.bodies.insert(i)
+            for f in range(4):
+                b = self.tables.face_bond[4 * i + f]
+                if b >= 0:
+                    if self.bonds.insert(b):
+                        sleeping.left_out[b] = sleeping.left_out_now(b, self.seconds(1), moved)
+        sleeping.unsorted[None] = sleeping.unsorted[None] + sleeping.woken_count[None]
+        sleeping.woken_count[None] = 0
+
+    @ti.func
+    def sort_woken(self, one):
+        """Renew the bound of sleep; bring bodies woken of late into the order of the others.
+
+        Visits in the order of waking take up to 40 % longer.
+        """
+        if self.sleeping.is_due():
+            self.sleeping.renew_bound()
+            if self.sleeping.unsorted[None] > 0:
+                self.sleeping.unsorted[None] = 0
+                self.list_members(0)
+
+    @ti.func
+    def move_entries(self, i):
+        """Move body i, its bonds and its pairs to their present keys."""
+        self.bodies.renew(i)
+        for f in range(4):
+            b = self.tables.face_bond[4 * i + f]
+            if b >= 0:
+                if self.bonds.key[b] >= 0:
+                    self.bonds.renew(b)
+                if ti.static(self.drifted):
+                    j = self.tables.neighbour[4 * i + f]
+                    self.bodies.renew(j)
+        for first, slots, other in ti.static(self.beside):
+            for k in range(first[i], first[i + 1]):
+                self.pairs.renew(slots[k])
+                if ti.static(self.drifted):
+                    j = self.store.body[slots[k]][other]
+                    self.bodies.renew(j)

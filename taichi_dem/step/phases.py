@@ -1,0 +1,191 @@
+"""The phases of a substep in their order, and those of the start of a run."""
+
+from collections.abc import Callable
+from typing import Any, Optional
+
+import taichi as ti
+
+from taichi_dem.contact.search import BroadPhase
+from taichi_dem.kit.allocation import values
+from taichi_dem.kit.products import squared
+from taichi_dem.step.advance import Advance
+from taichi_dem.step.audit import Audit
+from taichi_dem.step.implicit.bonds import BOND_COLOURS
+from taichi_dem.step.implicit.pairs import COLOURS
+from taichi_dem.step.multirate.lists import Colour, Once
+
+#: Pairs of a list and the function that is called with each member that is active.
+Phases = tuple[tuple[Any, Callable[..., Any]], ...]
+
+
+@ti.data_oriented
+class Step:
+    """Phases of a substep, pairs of an active list and a function of a member.
+
+    A substep begins with the contacts of the present tick, whose bonds are evaluated already, and
+    ends with the bonds of the next: between substeps the contact lists can be renewed.
+
+    search: the ``BroadPhase`` that does so, None for a scene without contact. start_phases: those
+    of the start of a run before the bonds of the first tick, which the step's kernel evaluates,
+    and after them.
+    """
+
+    def __init__(self, advance: Advance, search: Optional[BroadPhase]):
+        self.advance, self.schedule, self.search = advance, advance.schedule, search
+        self.has_contact = search is not None
+        self.state = advance.state
+        self.audit = Audit(self.schedule) if self.schedule.sleeps else None
+        self.parts = self._parts()
+        self.phases = self._phases()
+        self.start_phases = self._before_bonds(), self._after_bonds()
+
+    def _before_bonds(self):
+        """First levels and full lists."""
+        schedule, bodies = self.schedule, self.schedule.bodies.everyone
+        phases: Phases = ()
+        if schedule.has_limits:
+            phases += ((bodies, schedule.limits.refresh),)
+        if schedule.sleeps:
+            sleeping = schedule.sleeping
+            phases += (bodies, sleeping.begin), (bodies, sleeping.begin_beside)
+        return (*phases, (bodies, self.first_level), (Once(), schedule.start_all))
+
+    def _after_bonds(self):
+        """Bonds that sleep have acted once, and leave the list."""
+        return ((Once(), self.schedule.list_members),) if self.schedule.sleeps else ()
+
+    @ti.func
+    def first_level(self, i):
+        """Choose the first level of body i."""
+        self.schedule.choose_level(i, squared(self.state.velocity[i]))
+
+    def _phases(self):
+        """All phases of a substep in a row, for one serial kernel."""
+        return self.parts[0]
+
+    def _parts(self):
+        """The same in parts of which one may be called for again."""
+        schedule = self.schedule
+        touching = ((schedule.pairs, self.advance.contact),) if self.has_contact else ()
+        return (
+            (
+                *self._retimed(),
+                *touching,
+                (Once(), schedule.advance_clock),
+                *self._rested(),
+                *self._moved(),
+            ),
+        )
+
+    def _moved(self):
+        """Phases of the bodies, of the bonds at the next time, and of the audit."""
+        schedule, audit = self.schedule, self.audit
+        audited = ((Once(), audit.choose), (audit, audit.visit)) if audit is not None else ()
+        return (
+            (schedule.bodies, self.advance.body),
+            (Once(), schedule.reorder),
+            (schedule.bonds, self.advance.bond),
+            *audited,
+        )
+
+    def _rested(self):
+        """Phases that find the momentum at which bodies wake others, where some may sleep."""
+        if not self.schedule.sleeps:
+            return ()
+        sleeping = self.schedule.sleeping
+        return (sleeping, sleeping.chunk), (Once(), self.schedule.sort_woken)
+
+    def repeats(self, part: int) -> bool:
+        """Whether a part of the phases is called for once more: never here."""
+        return False
+
+    def _retimed(self):
+        """Phases that update rates and wake bodies, where the method requires it."""
+        limits = self.schedule.limits
+        if limits is None:
+            return ()
+        phases: Phases = ((limits, limits.refresh),)
+        if self.schedule.controlled:
+            phases += ((limits, self.advance.wake_up),)
+        return (*phases, (Once(), self.schedule.apply_changes))
+
+    def is_of_start(self, item: object) -> bool:
+        """Whether a phase also belongs to the start of a run: that of the bonds does."""
+        return item == self.advance.bond
+
+    @ti.kernel
+    def start(self, last: ti.template()):
+        """Run the phases of the start before the bonds, or the last, after them."""
+        for members, item in ti.static(self.start_phases[last]):
+            for a in range(members.count(0)):
+                item(members.pick(a))
+
+    @ti.func
+    def halted(self):
+        """1 when the host must act: a body left its bounds, or a list its room."""
+        halt = ti.cast(self.state.bad_body[None] < self.advance.tables.body_count[None], ti.i32)
+        if ti.static(self.has_contact):
+            halt |= self.search.overflows()
+        return halt
+
+
+@ti.data_oriented
+class SolvedStep(Step):
+    """The phases of a substep in which all dashpots are solved together.
+
+    A run begins with their first guesses.
+    """
+
+    def _before_bonds(self):
+        phases: Phases = (
+            *super()._before_bonds(),
+            (self.schedule.bodies.everyone, self.advance.update_inertia),
+        )
+        if self.advance.solver.has_bonds:
+            phases += ((self.schedule.bonds.everyone, self.advance.solver.bonds.first),)
+        return phases
+
+    def _after_bonds(self):
+        return (*super()._after_bonds(), (self.schedule.bonds.everyone, self.undo))
+
+    @ti.func
+    def undo(self, b):
+        """Book no heat of bond b, whose evaluation booked a step before the start."""
+        if ti.static(self.advance.tables.has_bond_heat):
+            self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
+        if ti.static(self.schedule.sleeps and self.advance.solver.has_bonds):
+            if self.schedule.bonds.key[b] < 0:
+                self.advance.solver.bonds.end(b)
+
+    def _phases(self):
+        before, _, after = self.parts
+        return (*before, (Once(), self.advance.solver.solve), *after)
+
+    def _parts(self):
+        advance, schedule, solver = self.advance, self.schedule, self.advance.solver
+        before: Phases = ()
+        after: Phases = ()
+        if self.has_contact:
+            before = (schedule.pairs, solver.pairs.begin), (Once(), solver.pairs.sort)
+            after = ((schedule.pairs, solver.pairs.book),)
+        before += (Once(), schedule.advance_clock), *self._rested(), (Once(), solver.begin)
+        before += ((schedule.bodies, advance.predict),)
+        return (before, self._sweep(solver), (*after, *self._moved()))
+
+    def _sweep(self, solver):
+        """One sweep, colour by colour."""
+        phases: Phases = ()
+        if solver.has_bonds:
+            first = solver.bonds.colour_first
+            phases += tuple((Colour(first, c), solver.bonds.visit) for c in range(BOND_COLOURS))
+        if self.has_contact:
+            first = solver.pairs.colour_first
+            phases += tuple((Colour(first, c), solver.pairs.visit) for c in range(COLOURS))
+            phases += ((Once(), solver.pairs.visit_last),)
+        if solver.has_ground:
+            phases += ((self.schedule.bodies, solver.ground.visit),)
+        return (*phases, (Once(), solver.check_convergence))
+
+    def repeats(self, part: int) -> bool:
+        """Whether a part, the sweep, is called for once more."""
+        return part == 1 and values(self.advance.solver.unsolved) == 1
