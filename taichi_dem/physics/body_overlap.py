@@ -14,23 +14,26 @@ import taichi as ti
 from taichi_dem.kit.products import cross, dot, entry, expression
 from taichi_dem.kit.types import real, vec3
 
+#: Turn of ray ends about the middle of a face, times the parts of its edges.
+TURN = 0.12
 mat4 = ti.types.matrix(4, 4, real)
 
 
 def ray_ends(parts: int) -> np.ndarray:
     """Where the rays of a body end, (4 parts^2, 4), as weights of its corners.
 
-    The ends are the centroids of parts^2 equal triangles of each face; face f is opposite corner f,
-    whose weight is 0.
+    The ends are the centroids of parts^2 equal triangles of each face, turned about its middle: on
+    lines of symmetry they would run along the faces between bodies that fit each other. Face f is
+    opposite corner f, whose weight is 0.
     """
     at = [(u + t, v + t) for t in (1 / 3, 2 / 3) for u in range(parts) for v in range(parts - u)]
     at = [(u, v) for u, v in at if u + v < parts]
+    u, v = np.array(at).T / parts
+    weights = np.column_stack([1.0 - u - v, u, v])
+    weights += TURN / parts * (np.roll(weights, 1, axis=1) - np.roll(weights, -1, axis=1))
     ends = np.zeros((4, len(at), 4))
     for face in range(4):
-        first, second, third = (corner for corner in range(4) if corner != face)
-        u, v = np.array(at).T / parts
-        ends[face, :, first], ends[face, :, second] = 1.0 - u - v, u
-        ends[face, :, third] = v
+        ends[face][:, np.arange(4) != face] = weights
     return ends.reshape(-1, 4)
 
 

@@ -1,4 +1,4 @@
-"""Contact of whole bodies: its energy, of which forces are the gradient, and what a break leaves."""
+"""Contact of whole bodies: its energy, of which forces are the gradient; nothing from a break."""
 
 from dataclasses import replace
 
@@ -24,6 +24,7 @@ class Placed:
         self.simulation = Simulation(Scene(mesh, LOSSLESS, listed), Uniform(dt))
         self.model, self.state = self.simulation.model, self.simulation.state
         self.moving = np.arange(self.model.body_count) >= first.body_count
+        self.simulation.start()
         self.middle = self.model.centre[self.moving].mean(axis=0)
 
     def put(self, place, orientation=(1.0, 0.0, 0.0, 0.0)):
@@ -58,7 +59,7 @@ def test_flat_sides_that_overlap_have_the_energy_of_their_bond():
 
 @pytest.mark.parametrize("turned, smaller", [(0.0, 1.0), (np.pi / 6, 1.183), (np.pi / 2, 1.0)])
 def test_energy_is_additive_in_the_area_of_contact(turned, smaller):
-    """A cube of 48 bodies on another, also turned on it, whatever faces meet; within 15 percent."""
+    """A cube of 48 bodies on another, also turned on it, whatever faces meet; within 5 percent."""
     cube, depth = bar(0.2, 0.2, (2, 2, 2)), 1e-4
     placed = Placed(cube, cube)
     middle = 0.5 * (cube.points.min(axis=0) + cube.points.max(axis=0))
@@ -66,7 +67,7 @@ def test_energy_is_additive_in_the_area_of_contact(turned, smaller):
     orientation = [np.cos(0.5 * turned), 0.0, np.sin(0.5 * turned), 0.0]
     placed.put(middle + [0.0, 0.2 - depth, 0.0] + matrix(np.array(orientation)) @ way, orientation)
     flat = 0.5 * STIFFNESS * 0.2**2 * depth**2 / smaller
-    assert placed.energy() == pytest.approx(flat, rel=0.15)
+    assert placed.energy() == pytest.approx(flat, rel=0.05)
 
 
 def touching(placed, random, count):
@@ -93,10 +94,12 @@ def test_the_force_is_the_gradient_of_the_energy_and_conserves_momentum():
                 placed.put(place + sign * h * np.eye(3)[axis], orientation)
                 slope[axis] += sign * placed.energy() / (2.0 * h)
         placed.put(place, orientation)
-        pushed, _ = placed.simulation.readings.contacts_now()
-        assert pushed[1, :3] == pytest.approx(-slope, rel=0, abs=1e-6 * np.linalg.norm(slope))
-        arms = placed.simulation.state.motion()["position"]
-        turning = pushed[:, 3:].sum(axis=0) + np.cross(arms, pushed[:, :3]).sum(axis=0)
-        size = np.linalg.norm(pushed[1, :3])
-        assert np.abs(pushed[:, :3].sum(axis=0)).max() < 1e-12 * size
+        # Impulses and moments in half a step on the first body, then on the second.
+        (table,) = placed.simulation.readings.contacts_now()
+        pushed = table[:12].reshape(2, 2, 3) / (0.5 * placed.simulation.method.dt0)
+        size = np.linalg.norm(slope)
+        assert pushed[1, 0] == pytest.approx(-slope, rel=0, abs=1e-6 * size)
+        assert np.abs(pushed[:, 0].sum(axis=0)).max() < 1e-12 * size
+        arms = placed.simulation.motion()["position"]
+        turning = pushed[:, 1].sum(axis=0) + np.cross(arms, pushed[:, 0]).sum(axis=0)
         assert np.abs(turning).max() < 1e-12 * size

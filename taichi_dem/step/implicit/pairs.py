@@ -54,7 +54,7 @@ class PairDashpots:
         self.entry, self.push = ti.field(ti.i32, shape=spheres), ti.field(real, shape=spheres)
         self.normal, self.arm = (ti.Vector.field(3, real, shape=spheres) for _ in range(2))
         self.share = ti.Vector.field(2, real, shape=spheres)
-        self.of_bodies = contacts.law.meets_bodies
+        self.of_bodies = self.contacts.law.meets_bodies
         if self.of_bodies:
             self.area = ti.field(real, shape=spheres)
             self.couple = ti.Vector.field(3, real, shape=spheres)
