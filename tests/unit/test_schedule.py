@@ -5,7 +5,7 @@ import taichi as ti
 
 from taichi_dem.state import timeline
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL
-from taichi_dem.step.multirate.lists import ActiveList, itself
+from taichi_dem.step.multirate.lists import ActiveList, Everyone
 from taichi_dem.step_control import Displacement
 
 
@@ -62,8 +62,10 @@ class Sorter:
     def __init__(self, keys):
         self.keys = ti.field(ti.i32, shape=len(keys))
         self.keys.from_numpy(keys)
-        self.list = ActiveList(len(keys))
-        self.fill(len(keys))
+        number = ti.field(ti.i32, shape=())
+        number.fill(len(keys))
+        self.list = ActiveList(len(keys), Everyone(number), self.key_of)
+        self.fill()
 
     @ti.func
     def key_of(self, member):
@@ -71,16 +73,20 @@ class Sorter:
         return self.keys[member]
 
     @ti.kernel
-    def fill(self, count: ti.i32):
-        """Take in the first count members."""
+    def fill(self):
+        """Take in all members."""
         for _ in range(1):
-            self.list.fill(count, itself, self.key_of)
+            self.list.fill(False)
 
     @ti.kernel
     def move(self, member: ti.i32, key: ti.i32):
         """Give a member another key."""
         for _ in range(1):
-            self.list.move(member, key)
+            self.keys[member] = key
+            if self.list.key[member] >= 0:
+                self.list.renew(member)
+            else:
+                self.list.insert(member)
 
     @ti.kernel
     def due(self, low: ti.i32) -> ti.i32:
@@ -100,13 +106,13 @@ class Sorter:
 
 
 def test_moves_keep_the_list_exact_at_every_level():
-    """Random members to random keys, up and down, not at all, and off the list for good."""
+    """Random members to random keys, up and down, not at all, off the list and back."""
     random = np.random.default_rng(1)
     keys = random.integers(0, MAX_LEVEL + 1, 60).astype(np.int32)
     sorter = Sorter(keys)
     sorter.check(keys)
     for _ in range(200):
-        member = int(random.choice(np.flatnonzero(keys >= 0)))
+        member = int(random.integers(len(keys)))
         keys[member] = random.integers(-1, MAX_LEVEL + 1)
         sorter.move(member, int(keys[member]))
         sorter.check(keys)
