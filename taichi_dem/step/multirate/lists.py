@@ -1,7 +1,7 @@
 """Lists of members for a phase: those active at a tick, by falling level; all; one."""
 
 from collections.abc import Callable
-from typing import Any, Optional
+from typing import Any
 
 import taichi as ti
 
@@ -29,27 +29,30 @@ class Once(Places):
 
 
 @ti.data_oriented
-class Everyone:
-    """List of all bodies, bonds or near pairs of a scene, active or not.
+class Everyone(Places):
+    """List of all bodies or bonds of a scene, active or not; number: field of how many."""
 
-    number: field of how many. slots: field of their numbers, None for 0 .. number - 1.
-    """
-
-    def __init__(self, number: ti.Field, slots: Optional[ti.Field] = None):
-        self.number, self.slots, self.has_slots = number, slots, slots is not None
+    def __init__(self, number: ti.Field):
+        self.number = number
 
     @ti.func
     def count(self, low):
         """Number of all."""
         return self.number[None]
 
+
+@ti.data_oriented
+class EveryPair(Everyone):
+    """List of all near pairs; slots: field of their slots, number of them."""
+
+    def __init__(self, number: ti.Field, slots: ti.Field):
+        super().__init__(number)
+        self.slots = slots
+
     @ti.func
     def pick(self, a):
-        """Member at place a."""
-        member = a
-        if ti.static(self.has_slots):
-            member = self.slots[a]
-        return member
+        """Slot of a pair."""
+        return self.slots[a]
 
 
 @ti.data_oriented
