@@ -81,7 +81,7 @@ def dropped_question(until: float) -> Question:
         place = 0.12 + 0.04 * k, 0.3, 0.3
         parts[f"body{k}"] = checked_mesh(turned, body.tetrahedra, body.groups), place
     material = replace(CONCRETE, contact_damping=0.0)
-    chosen = [effects.Gravity((-3e4, 0, 0)), effects.FaceContact(), effects.Fixed("floor_left")]
+    chosen = [effects.Gravity((-3e4, 0, 0)), effects.BodyContact(), effects.Fixed("floor_left")]
     scene = Scene(placed_together(parts), material, chosen)
     return Question(0, scene, until, goals.displacement("base"), 0.01)
 

@@ -22,7 +22,7 @@ EFFECTS = {
     # The paper's reading: faces carry spheres once they break, outer faces never.
     "sphere_contact": partial(effects.SphereContact, outer_faces=False),
     "surface_contact": effects.SphereContact,
-    "face_contact": effects.FaceContact,
+    "body_contact": effects.BodyContact,
     "friction": effects.Friction,
     "gas_pressure": effects.GasPressure,
     "gravity": effects.Gravity,
@@ -30,7 +30,7 @@ EFFECTS = {
 }
 #: Those that the paper's scene does not have: weight, contact of all surfaces in place of that of
 #: broken faces, through spheres or of spheres with faces, and cohesion that slip degrades.
-OPTIONAL = ("gravity", "surface_contact", "face_contact", "slip_weakening")
+OPTIONAL = ("gravity", "surface_contact", "body_contact", "slip_weakening")
 
 
 def blast_parser(name, description, drivers=BLAST_DRIVERS, mesh=PAPER_BLOCK, saves=False, **given):

@@ -16,7 +16,7 @@ from taichi_dem.demo import figures_of_certificate
 #: Effects in the order in which they are added; the load is always there.
 ORDER = ("bond_damping", "softening", "shear_slip", "sphere_contact", "friction")
 #: Contacts with other pairs than those of broken faces: their states are those of an own run.
-REPLACING = ("surface_contact", "face_contact")
+REPLACING = ("surface_contact", "body_contact")
 #: Pressure at which no bond of the paper's block reaches its envelope [Pa].
 WEAK = 0.01 * PEAK
 BEST, AUTO, EVERY = "best list", "auto", "all effects"

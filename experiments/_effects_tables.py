@@ -8,7 +8,7 @@ from taichi_dem.kit.study.paired_timing import median_interval
 
 LAST_BIT = "all effects, last bit of the load changed"
 #: Rows in which another contact takes the place of that of broken faces through spheres.
-CONTACTS = {"contact of all surfaces": "surface_contact", "contact with faces": "face_contact"}
+CONTACTS = {"contact of all surfaces": "surface_contact", "contact of bodies": "body_contact"}
 ADDED = ("rotation", *CONTACTS)
 #: Columns of what an effect adds, and their units.
 ADDS = {"memory_MB": "MB", "compiled_kB": "kB"}

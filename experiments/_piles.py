@@ -25,7 +25,7 @@ def softened(friction):
 
 def loose(weight=(-GRAVITY, 0.0, 0.0), fixed=("plate_left",), **contact):
     """Effects of blocks that touch and stick, on plates that are held at groups ``fixed``."""
-    touch = effects.BondDamping(), effects.FaceContact(**contact), effects.StickingFriction()
+    touch = effects.BondDamping(), effects.BodyContact(**contact), effects.StickingFriction()
     return [*touch, effects.Gravity(tuple(weight)), *map(effects.Fixed, fixed)]
 
 

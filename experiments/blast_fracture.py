@@ -92,7 +92,7 @@ def chosen_effects(added, without):
     for name in (*added, *without):
         if name not in EFFECTS:
             raise InputError(f"effect must be one of {', '.join(EFFECTS)}, got {name!r}")
-    if "surface_contact" in added or "face_contact" in added:
+    if "surface_contact" in added or "body_contact" in added:
         without.append("sphere_contact")
     names = (name for name in EFFECTS if name not in OPTIONAL or name in added)
     return [EFFECTS[name]() for name in names if name not in without]

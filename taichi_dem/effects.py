@@ -2,7 +2,6 @@
 
 from taichi_dem.laws.body_contact import BodyContact
 from taichi_dem.laws.bond import BondDamping, ShearSlip, Softening
-from taichi_dem.laws.face_contact import FaceContact
 from taichi_dem.laws.friction import Friction, StickingFriction
 from taichi_dem.laws.mixed_mode import MixedMode
 from taichi_dem.laws.slip_weakening import SlipWeakening
@@ -16,7 +15,6 @@ from taichi_dem.loads.supports import Fixed, PrescribedMotion, Roller
 __all__ = [
     "BodyContact",
     "BondDamping",
-    "FaceContact",
     "Fixed",
     "Friction",
     "GasPressure",

@@ -45,7 +45,7 @@ def sliding(body, speed, angle, friction, method):
     mesh = placed_together({"plate": (plate(), (0.0, 0.0, 0.0)), "body": (body, place)})
     listed = [
         effects.BondDamping(),
-        effects.FaceContact(5, spheres_per_body=160),
+        effects.BodyContact(),
         effects.Friction(),
         effects.Gravity((0.0, -GRAVITY, 0.0)),
         effects.Fixed("plate_bottom"),

@@ -96,7 +96,7 @@ def vertices_at_faces(trial, contact):
 case.add(
     "vertices_at_coarse_faces",
     "Sixteen bodies fired at 50 m/s, vertex first, at coarse faces: none passes.",
-    partial(vertices_at_faces, contact=effects.FaceContact()),
+    partial(vertices_at_faces, contact=effects.BodyContact()),
     ["implicit"],
 )
 case.add(

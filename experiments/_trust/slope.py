@@ -16,8 +16,8 @@ SOURCE = "statics of a rigid block"
 TIME = 0.12
 #: Angles, as shares of the limit: one at which it stands, two from which the limit follows.
 SHARES = 0.99, 1.05, 1.1
-#: Divisions of the contact's faces, and sphere pairs for each body that they bring.
-USUAL, FINE = {"divisions": 5}, {"divisions": 10, "spheres_per_body": 1280}
+#: Rays of the contact: 9 and 36 a face.
+USUAL, FINE = {"parts": 3}, {"parts": 6}
 #: Width of the block [m]; its height over it where it slides, where it topples; friction there.
 WIDTH, LOW, HIGH, ROUGH = 0.1, 0.5, 2.0, 0.9
 FRICTION = CONCRETE.friction
@@ -32,7 +32,7 @@ def slope(effort):
         for contact in (USUAL, FINE)
     )
     words = "tangent at which a high block topples, by b / h"
-    note = "spheres stand behind the faces, so the outermost is a radius inside the edge"
+    note = "a ray stands for its share of a face, so the outermost is inside the edge"
     numbers = (
         Number(
             "slope_slides", "tangent at which a block slides, by mu", "1", SOURCE, 1.0, limit(way)
@@ -41,7 +41,7 @@ def slope(effort):
         Number("slope_topples", words, "1", SOURCE, 1.0, limit(usual), note=note),
         Number(
             "slope_topples_fine",
-            f"{words}, 36 spheres a face",
+            f"{words}, 36 rays a face",
             "1",
             SOURCE,
             1.0,

@@ -79,8 +79,8 @@ class Breaks:
             fresh = False
         for k in range(self.store.first[p], self.store.last[p]):
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
-            face_i, face_j = self.contacts.law.face_of(a), self.contacts.law.face_of(b)
-            born = ti.max(self.state.exposed_tick[face_i], self.state.exposed_tick[face_j])
+            size = self.tables.face_spheres[None]
+            born = ti.max(self.state.exposed_tick[a // size], self.state.exposed_tick[b // size])
             if fresh and (freed or born == tick):
                 overlap = ti.max(0.0, -self.contacts.gap(i, j, a, b))
                 energy += self.contacts.law.stored(self.tables.pair(i, j), overlap)

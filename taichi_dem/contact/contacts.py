@@ -23,8 +23,6 @@ STEPS = 16.0
 #: Share of its extent beyond which it is searched again whatever its speed, and further than which
 #: no step may carry it: spheres would pass each other unseen.
 FARTHEST = 0.25
-#: Gap where another face has the contact [m].
-AWAY = 1e30
 
 
 @ti.data_oriented
@@ -49,7 +47,6 @@ class Contacts:
         for effect in tables.effects:
             effect.declare_columns(self.store)
         self.exposed_faces = ti.field(ti.i32, shape=n)
-        self.law.watch_faces(self.exposed_faces)
         self.travel = ti.field(real, shape=n)
         self.body_skin = ti.field(real, shape=n)
         self.skin = ti.field(real, shape=n)
@@ -86,15 +83,7 @@ class Contacts:
         """Gap between bodies i and j by an entry (a, b) of the pair store [m]."""
         gap = 0.0
         if ti.static(self.law.meets_bodies):
-            near = self.nearest(i, j, a, b)
-            gap = -near.reach
-            if near.can_meet == 0:
-                gap = 0.0
-        elif ti.static(self.law.meets_faces):
-            near = self.nearest(i, j, a, b)
-            gap = norm(near.apart) - near.reach
-            if near.can_meet == 0:
-                gap = AWAY
+            gap = -self.nearest(i, j, a, b).reach
         else:
             gap = self._gap_of_spheres(i, j, a, b)
         return gap

@@ -3,10 +3,9 @@
 import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
-from taichi_dem.kit.products import matvec, norm, squared
+from taichi_dem.kit.products import matvec, squared
 from taichi_dem.kit.types import real, vec4
 from taichi_dem.physics.rotation import place_in
-from taichi_dem.physics.triangle import closest_point
 
 #: Skins beyond their margin within which the gap of two spheres is found; others count as farther.
 OUTLOOK = 7.0
@@ -17,7 +16,7 @@ class NarrowPhase:
     """Compares the spheres on the faces of two bodies, at the positions of their last search.
 
     sphere: centre and radius of every sphere there [m]. cluster: centre of the ball around those of
-    a face [m]. corner: of every face there [m], where spheres meet faces.
+    a face [m]. position, rotation: of every body there, where bodies meet.
     """
 
     def __init__(self, contacts: Contacts):
@@ -30,8 +29,6 @@ class NarrowPhase:
         if self.law.meets_bodies:
             self.position = ti.Vector.field(3, real, shape=capacity.bodies)
             self.rotation = ti.Matrix.field(3, 3, real, shape=capacity.bodies)
-        if self.law.meets_faces:
-            self.corner = ti.Vector.field(3, real, shape=3 * capacity.faces)
 
     @ti.func
     def note_places(self, i):
@@ -47,9 +44,6 @@ class NarrowPhase:
                     sphere = self.tables.sphere[s]
                     place = position + matvec(rotation, sphere.xyz)
                     self.sphere[s] = vec4(place[0], place[1], place[2], sphere[3])
-                if ti.static(self.law.meets_faces):
-                    for k in range(3 * face, 3 * face + 3):
-                        self.corner[k] = position + matvec(rotation, self.law.corner[k])
 
     @ti.func
     def compare(self, i, j, faces, start, write):
@@ -73,11 +67,7 @@ class NarrowPhase:
                 face_i, face_j = 4 * i + fg // 4, 4 * j + fg % 4
                 if self._clusters_near(face_i, face_j, least):
                     place = start + count
-                    more = 0
-                    if ti.static(self.law.meets_faces):
-                        more, least = self._on_faces(face_i, face_j, place, margin, least, write)
-                    else:
-                        more, least = self._of_faces(face_i, face_j, place, margin, least, write)
+                    more, least = self._of_faces(face_i, face_j, place, margin, least, write)
                     count += more
                     hits |= ti.cast(more > 0, ti.i32) << fg
         return count, hits, least
@@ -122,33 +112,3 @@ class NarrowPhase:
                         else:
                             least = ti.sqrt(apart2) - reach
         return count, least
-
-    @ti.func
-    def _on_faces(self, face_i, face_j, start, margin, least, write):
-        """Both ways: the spheres of one face on the other, then those of the other on the one."""
-        count = 0
-        size = self.tables.face_spheres[None]
-        for turned in range(2):
-            face, other = face_i, face_j
-            if turned == 1:
-                face, other = face_j, face_i
-            for a in range(size * face, size * face + size):
-                mine = self.sphere[a]
-                whole = mine[3] + self.tables.cluster[other][3] + least
-                if squared(self.cluster[other] - mine.xyz) < whole * whole:
-                    gap = self._gap(mine, other)
-                    if gap < margin:
-                        if write:
-                            k = start + count
-                            self.store.sphere[k][turned] = a
-                            self.store.sphere[k][1 - turned] = -1 - other
-                        count += 1
-                    elif gap < least:
-                        least = gap
-        return count, least
-
-    @ti.func
-    def _gap(self, sphere, face):
-        """Gap between a sphere and a face, whichever side it is on [m]."""
-        p, q, s = self.corner[3 * face], self.corner[3 * face + 1], self.corner[3 * face + 2]
-        return norm(sphere.xyz - closest_point(sphere.xyz, p, q, s)) - sphere[3]

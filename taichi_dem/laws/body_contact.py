@@ -185,7 +185,7 @@ class BodyContact(SphereContact):
             push, turning, place, shared = pushed_out(slope, planes, at)
             force, moment = force + sign * push, moment + sign * turning
             middle, volume, doubled = middle + place, volume + shared, doubled + total
-        near, strength = Nearest(reach=-outside, can_meet=1, size=1.0), norm(force)
+        near, strength = Nearest(reach=-outside, size=1.0), norm(force)
         if doubled > _NONE * _NONE and strength > 0.0:
             middle /= volume
             near.first, near.apart = vec4(middle[0], middle[1], middle[2], 0.0), force / strength
@@ -206,7 +206,7 @@ class BodyContact(SphereContact):
     @ti.func
     def is_within(self, near, margin):
         """Whether two bodies are nearer than a margin [m]."""
-        return near.can_meet == 1 and near.reach + margin > 0.0
+        return near.reach + margin > 0.0
 
     @ti.func
     def meeting(self, near, k, rotation):

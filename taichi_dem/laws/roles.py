@@ -73,16 +73,17 @@ MEMBERS = {
         "damping(m)",
         # Energy [J].
         "stored(m, overlap)",
-        # Whether spheres meet faces, with ``corner`` of each in the frame of its body.
-        "meets_faces",
+        # Whether bodies meet (``BodyContact``), instead of their spheres.
+        "meets_bodies",
         # The ``ContactSpheres`` of all faces of a ``Model``.
         "spheres(model)",
-        # Take note of the field with a bit for each face of a body that is free.
-        "watch_faces(exposed_faces)",
         # Where two bodies are nearest by an entry of the pair store (``SphereContact``).
         "nearest(a, b, turn, offset)",
-        # Face of one side of an entry of the pair store.
-        "face_of(a)",
+        # Whether a ``Nearest`` is nearer than a margin [m], and the ``Meeting`` there.
+        "is_within(near, margin)",
+        "meeting(near, k, rotation)",
+        # Take note of a ``Nearest`` of entry k before its forces are asked.
+        "settle(near, k)",
     ),
     # Tangential law of contact spheres.
     "friction": (

@@ -67,8 +67,7 @@ class SphereContact(Effect):
     role = "contact"
     name = "sphere_contact"
     activation = "spheres of free faces touch"
-    #: Whether spheres meet the faces of other bodies, or bodies each other, instead of spheres.
-    meets_faces = False
+    #: Whether bodies meet each other, instead of their spheres.
     meets_bodies = False
 
     def __init__(
@@ -105,9 +104,6 @@ class SphereContact(Effect):
         """Spheres of a model, in balls that hold all of a face, or of a body, that can touch."""
         return spheres_of_faces(model.mesh, model.centre, self.divisions)
 
-    def watch_faces(self, exposed_faces: ti.Field) -> None:
-        """Take note of the field with a bit for each face of a body that is free."""
-
     @ti.func
     def nearest(self, a, b, turn, offset):
         """Where two bodies are nearest by an entry (a, b) of the pair store, a ``Nearest``.
@@ -117,7 +113,7 @@ class SphereContact(Effect):
         first, second = self.tables.sphere[a], self.tables.sphere[b]
         apart = matvec(turn, second.xyz) + offset - first.xyz
         size = first[3] + second[3]
-        return Nearest(first=first, apart=apart, reach=size, size=size, can_meet=1)
+        return Nearest(first=first, apart=apart, reach=size, size=size)
 
     @ti.func
     def is_within(self, near, margin):
@@ -132,11 +128,6 @@ class SphereContact(Effect):
     @ti.func
     def settle(self, near, k):
         """Take note of how entry k is now, before its forces are asked."""
-
-    @ti.func
-    def face_of(self, a):
-        """Face 4 * body + f of one side of an entry of the pair store."""
-        return a // self.tables.face_spheres[None]
 
     @ti.func
     def normal(self, m, overlap, opening_rate):

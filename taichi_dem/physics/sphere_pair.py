@@ -1,4 +1,4 @@
-"""Contact after fracture, of spheres (Konno et al., 2.2) or faces: normal force and friction."""
+"""Contact after fracture, of spheres (Konno et al., 2.2) or bodies: normal force and friction."""
 
 import taichi as ti
 
@@ -64,17 +64,15 @@ def add_within(held, more, bound):
 class Nearest:
     """Two bodies' surfaces where they are nearest, in the first body's frame.
 
-    first: centre of the first's sphere and its radius [m], or a point of its face and 0. apart:
-    from there to the second's centre or point [m]. reach: their distance when they touch [m].
-    size: the sum of the radii [m]. can_meet: 0 where another face of the body is nearer. area,
-    couple: as in ``Meeting``.
+    first: centre of the first's sphere and its radius [m]. apart: from there to the second's
+    centre [m]. reach: their distance when they touch [m]. size: the sum of the radii [m]. Of bodies
+    see ``BodyContact.nearest``; area, couple: as in ``Meeting``.
     """
 
     first: ti.types.vector(4, ti.f64)
     apart: ti.types.vector(3, ti.f64)
     reach: ti.f64
     size: ti.f64
-    can_meet: ti.i32
     area: ti.f64
     couple: ti.types.vector(3, ti.f64)
 
@@ -83,7 +81,7 @@ class Nearest:
 def is_within(surfaces, margin):
     """Whether the surfaces of a ``Nearest`` are nearer than a margin [m]."""
     wide = surfaces.reach + margin
-    return surfaces.can_meet == 1 and squared(surfaces.apart) < wide * wide
+    return squared(surfaces.apart) < wide * wide
 
 
 @ti.dataclass
@@ -105,7 +103,7 @@ class Meeting:
 
 @ti.func
 def meeting(first, reach, apart, rotation):
-    """Meeting of two spheres, or of a sphere and a face; all but rotation as in ``Nearest``.
+    """Meeting of two spheres; all but rotation as in ``Nearest``.
 
     rotation: of the first body.
     """

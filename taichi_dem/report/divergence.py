@@ -95,11 +95,8 @@ class DivergenceCheck:
                 self._shares(*bodies[pair].tolist(), deepest[pair])
         elif deepest[pair] > DEEPEST_OVERLAP:
             body, other = bodies[pair].tolist()
-            inside, size = f"one of body {other}", "their radii"
-            if contacts.law.meets_faces:
-                inside, size = f"body {other}", "its radius"
-            share = f"{100 * deepest[pair]:.0f} % of {size}"
-            raise self._too_deep(body, f"has a contact sphere inside {inside} ({share})")
+            share = f"{100 * deepest[pair]:.0f} % of their radii"
+            raise self._too_deep(body, f"has a contact sphere inside one of body {other} ({share})")
 
     def check_shared(self, volume: SharedVolume) -> None:
         """Raise SimulationDiverged where contact of all faces has not kept two bodies apart."""

@@ -31,7 +31,7 @@ class TangentialSprings:
 
     @ti.func
     def follow(self, m, k, rotation, met, way):
-        """Stretch the spring of pair k, at a ``Meeting``, by ``way`` [m]; energy that is lost [J]."""
+        """Stretch the spring of pair k, at a ``Meeting``, by ``way`` [m]; energy lost [J]."""
         lost = 0.0
         if ti.static(self.by_area):
             lost = self.friction.resize(m, k, met.area)

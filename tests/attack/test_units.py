@@ -51,7 +51,7 @@ def run_in(length, mass, time, number, weight, speed):
 
     constants = {name: getattr(MATERIAL, name) * of(*by) for name, by in DIMENSIONS.items()}
     laws = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
-    laws += [(effects.SphereContact, effects.FaceContact)[number % 2](), effects.Friction()]
+    laws += [(effects.SphereContact, effects.BodyContact)[number % 2](), effects.Friction()]
     gas = effects.GasPressure("target_left", peak=2e9 * of(-1, 1, -2), rise=1e-5 * time)
     thrown = effects.PrescribedMotion("thrown_right", tuple(speed * of(1, 0, -1)), 2e4 / time)
     scene = Scene(

@@ -171,7 +171,7 @@ def test_a_law_that_does_not_say_when_it_begins_is_not_taken_on_demand(law):
 
 def test_a_scene_that_is_changed_keeps_its_loads():
     """The certificate may send a user from auto to all."""
-    made = on_demand(effects.Gravity(), effects.FaceContact())
+    made = on_demand(effects.Gravity(), effects.BodyContact())
     every = replace(made, effects="all", sleep=0.0)
     assert [effect.name for effect in every.effects] == [effect.name for effect in made.effects]
     stronger = replace(made, material=replace(CONCRETE, cohesion=1e7))

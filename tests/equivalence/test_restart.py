@@ -86,7 +86,7 @@ def differing(first, second):
 CASES = {
     "controlled": (effects.SphereContact, METHODS["controlled"]),
     "implicit": (effects.SphereContact, METHODS["implicit"]),
-    "faces": (effects.FaceContact, METHODS["controlled"]),
+    "bodies": (effects.BodyContact, METHODS["controlled"]),
 }
 
 

@@ -35,7 +35,7 @@ class Kind(NamedTuple):
 
 BONDS = (effects.BondDamping, effects.Softening, effects.ShearSlip)
 SPHERES = (*BONDS, effects.SphereContact, effects.Friction)
-FACES = (*BONDS, effects.FaceContact, effects.StickingFriction)
+FACES = (*BONDS, effects.BodyContact, effects.StickingFriction)
 GAS, WEIGHT, MOVED = effects.GasPressure, effects.Gravity, effects.PrescribedMotion
 #: Few structures, as each takes seconds to compile; every effect and method is in one of them.
 KINDS = (

@@ -52,7 +52,7 @@ def test_flat_sides_that_overlap_have_the_energy_of_their_bond():
     radius = 3.0 * volume / (4.0 * area)
     mirrored = placed.model.centre[0] * [-1.0, 1.0, 1.0]
     for depth in (1e-6, 1e-4):
-        placed.put(mirrored - [depth, 0.0, 0.0] if mirrored[0] > 0.0 else mirrored + [depth, 0, 0])
+        placed.put(mirrored - np.array([depth, 0.0, 0.0]))
         flat = 0.5 * STIFFNESS * area * depth**2
         assert (1.0 - depth / radius) ** 2 * flat <= placed.energy() <= (1.0 + 1e-9) * flat
 

@@ -329,9 +329,7 @@ class PairDashpots:
                 found.moment_i -= pressed * met.couple
                 found.moment_j += pressed * met.couple
                 rate += dot(met.couple, self.state.spin[j] - self.state.spin[i])
-            spring = 0.0
-            if near.can_meet == 1:
-                spring = met.area * self.contacts.law.elastic(m, ti.max(met.overlap, 0.0))
+            spring = met.area * self.contacts.law.elastic(m, ti.max(met.overlap, 0.0))
             found.dragged += (spring - pressed) * rate
             rub = pushed - pressed * met.normal
             if ti.static(self.springs.present):
