@@ -46,10 +46,9 @@ class Everyone:
     @ti.func
     def pick(self, a):
         """Member at place a."""
-        member = a
         if ti.static(self.has_slots):
-            member = self.slots[a]
-        return member
+            a = self.slots[a]
+        return a
 
 
 @ti.data_oriented
