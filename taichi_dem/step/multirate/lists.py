@@ -1,7 +1,7 @@
 """Lists of members for a phase: those active at a tick, by falling level; all; one."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Optional
 
 import taichi as ti
 
@@ -29,30 +29,26 @@ class Once(Places):
 
 
 @ti.data_oriented
-class Everyone(Places):
-    """List of all bodies or bonds of a scene, active or not; number: field of how many."""
+class Everyone:
+    """List of all bodies, bonds or near pairs of a scene, active or not.
 
-    def __init__(self, number: ti.Field):
-        self.number = number
+    number: field of how many. slots: field of their numbers, None for 0 .. number - 1.
+    """
+
+    def __init__(self, number: ti.Field, slots: Optional[ti.Field] = None):
+        self.number, self.slots, self.has_slots = number, slots, slots is not None
 
     @ti.func
     def count(self, low):
         """Number of all."""
         return self.number[None]
 
-
-@ti.data_oriented
-class EveryPair(Everyone):
-    """List of all near pairs; slots: field of their slots, number of them."""
-
-    def __init__(self, number: ti.Field, slots: ti.Field):
-        super().__init__(number)
-        self.slots = slots
-
     @ti.func
     def pick(self, a):
-        """Slot of a pair."""
-        return self.slots[a]
+        """Member at place a."""
+        if ti.static(self.has_slots):
+            a = self.slots[a]
+        return a
 
 
 @ti.data_oriented

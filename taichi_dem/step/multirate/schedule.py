@@ -18,7 +18,7 @@ from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL, coarsest_active, ticks_of
-from taichi_dem.step.multirate.lists import ActiveList, Everyone, EveryPair
+from taichi_dem.step.multirate.lists import ActiveList, Everyone
 from taichi_dem.step.multirate.members import Members
 from taichi_dem.step.multirate.neighbours import AppliedUntil, LevelLimit
 from taichi_dem.step.sleeping import Sleeping
@@ -61,7 +61,7 @@ class Schedule(Members):
             # Pairs of which a body is the first, then those of which it is the second.
             as_second = self.store.second_start, self.store.second_slot, 0
             self.beside = (self.store.first_of, self.store.near_slot, 1), as_second
-            near = EveryPair(self.store.near_count, self.store.near_slot)
+            near = Everyone(self.store.near_count, self.store.near_slot)
             self.pairs = ActiveList(self.store.slots, near, self.pair_key)
         self.applied_until = AppliedUntil(self) if self.controlled else None
         self.spreads = self.controlled and not self.uniform and self.limits.spreads
