@@ -1,6 +1,7 @@
 """Contact of whole bodies, whose energy is that of the volume in which they overlap."""
 
 from dataclasses import replace
+from typing import Union
 
 import numpy as np
 import taichi as ti
@@ -13,6 +14,7 @@ from taichi_dem.kit.types import real, vec3, vec4
 from taichi_dem.kit.validation import whole
 from taichi_dem.laws.sphere_contact import SphereContact
 from taichi_dem.materials import Material
+from taichi_dem.materials.bond_rules import typical_of
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES, signed_volumes
 from taichi_dem.physics.body_overlap import (
@@ -43,6 +45,8 @@ class BodyContact(SphereContact):
     ----------
     parts : int, default 3
         Equal parts of the edges of a face; parts^2 rays go from the middle of a body to each face.
+    outer_faces : bool or str, default True
+        True: outer faces meet from the start. ``"once_broken"``: from the first break of any bond.
     skin : float, default 0.0075
         Gap up to which pairs enter the candidate list, as a share of the radius of a body to its
         corners. It changes time, not results.
@@ -77,16 +81,17 @@ class BodyContact(SphereContact):
     def __init__(
         self,
         parts: int = 3,
+        outer_faces: Union[bool, str] = True,
         skin: float = 0.0075,
         neighbours_per_body: int = 192,
         pairs_per_body: int = 48,
     ):
         self.parts = whole("parts", parts, 1, _MOST_PARTS)
-        super().__init__(3, True, skin, neighbours_per_body, pairs_per_body, pairs_per_body)
+        super().__init__(3, outer_faces, skin, neighbours_per_body, pairs_per_body, pairs_per_body)
 
     def numbers(self, material: Material) -> tuple[float, ...]:
-        """Stiffness [Pa/m] and damping [Pa s/m] per area: those of a bond."""
-        return float(material.normal_stiffness), float(material.normal_damping)
+        """Stiffness [Pa/m] and damping [Pa s/m] per area: those of a bond of the usual size."""
+        return typical_of(material.normal_stiffness), typical_of(material.normal_damping)
 
     def spheres(self, model: Model) -> ContactSpheres:
         """Balls around the faces of all bodies, by which neighbours are found."""

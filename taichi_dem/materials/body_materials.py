@@ -99,11 +99,13 @@ class BodyMaterials:
     def _on_mesh(self, k):
         """Material k with the numbers that contacts of its bodies have."""
         material, bodies = self.materials[k], self.of_body == k
-        numbers = {
-            name: rule.of_mesh(self.mesh, material.density, bodies)
-            for name, rule in vars(material).items()
-            if isinstance(rule, ContactRule)
-        }
+        numbers: dict[str, Any] = {}
+        on_mesh = self.mesh, material.density, bodies
+        for name, rule in vars(material).items():
+            if isinstance(rule, ContactRule):
+                numbers[name] = rule.of_mesh(*on_mesh)
+            elif isinstance(rule, BondRule):
+                numbers[name] = rule.on_mesh(*on_mesh)
         return replace(material, **numbers) if numbers else material
 
     @property

@@ -6,9 +6,10 @@ stiffness = modulus / distance the modulus of a block does not depend on the siz
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass
-from typing import Union
+from typing import Any, ClassVar, Union
 
 import numpy as np
 
@@ -55,6 +56,16 @@ def bond_geometry(mesh: Mesh, topology: Topology, density: Density) -> BondGeome
     return BondGeometry(distance, area, pair_mass, behind / distance, bodies)
 
 
+def mirrored(mesh: Mesh, density: float, bodies: np.ndarray) -> BondGeometry:
+    """Sizes of bonds of some bodies (n,), truth values, each with its mirror image at each face."""
+    faces = all_faces(mesh.tetrahedra[bodies])
+    area = length(area_vectors(mesh.points, faces)).reshape(-1, 4)
+    volume = volumes(mesh)[bodies, None]
+    # The centre is a quarter of the altitude 3 V / A away from a face.
+    distance, mass = 2.0 * 0.75 * volume / area, 0.5 * density * volume + 0.0 * area
+    return BondGeometry(distance, area, mass, 0.5 + 0.0 * area, np.zeros((0, 2), dtype=int))
+
+
 class Rule:
     """Base of rules: a constant that depends on the sizes of the bodies.
 
@@ -75,7 +86,20 @@ class Rule:
 
 
 class BondRule(Rule):
-    """Base of rules for a constant that each bond has of its own."""
+    """Base of rules for a constant that each bond has of its own.
+
+    typical: the median over the faces of bodies of one kind, as contacts of bodies use it;
+    NaN until their mesh is known.
+    """
+
+    typical: ClassVar[float] = math.nan
+
+    def on_mesh(self, mesh: Mesh, density: float, bodies: np.ndarray) -> BondRule:
+        """The same rule with its typical value for some bodies of a mesh, (n,) truth values."""
+        made = copy.copy(self)
+        value = np.median(self.per_bond(mirrored(mesh, density, bodies)))
+        object.__setattr__(made, "typical", float(value))
+        return made
 
     def per_bond(self, bonds: BondGeometry) -> np.ndarray:
         """The constant of every bond, per area, (bond_count,)."""
@@ -137,11 +161,8 @@ class FaceStiffness(ContactRule):
 
     def of_mesh(self, mesh: Mesh, density: float, bodies: np.ndarray) -> float:
         """Stiffness of a contact of two bodies [N/m]."""
-        faces = all_faces(mesh.tetrahedra[bodies])
-        area = length(area_vectors(mesh.points, faces)).reshape(-1, 4)
-        # The centre is a quarter of the altitude 3 V / A away from a face.
-        distance = 2.0 * 0.75 * volumes(mesh)[bodies, None] / area
-        return float(np.median(self.modulus * area / distance)) / FACE_SPHERES
+        bonds = mirrored(mesh, density, bodies)
+        return float(np.median(self.modulus * bonds.area / bonds.distance)) / FACE_SPHERES
 
 
 @dataclass(frozen=True, repr=False)
@@ -221,6 +242,15 @@ def joined_constants(first: Constant, second: Constant) -> Constant:
     if isinstance(first, Rule) or isinstance(second, Rule):
         return InSeries(first, second)
     return 2.0 * first * second / (first + second)
+
+
+def typical_of(constant: Constant) -> float:
+    """A constant of bonds per area as one number, of a rule its typical one."""
+    if isinstance(constant, InSeries):
+        first, second = typical_of(constant.first), typical_of(constant.second)
+        return 2.0 * first * second / (first + second)
+    number: Any = constant.typical if isinstance(constant, BondRule) else constant
+    return float(number)
 
 
 def per_bond(
