@@ -75,8 +75,6 @@ class Breaks:
         i, j = self.store.body[p][0], self.store.body[p][1]
         energy, tick = 0.0, self.state.tick[None]
         fresh, freed = self.fresh[None] == 1, self._freed_at(i, j, tick)
-        if ti.static(self.contacts.law.meets_bodies):
-            fresh = False
         for k in range(self.store.first[p], self.store.last[p]):
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
             size = self.tables.face_spheres[None]

@@ -59,7 +59,7 @@ class NarrowPhase:
             least += 0.5 * OUTLOOK * (self.contacts.skin[i] + self.contacts.skin[j])
         if ti.static(self.law.meets_bodies):
             if faces != 0:
-                count, least = self._of_bodies(i, j, start, margin, write)
+                count, least = self._of_bodies(i, j, margin)
                 hits = count * faces
             faces = 0
         for fg in range(16):
@@ -79,15 +79,13 @@ class NarrowPhase:
         return squared(self.cluster[face_j] - self.cluster[face_i]) < reach * reach
 
     @ti.func
-    def _of_bodies(self, i, j, start, margin, write):
+    def _of_bodies(self, i, j, margin):
         """1 where two bodies may meet, and how far they may go until then."""
         count = 0
         apart = self.position[j] - self.position[i]
         turn, offset = place_in(self.rotation[i], self.rotation[j], apart)
         gap = self.law.gap(i, j, turn, offset)
         if gap < margin:
-            if write:
-                self.store.sphere[start] = [i, j]
             count, gap = 1, margin
         return count, gap
 

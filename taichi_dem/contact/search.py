@@ -292,11 +292,15 @@ class BroadPhase:
         faces, count = self.listed.new_faces[k], self.listed.found[k]
         self.listed.new_faces[k] = 0
         if faces != 0:
-            self.narrow_phase.compare(i, j, faces, self.store.sphere_place[p], True)
-            self.store.replace_spheres(p, count)
-            injected = self.breaks.injected(p)
-            if injected > 0.0:
-                self.store.heat[p] = self.store.heat[p] + vec3(0.0, 0.0, injected)
-                self.store.waiting[p][0] = 1
+            if ti.static(self.contacts.law.meets_bodies):
+                self.store.sphere[self.store.sphere_place[p]] = [i, j]
+                self.store.replace_spheres(p, count)
+            else:
+                self.narrow_phase.compare(i, j, faces, self.store.sphere_place[p], True)
+                self.store.replace_spheres(p, count)
+                injected = self.breaks.injected(p)
+                if injected > 0.0:
+                    self.store.heat[p] = self.store.heat[p] + vec3(0.0, 0.0, injected)
+                    self.store.waiting[p][0] = 1
         elif count == 0:
             self.store.remove_spheres(p)

@@ -18,10 +18,16 @@ from taichi_dem.materials.bond_rules import typical_of
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES, signed_volumes
 from taichi_dem.physics.body_overlap import (
+    along,
     depths,
-    pushed_out,
+    placed,
+    pushes,
     ray_ends,
+    shared,
     sum_of_rays,
+    summed,
+    turning,
+    weighted,
 )
 from taichi_dem.physics.sphere_pair import Meeting, Nearest
 from taichi_dem.state.capacity import Capacity
@@ -74,7 +80,7 @@ class BodyContact(SphereContact):
     activation = "bodies touch"
     meets_bodies = True
     constant_fields = (
-        *("corner", "normal_of", "plane", "incentre", "volume", "face_area"),
+        *("corner", "outward", "plane", "incentre", "volume", "face_area"),
         *("ends", "end_count"),
     )
 
@@ -108,7 +114,7 @@ class BodyContact(SphereContact):
         incentre: weights of the corners there. volume: [m3]. face_area: of the largest face [m2].
         """
         self.corner = ti.Matrix.field(4, 3, real, shape=capacity.bodies)
-        self.normal_of = ti.Matrix.field(4, 3, real, shape=capacity.bodies)
+        self.outward = ti.Matrix.field(4, 3, real, shape=capacity.bodies)
         self.plane = ti.Vector.field(4, real, shape=capacity.bodies)
         self.incentre = ti.Vector.field(4, real, shape=capacity.bodies)
         self.volume, self.face_area = (ti.field(real, shape=capacity.bodies) for _ in range(2))
@@ -130,7 +136,7 @@ class BodyContact(SphereContact):
         whole_area = 0.5 * twice.sum(axis=1)
         ends = ray_ends(self.parts)
         assign(self.corner, corners)
-        assign(self.normal_of, normal)
+        assign(self.outward, normal)
         assign(self.plane, fixed_order.dot(normal, faces[:, :, 0]))
         assign(self.incentre, 0.5 * twice / whole_area[:, None])
         assign(self.volume, volume)
@@ -146,50 +152,15 @@ class BodyContact(SphereContact):
         overlap as if a flat side met a flat one [m], or minus the gap. reach / size: share of the
         smaller body that both fill.
         """
-        corners, normals = self._placed(b, turn, offset)
-        mine, others = self._depths(a, b, corners, normals, offset)
-        return self._overlap(a, b, mine, others, corners, normals)
-
-    @ti.func
-    def gap(self, a, b, turn, offset):
-        """A bound of the way that bodies may go before a ray of one enters the other [m]."""
-        return ti.max(0.0, -self.nearest(a, b, turn, offset).reach)
-
-    @ti.func
-    def _depths(self, a, b, corners, normals, offset):
-        """Depths of the corners of body a below the planes of body b [m], and the other way."""
-        distances = self.plane[b]
-        for g in ti.static(range(4)):
-            for k in ti.static(range(3)):
-                distances[g] += normals[g, k] * offset[k]
-        mine = depths(self.corner[a], normals, distances)
-        return mine, depths(corners, self.normal_of[a], self.plane[a])
-
-    @ti.func
-    def _placed(self, b, turn, offset):
-        """Corners and outward normals of the second body in the frame of the first."""
-        corners = self.corner[b] @ turn.transpose()
-        for c in ti.static(range(4)):
-            for k in ti.static(range(3)):
-                corners[c, k] += offset[k]
-        return corners, self.normal_of[b] @ turn.transpose()
-
-    @ti.func
-    def _overlap(self, a, b, mine, others, corners, normals):
-        """The ``Nearest`` of two bodies that may overlap."""
         force, moment, middle = vec3(0.0), vec3(0.0), vec3(0.0)
         doubled, volume, outside = 0.0, 0.0, 1e30
         for side in range(2):
-            body, depth, at, planes, sign = a, mine, self.corner[a], normals, -1.0
-            if side == 1:
-                body, depth, at, planes, sign = b, others, corners, self.normal_of[a], 1.0
-            total, slope, apart = sum_of_rays(
-                depth, self.incentre[body], self.volume[body], self.ends, self.end_count[None]
-            )
-            outside = ti.min(outside, apart)
-            push, turning, place, shared = pushed_out(slope, planes, at)
-            force, moment = force + sign * push, moment + sign * turning
-            middle, volume, doubled = middle + place, volume + shared, doubled + total
+            at, planes, total, slope, apart = self._side(side, a, b, turn, offset, True)
+            outside, doubled = ti.min(outside, apart), doubled + total
+            weights, push = shared(slope), pushes(slope, planes)
+            middle, volume = middle + weighted(weights, at), volume + weights.sum()
+            sign = 2.0 * side - 1.0
+            force, moment = force + sign * summed(push), moment + sign * turning(at, push)
         near, strength = Nearest(reach=-outside, size=1.0), norm(force)
         if doubled > _NONE * _NONE and strength > 0.0:
             middle /= volume
@@ -202,6 +173,36 @@ class BodyContact(SphereContact):
         else:
             near.apart = vec3(1.0, 0.0, 0.0)
         return near
+
+    @ti.func
+    def gap(self, a, b, turn, offset):
+        """A bound of the way that bodies may go before a ray of one enters the other [m]."""
+        outside = 1e30
+        for side in range(2):
+            found = self._side(side, a, b, turn, offset, False)
+            outside = ti.min(outside, found[4])
+        return outside
+
+    @ti.func
+    def _side(self, side, a, b, turn, offset, whole: ti.template()):
+        """Corners of one body and planes of the other in the first's frame; their ``sum_of_rays``.
+
+        side: 0 for the rays of body a, 1 for those of body b.
+        """
+        body, at, planes = a, self.corner[a], placed(self.outward[b], turn, 0.0 * offset)
+        distances = self.plane[b] + along(planes, offset)
+        if side == 1:
+            body, at = b, placed(self.corner[b], turn, offset)
+            planes, distances = self.outward[a], self.plane[a]
+        total, slope, apart = sum_of_rays(
+            depths(at, planes, distances),
+            self.incentre[body],
+            self.volume[body],
+            self.ends,
+            self.end_count[None],
+            whole,
+        )
+        return at, planes, total, slope, apart
 
     @ti.func
     def largest_area(self, a, b):

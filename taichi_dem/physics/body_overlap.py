@@ -8,17 +8,20 @@ from plane to plane. So W is a function of the depths of four corners below four
 forces are its exact derivatives.
 """
 
+from functools import reduce
+from operator import add
+
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.products import cross, dot, entry, expression
-from taichi_dem.kit.types import real, vec3
+from taichi_dem.kit.products import entry, expression
+from taichi_dem.kit.types import real, vec3, vec4
 
 #: Turn of ray ends about the middle of a face, times the parts of its edges.
 TURN = 0.12
 #: Distance beyond which a pyramid is left out at once, as a share of the size of its body.
 FAR = 0.05
-mat4 = ti.types.matrix(4, 4, real)
+mat4, mat43 = ti.types.matrix(4, 4, real), ti.types.matrix(4, 3, real)
 
 
 def ray_ends(parts: int) -> np.ndarray:
@@ -39,10 +42,101 @@ def ray_ends(parts: int) -> np.ndarray:
     return ends.reshape(-1, 4)
 
 
+def _total(terms):
+    return reduce(add, terms)
+
+
 @expression
 def row(matrix, r):
-    """Row r of a matrix of three columns."""
-    return vec3([entry(matrix, r, k) for k in range(3)])
+    """Row r of a matrix of four columns."""
+    return vec4([entry(matrix, r, k) for k in range(4)])
+
+
+@expression
+def placed(points, turn, offset):
+    """Four points, (4, 3), turned and moved."""
+    return mat43(
+        [
+            [
+                _total(entry(points, c, j) * entry(turn, k, j) for j in range(3)) + entry(offset, k)
+                for k in range(3)
+            ]
+            for c in range(4)
+        ]
+    )
+
+
+@expression
+def along(vectors, way):
+    """Four vectors, (4, 3), times another."""
+    return vec4([_total(entry(vectors, c, k) * entry(way, k) for k in range(3)) for c in range(4)])
+
+
+@expression
+def depths(corners, normals, distances):
+    """Depth of each corner below each plane [m], (4, 4)."""
+    return mat4(
+        [
+            [
+                entry(distances, g)
+                - _total(entry(normals, g, k) * entry(corners, c, k) for k in range(3))
+                for g in range(4)
+            ]
+            for c in range(4)
+        ]
+    )
+
+
+@expression
+def at_weights(depth, weights):
+    """Depths below four planes of the point with some weights of the corners."""
+    four = range(4)
+    return vec4([_total(entry(depth, c, g) * entry(weights, c) for c in four) for g in four])
+
+
+@expression
+def pushes(slope, normals):
+    """Force on each corner along the normals of four planes, (4, 3)."""
+    return mat43(
+        [
+            [_total(entry(slope, c, g) * entry(normals, g, k) for g in range(4)) for k in range(3)]
+            for c in range(4)
+        ]
+    )
+
+
+@expression
+def summed(push):
+    """Sum of four vectors, (4, 3)."""
+    return vec3([_total(entry(push, c, k) for c in range(4)) for k in range(3)])
+
+
+@expression
+def turning(corners, push):
+    """Sum of the moments of forces on four corners."""
+    return vec3(
+        [
+            _total(
+                entry(corners, c, (k + 1) % 3) * entry(push, c, (k + 2) % 3)
+                - entry(corners, c, (k + 2) % 3) * entry(push, c, (k + 1) % 3)
+                for c in range(4)
+            )
+            for k in range(3)
+        ]
+    )
+
+
+@expression
+def shared(slope):
+    """Weight of each corner in the shared volume [m3], by the derivatives of ``sum_of_rays``."""
+    return vec4([_total(entry(slope, c, g) for g in range(4)) for c in range(4)])
+
+
+@expression
+def weighted(weights, corners):
+    """Sum of four corners times their weights."""
+    three, four = range(3), range(4)
+    return vec3([_total(entry(weights, c) * entry(corners, c, k) for c in four) for k in three])
 
 
 @ti.func
@@ -82,78 +176,59 @@ def least(first, last, g: ti.template()):
 
 
 @ti.func
-def sum_of_rays(depth, centre, volume, ends: ti.template(), count):
+def integrals(start, change, low, high, centre, end):
+    """Integral of the least depth over a thin pyramid, and its derivatives by the depths, (4, 4).
+
+    Of a part low .. high of its ray, for a unit of three times its volume.
+    """
+    total, slope, way = 0.0, mat4(0.0), high - low
+    first, last = start + low * change, start + high * change
+    for g in ti.static(range(4)):
+        since, until = least(first, last, g)
+        if until > since:
+            # Integrals of t^2 and t^3 over the part: a pyramid widens with t^2.
+            since, until = low + since * way, low + until * way
+            square, cube = (until**3 - since**3) / 3.0, (until**4 - since**4) / 4.0
+            total += start[g] * square + change[g] * cube
+            weights = centre * (square - cube) + end * cube
+            for c in ti.static(range(4)):
+                slope[c, g] = weights[c]
+    return total, slope
+
+
+@ti.func
+def sum_of_rays(depth, centre, volume, ends: ti.template(), count, whole: ti.template()):
     """Integral of the least depth over a body [m4], and its derivatives by the depths [m3].
 
     Returns also how far all rays are outside at least [m], 0 where one is not. depth[c, g]: of
     corner c of the body below plane g of the other [m]. centre: weights of the corners in its
-    incentre. ends, count: of ``ray_ends`` and their number.
+    incentre. ends, count: of ``ray_ends`` and their number. whole: whether to integrate, or only to
+    find how far rays are outside.
     """
     total, slope, outside = 0.0, mat4(0.0), 1e30
-    turned = depth.transpose()
-    start = turned @ centre
+    start = at_weights(depth, centre)
     # Rays are seldom as near as the pyramid that they stand for: one by one, unless it is far off.
     far = FAR * volume ** (1.0 / 3.0)
     for face in range(4):
         top = start
         for c in ti.static(range(4)):
             if c != face:
-                top = ti.max(top, turned[:, c])
+                top = ti.max(top, row(depth, c))
         if top.min() < -far:
             outside = ti.min(outside, -top.min())
         else:
             share = 12.0 * volume * centre[face] / count
             for r in range(face * count // 4, (face + 1) * count // 4):
-                end = ends[r]
-                change = turned @ end
+                change = at_weights(depth, ends[r])
                 highest = ti.max(start, change).min()
                 if highest > 0.0:
                     change -= start
                     low, high, apart = inside(start, change)
                     outside = ti.max(0.0, ti.min(outside, apart))
-                    if high > low:
-                        first, last, whole = start + low * change, start + high * change, high - low
-                        for g in ti.static(range(4)):
-                            since, until = least(first, last, g)
-                            if until > since:
-                                # Integrals of t^2 and t^3 over the part: a pyramid widens with t^2.
-                                since, until = low + since * whole, low + until * whole
-                                square = share * (until**3 - since**3) / 3.0
-                                cube = share * (until**4 - since**4) / 4.0
-                                total += start[g] * square + change[g] * cube
-                                for c in ti.static(range(4)):
-                                    slope[c, g] += centre[c] * (square - cube) + end[c] * cube
+                    if ti.static(whole):
+                        if high > low:
+                            more, by = integrals(start, change, low, high, centre, ends[r])
+                            total, slope = total + share * more, slope + share * by
                 else:
                     outside = ti.min(outside, -highest)
     return total, slope, outside
-
-
-@ti.func
-def pushed_out(slope, normals, corners):
-    """Force [m3] on a body's corners along the other's normals, its moment [m4], and volume [m3].
-
-    Returns also the first moment [m4] of the shared volume. slope: of ``sum_of_rays``; normals,
-    corners: 4 x 3, in one frame.
-    """
-    force, moment, at, volume = vec3(0.0), vec3(0.0), vec3(0.0), 0.0
-    for c in ti.static(range(4)):
-        push, weight = vec3(0.0), 0.0
-        for g in ti.static(range(4)):
-            push += slope[c, g] * row(normals, g)
-            weight += slope[c, g]
-        corner = row(corners, c)
-        force += push
-        moment += cross(corner, push)
-        at += weight * corner
-        volume += weight
-    return force, moment, at, volume
-
-
-@ti.func
-def depths(corners, normals, distances):
-    """Depth of each corner below each plane [m], (4, 4)."""
-    depth = mat4(0.0)
-    for c in ti.static(range(4)):
-        for g in ti.static(range(4)):
-            depth[c, g] = distances[g] - dot(row(normals, g), row(corners, c))
-    return depth
