@@ -5,13 +5,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    Scene,
+    Simulation,
+    Uniform,
+    checked_mesh,
+    effects,
+)
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar, placed_together, single
 from tests.turns import matrix
 
 LOSSLESS = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0, friction=0.0)
-STIFFNESS, EPS = CONCRETE.normal_stiffness, np.finfo(float).eps
+STIFFNESS = CONCRETE.normal_stiffness
+PARTS = "normal", "shear"
+
+
+def mirrored(body):
+    """The mirror image of a tetrahedron at x = 0, where it has a face."""
+    return checked_mesh(body.points * [-1.0, 1.0, 1.0], [[0, 2, 1, 3]], {})
 
 
 class Placed:
@@ -46,13 +60,12 @@ class Placed:
 def test_flat_sides_that_overlap_have_the_energy_of_their_bond():
     """k A d^2 / 2, less what pyramids are narrower at a depth d below the face: (1 - d / r)^2."""
     body = single(0.05)
-    placed = Placed(body, checked_mesh(body.points * [-1.0, 1.0, 1.0], [[0, 2, 1, 3]], {}))
+    placed = Placed(body, mirrored(body))
     law = placed.simulation.contacts.law
     volume, area = values(law.volume)[0], values(law.face_area)[0]
     radius = 3.0 * volume / (4.0 * area)
-    mirrored = placed.model.centre[0] * [-1.0, 1.0, 1.0]
     for depth in (1e-6, 1e-4):
-        placed.put(mirrored - np.array([depth, 0.0, 0.0]))
+        placed.put(placed.model.centre[0] * [-1.0, 1.0, 1.0] - np.array([depth, 0.0, 0.0]))
         flat = 0.5 * STIFFNESS * area * depth**2
         assert (1.0 - depth / radius) ** 2 * flat <= placed.energy() <= (1.0 + 1e-9) * flat
 
@@ -103,3 +116,74 @@ def test_the_force_is_the_gradient_of_the_energy_and_conserves_momentum():
         arms = placed.simulation.motion()["position"]
         turning = pushed[:, 1].sum(axis=0) + np.cross(arms, pushed[:, 0]).sum(axis=0)
         assert np.abs(turning).max() < 1e-12 * size
+
+
+def drawn(random):
+    """Two tetrahedra of about 5 cm that turn and fly at each other at 5 m/s."""
+    way, points, velocity = random.standard_normal(3), [], []
+    way /= np.linalg.norm(way)
+    for sign in (-1.0, 1.0):
+        corners = random.uniform(-0.05, 0.05, (4, 3))
+        while abs(np.linalg.det(corners[1:] - corners[0])) < 1e-4:
+            corners = random.uniform(-0.05, 0.05, (4, 3))
+        points.append(corners - corners.mean(axis=0) + sign * 0.06 * way)
+        velocity.append(-2.5 * sign * way)
+    mesh = checked_mesh(np.vstack(points), [[0, 1, 2, 3], [4, 5, 6, 7]], {})
+    spin = random.uniform(-60.0, 60.0, (2, 3))
+    return Scene(mesh, LOSSLESS, [effects.BodyContact()], velocity=velocity, spin=spin)
+
+
+@pytest.mark.parametrize("seed", [0, 6])
+def test_bodies_that_collide_keep_their_energy(seed):
+    """To (w dt)^2 / 8 of it: that of a leapfrog where a spring of rate w begins to act."""
+    simulation = Simulation(drawn(np.random.default_rng(seed)), Uniform(2e-7))
+    simulation.start()
+    before = simulation.energy_balance.account()["kinetic"]
+    model = simulation.model
+    arm, least = model.body_radius, np.linalg.eigvalsh(model.body_inertia)[:, 0]
+    mobility = (1.0 / model.body_mass + arm**2 / least).sum()
+    area = values(simulation.contacts.law.face_area)[:2].min()
+    simulation.advance_to(80_000)
+    account = simulation.energy_balance.account()
+    turned_back = simulation.motion()["velocity"][0] - simulation.scene.velocity[0]
+    assert np.linalg.norm(turned_back) > 1.0
+    error = STIFFNESS * area * mobility * 2e-7**2 / 8.0
+    assert account["kinetic"] + account["sphere_strain"] == pytest.approx(before, rel=error)
+
+
+def on_slope(angle, damping):
+    """A tetrahedron on a plate of 24 bodies that is inclined by an angle [degrees]."""
+    body, plate, tilt = mirrored(single(0.05)), bar(0.1, 0.2, (1, 2, 2)), np.radians(angle)
+    parts = {"plate": (plate, (-0.1, 0.0, 0.0)), "body": (body, (1e-9, 0.08, 0.08))}
+    mesh = placed_together(parts)
+    dashpots = {f"{name}_damping": damping * getattr(CONCRETE, f"{name}_damping") for name in PARTS}
+    listed = [
+        effects.BondDamping(),
+        effects.BodyContact(),
+        effects.StickingFriction(),
+        effects.Gravity((-9.81 * np.cos(tilt), 9.81 * np.sin(tilt), 0.0)),
+        effects.Fixed("plate_left"),
+    ]
+    material = replace(CONCRETE, friction=0.4, **dashpots)
+    simulation = Simulation(Scene(mesh, material, listed), ImplicitDashpots(2e-6))
+    simulation.start()
+    return simulation
+
+
+@pytest.mark.parametrize("damping", [0.05, 1.0])
+def test_a_body_rests_below_its_friction_angle(damping):
+    """Its springs bear the weight at some nanometres, and nothing creeps."""
+    simulation = on_slope(15.0, damping)
+    simulation.advance_to(20_000)
+    moved = simulation.motion()["position"][-1] - simulation.model.centre[-1]
+    assert np.abs(moved).max() < 1e-7
+    assert np.abs(simulation.motion()["velocity"][-1]).max() < 1e-9
+
+
+def test_a_body_slides_beyond_it_as_coulomb_says():
+    simulation = on_slope(30.0, 1.0)
+    simulation.advance_to(20_000)
+    rate = 9.81 * (np.sin(np.pi / 6) - 0.4 * np.cos(np.pi / 6))
+    velocity = simulation.motion()["velocity"][-1]
+    assert velocity[1] == pytest.approx(rate * 0.04, rel=2e-3)
+    assert np.abs(velocity[[0, 2]]).max() < 1e-3 * velocity[1]
