@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import taichi as ti
 
 from taichi_dem import (
     CONCRETE,
@@ -16,16 +17,17 @@ from taichi_dem import (
 )
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar, placed_together, single
+from taichi_dem.physics.rotation import place_in
 from tests.turns import matrix
 
 LOSSLESS = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0, friction=0.0)
 STIFFNESS = CONCRETE.normal_stiffness
-PARTS = "normal", "shear"
+PARTS, MIRROR = ("normal", "shear"), np.array([-1.0, 1.0, 1.0])
 
 
 def mirrored(body):
     """The mirror image of a tetrahedron at x = 0, where it has a face."""
-    return checked_mesh(body.points * [-1.0, 1.0, 1.0], [[0, 2, 1, 3]], {})
+    return checked_mesh(body.points * MIRROR, [[0, 2, 1, 3]], {})
 
 
 class Placed:
@@ -41,7 +43,7 @@ class Placed:
         self.simulation.start()
         self.middle = self.model.centre[self.moving].mean(axis=0)
 
-    def put(self, place, orientation=(1.0, 0.0, 0.0, 0.0)):
+    def put(self, place, orientation=(1.0, 0.0, 0.0, 0.0), apart_before=True):
         """Put the middle of the second solid at a place, and search."""
         position, turned = self.model.centre.copy(), np.tile([1.0, 0, 0, 0], (len(self.moving), 1))
         arms = (position[self.moving] - self.middle) @ matrix(np.array(orientation)).T
@@ -50,7 +52,8 @@ class Placed:
         self.state.set_motion(position, turned)
         self.simulation.broad_phase.search()
         rest = self.simulation.contacts.law.rest
-        assign(rest, np.tile([0.0, 1.0], (len(values(rest)), 1)))
+        if apart_before:
+            assign(rest, np.tile([0.0, 1.0], (len(values(rest)), 1)))
 
     def energy(self):
         """Elastic energy of all contacts [J]."""
@@ -65,7 +68,7 @@ def test_flat_sides_that_overlap_have_the_energy_of_their_bond():
     volume, area = values(law.volume)[0], values(law.face_area)[0]
     radius = 3.0 * volume / (4.0 * area)
     for depth in (1e-6, 1e-4):
-        placed.put(placed.model.centre[0] * [-1.0, 1.0, 1.0] - np.array([depth, 0.0, 0.0]))
+        placed.put(placed.model.centre[0] * MIRROR - [depth, 0.0, 0.0])
         flat = 0.5 * STIFFNESS * area * depth**2
         assert (1.0 - depth / radius) ** 2 * flat <= placed.energy() <= (1.0 + 1e-9) * flat
 
@@ -81,6 +84,44 @@ def test_energy_is_additive_in_the_area_of_contact(turned, smaller):
     placed.put(middle + [0.0, 0.2 - depth, 0.0] + matrix(np.array(orientation)) @ way, orientation)
     flat = 0.5 * STIFFNESS * 0.2**2 * depth**2 / smaller
     assert placed.energy() == pytest.approx(flat, rel=0.1)
+
+
+def test_an_overlap_at_the_start_is_at_rest_until_it_shrinks():
+    """Nothing is injected, and what the bodies part by counts when they come back."""
+    body, depth = single(0.05), 1e-5
+    placed = Placed(body, mirrored(body))
+    area, found = values(placed.simulation.contacts.law.face_area)[0], []
+    image = placed.model.centre[0] * MIRROR
+    for step, share in enumerate((1.0, 0.5, 1.0)):
+        placed.simulation.advance_to(step)
+        placed.put(image - [share * depth, 0.0, 0.0], apart_before=False)
+        found.append(placed.energy())
+    flat = 0.5 * STIFFNESS * area * (0.5 * depth) ** 2
+    assert found[:2] == [0.0, 0.0]
+    assert found[2] == pytest.approx(flat, rel=0.01)
+
+
+@ti.kernel
+def _gap(law: ti.template(), position: ti.template(), rotation: ti.template()) -> ti.f64:
+    turn, offset = place_in(rotation[0], rotation[1], position[1] - position[0])
+    return law.gap(0, 1, turn, offset)
+
+
+def test_bodies_that_move_less_than_their_gap_do_not_touch():
+    """The gap bounds how far any point of one may go before a ray of one is in the other."""
+    placed, random = Placed(single(0.05), single(0.06)), np.random.default_rng(3)
+    law, state, tried = placed.simulation.contacts.law, placed.state, 0
+    while tried < 60:
+        orientation = random.standard_normal(4)
+        orientation /= np.linalg.norm(orientation)
+        place = placed.model.centre[0] + random.standard_normal(3) * 0.03
+        placed.put(place, orientation)
+        gap = _gap(law, state.position, state.rotation)
+        if gap > 1e-5:
+            tried += 1
+            for way in (*np.eye(3), *-np.eye(3)):
+                placed.put(place + 0.999 * gap * way, orientation)
+                assert placed.energy() == 0.0
 
 
 def touching(placed, random, count):
