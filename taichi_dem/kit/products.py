@@ -1,4 +1,4 @@
-"""Products of 3x3 matrices and vectors in kernels.
+"""Products of small matrices and vectors in kernels.
 
 Taichi's own ``@`` starts every sum with a product times zero, and stores each step of it: with
 these a step of a blast takes a tenth less time, and a seventh less to compile, for the same bits.
@@ -8,7 +8,7 @@ They are plain functions that write expressions: where a kernel is compiled, Tai
 does not walk through their source anew at each call.
 """
 
-from functools import reduce
+from functools import cache, reduce
 from itertools import product
 from operator import add
 from typing import Any, Callable
@@ -16,7 +16,7 @@ from typing import Any, Callable
 import taichi as ti
 from taichi.lang import impl
 
-from taichi_dem.kit.types import mat3, vec3, vec6
+from taichi_dem.kit.types import mat3, real, vec3, vec6
 
 _AXES = range(3)
 
@@ -43,40 +43,58 @@ def entry(tensor: Any, *place: int) -> Any:
     return impl.subscript(impl.get_runtime().compiling_callable.ast_builder(), tensor, *place)
 
 
-def _products(at_one, at_other):
+@cache
+def _tensor(*shape):
+    return ti.types.vector(*shape, real) if len(shape) == 1 else ti.types.matrix(*shape, real)
+
+
+def _products(rows, inner, columns, at_one, at_other):
     """Matrix of sums over k of at_one(r, k) times at_other(k, c)."""
-    rows = [[[at_one(r, k) * at_other(k, c) for k in _AXES] for c in _AXES] for r in _AXES]
-    return mat3([[reduce(add, terms) for terms in row] for row in rows])
+    terms = [
+        [[at_one(r, k) * at_other(k, c) for k in range(inner)] for c in range(columns)]
+        for r in range(rows)
+    ]
+    return _tensor(rows, columns)([[reduce(add, sums) for sums in row] for row in terms])
 
 
 @expression
 def matvec(m, v):
     """Product m v."""
-    return vec3([reduce(add, (entry(m, r, k) * entry(v, k) for k in _AXES)) for r in _AXES])
+    rows, inner = m.get_shape()
+    terms = [[entry(m, r, k) * entry(v, k) for k in range(inner)] for r in range(rows)]
+    return _tensor(rows)([reduce(add, sums) for sums in terms])
 
 
 @expression
 def transposed_matvec(m, v):
     """Product m^T v."""
-    return vec3([reduce(add, (entry(m, k, r) * entry(v, k) for k in _AXES)) for r in _AXES])
+    inner, rows = m.get_shape()
+    terms = [[entry(m, k, r) * entry(v, k) for k in range(inner)] for r in range(rows)]
+    return _tensor(rows)([reduce(add, sums) for sums in terms])
 
 
 @expression
 def matmul(a, b):
     """Product a b."""
-    return _products(lambda r, k: entry(a, r, k), lambda k, c: entry(b, k, c))
+    rows, inner = a.get_shape()
+    columns = b.get_shape()[1]
+    return _products(rows, inner, columns, lambda r, k: entry(a, r, k), lambda k, c: entry(b, k, c))
 
 
 @expression
 def matmul_transposed(a, b):
     """Product a b^T."""
-    return _products(lambda r, k: entry(a, r, k), lambda k, c: entry(b, c, k))
+    rows, inner = a.get_shape()
+    columns = b.get_shape()[0]
+    return _products(rows, inner, columns, lambda r, k: entry(a, r, k), lambda k, c: entry(b, c, k))
 
 
 @expression
 def transposed_matmul(a, b):
     """Product a^T b."""
-    return _products(lambda r, k: entry(a, k, r), lambda k, c: entry(b, k, c))
+    inner, rows = a.get_shape()
+    columns = b.get_shape()[1]
+    return _products(rows, inner, columns, lambda r, k: entry(a, k, r), lambda k, c: entry(b, k, c))
 
 
 @expression

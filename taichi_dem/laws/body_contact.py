@@ -9,7 +9,14 @@ import taichi as ti
 from taichi_dem.kit import fixed_order
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.fixed_order import length
-from taichi_dem.kit.products import cross, matvec, norm
+from taichi_dem.kit.products import (
+    cross,
+    matmul,
+    matmul_transposed,
+    matvec,
+    norm,
+    transposed_matvec,
+)
 from taichi_dem.kit.types import real, vec3, vec4
 from taichi_dem.kit.validation import whole
 from taichi_dem.laws.sphere_contact import SphereContact
@@ -18,16 +25,10 @@ from taichi_dem.materials.bond_rules import typical_of
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES, signed_volumes
 from taichi_dem.physics.body_overlap import (
-    along,
-    depths,
-    placed,
-    pushes,
+    raised,
     ray_ends,
-    shared,
     sum_of_rays,
-    summed,
     turning,
-    weighted,
 )
 from taichi_dem.physics.sphere_pair import Meeting, Nearest
 from taichi_dem.state.capacity import Capacity
@@ -153,14 +154,15 @@ class BodyContact(SphereContact):
         smaller body that both fill.
         """
         force, moment, middle = vec3(0.0), vec3(0.0), vec3(0.0)
-        doubled, volume, outside = 0.0, 0.0, 1e30
+        doubled, volume, outside, ones = 0.0, 0.0, 1e30, vec4(1.0)
         for side in range(2):
             at, planes, total, slope, apart = self._side(side, a, b, turn, offset, True)
             outside, doubled = ti.min(outside, apart), doubled + total
-            weights, push = shared(slope), pushes(slope, planes)
-            middle, volume = middle + weighted(weights, at), volume + weights.sum()
+            weights, push = matvec(slope, ones), matmul(slope, planes)
+            middle, volume = middle + transposed_matvec(at, weights), volume + weights.sum()
             sign = 2.0 * side - 1.0
-            force, moment = force + sign * summed(push), moment + sign * turning(at, push)
+            force += sign * transposed_matvec(push, ones)
+            moment += sign * turning(at, push)
         near, strength = Nearest(reach=-outside, size=1.0), norm(force)
         if doubled > _NONE * _NONE and strength > 0.0:
             middle /= volume
@@ -189,13 +191,13 @@ class BodyContact(SphereContact):
 
         side: 0 for the rays of body a, 1 for those of body b.
         """
-        body, at, planes = a, self.corner[a], placed(self.outward[b], turn, 0.0 * offset)
-        distances = self.plane[b] + along(planes, offset)
+        body, at, planes = a, self.corner[a], matmul_transposed(self.outward[b], turn)
+        distances = self.plane[b] + matvec(planes, offset)
         if side == 1:
-            body, at = b, placed(self.corner[b], turn, offset)
+            body, at = b, raised(matmul_transposed(self.corner[b], turn), offset)
             planes, distances = self.outward[a], self.plane[a]
         total, slope, apart = sum_of_rays(
-            depths(at, planes, distances),
+            raised(-matmul_transposed(at, planes), distances),
             self.incentre[body],
             self.volume[body],
             self.ends,

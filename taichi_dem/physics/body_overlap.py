@@ -14,7 +14,7 @@ from operator import add
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.products import entry, expression
+from taichi_dem.kit.products import entry, expression, transposed_matvec
 from taichi_dem.kit.types import real, vec3, vec4
 
 #: Turn of ray ends about the middle of a face, times the parts of its edges.
@@ -42,10 +42,6 @@ def ray_ends(parts: int) -> np.ndarray:
     return ends.reshape(-1, 4)
 
 
-def _total(terms):
-    return reduce(add, terms)
-
-
 @expression
 def row(matrix, r):
     """Row r of a matrix of four columns."""
@@ -53,90 +49,22 @@ def row(matrix, r):
 
 
 @expression
-def placed(points, turn, offset):
-    """Four points, (4, 3), turned and moved."""
-    return mat43(
-        [
-            [
-                _total(entry(points, c, j) * entry(turn, k, j) for j in range(3)) + entry(offset, k)
-                for k in range(3)
-            ]
-            for c in range(4)
-        ]
-    )
-
-
-@expression
-def along(vectors, way):
-    """Four vectors, (4, 3), times another."""
-    return vec4([_total(entry(vectors, c, k) * entry(way, k) for k in range(3)) for c in range(4)])
-
-
-@expression
-def depths(corners, normals, distances):
-    """Depth of each corner below each plane [m], (4, 4)."""
-    return mat4(
-        [
-            [
-                entry(distances, g)
-                - _total(entry(normals, g, k) * entry(corners, c, k) for k in range(3))
-                for g in range(4)
-            ]
-            for c in range(4)
-        ]
-    )
-
-
-@expression
-def at_weights(depth, weights):
-    """Depths below four planes of the point with some weights of the corners."""
-    four = range(4)
-    return vec4([_total(entry(depth, c, g) * entry(weights, c) for c in four) for g in four])
-
-
-@expression
-def pushes(slope, normals):
-    """Force on each corner along the normals of four planes, (4, 3)."""
-    return mat43(
-        [
-            [_total(entry(slope, c, g) * entry(normals, g, k) for g in range(4)) for k in range(3)]
-            for c in range(4)
-        ]
-    )
-
-
-@expression
-def summed(push):
-    """Sum of four vectors, (4, 3)."""
-    return vec3([_total(entry(push, c, k) for c in range(4)) for k in range(3)])
+def raised(matrix, by):
+    """A matrix of four rows with a vector added to each."""
+    columns = range(matrix.get_shape()[1])
+    kind = mat43 if len(columns) == 3 else mat4
+    return kind([[entry(matrix, r, k) + entry(by, k) for k in columns] for r in range(4)])
 
 
 @expression
 def turning(corners, push):
-    """Sum of the moments of forces on four corners."""
-    return vec3(
-        [
-            _total(
-                entry(corners, c, (k + 1) % 3) * entry(push, c, (k + 2) % 3)
-                - entry(corners, c, (k + 2) % 3) * entry(push, c, (k + 1) % 3)
-                for c in range(4)
-            )
-            for k in range(3)
-        ]
-    )
+    """Sum of the moments of forces on four corners, (4, 3) each."""
 
+    def moment(c, k, m):
+        return entry(corners, c, k) * entry(push, c, m) - entry(corners, c, m) * entry(push, c, k)
 
-@expression
-def shared(slope):
-    """Weight of each corner in the shared volume [m3], by the derivatives of ``sum_of_rays``."""
-    return vec4([_total(entry(slope, c, g) for g in range(4)) for c in range(4)])
-
-
-@expression
-def weighted(weights, corners):
-    """Sum of four corners times their weights."""
-    three, four = range(3), range(4)
-    return vec3([_total(entry(weights, c) * entry(corners, c, k) for c in four) for k in three])
+    axes = ((1, 2), (2, 0), (0, 1))
+    return vec3([reduce(add, (moment(c, k, m) for c in range(4))) for k, m in axes])
 
 
 @ti.func
@@ -206,7 +134,7 @@ def sum_of_rays(depth, centre, volume, ends: ti.template(), count, whole: ti.tem
     find how far rays are outside.
     """
     total, slope, outside = 0.0, mat4(0.0), 1e30
-    start = at_weights(depth, centre)
+    start = transposed_matvec(depth, centre)
     # Rays are seldom as near as the pyramid that they stand for: one by one, unless it is far off.
     far = FAR * volume ** (1.0 / 3.0)
     for face in range(4):
@@ -219,7 +147,7 @@ def sum_of_rays(depth, centre, volume, ends: ti.template(), count, whole: ti.tem
         else:
             share = 12.0 * volume * centre[face] / count
             for r in range(face * count // 4, (face + 1) * count // 4):
-                change = at_weights(depth, ends[r])
+                change = transposed_matvec(depth, ends[r])
                 highest = ti.max(start, change).min()
                 if highest > 0.0:
                     change -= start
