@@ -209,6 +209,14 @@ EVERY = {
             **each("plateau_at_{}_MPa_error", "0 5 10 15", (-1e-9, 1e-9)),
         }
     ),
+    "demo_contact": Row(
+        {
+            **each("bodies_{}_injected_kJ", "4 9", NONE),
+            **each("bodies_{}_residual", "4 9", (0.0, 1e-3)),
+            **each("spheres_{}_injected_kJ", "3 6", (0.1, 10.0)),
+            "bodies_spread_mm": below("spheres_spread_mm", 0.5),
+        }
+    ),
     "demo_multirate": Row({"held_fewer_evaluations": (3, 99), "held_difference": (0.0, 2e-3)}),
     # A share of 1e-6 of the impulse moves nothing by more than some of that.
     "demo_sleeping": Row(
