@@ -93,7 +93,7 @@ class BodyContact(SphereContact):
         neighbours_per_body: int = 192,
         pairs_per_body: int = 48,
     ):
-        self.parts = whole("parts", parts, 1, _MOST_PARTS)
+        self.parts = whole("parts", parts, 2, _MOST_PARTS)
         super().__init__(3, outer_faces, skin, neighbours_per_body, pairs_per_body, pairs_per_body)
 
     def numbers(self, material: Material) -> tuple[float, ...]:
