@@ -29,7 +29,7 @@ EFFECTS = {
     "slip_weakening": partial(effects.SlipWeakening, MODE_TWO),
 }
 #: Those that the paper's scene does not have: weight, contact of all surfaces in place of that of
-#: broken faces, through spheres or of spheres with faces, and cohesion that slip degrades.
+#: broken faces, through spheres or of whole bodies, and cohesion that slip degrades.
 OPTIONAL = ("gravity", "surface_contact", "body_contact", "slip_weakening")
 
 

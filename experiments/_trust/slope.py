@@ -32,7 +32,7 @@ def slope(effort):
         for contact in (USUAL, FINE)
     )
     words = "tangent at which a high block topples, by b / h"
-    note = "a ray stands for its share of a face, so the outermost is inside the edge"
+    note = "springs are soft, so a leaning block stands on a strip along its edge"
     numbers = (
         Number(
             "slope_slides", "tangent at which a block slides, by mu", "1", SOURCE, 1.0, limit(way)
