@@ -1,7 +1,7 @@
 """Contact of whole bodies, whose energy is that of the volume in which they overlap."""
 
 from dataclasses import replace
-from typing import Union
+from typing import Any, Union
 
 import numpy as np
 import taichi as ti
@@ -23,7 +23,8 @@ from taichi_dem.laws.sphere_contact import SphereContact
 from taichi_dem.materials import Material
 from taichi_dem.materials.bond_rules import typical_of
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
-from taichi_dem.mesh.tetrahedra import LOCAL_FACES, signed_volumes
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.tetrahedra import LOCAL_FACES, all_faces, area_vectors, signed_volumes
 from taichi_dem.physics.body_overlap import (
     raised,
     ray_ends,
@@ -80,6 +81,7 @@ class BodyContact(SphereContact):
     name = "body_contact"
     activation = "bodies touch"
     meets_bodies = True
+    constants, unit = ("normal_stiffness", "normal_damping"), "Pa/m"
     constant_fields = (
         *("corner", "outward", "plane", "incentre", "volume", "face_area"),
         *("ends", "end_count"),
@@ -99,6 +101,11 @@ class BodyContact(SphereContact):
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Stiffness [Pa/m] and damping [Pa s/m] per area: those of a bond of the usual size."""
         return typical_of(material.normal_stiffness), typical_of(material.normal_damping)
+
+    def areas(self, mesh: Mesh) -> Any:
+        """Area of the largest face of each body [m2], (n,)."""
+        faces = all_faces(mesh.tetrahedra)
+        return length(area_vectors(mesh.points, faces)).reshape(-1, 4).max(axis=1)
 
     def spheres(self, model: Model) -> ContactSpheres:
         """Balls around the faces of all bodies, by which neighbours are found."""
@@ -141,7 +148,7 @@ class BodyContact(SphereContact):
         assign(self.plane, fixed_order.dot(normal, faces[:, :, 0]))
         assign(self.incentre, 0.5 * twice / whole_area[:, None])
         assign(self.volume, volume)
-        assign(self.face_area, 0.5 * twice.max(axis=1))
+        assign(self.face_area, self.areas(model.mesh))
         assign(self.ends, np.concatenate([ends, np.zeros((4 * _MOST_PARTS**2 - len(ends), 4))]))
         assign(self.end_count, len(ends))
 

@@ -10,6 +10,7 @@ from taichi_dem.kit.validation import between, flag, shown, whole
 from taichi_dem.laws.base import Effect
 from taichi_dem.materials import Material
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.physics.sphere_pair import Nearest, is_within, meeting, normal_force
 from taichi_dem.state.model import Model
 
@@ -69,6 +70,8 @@ class SphereContact(Effect):
     activation = "spheres of free faces touch"
     #: Whether bodies meet each other, instead of their spheres.
     meets_bodies = False
+    #: The constants of a material that are its stiffness and its dashpot; unit of the stiffness.
+    constants, unit = ("contact_stiffness", "contact_damping"), "N/m"
 
     def __init__(
         self,
@@ -103,6 +106,10 @@ class SphereContact(Effect):
     def spheres(self, model: Model) -> ContactSpheres:
         """Spheres of a model, in balls that hold all of a face, or of a body, that can touch."""
         return spheres_of_faces(model.mesh, model.centre, self.divisions)
+
+    def areas(self, mesh: Mesh) -> Any:
+        """By what the constants are multiplied at most in a contact of each body, (n,) or one."""
+        return 1.0
 
     @ti.func
     def nearest(self, a, b, turn, offset):

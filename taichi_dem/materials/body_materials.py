@@ -24,6 +24,7 @@ from taichi_dem.materials.bond_rules import (
     bond_geometry,
     joined_constants,
     per_bond,
+    typical_of,
 )
 from taichi_dem.materials.material import RULES, Material, check_energy, unchecked
 from taichi_dem.mesh.mesh import Mesh
@@ -141,13 +142,13 @@ class BodyMaterials:
         return all(each.has_contact_damping for each in self.materials if each.friction > 0.0)
 
     def of_contacts(self, name: str) -> Any:
-        """Largest constant of the contacts that a body can have [N/m, N s/m], (body_count,).
+        """Largest constant of the contacts that a body can have, (body_count,).
 
         name: of the constant. One number for all where all bodies have the same material.
         """
         if self.is_one:
-            return getattr(self.pairs[0][0], name)
-        most = [max(float(getattr(pair, name)) for pair in row) for row in self.pairs]
+            return typical_of(getattr(self.pairs[0][0], name))
+        most = [max(typical_of(getattr(pair, name)) for pair in row) for row in self.pairs]
         return np.array(most)[self.of_body]
 
     def checked_pairs(self) -> tuple[Material, ...]:

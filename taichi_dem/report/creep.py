@@ -35,9 +35,12 @@ class Creep(Kept):
     def __init__(self, run: Run):
         self.run, self.time_s, self.speed, self.share = run, 0.0, 0.0, 0.0
         self.code, self.table = np.zeros(0, dtype=np.int64), np.zeros((0, 9))
-        of_contacts = run.model.materials.of_contacts
-        self.softest = float(np.min(of_contacts("contact_stiffness")))
-        self.parting_s = float(np.max(of_contacts("contact_damping"))) / self.softest
+        law, model = run.model.contact, run.model
+        stiffness, damping = (
+            model.materials.of_contacts(name) * law.areas(model.mesh) for name in law.constants
+        )
+        self.softest = float(np.min(stiffness))
+        self.parting_s = float(np.max(damping / stiffness))
 
     def sample(self, time_s: float) -> np.ndarray:
         """Bodies that creep at a recording time [s]."""

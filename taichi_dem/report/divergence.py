@@ -146,9 +146,10 @@ class DivergenceCheck:
         if not values(self.run.state.tick):
             words = "and the scene begins like this: move the bodies apart"
             return self._error(body, what, (words, {}))
-        stiffness = self.run.model.materials.of_contacts("contact_stiffness")
+        law = self.run.model.contact
+        stiffness = self.run.model.materials.of_contacts(law.constants[0])
         firm = RAISED * float(np.broadcast_to(stiffness, self.run.model.body_count)[body])
-        firmer = _to_try("its contacts are too soft", "contact_stiffness", firm, "N/m")
+        firmer = _to_try("its contacts are too soft", law.constants[0], firm, law.unit)
         return self._error(body, what, self._shorter_step(body) or firmer)
 
     def _beside(self, body):
@@ -198,9 +199,11 @@ class DivergenceCheck:
             # Most sphere pairs that a body has with another, over its mass [1/kg].
             rates, mass = np.zeros(model.body_count), model.body_mass
             np.maximum.at(rates, pairs, np.maximum(1, counts)[:, None] / mass[pairs])
-            limits["contact springs"] = spring_step(of_contacts("contact_stiffness") * rates)
+            rates *= model.contact.areas(model.mesh)
+            stiffness, damping = model.contact.constants
+            limits["contact springs"] = spring_step(of_contacts(stiffness) * rates)
             if stiff:
-                limits["sphere dashpots"] = dashpot_step(of_contacts("contact_damping") * rates)
+                limits["contact dashpots"] = dashpot_step(of_contacts(damping) * rates)
         return limits
 
 

@@ -245,6 +245,8 @@ class Readings:
                     ti.atomic_min(share[i], self.advance.contact_share(i, j))
                 else:
                     rate = count * self.contacts.law.damping(self.tables.pair(i, j))
+                    if ti.static(self.contacts.law.meets_bodies):
+                        rate *= self.contacts.law.largest_area(i, j)
                     rate *= 1.0 / self.tables.mass[i] + 1.0 / self.tables.mass[j]
                     ti.atomic_max(taken[i], rate * self.advance.schedule.pair_step(i, j))
 
