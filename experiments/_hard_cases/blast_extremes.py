@@ -90,7 +90,7 @@ def vertices_at_faces(trial, contact):
     run.momentum_kept()
     run.no_energy_made()
     way = run.moved[-1, first, 0].max() / EDGE
-    trial.limit("way / size", way, 0.5, "half of the vertex is in before its spheres touch")
+    trial.limit("way / size", way, 0.5, "a vertex sinks in, at most by half")
 
 
 case.add(

@@ -122,7 +122,7 @@ def leaning(trial, outlines, share):
 
 
 #: Shares of the least friction at which they stand and fall. The sides of an arch slide, where
-#: places are exact; cards turn about their feet, and spheres bear a radius within the edges.
+#: places are exact; cards turn about their feet, and the outermost ray bears within the edges.
 LEANING = {"house_of_cards": (house, 1.25, 0.98), "arch": (arch, 1.02, 0.98)}
 for name, (outlines, *shares) in LEANING.items():
     for share, word in zip(shares, ("stands", "falls")):

@@ -53,6 +53,7 @@ class BodyContact(SphereContact):
     ----------
     parts : int, default 3
         Equal parts of the edges of a face; parts^2 rays go from the middle of a body to each face.
+        Those of the smaller body of a pair count more, by the square of the ratio of volumes.
     outer_faces : bool or str, default True
         True: outer faces meet from the start. ``"once_broken"``: from the first break of any bond.
     skin : float, default 0.0075
@@ -164,7 +165,12 @@ class BodyContact(SphereContact):
         doubled, volume, outside, ones = 0.0, 0.0, 1e30, vec4(1.0)
         for side in range(2):
             at, planes, total, slope, apart = self._side(side, a, b, turn, offset, True)
-            outside, doubled = ti.min(outside, apart), doubled + total
+            # Rays of a large body miss a small one, or stand for more than all of it.
+            weight = self._weight(a, b)
+            if side == 1:
+                weight = 2.0 - weight
+            outside, slope = ti.min(outside, apart), weight * slope
+            doubled += weight * total
             weights, push = matvec(slope, ones), matmul(slope, planes)
             middle, volume = middle + transposed_matvec(at, weights), volume + weights.sum()
             sign = 2.0 * side - 1.0
@@ -212,6 +218,12 @@ class BodyContact(SphereContact):
             whole,
         )
         return at, planes, total, slope, apart
+
+    @ti.func
+    def _weight(self, a, b):
+        """Weight of the rays of body a against those of body b; both add to 2."""
+        ratio = self.volume[a] / self.volume[b]
+        return 2.0 / (1.0 + ratio * ratio)
 
     @ti.func
     def largest_area(self, a, b):

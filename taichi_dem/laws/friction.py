@@ -89,28 +89,16 @@ class StickingFriction(Friction):
         """Keep the stretch [m] of the spring of each sphere pair, in the first body's frame."""
         self.stretch = store.sphere_column("tangential_stretch", real, 3)
         if self.tables.contact.meets_bodies:
-            self.area = store.sphere_column("tangential_area", real)
+            self.bodies = store.sphere
 
     @ti.func
     def stiffness(self, m, k):
-        """Stiffness of the spring of pair k [N/m]; that of bodies grows with their contact."""
+        """Stiffness of the spring of pair k [N/m]; of bodies for as much area as may touch."""
         found = self.law[m, 1]
         if ti.static(self.tables.contact.meets_bodies):
-            found = self.law[m, 2] * self.tables.contact.elastic(m, 1.0) * self.area[k]
+            area = self.tables.contact.largest_area(self.bodies[k][0], self.bodies[k][1])
+            found = self.law[m, 2] * self.tables.contact.elastic(m, 1.0) * area
         return found
-
-    @ti.func
-    def resize(self, m, k, area):
-        """Give the spring of pair k a new area of contact [m2]; energy [J] that this takes.
-
-        It keeps its force where the area grows, and its stretch where it shrinks: neither adds
-        energy.
-        """
-        before = self.stored(m, k)
-        if area > self.area[k]:
-            self.stretch[k] = self.stretch[k] * (self.area[k] / area)
-        self.area[k] = area
-        return before - self.stored(m, k)
 
     @ti.func
     def follow(self, k, normal, way):

@@ -139,8 +139,8 @@ class ContactForce:
         if ti.static(self.springs.present):
             rotation, bound = self.state.rotation[i], self.tables.friction.limit(m, push)
             if ti.static(stepping):
-                spent = self.springs.follow(m, k, rotation, met, elapsed * slide)
-                spent += self.springs.slip(m, k, rotation, bound, elapsed * slide)
+                self.springs.follow(k, rotation, met.normal, elapsed * slide)
+                spent = self.springs.slip(m, k, rotation, bound, elapsed * slide)
             stuck = self.springs.force(m, k, rotation)
             rub = add_within(stuck, -drag * slide, bound)
         else:

@@ -16,7 +16,6 @@ class TangentialSprings:
     def __init__(self, schedule: Schedule):
         self.friction, self.schedule = schedule.tables.friction, schedule
         self.present = schedule.has_contact and schedule.contacts.remembers
-        self.by_area = schedule.has_contact and schedule.contacts.law.meets_bodies
         if self.present:
             self.evaluated = schedule.store.column("evaluated", ti.i64)
 
@@ -30,14 +29,10 @@ class TangentialSprings:
         return elapsed
 
     @ti.func
-    def follow(self, m, k, rotation, met, way):
-        """Stretch the spring of pair k, at a ``Meeting``, by ``way`` [m]; energy lost [J]."""
-        lost = 0.0
-        if ti.static(self.by_area):
-            lost = self.friction.resize(m, k, met.area)
-        across = transposed_matvec(rotation, met.normal)
+    def follow(self, k, rotation, normal, way):
+        """Stretch the spring of sphere pair k by ``way`` [m]."""
+        across = transposed_matvec(rotation, normal)
         self.friction.follow(k, across, transposed_matvec(rotation, way))
-        return lost
 
     @ti.func
     def slip(self, m, k, rotation, bound, way):

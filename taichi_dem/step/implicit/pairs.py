@@ -140,7 +140,7 @@ class PairDashpots:
                         self.pull[end] = vec3(0.0)
                         if depth > 0.0:
                             way = self._way(i, j, branch, arm, normal, elapsed)
-                            parted += self.springs.follow(m, k, self.state.rotation[i], met, way)
+                            self.springs.follow(k, self.state.rotation[i], normal, way)
                             self.pull[end] = dt * self.springs.force(m, k, self.state.rotation[i])
                     end += 1
                 else:
