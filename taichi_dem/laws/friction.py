@@ -13,7 +13,7 @@ from taichi_dem.state.pair_store import PairStore
 
 @ti.data_oriented
 class Friction(Effect):
-    """Sliding friction of sphere contacts with the material's coefficient; no tangential spring.
+    """Sliding friction of contacts with the material's coefficient; no tangential spring.
 
     References
     ----------
@@ -41,16 +41,18 @@ class Friction(Effect):
 
 @ti.data_oriented
 class StickingFriction(Friction):
-    """Friction with a tangential spring in each contact of two spheres, up to Coulomb's limit.
+    """Friction with a tangential spring in each contact, up to Coulomb's limit.
 
     A body at rest on a slope below the friction angle stays there; with ``Friction`` it creeps. The
-    stretch of a spring turns with the first body and is lost when the spheres part.
+    stretch of a spring turns with the first body and is lost when the two part. Between bodies
+    (``BodyContact``) the spring has the area of the smaller body's largest face, always: one that
+    followed the area of contact would creep.
 
     Parameters
     ----------
     stiffness_ratio : float, default 0.8
-        Ratio of the stiffness of the spring to the material's contact stiffness, from 1e-6 to 1;
-        spheres of a Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
+        Ratio of the stiffness of the spring to that along the normal, from 1e-6 to 1; spheres of
+        a Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
 
     Raises
     ------

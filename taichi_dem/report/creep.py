@@ -36,11 +36,12 @@ class Creep(Kept):
         self.run, self.time_s, self.speed, self.share = run, 0.0, 0.0, 0.0
         self.code, self.table = np.zeros(0, dtype=np.int64), np.zeros((0, 9))
         law, model = run.model.contact, run.model
-        stiffness, damping = (
-            model.materials.of_contacts(name) * law.areas(model.mesh) for name in law.constants
-        )
-        self.softest = float(np.min(stiffness))
-        self.parting_s = float(np.max(damping / stiffness))
+        self.softest, self.parting_s = np.inf, 0.0
+        if law is not None:
+            of_contacts, area = model.materials.of_contacts, law.areas(model.mesh)
+            stiffness, damping = (of_contacts(name) * area for name in law.constants)
+            self.softest = float(np.min(stiffness))
+            self.parting_s = float(np.max(damping)) / self.softest
 
     def sample(self, time_s: float) -> np.ndarray:
         """Bodies that creep at a recording time [s]."""

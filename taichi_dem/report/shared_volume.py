@@ -120,7 +120,8 @@ class SharedVolume(Kept):
         if contact is None or worst.share <= NOTABLE:
             return ()
         law = type(contact).__name__
-        advice = f"a larger contact_stiffness, or more divisions of {law}, keeps them apart"
+        stiffness = contact.constants[0]
+        advice = f"a larger {stiffness}, or more points of {law}, keeps them apart"
         if not contact.outer_faces:
             advice = f"{remedy(contact)} lets them touch there too"
         first, second = worst.bodies

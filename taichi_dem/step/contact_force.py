@@ -105,7 +105,7 @@ class ContactForce:
                     drag = met.area * self._limited(self.contacts.law.damping(m), scale)
                     spring = met.area * self.contacts.law.elastic(m, overlap)
                     rub, stuck, spent = self._rub(
-                        m, k, i, met, push, drag, slide, elapsed, stepping
+                        m, k, i, normal, push, drag, slide, elapsed, stepping
                     )
                     pushed = push * normal + rub
                     found.active |= active_bits(push, rub)
@@ -133,13 +133,13 @@ class ContactForce:
         return overlap / near.size
 
     @ti.func
-    def _rub(self, m, k, i, met, push, drag, slide, elapsed, stepping: ti.template()):
+    def _rub(self, m, k, i, normal, push, drag, slide, elapsed, stepping: ti.template()):
         """Friction on the second sphere and the spring's part of it [N]; energy of slipping [J]."""
         rub, stuck, spent = vec3(0.0), vec3(0.0), 0.0
         if ti.static(self.springs.present):
             rotation, bound = self.state.rotation[i], self.tables.friction.limit(m, push)
             if ti.static(stepping):
-                self.springs.follow(k, rotation, met.normal, elapsed * slide)
+                self.springs.follow(k, rotation, normal, elapsed * slide)
                 spent = self.springs.slip(m, k, rotation, bound, elapsed * slide)
             stuck = self.springs.force(m, k, rotation)
             rub = add_within(stuck, -drag * slide, bound)

@@ -88,11 +88,11 @@ KINDS = {
         solve_response.tolerance""",
     "limited": "friction_angle poisson wall_poisson",
     "index": "bodies frame number",
-    "whole": """body columns rows count cycles divisions done every_steps force_place
-        frame_every frames level_jump macro_step measured_cycles modes neighbours_per_body
-        pairs_per_body particles place record_every recorded_samples s sample_every samples scene
-        scenes sectors seed seeds spheres_per_body steps substeps sweeps threads total
-        transient_cycles""",
+    "whole": """body columns rows count cycles divisions done every_steps force_place frame_every
+        frames level_jump macro_step measured_cycles modes neighbours_per_body
+        pairs_per_body particles effects.BodyContact.parts place record_every
+        recorded_samples s sample_every samples scene scenes sectors seed seeds
+        spheres_per_body steps substeps sweeps threads total transient_cycles""",
     "word": """accounting accumulator arch colour dashpot driver effects friction_law
         if_diverged kind measure mount neighbour of outer_faces pair_rule priority rules search
         start traversal way progress term Spheres.damping""",
