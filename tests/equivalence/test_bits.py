@@ -172,3 +172,20 @@ def test_whole_searches_give_the_same_bits(block, solved):
     block.restart(STEP)
     block.run(SOLVED, block.simulation.broad_phase.search)
     assert differing(solved, fields_of(block.simulation), MOTION) == []
+
+
+def of_bodies(driver="resident", skin=0.0075):
+    """The same block by contact of bodies with sticking friction: its changing fields."""
+    scene, laws = brisk_scene(), (effects.BodyContact(skin=skin), effects.StickingFriction())
+    others = [e for e in scene.effects if e.role not in ("contact", "friction")]
+    made = Scene(scene.mesh, scene.material, [*others, *laws])
+    simulation = Simulation(made, ImplicitDashpots(STEP), driver)
+    simulation.advance_to(200)
+    assert (simulation.contacts.store.near_table()[2] > 0.0).sum() > 10
+    return fields_of(simulation)
+
+
+def test_bodies_that_touch_have_the_same_bits_whatever_the_driver_and_the_skin():
+    first = of_bodies()
+    assert differing(first, of_bodies("parallel")) == []
+    assert differing(first, of_bodies(skin=0.05), MOTION) == []
