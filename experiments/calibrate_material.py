@@ -43,7 +43,7 @@ SETTINGS = {
     "brazilian": (None, None, STRESS, "2 P / (pi D t) of a disc between two arcs [Pa]"),
     "compression": (None, None, STRESS, "strength of a prism between held ends [Pa]"),
     "slip_energy": (None, None, ENERGY, "G_II of SlipWeakening [J/m2]; else bonds slip"),
-    "tolerance": (0.02, 0.02, study.tolerance, "misfit that is allowed, 2%%"),
+    "tolerance": (0.02, 0.02, study.tolerance, "misfit that is allowed, 2%"),
     "seed": (0, 0, study.whole(0, 2**31 - 1), "of the specimens, 0"),
     "density": (2450.0, 2450.0, study.number(0, 1e6), "[kg/m3], 2450"),
     "fracture_energy": (60.0, 60.0, ENERGY, "of a bond [J/m2], 60"),

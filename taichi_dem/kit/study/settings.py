@@ -20,7 +20,9 @@ def add_settings(made: ArgumentParser, settings: Settings, **defaults: Any) -> A
     for name, (_, _, *option) in settings.items():
         if option:
             kind, words = option
-            made.add_argument(f"--{name.replace('_', '-')}", type=kind, help=words)
+            made.add_argument(
+                f"--{name.replace('_', '-')}", type=kind, help=words.replace("%", "%%")
+            )
     made.set_defaults(**defaults)
     return made
 
