@@ -12,6 +12,7 @@ from taichi_dem.kit.types import real, vec3
 from taichi_dem.laws.sphere_contact import ONCE_BROKEN
 from taichi_dem.methods import Method
 from taichi_dem.physics.rotation import place_in
+from taichi_dem.physics.sphere_pair import Nearest
 from taichi_dem.state.capacity import SPARE_PAIRS, SPARE_SPHERES
 from taichi_dem.state.model import Model
 from taichi_dem.state.pair_store import PairStore
@@ -23,6 +24,8 @@ STEPS = 16.0
 #: Share of its extent beyond which it is searched again whatever its speed, and further than which
 #: no step may carry it: spheres would pass each other unseen.
 FARTHEST = 0.25
+#: Gap of bodies that are not compared [m].
+AWAY = 1e30
 
 
 @ti.data_oriented
@@ -187,21 +190,28 @@ class Contacts:
         return level
 
     @ti.func
-    def may_meet(self, k, i, j, margin):
-        """Whether entry k, bodies i and j, may be nearer than a margin [m] by their paths."""
+    def look(self, k, i, j, turn, offset, margin, stepping: ti.template()):
+        """The ``Nearest`` of entry k, bodies i and j, of which a step takes note.
+
+        Bodies whose paths cannot have brought them within a margin [m] are not compared again.
+        """
+        near = Nearest(reach=-AWAY)
+        if self._may_meet(k, i, j, margin):
+            near = self.law.nearest(self.store.sphere[k][0], self.store.sphere[k][1], turn, offset)
+            if ti.static(stepping):
+                self.law.settle(near, k)
+                if ti.static(self.law.meets_bodies):
+                    # Rounding of paths is far below what is left of the gap.
+                    gap = ti.max(0.0, -near.reach) * (1.0 - 1e-6)
+                    self.clear_until[k] = self.path[i] + self.path[j] + gap
+        return near
+
+    @ti.func
+    def _may_meet(self, k, i, j, margin):
         meets = True
         if ti.static(self.law.meets_bodies):
             meets = not self.path[i] + self.path[j] + margin < self.clear_until[k]
         return meets
-
-    @ti.func
-    def settle(self, k, i, j, near):
-        """Take note of a ``Nearest`` of entry k before its forces are asked."""
-        self.law.settle(near, k)
-        if ti.static(self.law.meets_bodies):
-            # Rounding of paths is far below what is left of the gap.
-            gap = ti.max(0.0, -near.reach) * (1.0 - 1e-6)
-            self.clear_until[k] = self.path[i] + self.path[j] + gap
 
     @ti.func
     def moved(self, i, velocity, spin, elapsed):

@@ -6,9 +6,8 @@ from typing import Any, Union
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit import fixed_order
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.fixed_order import length
+from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.kit.products import (
     cross,
     matmul,
@@ -23,8 +22,8 @@ from taichi_dem.laws.sphere_contact import SphereContact
 from taichi_dem.materials import Material
 from taichi_dem.materials.bond_rules import typical_of
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
-from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.tetrahedra import LOCAL_FACES, all_faces, area_vectors, signed_volumes
+from taichi_dem.mesh.mesh import Mesh, volumes
+from taichi_dem.mesh.tetrahedra import LOCAL_FACES, all_faces, area_vectors
 from taichi_dem.physics.body_overlap import (
     raised,
     ray_ends,
@@ -105,8 +104,7 @@ class BodyContact(SphereContact):
 
     def areas(self, mesh: Mesh) -> Any:
         """Area of the largest face of each body [m2], (n,)."""
-        faces = all_faces(mesh.tetrahedra)
-        return length(area_vectors(mesh.points, faces)).reshape(-1, 4).max(axis=1)
+        return length(_outward(mesh)).max(axis=1)
 
     def spheres(self, model: Model) -> ContactSpheres:
         """Balls around the faces of all bodies, by which neighbours are found."""
@@ -136,20 +134,15 @@ class BodyContact(SphereContact):
 
     def load(self, model: Model) -> None:
         """Load the bodies of a scene."""
-        corners = _corners(model)
-        faces = corners[:, LOCAL_FACES]
-        normal = np.cross(faces[:, :, 1] - faces[:, :, 0], faces[:, :, 2] - faces[:, :, 0])
-        twice = length(normal)
-        normal /= twice[..., None]
-        volume = signed_volumes(model.mesh.points, model.mesh.tetrahedra)
-        whole_area = 0.5 * twice.sum(axis=1)
-        ends = ray_ends(self.parts)
+        corners, normal, ends = _corners(model), _outward(model.mesh), ray_ends(self.parts)
+        area = length(normal)
+        normal /= area[..., None]
         assign(self.corner, corners)
         assign(self.outward, normal)
-        assign(self.plane, fixed_order.dot(normal, faces[:, :, 0]))
-        assign(self.incentre, 0.5 * twice / whole_area[:, None])
-        assign(self.volume, volume)
-        assign(self.face_area, self.areas(model.mesh))
+        assign(self.plane, dot(normal, corners[:, LOCAL_FACES[:, 0]]))
+        assign(self.incentre, area / area.sum(axis=1, keepdims=True))
+        assign(self.volume, volumes(model.mesh))
+        assign(self.face_area, area.max(axis=1))
         assign(self.ends, np.concatenate([ends, np.zeros((4 * _MOST_PARTS**2 - len(ends), 4))]))
         assign(self.end_count, len(ends))
 
@@ -194,8 +187,7 @@ class BodyContact(SphereContact):
         """A bound of the way that bodies may go before a ray of one enters the other [m]."""
         outside = 1e30
         for side in range(2):
-            found = self._side(side, a, b, turn, offset, False)
-            outside = ti.min(outside, found[4])
+            outside = ti.min(outside, self._side(side, a, b, turn, offset, False)[4])
         return outside
 
     @ti.func
@@ -266,3 +258,8 @@ class BodyContact(SphereContact):
 def _corners(model):
     """Corners of all bodies in their frames, (n, 4, 3) [m]."""
     return model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
+
+
+def _outward(mesh):
+    """Area vectors of all faces of all bodies, (n, 4, 3) [m2]."""
+    return area_vectors(mesh.points, all_faces(mesh.tetrahedra)).reshape(-1, 4, 3)

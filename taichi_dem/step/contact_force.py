@@ -84,45 +84,37 @@ class ContactForce:
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
         for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
-            if self.contacts.may_meet(k, i, j, margin):
-                a, b = self.contacts.store.sphere[k][0], self.contacts.store.sphere[k][1]
-                near = self.contacts.law.nearest(a, b, turn, offset)
-                if ti.static(stepping):
-                    self.contacts.settle(k, i, j, near)
-                if ti.static(self.has_limits):
-                    found.near_count += ti.cast(self.contacts.law.is_within(near, margin), ti.i32)
-                if self.contacts.law.is_within(near, 0.0):
-                    met = self.contacts.law.meeting(near, k, self.state.rotation[i])
-                    overlap, normal, arm = met.overlap, met.normal, met.arm
-                    velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
-                    rate = dot(velocity, normal)
-                    slide = velocity - rate * normal
-                    if ti.static(self.contacts.law.meets_bodies):
-                        rate += dot(met.couple, self.state.spin[j] - self.state.spin[i])
-                    push = met.area * self.contacts.law.normal(
-                        m, overlap, self._limited(rate, scale)
-                    )
-                    drag = met.area * self._limited(self.contacts.law.damping(m), scale)
-                    spring = met.area * self.contacts.law.elastic(m, overlap)
-                    rub, stuck, spent = self._rub(
-                        m, k, i, normal, push, drag, slide, elapsed, stepping
-                    )
-                    pushed = push * normal + rub
-                    found.active |= active_bits(push, rub)
-                    found.force += pushed
-                    found.moment_i -= cross(arm, pushed)
-                    found.moment_j += cross(arm - branch, pushed)
-                    if ti.static(self.contacts.law.meets_bodies):
-                        found.moment_i -= push * met.couple
-                        found.moment_j += push * met.couple
-                    found.dragged += (spring - push) * rate
-                    found.rubbed -= dot(rub - stuck, slide)
-                    found.slipped += spent
-                    found.rub += norm(rub)
-                    found.bound += self.tables.friction.limit(m, push)
-                    found.deepest = ti.max(found.deepest, self._depth(near, overlap))
-                elif ti.static(stepping):
-                    found.slipped += self.springs.part(m, k)
+            near = self.contacts.look(k, i, j, turn, offset, margin, stepping)
+            if ti.static(self.has_limits):
+                found.near_count += ti.cast(self.contacts.law.is_within(near, margin), ti.i32)
+            if self.contacts.law.is_within(near, 0.0):
+                met = self.contacts.law.meeting(near, k, self.state.rotation[i])
+                overlap, normal, arm = met.overlap, met.normal, met.arm
+                velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
+                rate = dot(velocity, normal)
+                slide = velocity - rate * normal
+                if ti.static(self.contacts.law.meets_bodies):
+                    rate += dot(met.couple, self.state.spin[j] - self.state.spin[i])
+                push = met.area * self.contacts.law.normal(m, overlap, self._limited(rate, scale))
+                drag = met.area * self._limited(self.contacts.law.damping(m), scale)
+                spring = met.area * self.contacts.law.elastic(m, overlap)
+                rub, stuck, spent = self._rub(m, k, i, normal, push, drag, slide, elapsed, stepping)
+                pushed = push * normal + rub
+                found.active |= active_bits(push, rub)
+                found.force += pushed
+                found.moment_i -= cross(arm, pushed)
+                found.moment_j += cross(arm - branch, pushed)
+                if ti.static(self.contacts.law.meets_bodies):
+                    found.moment_i -= push * met.couple
+                    found.moment_j += push * met.couple
+                found.dragged += (spring - push) * rate
+                found.rubbed -= dot(rub - stuck, slide)
+                found.slipped += spent
+                found.rub += norm(rub)
+                found.bound += self.tables.friction.limit(m, push)
+                found.deepest = ti.max(found.deepest, self._depth(near, overlap))
+            elif ti.static(stepping):
+                found.slipped += self.springs.part(m, k)
         return found
 
     @ti.func

@@ -107,6 +107,9 @@ class PairDashpots:
         branch = self.state.position[j] - self.state.position[i]
         turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
         ahead, m = dt * self.contacts.approach(i, j), self.tables.pair(i, j)
+        if ti.static(self.of_bodies):
+            # Bodies have no area of contact before they touch.
+            ahead = 0.0
         force, moment, deepest, parted = vec3(0.0), vec3(0.0), 0.0, 0.0
         elapsed = 0.0
         if ti.static(self.springs.present):
@@ -115,38 +118,35 @@ class PairDashpots:
         start = self.store.first[p]
         end = start
         for k in range(start, self.store.last[p]):
-            if self.contacts.may_meet(k, i, j, self._outlook(ahead)):
-                a, b = self.store.sphere[k][0], self.store.sphere[k][1]
-                near = self.contacts.law.nearest(a, b, turn, offset)
-                self.contacts.settle(k, i, j, near)
-                if self.contacts.law.is_within(near, self._outlook(ahead)):
-                    met = self.contacts.law.meeting(near, k, self.state.rotation[i])
-                    overlap, normal, arm = met.overlap, met.normal, met.arm - branch
-                    self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
-                    # Spheres still apart may approach until they touch, at the end of the step.
-                    push = dt * self.contacts.law.elastic(m, ti.max(overlap, 0.0))
-                    push += self.contacts.law.damping(m) * ti.min(overlap, 0.0)
-                    self.push[end] = met.area * push
-                    self.share[end] = self._share(i, j, branch, arm, met)
-                    force += self.impulse[k]
-                    moment += cross(arm, self.impulse[k])
-                    depth = overlap
-                    if ti.static(self.of_bodies):
-                        self.area[end], self.couple[end] = met.area, met.couple
-                        moment += dot(self.impulse[k], normal) * met.couple
-                        depth = near.reach
-                    deepest = ti.max(deepest, depth / near.size)
-                    if ti.static(self.springs.present):
-                        self.pull[end] = vec3(0.0)
-                        if depth > 0.0:
-                            way = self._way(i, j, branch, arm, normal, elapsed)
-                            self.springs.follow(k, self.state.rotation[i], normal, way)
-                            self.pull[end] = dt * self.springs.force(m, k, self.state.rotation[i])
-                    end += 1
-                else:
-                    self.impulse[k] = vec3(0.0)
-                if not self.contacts.law.is_within(near, 0.0):
-                    parted += self.springs.part(m, k)
+            near = self.contacts.look(k, i, j, turn, offset, ahead, True)
+            if self.contacts.law.is_within(near, ahead):
+                met = self.contacts.law.meeting(near, k, self.state.rotation[i])
+                overlap, normal, arm = met.overlap, met.normal, met.arm - branch
+                self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
+                # Spheres still apart may approach until they touch, at the end of the step.
+                push = dt * self.contacts.law.elastic(m, ti.max(overlap, 0.0))
+                push += self.contacts.law.damping(m) * ti.min(overlap, 0.0)
+                self.push[end] = met.area * push
+                self.share[end] = self._share(i, j, branch, arm, met)
+                force += self.impulse[k]
+                moment += cross(arm, self.impulse[k])
+                depth = overlap
+                if ti.static(self.of_bodies):
+                    self.area[end], self.couple[end] = met.area, met.couple
+                    moment += dot(self.impulse[k], normal) * met.couple
+                    depth = near.reach
+                deepest = ti.max(deepest, depth / near.size)
+                if ti.static(self.springs.present):
+                    self.pull[end] = vec3(0.0)
+                    if depth > 0.0:
+                        way = self._way(i, j, branch, arm, normal, elapsed)
+                        self.springs.follow(k, self.state.rotation[i], normal, way)
+                        self.pull[end] = dt * self.springs.force(m, k, self.state.rotation[i])
+                end += 1
+            else:
+                self.impulse[k] = vec3(0.0)
+            if not self.contacts.law.is_within(near, 0.0):
+                parted += self.springs.part(m, k)
         self.store.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
         if end > start:
             around = moment + cross(branch, force)
@@ -154,13 +154,6 @@ class PairDashpots:
             self.contacts.add_impulse(p, 1, force, moment)
         if ti.static(self.springs.present):
             self.contacts.book_friction(p, parted)
-
-    @ti.func
-    def _outlook(self, ahead):
-        """Gap within which a contact is solved [m]; bodies have no area before they touch."""
-        if ti.static(self.of_bodies):
-            ahead = 0.0
-        return ahead
 
     @ti.func
     def _turned(self, c, angular):
