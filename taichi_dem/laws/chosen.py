@@ -6,10 +6,11 @@ from typing import Any
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
 from taichi_dem.laws.base import PARTS_OF_BOND, Effect
+from taichi_dem.laws.body_contact import BodyContact
 from taichi_dem.laws.bond import BondDamping, ShearSlip, Softening
-from taichi_dem.laws.friction import Friction, StickingFriction
+from taichi_dem.laws.friction import StickingFriction
 from taichi_dem.laws.roles import check_activation
-from taichi_dem.laws.sphere_contact import ONCE_BROKEN, SphereContact
+from taichi_dem.laws.sphere_contact import ONCE_BROKEN
 from taichi_dem.materials.body_materials import BodyMaterials
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import parts_of
@@ -70,8 +71,7 @@ def _laws(mesh, material, taken):
     if "contact" not in taken:
         # Nothing meets a solid of one piece at its outer faces before something has come loose.
         meets = parts_of(mesh).max() > 0 or mesh.has_open_faces
-        laws.append(SphereContact(outer_faces=True if meets else ONCE_BROKEN))
+        laws.append(BodyContact(outer_faces=True if meets else ONCE_BROKEN))
     if material.friction > 0.0:
-        # Friction without springs is a dashpot's force up to its limit: none without a dashpot.
-        laws.append(Friction() if material.friction_has_dashpots else StickingFriction())
+        laws.append(StickingFriction())
     return laws
