@@ -1,40 +1,61 @@
-"""Bonds between the bodies of a pair, and overlaps that a break at this tick creates."""
+"""Which bodies can touch others, which are bonded, and overlaps that a break creates."""
 
 import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
+from taichi_dem.kit.allocation import assign
+from taichi_dem.state.model import Model
 
 
 @ti.data_oriented
 class Breaks:
-    """Which pairs are bonded, and which overlaps are new, for the contact search.
+    """What breaks have set free, for the contact search.
 
-    fresh: 1 when a face has got its spheres since the last search, whose injection is booked.
-    newest: last tick at which a face of a body got its spheres, negative for none.
+    Spheres touch on free faces, broken or outer ones. Bodies can touch others at every corner of a
+    free face: around it lie bodies that reach the surface with an edge or a corner only.
+    corner: number of a body's corners, 4 a body; is_open: 1 for a corner of a free face.
+    newest: last tick at which a face of a body was set free, negative for none. fresh: 1 when that
+    of any has been since the last search, whose injection is booked.
     """
 
-    scratch_fields = ("newest",)
+    constant_fields = ("corner",)
+    scratch_fields = ("newest", "is_open")
 
     def __init__(self, contacts: Contacts):
         self.contacts, self.store = contacts, contacts.store
         self.tables, self.state = contacts.tables, contacts.state
         self.fresh = ti.field(ti.i32, shape=())
         self.newest = ti.field(ti.i64, shape=self.tables.capacity.bodies)
+        if contacts.law.meets_bodies:
+            self.corner, self.is_open = (
+                ti.field(ti.i32, shape=self.tables.capacity.faces) for _ in range(2)
+            )
+
+    def load(self, model: Model) -> None:
+        """Load the corners of a scene."""
+        if self.contacts.law.meets_bodies:
+            assign(self.corner, model.mesh.tetrahedra.reshape(-1))
 
     @ti.func
-    def exposed_faces(self, i):
-        """Bit f for a face f of body i with spheres; notes when it got the last of them."""
-        exposed, newest = 0, self.state.exposed_tick[4 * i]
-        for f in range(4):
-            since = self.state.exposed_tick[4 * i + f]
-            newest = ti.max(newest, since)
-            exposed |= ti.cast(since >= 0, ti.i32) << f
-        self.newest[i] = newest
-        return exposed
+    def note(self):
+        """Note which faces are free now, and when the last of them were set free."""
+        self._free_outer()
+        latest = ti.cast(0, ti.i64)
+        for i in range(self.tables.body_count[None]):
+            newest = self.state.exposed_tick[4 * i]
+            for f in range(1, 4):
+                newest = ti.max(newest, self.state.exposed_tick[4 * i + f])
+            self.newest[i] = newest
+            latest = ti.max(latest, newest)
+        # A second search at the tick of a break must not book its injection again.
+        self.fresh[None] = ti.cast(latest > self.state.injected_tick[None], ti.i32)
+        self.state.injected_tick[None] = latest
+        if ti.static(self.contacts.law.meets_bodies):
+            self._open_corners()
 
     @ti.func
-    def expose_outer(self):
-        """Put spheres on all outer faces once a bond has broken, where they wait for that."""
+    def _free_outer(self):
+        """Set all outer faces free once a bond has broken, where they wait for that."""
         if self.contacts.outer_waits[None] == 1:
             broken = False
             for b in range(self.tables.bond_count[None]):
@@ -47,34 +68,61 @@ class Breaks:
                         self.state.exposed_tick[face] = self.state.tick[None]
 
     @ti.func
-    def note_newest(self, newest):
-        """Note the last tick at which a face got its spheres.
+    def _open_corners(self):
+        """Mark the corners of all free faces; face f of a body lies opposite its corner f."""
+        for k in range(4 * self.tables.body_count[None]):
+            self.is_open[k] = 0
+        for i in range(self.tables.body_count[None]):
+            for f in range(4):
+                if self.state.exposed_tick[4 * i + f] >= 0:
+                    for c in range(1, 4):
+                        self.is_open[self.corner[4 * i + (f + c) % 4]] = 1
 
-        A second search at the tick of a break must not book its injection again.
-        """
-        self.fresh[None] = ti.cast(newest > self.state.injected_tick[None], ti.i32)
-        self.state.injected_tick[None] = newest
+    @ti.func
+    def is_free(self, i):
+        """1 for a body that others may touch."""
+        free = ti.cast(self.newest[i] >= 0, ti.i32)
+        if ti.static(self.contacts.law.meets_bodies):
+            for c in range(4):
+                free |= self.is_open[self.corner[4 * i + c]]
+        return free
+
+    @ti.func
+    def free_since(self, i, tick):
+        """1 when a face of body i has been set free at a tick or later."""
+        return ti.cast(self.newest[i] >= tick, ti.i32)
+
+    @ti.func
+    def free_faces(self, i, j):
+        """Bit 4 f + g for every free face f of the one and g of the other."""
+        faces = 0
+        for f in range(4):
+            if self.state.exposed_tick[4 * i + f] >= 0:
+                for g in range(4):
+                    free = ti.cast(self.state.exposed_tick[4 * j + g] >= 0, ti.i32)
+                    faces |= free << (4 * f + g)
+        return faces
 
     @ti.func
     def bonded(self, i, j):
         """Whether two bodies share a bond that holds."""
-        bonded = False
-        for f in range(4):
-            if self.tables.neighbour[4 * i + f] == j:
-                bonded = self.state.broken_tick[self.tables.face_bond[4 * i + f]] < 0
-        return bonded
+        return self._shared(i, j, ti.cast(-1, ti.i64))
 
     @ti.func
-    def exposed_since(self, i, tick):
-        """1 when a face of body i has got its spheres at a tick or later."""
-        return ti.cast(self.newest[i] >= tick, ti.i32)
+    def _shared(self, i, j, tick):
+        """Whether two bodies share a bond that was released at a tick; -1 for one that holds."""
+        shared = False
+        for f in range(4):
+            if self.tables.neighbour[4 * i + f] == j:
+                shared = self.state.broken_tick[self.tables.face_bond[4 * i + f]] == tick
+        return shared
 
     @ti.func
     def injected(self, p):
         """Energy [J] of overlaps of a pair that this tick's breaks have brought into being."""
         i, j = self.store.body[p][0], self.store.body[p][1]
         energy, tick = 0.0, self.state.tick[None]
-        fresh, freed = self.fresh[None] == 1, self._freed_at(i, j, tick)
+        fresh, freed = self.fresh[None] == 1, self._shared(i, j, tick)
         for k in range(self.store.first[p], self.store.last[p]):
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
             size = self.tables.face_spheres[None]
@@ -83,12 +131,3 @@ class Breaks:
                 overlap = ti.max(0.0, -self.contacts.gap(i, j, a, b))
                 energy += self.contacts.law.stored(self.tables.pair(i, j), overlap)
         return energy
-
-    @ti.func
-    def _freed_at(self, i, j, tick):
-        """Whether the bond of two bodies was released at a tick."""
-        freed = False
-        for f in range(4):
-            if self.tables.neighbour[4 * i + f] == j:
-                freed = self.state.broken_tick[self.tables.face_bond[4 * i + f]] == tick
-        return freed

@@ -2,8 +2,8 @@
 
 import taichi as ti
 
+from taichi_dem.contact.reach import Reach
 from taichi_dem.kit.types import real
-from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 
 #: Coordinates beyond this [m], and those that are no number, count as this: a run that diverges is
@@ -21,9 +21,9 @@ class CellGrid:
 
     scratch_fields = ("first", "member", "cell", "counts", "corner", "edge", "largest")
 
-    def __init__(self, tables: Tables, state: State, ball: ti.Field):
+    def __init__(self, tables: Tables, reach: Reach):
         n = tables.capacity.bodies
-        self.tables, self.state, self.ball = tables, state, ball
+        self.tables, self.placed_at, self.ball = tables, reach.placed_at, reach.ball
         self.first = ti.field(ti.i32, shape=4 * n + 66)
         self.member = ti.field(ti.i32, shape=n)
         self.cell = ti.field(ti.i32, shape=n)
@@ -78,8 +78,8 @@ class CellGrid:
 
     @ti.func
     def _bounded(self, i):
-        """Position of a body, as far as it is one."""
-        return ti.max(ti.min(self.state.position[i], _FAR), -_FAR)
+        """Place of a body, as far as it is one."""
+        return ti.max(ti.min(self.placed_at[i], _FAR), -_FAR)
 
     @ti.func
     def _cell_of(self, position):

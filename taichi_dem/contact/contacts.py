@@ -1,7 +1,4 @@
-"""Pairs of bodies in contact: the impulses they exchange, and how far bodies may go unsearched.
-
-A pair holds the sphere pairs whose gap was below the body skin of its bodies at the last search.
-"""
+"""Pairs of bodies in contact: the impulses they exchange, and how far bodies may go unsearched."""
 
 import numpy as np
 import taichi as ti
@@ -30,14 +27,13 @@ AWAY = 1e30
 
 @ti.data_oriented
 class Contacts:
-    """Candidate pairs of bodies with broken faces; p: a slot of the ``PairStore``, called store.
+    """Pairs of bodies that may touch soon; p: a slot of the ``PairStore``, called store.
 
-    exposed_faces: bit f for a broken face f. travel: bound of the displacement of any point of a
-    body since it was last searched [m]. skin: least gap up to which its spheres are listed [m].
-    body_skin: travel at which it is searched again [m]; a pair holds the spheres whose gap is below
-    the body skin of both. pace: largest step [s], and steps of
-    a body by which its contacts are counted before they touch. search_requested: 1 when the list
-    may miss one of them. outer_waits: 1 while outer faces wait for the first break to get spheres.
+    free: 1 for bodies that others can touch. path: bound of the way that any point of such a body
+    has gone [m]; horizon: path up to which its pairs are known [m], body_skin ahead of where it was
+    visited last. skin: least of that, twice [m]. pace: largest step [s], and steps of a body by
+    which its contacts are counted before they touch. search_requested: 1 when a path comes near its
+    horizon. outer_waits: 1 while outer faces wait for the first break to be free.
     """
 
     def __init__(self, tables: Tables, state: State):
@@ -49,14 +45,12 @@ class Contacts:
         self.store = PairStore(n, capacity.pair_entries, capacity.sphere_entries)
         for effect in tables.effects:
             effect.declare_columns(self.store)
-        self.exposed_faces = ti.field(ti.i32, shape=n)
-        self.travel = ti.field(real, shape=n)
-        self.body_skin = ti.field(real, shape=n)
-        self.skin = ti.field(real, shape=n)
+        self.free = ti.field(ti.i32, shape=n)
+        self.path, self.horizon = (ti.field(real, shape=n) for _ in range(2))
+        self.skin, self.body_skin = (ti.field(real, shape=n) for _ in range(2))
         self.search_requested = ti.field(ti.i32, shape=())
         self.outer_waits = ti.field(ti.i32, shape=())
         if self.law.meets_bodies:
-            self.path = ti.field(real, shape=n)
             self.clear_until = self.store.sphere_column("clear_until", real)
 
     def load(self, model: Model, method: Method) -> None:
@@ -71,15 +65,7 @@ class Contacts:
     def forget_gaps(self) -> None:
         """Forget how far bodies may go before they touch: they have been moved by hand."""
         if self.law.meets_bodies:
-            assign(self.path, 0.0)
             assign(self.clear_until, 0.0)
-
-    @ti.func
-    def cluster_centre(self, i, face):
-        """Centre of the ball around the spheres of a face of body i now [m]."""
-        return self.state.position[i] + matvec(
-            self.state.rotation[i], self.tables.cluster[face].xyz
-        )
 
     @ti.func
     def gap(self, i, j, a, b):
@@ -94,9 +80,14 @@ class Contacts:
     @ti.func
     def nearest(self, i, j, a, b):
         """Where bodies i and j are nearest by an entry (a, b), in the frame of the first."""
-        branch = self.state.position[j] - self.state.position[i]
-        turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
+        turn, offset = self.place(i, j)
         return self.law.nearest(a, b, turn, offset)
+
+    @ti.func
+    def place(self, i, j):
+        """Rotation and place [m] of body j in the frame of body i."""
+        branch = self.state.position[j] - self.state.position[i]
+        return place_in(self.state.rotation[i], self.state.rotation[j], branch)
 
     @ti.func
     def _gap_of_spheres(self, i, j, a, b):
@@ -219,15 +210,13 @@ class Contacts:
 
         A body that leaps too far in one step for its contacts to be followed is out of bounds.
         """
-        if self.exposed_faces[i] != 0:
+        if self.free[i] == 1:
             speed = self._speed(i, velocity, spin)
             if elapsed * speed > FARTHEST * self.tables.extent[i]:
                 ti.atomic_min(self.state.bad_body[None], i)
-            way = self.travel[i] + speed * elapsed
-            self.travel[i] = way
-            if ti.static(self.law.meets_bodies):
-                self.path[i] = self.path[i] + speed * elapsed
-            if way + self.pace[1] * elapsed * speed > self.body_skin[i]:
+            path = self.path[i] + speed * elapsed
+            self.path[i] = path
+            if path + self.pace[1] * elapsed * speed > self.horizon[i]:
                 self.search_requested[None] = 1
 
     @ti.func
@@ -239,6 +228,12 @@ class Contacts:
         speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
         way = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])
         self.body_skin[i] = ti.max(0.5 * self.skin[i], way)
+        self.horizon[i] = self.path[i] + self.body_skin[i]
+
+    @ti.func
+    def is_far(self, i, share):
+        """Whether body i has used up more than a share of its body skin."""
+        return self.path[i] >= self.horizon[i] - (1.0 - share) * self.body_skin[i]
 
     @ti.func
     def _speed(self, i, velocity, spin):
@@ -253,6 +248,16 @@ class Contacts:
         return first + norm(self.state.spin[j]) * self.tables.extent[j]
 
     @ti.func
+    def paths(self, i, j):
+        """Sum of the paths of two bodies [m]."""
+        return self.path[i] + self.path[j]
+
+    @ti.func
+    def horizons(self, i, j):
+        """Sum of the paths of two bodies up to which their contacts have to be known [m]."""
+        return self.horizon[i] + self.horizon[j]
+
+    @ti.func
     def margin(self, i, j):
-        """Gap below which spheres of two bodies are candidates [m]."""
-        return self.body_skin[i] + self.body_skin[j]
+        """Gap that two bodies can close before they are searched again [m]."""
+        return self.horizons(i, j) - self.paths(i, j)

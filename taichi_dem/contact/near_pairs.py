@@ -21,7 +21,7 @@ class NearPairs:
 
     def __init__(self, contacts: Contacts, neighbours: VerletList):
         self.tables, self.contacts, self.store = contacts.tables, contacts, contacts.store
-        self.neighbours, self.listed = neighbours, neighbours.listed
+        self.neighbours = neighbours
         n = self.tables.capacity.bodies
         self.row = ti.field(ti.i32, shape=neighbours.capacity)
         self.row_count, self.row_spheres = (ti.field(ti.i32, shape=n) for _ in range(2))
@@ -29,14 +29,14 @@ class NearPairs:
         self.full = ti.field(ti.i32, shape=())
 
     @ti.func
-    def number(self, exposed: ti.template(), count):
+    def number(self, free: ti.template(), count):
         """Number the near pairs in order; new ones get slots, others lose theirs.
 
-        exposed: the bodies with spheres, count of them; others are in no pair.
+        free: the bodies that can touch others, count of them; the rest are in no pair.
         """
         for a in range(count):
-            i = exposed[a]
-            self.row_is_new[i] = self.listed.changed[i]
+            i = free[a]
+            self.row_is_new[i] = self.neighbours.changed[i]
             if self.row_is_new[i] == 1:
                 self._renew_row(i)
         self._count_rows()
@@ -48,33 +48,33 @@ class NearPairs:
         """List the near pairs of which body i is the first."""
         start, count, spheres, waiting = self.neighbours.first[i], 0, 0, 0
         for k in range(start, self.neighbours.last[i]):
-            p, found = self.listed.slot[k], self.listed.found[k]
+            p, found = self.neighbours.slot[k], self.neighbours.found[k]
             stays = found > 0
             if p >= 0 and found == 0:
                 stays = self.store.waits(p)
                 waiting |= ti.cast(stays, ti.i32)
                 if not stays:
                     self.store.release(p)
-                    self.listed.slot[k] = -1
+                    self.neighbours.slot[k] = -1
             if stays:
                 self.row[start + count] = self._slot_of(k, i)
                 count += 1
                 spheres += found
         self.row_count[i], self.row_spheres[i] = count, spheres
         # Pairs that only hold a pending impulse leave at the next search.
-        self.listed.changed[i] = waiting
+        self.neighbours.changed[i] = waiting
 
     @ti.func
     def _slot_of(self, k, i):
         """Slot of entry k of body i, new or not, with places for sphere pairs just found."""
-        p = self.listed.slot[k]
+        p = self.neighbours.slot[k]
         if p < 0:
-            p = self.store.allocate(i, self.listed.body[k])
-            self.listed.slot[k] = p
+            p = self.store.allocate(i, self.neighbours.body[k])
+            self.neighbours.slot[k] = p
         if p < 0:
             self.full[None] = 1
-        elif self.listed.new_faces[k] != 0:
-            if self.store.reserve_spheres(p, self.listed.found[k]) == 1:
+        elif self.neighbours.is_new[k] == 1:
+            if self.store.reserve_spheres(p, self.neighbours.found[k]) == 1:
                 self.full[None] = 2
         return p
 
@@ -83,7 +83,7 @@ class NearPairs:
         pairs, spheres = 0, 0
         for i in range(self.tables.body_count[None]):
             self.store.first_of[i] = pairs
-            if self.contacts.exposed_faces[i] != 0:
+            if self.contacts.free[i] == 1:
                 pairs += self.row_count[i]
                 spheres += self.row_spheres[i]
         self.store.first_of[self.tables.body_count[None]] = pairs

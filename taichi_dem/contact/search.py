@@ -1,8 +1,16 @@
-"""Search for contact pairs: the broken ones among the neighbouring faces, then their spheres.
+"""Search for pairs of bodies that may touch soon, and for what the contact law wants of each.
 
-The lists are updated when a body may have used up its body skin, or at once when a bond breaks: a
-search visits the bodies that moved or broke, and keeps the results of the others. A pair keeps its
-slot of the store, so results do not depend on the times of searches.
+Invariants, at any tick between two searches:
+
+- A pair has one owner: an entry in the row of its first body, first < second, which holds its slot
+  of the ``PairStore`` as long as the pair is near or an impulse waits in it.
+- A pair of free bodies without a bond that is not near, or a contact that a near pair does not
+  hold, has a gap: the bodies cannot close it before their paths have grown to ``until``.
+- No path is longer than its horizon: a search is requested before that.
+
+So a search visits the bodies that have come near their horizon or that a break has set free, and
+compares the pairs of which ``until`` lies below the new horizons. Results do not depend on the
+times of searches.
 """
 
 from collections.abc import Callable
@@ -12,17 +20,21 @@ import taichi as ti
 
 from taichi_dem.contact.breaks import Breaks
 from taichi_dem.contact.contacts import Contacts
-from taichi_dem.contact.narrow_phase import NarrowPhase
 from taichi_dem.contact.near_pairs import NearPairs
-from taichi_dem.contact.verlet_list import FAR, VerletList
+from taichi_dem.contact.verlet_list import VerletList
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.products import norm
 from taichi_dem.kit.types import vec3
 from taichi_dem.methods import Method
 from taichi_dem.state.model import Model
 
-#: Marks of a body: it has spheres, and the last search visited it.
-EXPOSED, LOOKED = 1, 2
+#: Marks of a body: others can touch it; a search visits it; and compares it whatever its path.
+FREE, VISITED, COMPARED = 1, 2, 3
+#: Share of its body skin that a body may use up before it is visited.
+FAR = 0.6
+#: Skins beyond their margin within which the gap of two bodies is found; others count as farther.
+OUTLOOK = 3.5
 _CAPACITIES = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 
 
@@ -32,13 +44,13 @@ class BroadPhase:
 
     start_pairs: takes in the pairs of a search. limits: ``StabilityLimits`` that are told of pairs,
     None where no step needs them.
-    everywhere: 1 when the next search visits all bodies, as is needed once they have been moved by
-    hand. looked: LOOKED for bodies that the last search visited, EXPOSED for others with spheres;
-    searched: its tick. searches: their number. full: the list without capacity, an index into
-    ``_CAPACITIES``.
+    everywhere: 1 when the next search compares all pairs, as is needed once bodies have been moved
+    by hand. mark: FREE, VISITED or COMPARED for each body, 0 for one within a solid; free: those
+    marked, in order; searched: tick of the last search. searches: their number. full: the list
+    without capacity, an index into ``_CAPACITIES``.
     """
 
-    scratch_fields = ("exposed", "exposed_count", "looked")
+    scratch_fields = ("free", "free_count", "mark")
 
     def __init__(self, contacts: Contacts, start_pairs: Callable[[], Any], limits: Any):
         n = contacts.tables.capacity.bodies
@@ -46,13 +58,10 @@ class BroadPhase:
         self.start_pairs, self.limits = start_pairs, limits
         self.has_limits = limits is not None
         self.tables, self.state = contacts.tables, contacts.state
-        self.exposed = ti.field(ti.i32, shape=n)
-        self.exposed_count = ti.field(ti.i32, shape=())
+        self.free, self.mark = (ti.field(ti.i32, shape=n) for _ in range(2))
+        self.free_count = ti.field(ti.i32, shape=())
         self.neighbours = VerletList(contacts)
-        self.listed = self.neighbours.listed
-        self.narrow_phase = NarrowPhase(contacts)
         self.searched = ti.field(ti.i64, shape=())
-        self.looked = ti.field(ti.i32, shape=n)
         self.everywhere = ti.field(ti.i32, shape=())
         self.breaks = Breaks(contacts)
         self.near_pairs = NearPairs(contacts, self.neighbours)
@@ -62,6 +71,7 @@ class BroadPhase:
     def load(self, model: Model, method: Method) -> None:
         """Load the limits of the lists; the first search makes all of them."""
         self.neighbours.load(model, method)
+        self.breaks.load(model)
 
     def clear(self) -> None:
         """Forget all pairs; the next search finds those present then."""
@@ -101,8 +111,8 @@ class BroadPhase:
     def phases(self) -> tuple[tuple[Callable[..., Any], Callable[..., Any]], ...]:
         """Phases of a search in order, as pairs of a count and a function of an index."""
         return (
-            (self._once, self._list_exposed),
-            (self._exposed_bodies, self._choose),
+            (self._once, self._list_free),
+            (self._free_bodies, self._choose),
             (self._once, self._begin),
             (self._all_anew, self.neighbours.list_anew),
             (self.neighbours.making, self._sort),
@@ -110,11 +120,9 @@ class BroadPhase:
             (self.neighbours.making, self._allot),
             (self._all_anew, self.neighbours.fill),
             (self._all_amended, self.neighbours.amend),
-            (self._exposed_bodies, self._note_places),
-            (self._once, self._pack_spheres),
-            (self._exposed_bodies, self._find_spheres),
+            (self._free_bodies, self._visit),
             (self._once, self._number_pairs),
-            (self._exposed_bodies, self._update_pairs),
+            (self._free_bodies, self._update_pairs),
             (self._once, self._end),
         )
 
@@ -135,8 +143,8 @@ class BroadPhase:
         return ti.cast(self.full[None] != 0, ti.i32)
 
     @ti.func
-    def _exposed_bodies(self):
-        return self.exposed_count[None]
+    def _free_bodies(self):
+        return self.free_count[None]
 
     @ti.func
     def _all_anew(self):
@@ -154,6 +162,7 @@ class BroadPhase:
     def _begin(self, one):
         self.neighbours.begin()
         self.searched[None] = self.state.tick[None]
+        self.store.pack_if_sparse()
 
     @ti.func
     def _sort(self, one):
@@ -162,10 +171,6 @@ class BroadPhase:
     @ti.func
     def _allot(self, one):
         self.neighbours.allot()
-
-    @ti.func
-    def _pack_spheres(self, one):
-        self.store.pack_if_sparse()
 
     @ti.func
     def _end(self, one):
@@ -181,98 +186,81 @@ class BroadPhase:
         self.contacts.search_requested[None] = ti.cast(again, ti.i32)
 
     @ti.func
-    def _list_exposed(self, one):
-        """List the bodies with spheres on some face, in order of their index."""
+    def _list_free(self, one):
+        """List the bodies that others can touch, in order of their index."""
         count = 0
-        newest = ti.cast(0, ti.i64)
-        self.breaks.expose_outer()
+        self.breaks.note()
         for i in range(self.tables.body_count[None]):
-            exposed = self.breaks.exposed_faces(i)
-            newest = ti.max(newest, self.breaks.newest[i])
-            self.contacts.exposed_faces[i] = exposed
-            self.looked[i] = ti.cast(exposed != 0, ti.i32)
-            if exposed != 0:
-                self.exposed[count] = i
+            self.mark[i] = self.breaks.is_free(i)
+            self.contacts.free[i] = self.mark[i]
+            if self.mark[i] == FREE:
+                self.free[count] = i
                 count += 1
-        self.exposed_count[None] = count
+        self.free_count[None] = count
         self.full[None] = 0
-        self.breaks.note_newest(newest)
 
     @ti.func
     def _choose(self, a):
-        """Mark an exposed body that used up much of its skin, or that a break has exposed."""
-        i = self.exposed[a]
-        far = self.contacts.travel[i] > FAR * self.contacts.body_skin[i]
-        looked = self.everywhere[None] | ti.cast(far, ti.i32)
-        looked |= self.breaks.exposed_since(i, self.searched[None] + 1)
-        if looked == 1:
-            self.looked[i] = LOOKED
+        """Mark a free body that used up much of its skin, or of which a face was set free."""
+        i = self.free[a]
+        if self.everywhere[None] == 1 or self.breaks.free_since(i, self.searched[None] + 1) == 1:
+            self.mark[i] = COMPARED
+        elif self.contacts.is_far(i, FAR):
+            self.mark[i] = VISITED
+        if self.mark[i] >= VISITED:
             self.contacts.set_body_skin(i)
             self.neighbours.reach.notice(i)
 
     @ti.func
-    def _note_places(self, a):
-        """Note the position of a body that is being searched.
-
-        The others are compared at the positions of their last search, from which they have used up
-        part of their body skin. All are searched while the list of neighbours is being rebuilt.
-        """
-        i = self.exposed[a]
-        if self.neighbours.making() == 1:
-            self.looked[i] = LOOKED
-        if self.looked[i] == LOOKED:
-            self.listed.note_travel(i, self.contacts.travel[i])
-            self.narrow_phase.note_places(i)
-            self.contacts.travel[i] = 0.0
-
-    @ti.func
-    def _find_spheres(self, a):
-        """Find the sphere pairs of an exposed body with each neighbour that is being searched."""
-        i = self.exposed[a]
-        least = ti.select(self.looked[i] == LOOKED, EXPOSED, LOOKED)
+    def _visit(self, a):
+        """Compare a free body with each neighbour, where either is visited and they may meet."""
+        i = self.free[a]
         for k in range(self.neighbours.first[i], self.neighbours.last[i]):
-            j = self.listed.body[k]
-            if self.looked[j] >= least:
-                faces = self._broken_faces(i, j)
-                if not ti.static(self.contacts.law.meets_bodies):
-                    faces &= self.listed.faces[k]
-                if self.everywhere[None] == 1 or self.listed.may_gain_spheres(k, i, j, faces):
-                    self._count_spheres(k, i, j, faces)
+            j = self.neighbours.body[k]
+            if self.mark[j] >= FREE:
+                mark = ti.max(self.mark[i], self.mark[j])
+                if self.neighbours.making() == 1:
+                    mark = COMPARED
+                meets = self.neighbours.until[k] < self.contacts.horizons(i, j)
+                if mark == COMPARED or (mark == VISITED and meets):
+                    if not self.breaks.bonded(i, j):
+                        self._compare(k, i, j)
 
     @ti.func
-    def _count_spheres(self, k, i, j, faces):
-        """Count the sphere pairs of an entry, and find how far apart the others are."""
-        count, hits, gap = 0, 0, 0.0
-        if not self.breaks.bonded(i, j):
-            compared = faces
-            if self.everywhere[None] == 0:
-                compared = self.listed.faces_to_compare(k, i, j, faces)
-            count, hits, gap = self.narrow_phase.compare(i, j, compared, 0, False)
-            if compared != faces:
-                gap = ti.min(gap, self.listed.least_gap(k, i, j))
-        self.listed.note_found(k, i, j, faces, count, hits, gap)
+    def _compare(self, k, i, j):
+        """Count the contacts of an entry, and find how far apart all else is."""
+        count, margin = 0, self.contacts.margin(i, j)
+        far = margin + OUTLOOK * (self.contacts.skin[i] + self.contacts.skin[j])
+        gap = norm(self.state.position[j] - self.state.position[i])
+        gap -= self.tables.extent[i] + self.tables.extent[j]
+        if gap < far:
+            count, gap = self._find(i, j, margin, far, -1)
+        keeps = ti.static(self.contacts.law.meets_bodies) and count == self.neighbours.found[k]
+        self.neighbours.note_found(k, i, count, self.contacts.paths(i, j) + gap, keeps)
 
     @ti.func
-    def _broken_faces(self, i, j):
-        """Bit 4 f + g for every broken face f of the one and g of the other."""
-        first, second = self.contacts.exposed_faces[i], self.contacts.exposed_faces[j]
-        # Bit f of the first goes to bit 4 f, and each such bit then takes a copy of the second.
-        spread = (first & 1) | ((first & 2) << 3) | ((first & 4) << 6) | ((first & 8) << 9)
-        return spread * second
+    def _find(self, i, j, margin, far, start):
+        """Contacts of two bodies nearer than a margin [m]: number, and the least gap of others.
+
+        start: place in the store from which they are entered, -1 to count them only.
+        """
+        turn, offset = self.contacts.place(i, j)
+        faces = self.breaks.free_faces(i, j)
+        return self.contacts.law.find(i, j, turn, offset, faces, margin, far, self.store, start)
 
     @ti.func
     def _number_pairs(self, one):
-        self.near_pairs.number(self.exposed, self.exposed_count[None])
+        self.near_pairs.number(self.free, self.free_count[None])
 
     @ti.func
     def _update_pairs(self, a):
-        """Put the near pairs of an exposed body in order, and write their new sphere pairs."""
-        i = self.exposed[a]
+        """Put the near pairs of a free body in order, and write their new contacts."""
+        i = self.free[a]
         if self.full[None] == 0:
             if self.near_pairs.row_is_new[i] == 1:
                 for k in range(self.neighbours.first[i], self.neighbours.last[i]):
-                    if self.listed.slot[k] >= 0:
-                        self._update_pair(k, self.listed.slot[k], i, self.listed.body[k])
+                    if self.neighbours.slot[k] >= 0:
+                        self._update_pair(k, self.neighbours.slot[k])
             self.near_pairs.put_row(i)
             if ti.static(self.has_limits):
                 for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
@@ -280,27 +268,25 @@ class BroadPhase:
 
     @ti.func
     def _notice(self, p):
-        """Notify the limits of a pair that is new, or has bodies that a break has exposed."""
+        """Notify the limits of a pair that is new, or has bodies that a break has set free."""
         pair, now = self.store.body[p], self.state.tick[None]
-        fresh = self.breaks.exposed_since(pair[0], now) | self.breaks.exposed_since(pair[1], now)
+        fresh = self.breaks.free_since(pair[0], now) | self.breaks.free_since(pair[1], now)
         self.limits.notice_listed(p, self.store.is_new[p], fresh)
         self.store.is_new[p] = 0
 
     @ti.func
-    def _update_pair(self, k, p, i, j):
-        """Write the sphere pairs of entry k, and book the energy that new overlaps inject."""
-        faces, count = self.listed.new_faces[k], self.listed.found[k]
-        self.listed.new_faces[k] = 0
-        if faces != 0:
-            if ti.static(self.contacts.law.meets_bodies):
-                self.store.sphere[self.store.sphere_place[p]] = [i, j]
-                self.store.replace_spheres(p, count)
-            else:
-                self.narrow_phase.compare(i, j, faces, self.store.sphere_place[p], True)
-                self.store.replace_spheres(p, count)
+    def _update_pair(self, k, p):
+        """Write the contacts of entry k, and book the energy that new overlaps inject."""
+        count, pair = self.neighbours.found[k], self.store.body[p]
+        if self.neighbours.is_new[k] == 1:
+            margin = self.contacts.margin(pair[0], pair[1])
+            self._find(pair[0], pair[1], margin, margin, self.store.sphere_place[p])
+            self.store.replace_spheres(p, count)
+            if not ti.static(self.contacts.law.meets_bodies):
                 injected = self.breaks.injected(p)
                 if injected > 0.0:
                     self.store.heat[p] = self.store.heat[p] + vec3(0.0, 0.0, injected)
                     self.store.waiting[p][0] = 1
         elif count == 0:
             self.store.remove_spheres(p)
+        self.neighbours.is_new[k] = 0

@@ -107,13 +107,8 @@ class BodyContact(SphereContact):
         return length(_outward(mesh)).max(axis=1)
 
     def spheres(self, model: Model) -> ContactSpheres:
-        """Balls around the faces of all bodies, by which neighbours are found."""
-        spheres = spheres_of_faces(model.mesh, model.centre, self.divisions)
-        corners = _corners(model)[:, LOCAL_FACES]
-        away = length(corners - spheres.cluster[:, :, None, :3]).max(axis=2)
-        cluster = spheres.cluster.copy()
-        cluster[..., 3] = np.maximum(cluster[..., 3], away)
-        return replace(spheres, cluster=cluster, extent=model.body_radius)
+        """No spheres are needed: a body extends to its corners."""
+        return replace(super().spheres(model), extent=model.body_radius)
 
     def declare(self, capacity: Capacity) -> None:
         """Corners, planes (4 x 3 normals, 4 distances) and ray ends of bodies, in their frames.
@@ -181,6 +176,18 @@ class BodyContact(SphereContact):
         else:
             near.apart = vec3(1.0, 0.0, 0.0)
         return near
+
+    @ti.func
+    def find(self, i, j, turn, offset, faces, margin, far, store: ti.template(), start):
+        """Bodies i and j make one contact where a ray of one may enter the other soon."""
+        count, gap = 1, margin
+        if start >= 0:
+            store.sphere[start] = [i, j]
+        else:
+            outside = self.gap(i, j, turn, offset)
+            if outside >= margin:
+                count, gap = 0, outside
+        return count, gap
 
     @ti.func
     def gap(self, a, b, turn, offset):

@@ -5,7 +5,7 @@ from typing import Any, Union
 import taichi as ti
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.products import matvec
+from taichi_dem.kit.products import matvec, squared
 from taichi_dem.kit.validation import between, flag, shown, whole
 from taichi_dem.laws.base import Effect
 from taichi_dem.materials import Material
@@ -121,6 +121,47 @@ class SphereContact(Effect):
         apart = matvec(turn, second.xyz) + offset - first.xyz
         size = first[3] + second[3]
         return Nearest(first=first, apart=apart, reach=size, size=size)
+
+    @ti.func
+    def find(self, i, j, turn, offset, faces, margin, far, store: ti.template(), start):
+        """Find contacts of bodies i and j with a gap below a margin [m], and the least gap of others.
+
+        That gap is at most far [m]. turn, offset: as in ``nearest``. faces: bit 4 f + g for free
+        faces f and g. start: place of the pair store from which they are entered, -1 to count them
+        only.
+        """
+        count, gap = 0, far
+        for fg in range(16):
+            if (faces >> fg) & 1 == 1:
+                first, second = 4 * i + fg // 4, 4 * j + fg % 4
+                mine, other = self.tables.cluster[first], self.tables.cluster[second]
+                middle, reach = matvec(turn, other.xyz) + offset, other[3] + gap
+                if squared(middle - mine.xyz) < (mine[3] + reach) ** 2:
+                    size = self.tables.face_spheres[None]
+                    for a in range(size * first, size * first + size):
+                        sphere = self.tables.sphere[a]
+                        # One far from the ball around those of the other face is far from all.
+                        if squared(middle - sphere.xyz) < (sphere[3] + reach) ** 2:
+                            count, gap = self._find_of(
+                                a, size * second, turn, offset, margin, gap, store, start, count
+                            )
+        return count, gap
+
+    @ti.func
+    def _find_of(self, a, first, turn, offset, margin, gap, store: ti.template(), start, count):
+        """Count, and enter, the contacts of sphere a with those of a face, from the first on."""
+        sphere = self.tables.sphere[a]
+        for b in range(first, first + self.tables.face_spheres[None]):
+            other = self.tables.sphere[b]
+            reach = sphere[3] + other[3]
+            apart = squared(matvec(turn, other.xyz) + offset - sphere.xyz)
+            if apart < (reach + margin) ** 2:
+                if start >= 0:
+                    store.sphere[start + count] = [a, b]
+                count += 1
+            elif apart < (reach + gap) ** 2:
+                gap = ti.sqrt(apart) - reach
+        return count, gap
 
     @ti.func
     def is_within(self, near, margin):

@@ -184,9 +184,8 @@ def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(again)
         simulation.state.set_motion(motion["position"] + step * way, turned)
         angle = 2.0 * np.linalg.norm(turned - before, axis=1)
         before = turned
-        travel = simulation.values(contacts.travel) + np.linalg.norm(way, axis=1) + extent * angle
-        shows = simulation.values(contacts.exposed_faces) != 0
-        assign(contacts.travel, np.where(shows, travel, 0.0))
+        path = simulation.values(contacts.path) + np.linalg.norm(way, axis=1) + extent * angle
+        assign(contacts.path, np.where(simulation.values(contacts.free) == 1, path, 0.0))
         touching = expected(simulation, 0.0)
         assert touching <= set(listed(simulation))
         broad.search(everywhere=False)
@@ -212,7 +211,7 @@ def test_a_fast_body_has_a_skin_for_some_steps(again):
     simulation.broad_phase.search()
     speed = np.linalg.norm(velocity, axis=1) + np.linalg.norm(spin, axis=1) * extent
     wanted = np.maximum(0.5 * skin, np.minimum(horizon * speed, FARTHEST * extent))
-    exposed = simulation.values(contacts.exposed_faces) != 0
+    exposed = simulation.values(contacts.free) == 1
     found = simulation.values(contacts.body_skin)
     assert found[exposed] == pytest.approx(wanted[exposed], rel=1e-12)
     for low, high in [(0.0, 0.6 * skin), (0.6 * skin, 0.24 * extent), (0.24 * extent, np.inf)]:
