@@ -21,7 +21,7 @@ from taichi_dem.kit.validation import whole
 from taichi_dem.laws.sphere_contact import SphereContact
 from taichi_dem.materials import Material
 from taichi_dem.materials.bond_rules import typical_of
-from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES, all_faces, area_vectors
 from taichi_dem.physics.body_overlap import (
@@ -35,8 +35,9 @@ from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import Model
 from taichi_dem.state.pair_store import PairStore
 
-#: Largest number of parts of an edge, and overlap [m2] that counts as none.
-_MOST_PARTS, _NONE = 8, 1e-28
+#: Largest number of parts of an edge, overlap [m2] that counts as none, and distance from which on
+#: the rays to a face are left out at once, as a share of the size of their body.
+_MOST_PARTS, _NONE, _FAR = 8, 1e-28, 0.02
 
 
 @ti.data_oriented
@@ -83,8 +84,8 @@ class BodyContact(SphereContact):
     meets_bodies = True
     constants, unit = ("normal_stiffness", "normal_damping"), "Pa/m"
     constant_fields = (
-        *("corner", "outward", "plane", "incentre", "volume", "face_area"),
-        *("ends", "end_count"),
+        *("corner", "outward", "plane", "incentre", "volume", "face_area", "far"),
+        *("ends", "end_count", "least_weight"),
     )
 
     def __init__(
@@ -114,14 +115,17 @@ class BodyContact(SphereContact):
         """Corners, planes (4 x 3 normals, 4 distances) and ray ends of bodies, in their frames.
 
         incentre: weights of the corners there. volume: [m3]. face_area: of the largest face [m2].
+        far: distance from which on the rays to a face are left out at once [m].
         """
         self.corner = ti.Matrix.field(4, 3, real, shape=capacity.bodies)
         self.outward = ti.Matrix.field(4, 3, real, shape=capacity.bodies)
         self.plane = ti.Vector.field(4, real, shape=capacity.bodies)
         self.incentre = ti.Vector.field(4, real, shape=capacity.bodies)
-        self.volume, self.face_area = (ti.field(real, shape=capacity.bodies) for _ in range(2))
+        self.volume, self.face_area, self.far = (
+            ti.field(real, shape=capacity.bodies) for _ in range(3)
+        )
         self.ends = ti.Vector.field(4, real, shape=4 * _MOST_PARTS**2)
-        self.end_count = ti.field(ti.i32, shape=())
+        self.end_count, self.least_weight = ti.field(ti.i32, shape=()), ti.field(real, shape=())
 
     def declare_columns(self, store: PairStore) -> None:
         """Keep q0 [m2] of each pair, and 1 once it is known."""
@@ -137,9 +141,11 @@ class BodyContact(SphereContact):
         assign(self.plane, dot(normal, corners[:, LOCAL_FACES[:, 0]]))
         assign(self.incentre, area / area.sum(axis=1, keepdims=True))
         assign(self.volume, volumes(model.mesh))
+        assign(self.far, _FAR * np.cbrt(volumes(model.mesh)))
         assign(self.face_area, area.max(axis=1))
         assign(self.ends, np.concatenate([ends, np.zeros((4 * _MOST_PARTS**2 - len(ends), 4))]))
         assign(self.end_count, len(ends))
+        assign(self.least_weight, ends[ends > 0.0].min())
 
     @ti.func
     def nearest(self, a, b, turn, offset):
@@ -212,7 +218,9 @@ class BodyContact(SphereContact):
             raised(-matmul_transposed(at, planes), distances),
             self.incentre[body],
             self.volume[body],
+            self.far[body],
             self.ends,
+            self.least_weight[None],
             self.end_count[None],
             whole,
         )

@@ -19,8 +19,6 @@ from taichi_dem.kit.types import real, vec3, vec4
 
 #: Turn of ray ends about the middle of a face, times the parts of its edges.
 TURN = 0.12
-#: Distance beyond which a pyramid is left out at once, as a share of the size of its body.
-FAR = 0.05
 mat4, mat43 = ti.types.matrix(4, 4, real), ti.types.matrix(4, 3, real)
 
 
@@ -72,9 +70,9 @@ def inside(start, change):
     """Part of a ray, between 0 and 1, with all depths positive: where it begins and ends.
 
     start: depths at its beginning; change: from there to its end. Where there is none, low > high,
-    and the third number is how far the ray is outside at least [m].
+    and the third number is how far the ray is outside at least [m], else 0.
     """
-    low, high, rise, fall = 0.0, 1.0, 0.0, 0.0
+    low, high, rise, fall, apart = 0.0, 1.0, 0.0, 0.0, 0.0
     for g in ti.static(range(4)):
         if start[g] <= 0.0:
             at = -start[g] / change[g]
@@ -84,7 +82,9 @@ def inside(start, change):
             at = -start[g] / change[g]
             if at < high:
                 high, fall = at, -change[g]
-    return low, high, rise * fall / ti.max(rise + fall, 1e-300) * (low - high)
+    if low > high:
+        apart = rise * fall / ti.max(rise + fall, 1e-300) * (low - high)
+    return low, high, apart
 
 
 @ti.func
@@ -104,44 +104,54 @@ def least(first, last, g: ti.template()):
 
 
 @ti.func
-def integrals(start, change, low, high, centre, end):
-    """Integral of the least depth over a thin pyramid, and its derivatives by the depths, (4, 4).
+def add_ray(total, slope, share, start, change, low, high, centre, end):
+    """Add the integral of the least depth over a thin pyramid, and its derivatives by the depths.
 
-    Of a part low .. high of its ray, for a unit of three times its volume.
+    low .. high: part of its ray that counts. share: three times its volume.
     """
-    total, slope, way = 0.0, mat4(0.0), high - low
-    first, last = start + low * change, start + high * change
+    way, first, last = high - low, start + low * change, start + high * change
+    bound = ti.max(first, last).min()
     for g in ti.static(range(4)):
-        since, until = least(first, last, g)
-        if until > since:
-            # Integrals of t^2 and t^3 over the part: a pyramid widens with t^2.
-            since, until = low + since * way, low + until * way
-            square, cube = (until**3 - since**3) / 3.0, (until**4 - since**4) / 4.0
-            total += start[g] * square + change[g] * cube
-            weights = centre * (square - cube) + end * cube
-            for c in ti.static(range(4)):
-                slope[c, g] = weights[c]
+        # One that is nowhere below the least of the largest values is nowhere the least.
+        if ti.min(first[g], last[g]) <= bound:
+            since, until = least(first, last, g)
+            if until > since:
+                # Integrals of t^2 and t^3 over the part: a pyramid widens with t^2.
+                since, until = low + since * way, low + until * way
+                square = share / 3.0 * (until**3 - since**3)
+                cube = share / 4.0 * (until**4 - since**4)
+                total += start[g] * square + change[g] * cube
+                for c in ti.static(range(4)):
+                    slope[c, g] += centre[c] * (square - cube) + end[c] * cube
     return total, slope
 
 
 @ti.func
-def sum_of_rays(depth, centre, volume, ends: ti.template(), count, whole: ti.template()):
+def highest_end(depth, face, least):
+    """Bound of the depths at the ends of the rays to a face, of which no weight is below least."""
+    highest, total = vec4(-1e30), vec4(0.0)
+    for c in ti.static(range(4)):
+        if c != face:
+            highest, total = ti.max(highest, row(depth, c)), total + row(depth, c)
+    return (1.0 - 3.0 * least) * highest + least * total
+
+
+@ti.func
+def sum_of_rays(
+    depth, centre, volume, far, ends: ti.template(), least, count, whole: ti.template()
+):
     """Integral of the least depth over a body [m4], and its derivatives by the depths [m3].
 
     Returns also how far all rays are outside at least [m], 0 where one is not. depth[c, g]: of
     corner c of the body below plane g of the other [m]. centre: weights of the corners in its
-    incentre. ends, count: of ``ray_ends`` and their number. whole: whether to integrate, or only to
-    find how far rays are outside.
+    incentre. far: distance from which on a pyramid is left out at once [m]. ends, least, count: of
+    ``ray_ends``, their smallest weight on a face, and their number. whole: whether to integrate, or
+    only to find how far rays are outside.
     """
     total, slope, outside = 0.0, mat4(0.0), 1e30
     start = transposed_matvec(depth, centre)
-    # Rays are seldom as near as the pyramid that they stand for: one by one, unless it is far off.
-    far = FAR * volume ** (1.0 / 3.0)
     for face in range(4):
-        top = start
-        for c in ti.static(range(4)):
-            if c != face:
-                top = ti.max(top, row(depth, c))
+        top = ti.max(start, highest_end(depth, face, least))
         if top.min() < -far:
             outside = ti.min(outside, -top.min())
         else:
@@ -155,8 +165,9 @@ def sum_of_rays(depth, centre, volume, ends: ti.template(), count, whole: ti.tem
                     outside = ti.max(0.0, ti.min(outside, apart))
                     if ti.static(whole):
                         if high > low:
-                            more, by = integrals(start, change, low, high, centre, ends[r])
-                            total, slope = total + share * more, slope + share * by
+                            total, slope = add_ray(
+                                total, slope, share, start, change, low, high, centre, ends[r]
+                            )
                 else:
                     outside = ti.min(outside, -highest)
     return total, slope, outside

@@ -8,7 +8,7 @@ from taichi_dem import CONCRETE, Scene, Uniform
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar
 from tests.again import Again
-from tests.unit.test_broad_phase import Marked, near_slots, slot_of_pair
+from tests.unit.test_contact_search import Marked, near_slots, slot_of_pair
 
 #: Scale of the motion by which bodies come near and part [m]; the skin is a twentieth of it.
 SPREAD = 0.02
