@@ -48,8 +48,9 @@ class Scene:
     material : Material
         Constants of bodies and bonds.
     effects : sequence of Effect or str, default ()
-        A list: exactly these effects are computed. ``"auto"``: the laws of the material, each
-        evaluated only where and when it acts. ``"all"``: the same laws, evaluated everywhere.
+        A list: exactly these effects are computed. ``"auto"``: the laws of the material, contact
+        by ``BodyContact`` and ``StickingFriction``, each evaluated only where and when it acts.
+        ``"all"``: the same laws, evaluated everywhere.
     max_speed : float, default 10000.0
         Speed beyond which a run counts as diverged [m/s].
     loads : iterable of Effect, default ()
@@ -60,7 +61,7 @@ class Scene:
         connected part to which they belong. None: 1e-6; at most 0.01, 0 for no sleep.
     unbonded : iterable of str, default ()
         Names of groups of inner faces without bonds from the start, as a notch or an open joint.
-        Both sides are free, and carry contact spheres as broken faces do.
+        Both sides are free, and touch as broken faces do.
     weaker : mapping, optional
         Share of the area of its faces that is bonded, above 0 and at most 1, by the name of a group
         of inner faces. Stiffness, damping, strength, cohesion and fracture energy per area of the
@@ -336,14 +337,14 @@ def remedy(contact: Any) -> str:
 
 
 def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
-    """Sentences about parts of a scene that may meet where they carry no spheres; before a run.
+    """Sentences about parts of a scene that may meet and would not touch there; before a run.
 
     A solid in one piece meets nothing until it breaks, which is detected in the run. Scenes with
     contact are expected to have meeting bodies: any with several parts is reported. Scenes without
     contact may hold independent solids: they are not reported where they stay at rest, fall alike,
     or are too far from each other (``parts.may_meet``). Faces that lie on each other without a bond
     (``Mesh.keep_coincident``, ``Scene.unbonded``) meet in a solid of one piece too; unbonded ones
-    have spheres with any contact.
+    touch with any contact.
     """
     contact = scene.effect("contact")
     if contact and contact.outer_faces:

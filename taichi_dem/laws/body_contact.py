@@ -44,10 +44,11 @@ _MOST_PARTS, _NONE, _FAR = 8, 1e-28, 0.02
 class BodyContact(SphereContact):
     """Bodies repel each other by the gradient of an energy of their overlap; outer faces too.
 
-    Takes the place of ``SphereContact``. The energy of a pair is k (q - q0)^2 / 2, k the normal
-    stiffness of a bond per area and q the size of the overlap, the area of contact's root times the
-    depth where flat sides meet; q0 is the smallest q since the two could first touch. So a break
-    injects nothing, whatever overlaps then. A dashpot acts on the rate of q, never as attraction.
+    The contact of ``effects="auto"`` and ``"all"``. The energy of a pair is k (q - q0)^2 / 2, k the
+    normal stiffness of a bond per area and q the size of the overlap, the area of contact's root
+    times the depth where flat sides meet; q0 is the smallest q since the two could first touch. So
+    a break injects nothing, whatever overlaps then. A dashpot acts on the rate of q, never as
+    attraction.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Friction between contact spheres that slide (Konno et al., 2.2), or stick until they slip."""
+"""Friction of contacts that slide (Konno et al., 2.2), or stick until they slip."""
 
 import taichi as ti
 

@@ -69,7 +69,7 @@ class Material:
     cohesion : float
         Cohesion of a bond [Pa].
     friction : float
-        Friction coefficient of bonds and of contact spheres.
+        Friction coefficient of bonds and of contacts.
     fracture_energy : float
         Fracture energy of mode I [J/m^2].
     contact_stiffness : float or rule
