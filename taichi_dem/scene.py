@@ -28,6 +28,7 @@ from taichi_dem.laws.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
 from taichi_dem.laws.roles import check_effect
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials, body_materials
+from taichi_dem.materials.bond_rules import typical_of
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
 from taichi_dem.mesh.topology import check_free
@@ -60,7 +61,7 @@ class Scene:
         connected part to which they belong. None: 1e-6; at most 0.01, 0 for no sleep.
     unbonded : iterable of str, default ()
         Names of groups of inner faces without bonds from the start, as a notch or an open joint.
-        Both sides are free, and carry contact spheres as broken faces do.
+        Both sides are free, and touch as broken faces do.
     weaker : mapping, optional
         Share of the area of its faces that is bonded, above 0 and at most 1, by the name of a group
         of inner faces. Stiffness, damping, strength, cohesion and fracture energy per area of the
@@ -203,10 +204,9 @@ class Scene:
             True where one acts.
         """
         flag("touching", touching)
-        material = self.body_materials
         roles = {effect.role for effect in self.effects if effect.name}
-        bonds = "dashpot" in roles and material.has_bond_damping
-        return bonds or (touching and "contact" in roles and material.has_contact_damping)
+        bonds = "dashpot" in roles and self.body_materials.has_bond_damping
+        return bonds or (touching and "contact" in roles and any(_drags(self)))
 
 
 def kind_of(scene: Scene) -> Hashable:
@@ -307,7 +307,7 @@ def _check_roles(effects):
             f"{' and '.join(parts)}"
         )
     if "friction" in roles and "contact" not in roles:
-        raise InputError("effect friction acts in sphere contacts: list SphereContact too")
+        raise InputError("effect friction acts in contacts: list BodyContact too")
 
 
 def scene_warnings(scene: Any) -> tuple[str, ...]:
@@ -320,30 +320,38 @@ def scene_warnings(scene: Any) -> tuple[str, ...]:
 
 def _friction_warnings(scene):
     """Friction without springs is a drag up to its limit, so without a dashpot it is none."""
-    friction, material = scene.effect("friction"), scene.body_materials
-    if friction is None or friction.remembers or material.friction_has_dashpots:
+    friction = scene.effect("friction")
+    if friction is None or friction.remembers or all(drags := _drags(scene, rough=True)):
         return ()
-    never = "never acts on bodies of a material" if material.has_contact_damping else "never acts"
+    never = "never acts on bodies of a material" if any(drags) else "never acts"
+    damping = scene.effect("contact").constants[1]
     return (
-        f"{friction.name} {never}: it is at most contact_damping times the sliding speed, and "
-        "contact_damping of the material is 0; StickingFriction acts by springs instead",
+        f"{friction.name} {never}: it is at most the dashpot of the contact, and {damping} of the "
+        "material is 0; StickingFriction acts by springs instead",
     )
+
+
+def _drags(scene, rough=False):
+    """Whether contacts of each material, or of each with friction, have dashpots."""
+    damping = scene.effect("contact").constants[1]
+    own = [row[k] for k, row in enumerate(scene.body_materials.pairs)]
+    return [typical_of(getattr(one, damping)) > 0.0 for one in own if one.friction or not rough]
 
 
 def remedy(contact: Any) -> str:
     """How bodies touch at their outer faces; contact: the effect of a scene, None without."""
-    return f"{type(contact).__name__ if contact else 'SphereContact'}(outer_faces=True)"
+    return f"{type(contact).__name__ if contact else 'BodyContact'}(outer_faces=True)"
 
 
 def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
-    """Sentences about parts of a scene that may meet where they carry no spheres; before a run.
+    """Sentences about parts of a scene that may meet where contact leaves them out; before a run.
 
     A solid in one piece meets nothing until it breaks, which is detected in the run. Scenes with
     contact are expected to have meeting bodies: any with several parts is reported. Scenes without
     contact may hold independent solids: they are not reported where they stay at rest, fall alike,
     or are too far from each other (``parts.may_meet``). Faces that lie on each other without a bond
     (``Mesh.keep_coincident``, ``Scene.unbonded``) meet in a solid of one piece too; unbonded ones
-    have spheres with any contact.
+    touch with any contact.
     """
     contact = scene.effect("contact")
     if contact and contact.outer_faces:
@@ -354,7 +362,7 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     cut = not contact and scene.mesh.has_open_faces
     if not (apart or cut or scene.mesh.keep_coincident):
         return ()
-    lack = "their outer faces carry no contact spheres" if contact else "no contact is listed"
+    lack = "contact leaves out their outer faces" if contact else "no contact is listed"
     if not apart:
         why = "coincident points of the mesh are kept apart, no bond joins the faces on them"
         if not scene.mesh.keep_coincident:
