@@ -21,7 +21,7 @@ from taichi_dem.kit.validation import whole
 from taichi_dem.laws.sphere_contact import SphereContact
 from taichi_dem.materials import Material
 from taichi_dem.materials.bond_rules import typical_of
-from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES, all_faces, area_vectors
 from taichi_dem.physics.body_overlap import (

@@ -124,7 +124,7 @@ class SphereContact(Effect):
 
     @ti.func
     def find(self, i, j, turn, offset, faces, margin, far, store: ti.template(), start):
-        """Find contacts of bodies i and j with a gap below a margin [m], and the least gap of others.
+        """Find contacts of bodies i and j with a gap below a margin [m]; least gap of the others.
 
         That gap is at most far [m]. turn, offset: as in ``nearest``. faces: bit 4 f + g for free
         faces f and g. start: place of the pair store from which they are entered, -1 to count them

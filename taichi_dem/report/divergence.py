@@ -17,8 +17,8 @@ from taichi_dem.step.drivers import CALL_SECONDS
 
 #: Unexplained energy beyond which a run counts as diverged, as a share of the energy present.
 ENERGY_FROM_NOWHERE = 0.5
-#: Share of the smaller body at which two bodies, whose faces all carry spheres, count as one
-#: within the other.
+#: Share of the smaller body at which two bodies, which touch with all faces, count as one within
+#: the other.
 DEEPEST_SHARE = 0.5
 #: Overlap of two contact spheres beyond recovery, as a share of the distance at which they touch:
 #: their centres are about to pass each other. A small sphere may be inside a large one.
@@ -196,7 +196,7 @@ class DivergenceCheck:
         if run.contacts is not None:
             of_contacts = model.materials.of_contacts
             pairs, counts, _ = run.contacts.store.near_table()
-            # Most sphere pairs that a body has with another, over its mass [1/kg].
+            # Most contacts that a body has with another, over its mass [1/kg].
             rates, mass = np.zeros(model.body_count), model.body_mass
             np.maximum.at(rates, pairs, np.maximum(1, counts)[:, None] / mass[pairs])
             rates *= model.contact.areas(model.mesh)

@@ -1,7 +1,7 @@
 """Volume that bodies share: the measure of interpenetration, counted in 512 parts of a body.
 
 Bodies are rigid, so two of them that are not bonded may share volume only where nothing keeps them
-apart: no contact, faces without spheres, or contact that is too soft or too sparse.
+apart: no contact, faces that it leaves out, or contact that is too soft or too sparse.
 """
 
 from dataclasses import dataclass
