@@ -28,6 +28,7 @@ from taichi_dem.laws.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
 from taichi_dem.laws.roles import check_effect
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials, body_materials
+from taichi_dem.materials.bond_rules import typical_of
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
 from taichi_dem.mesh.topology import check_free
@@ -204,10 +205,9 @@ class Scene:
             True where one acts.
         """
         flag("touching", touching)
-        material = self.body_materials
         roles = {effect.role for effect in self.effects if effect.name}
-        bonds = "dashpot" in roles and material.has_bond_damping
-        return bonds or (touching and "contact" in roles and material.has_contact_damping)
+        bonds = "dashpot" in roles and self.body_materials.has_bond_damping
+        return bonds or (touching and "contact" in roles and any(_drags(self)))
 
 
 def kind_of(scene: Scene) -> Hashable:
@@ -308,7 +308,7 @@ def _check_roles(effects):
             f"{' and '.join(parts)}"
         )
     if "friction" in roles and "contact" not in roles:
-        raise InputError("effect friction acts in sphere contacts: list SphereContact too")
+        raise InputError("effect friction acts in contacts: list BodyContact too")
 
 
 def scene_warnings(scene: Any) -> tuple[str, ...]:
@@ -321,19 +321,27 @@ def scene_warnings(scene: Any) -> tuple[str, ...]:
 
 def _friction_warnings(scene):
     """Friction without springs is a drag up to its limit, so without a dashpot it is none."""
-    friction, material = scene.effect("friction"), scene.body_materials
-    if friction is None or friction.remembers or material.friction_has_dashpots:
+    friction = scene.effect("friction")
+    if friction is None or friction.remembers or all(drags := _drags(scene, rough=True)):
         return ()
-    never = "never acts on bodies of a material" if material.has_contact_damping else "never acts"
+    never = "never acts on bodies of a material" if any(drags) else "never acts"
+    damping = scene.effect("contact").constants[1]
     return (
-        f"{friction.name} {never}: it is at most contact_damping times the sliding speed, and "
-        "contact_damping of the material is 0; StickingFriction acts by springs instead",
+        f"{friction.name} {never}: it is at most the dashpot of the contact, and {damping} of the "
+        "material is 0; StickingFriction acts by springs instead",
     )
+
+
+def _drags(scene, rough=False):
+    """Whether contacts of each material, or of each with friction, have dashpots."""
+    damping = scene.effect("contact").constants[1]
+    own = [row[k] for k, row in enumerate(scene.body_materials.pairs)]
+    return [typical_of(getattr(one, damping)) > 0.0 for one in own if one.friction or not rough]
 
 
 def remedy(contact: Any) -> str:
     """How bodies touch at their outer faces; contact: the effect of a scene, None without."""
-    return f"{type(contact).__name__ if contact else 'SphereContact'}(outer_faces=True)"
+    return f"{type(contact).__name__ if contact else 'BodyContact'}(outer_faces=True)"
 
 
 def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
@@ -355,7 +363,7 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     cut = not contact and scene.mesh.has_open_faces
     if not (apart or cut or scene.mesh.keep_coincident):
         return ()
-    lack = "their outer faces carry no contact spheres" if contact else "no contact is listed"
+    lack = "contact leaves out their outer faces" if contact else "no contact is listed"
     if not apart:
         why = "coincident points of the mesh are kept apart, no bond joins the faces on them"
         if not scene.mesh.keep_coincident:

@@ -95,8 +95,8 @@ def simulate(
 
     Notes
     -----
-    A UserWarning before the first step says what the scene cannot do (``scene_warnings``), and
-    which of its histories change within less than a step.
+    A UserWarning before the first step says what the scene cannot do (``scene_warnings``), which of
+    its histories change within less than a step, and which bodies begin within each other.
 
     Examples
     --------
@@ -114,6 +114,8 @@ def simulate(
         warnings.warn(sentence, stacklevel=2)
     with reporting(progress, title) as tell:
         simulation, recorder = _started(Simulation(scene, method, driver))
+        for sentence in simulation.shared_volume.at_start():
+            warnings.warn(sentence, stacklevel=2)
         writer = writer_of(simulation, recorder, checkpoint, resume, arrays)
         result, error = _result(simulation, recorder, writer, plan, tell)
         if error is None:

@@ -54,7 +54,7 @@ class Job:
     def _longest_step(self):
         """Longest step that all springs bear [s]: solved dashpots leave no other limit.
 
-        Without bonds that of contacts, which is not needed where few of their spheres ever touch.
+        Without bonds that of contacts, which is not needed where no whole face ever touches.
         """
         mesh, material = self.scene.mesh, self.scene.body_materials
         rates = bond_rates(mesh, topology_of(mesh), material.density, springs_of(material))

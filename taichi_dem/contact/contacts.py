@@ -9,7 +9,7 @@ from taichi_dem.kit.types import real, vec3
 from taichi_dem.laws.sphere_contact import ONCE_BROKEN
 from taichi_dem.methods import Method
 from taichi_dem.physics.rotation import place_in
-from taichi_dem.physics.sphere_pair import Nearest
+from taichi_dem.physics.sphere_pair import DEEPEST_SHARE, SUNK, Nearest
 from taichi_dem.state.capacity import SPARE_PAIRS, SPARE_SPHERES
 from taichi_dem.state.model import Model
 from taichi_dem.state.pair_store import PairStore
@@ -129,6 +129,15 @@ class Contacts:
     def touching(self, p):
         """Number of sphere pairs of a pair of bodies that overlap now."""
         return self.closer(p, 0.0)
+
+    @ti.func
+    def note_depth(self, p, deepest):
+        """Keep the depth of a pair, a share of its size, and for good where one body sinks in."""
+        self.store.deepest[p] = deepest
+        if ti.static(self.law.meets_bodies):
+            if deepest > DEEPEST_SHARE:
+                for side in ti.static(range(2)):
+                    self.state.note_active(self.store.body[p][side], ti.i64(SUNK))
 
     @ti.func
     def add_impulse(self, p, side: ti.template(), linear, angular):

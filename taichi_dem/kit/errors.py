@@ -26,7 +26,8 @@ class SimulationDiverged(Portable, RuntimeError):
         Result of the run up to its last good sample; None where there is none.
     advice : mapping of float
         What the sentence advises, numbers by name: step [s], the largest one of the method;
-        max_speed [m/s] of the scene; contact_stiffness [N/m] of the material; of the damper dt [s].
+        max_speed [m/s] of the scene; contact_stiffness [N/m] or, of whole bodies, normal_stiffness
+        [Pa/m] of the material; of the damper dt [s].
         A run that follows it may have to be advised again.
     """
 

@@ -21,7 +21,7 @@ class Friction(Effect):
     """
 
     role = "friction"
-    activation = "spheres that touch slide"
+    activation = "bodies that touch slide"
     may_be_silent = True
 
     def numbers(self, material: Material) -> tuple[float, ...]:
@@ -74,7 +74,7 @@ class StickingFriction(Friction):
     """
 
     name = "sticking_friction"
-    activation = "spheres that touch slide"
+    activation = "bodies that touch slide"
     remembers = True
     #: Its springs let bodies that touch remember: without a limit they would still slip.
     may_be_silent = False

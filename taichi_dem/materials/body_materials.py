@@ -38,7 +38,7 @@ _LEAST = ("tensile_strength", "cohesion", "friction", "fracture_energy")
 
 
 def joined(first: Material, second: Material) -> Material:
-    """What a bond between two materials has, and a contact of two spheres.
+    """What a bond between two materials has, and a contact of two bodies.
 
     Stiffnesses and dashpots are in series (``bond_rules.InSeries``; of contacts 2 k1 k2 / (k1 +
     k2), numbers by now), strengths the lesser ones. A constant that both share stays, to the bit.
@@ -127,19 +127,9 @@ class BodyMaterials:
         return any(material.has_bond_damping for material in self.materials)
 
     @property
-    def has_contact_damping(self) -> bool:
-        """Whether contacts of any material have dashpots."""
-        return any(material.has_contact_damping for material in self.materials)
-
-    @property
     def friction(self) -> float:
         """Largest friction coefficient."""
         return max(material.friction for material in self.materials)
-
-    @property
-    def friction_has_dashpots(self) -> bool:
-        """Whether contacts of every material with friction have dashpots."""
-        return all(each.has_contact_damping for each in self.materials if each.friction > 0.0)
 
     def of_contacts(self, name: str) -> Any:
         """Largest constant of the contacts that a body can have, (body_count,).

@@ -57,11 +57,11 @@ class Material:
     density : float
         Density [kg/m^3].
     normal_stiffness : float or rule
-        Normal stiffness of a bond per area [Pa/m].
+        Normal stiffness of a bond per area [Pa/m], and of a contact of two bodies.
     shear_stiffness : float or rule
         Shear stiffness of a bond per area [Pa/m].
     normal_damping : float or rule
-        Normal dashpot of a bond per area [Pa s/m].
+        Normal dashpot of a bond per area [Pa s/m], and of a contact of two bodies.
     shear_damping : float or rule
         Shear dashpot of a bond per area [Pa s/m].
     tensile_strength : float
@@ -73,9 +73,9 @@ class Material:
     fracture_energy : float
         Fracture energy of mode I [J/m^2].
     contact_stiffness : float or rule
-        Stiffness of one sphere contact [N/m].
+        Stiffness of one contact of spheres [N/m], for ``SphereContact`` alone.
     contact_damping : float or rule
-        Dashpot of one sphere contact [N s/m].
+        Dashpot of one contact of spheres [N s/m], likewise.
 
     Raises
     ------
@@ -146,7 +146,7 @@ class Material:
         fracture_energy : float
             Fracture energy of mode I of a bond [J/m^2].
         friction_angle : float
-            Friction angle of bonds and of spheres, from 0 to 89.9 [degrees].
+            Friction angle of bonds and of contacts, from 0 to 89.9 [degrees].
         cohesion : float
             Cohesion of a bond [Pa].
         damping_ratio : float, default 0.05
@@ -197,12 +197,6 @@ class Material:
         """Whether bonds have dashpots."""
         constants = self.normal_damping, self.shear_damping
         return any(isinstance(value, Rule) or value > 0.0 for value in constants)
-
-    @property
-    def has_contact_damping(self) -> bool:
-        """Whether contacts have dashpots."""
-        value = self.contact_damping
-        return isinstance(value, Rule) or value > 0.0
 
     @property
     def onset_opening(self) -> float:

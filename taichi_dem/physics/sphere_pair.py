@@ -4,9 +4,12 @@ import taichi as ti
 
 from taichi_dem.kit.products import dot, matvec, norm, squared
 
-#: Bits of ``State.active_effects`` beside those of loads and supports: of sphere contact and of its
-#: friction.
-CONTACT, RUBBED = 1 << 61, 1 << 60
+#: Bits of ``State.active_effects`` beside those of loads and supports: of contact, of its friction,
+#: and of two bodies of which one was within the other.
+CONTACT, RUBBED, SUNK = 1 << 61, 1 << 60, 1 << 59
+#: Share of the smaller body at which two bodies, which touch with all faces, count as one within
+#: the other.
+DEEPEST_SHARE = 0.5
 
 
 @ti.func

@@ -17,12 +17,12 @@ from taichi_dem.plot.bodies import shades
 ENERGY_TERMS = {
     "kinetic_J": ("kinetic", "#08306B", "-"),
     "bond_strain_J": ("bond strain", "#3A87C2", "-"),
-    "sphere_strain_J": ("sphere strain", "#A6CEE8", "-"),
+    "sphere_strain_J": ("contact strain", "#A6CEE8", "-"),
     "bond_dashpot_J": ("bond dashpots", "#FDBE85", "--"),
     "slip_J": ("slip", "#E6700F", "--"),
     "softening_J": ("softening", "#A63603", "--"),
     "release_J": ("release", "#5C1A00", "--"),
-    "sphere_dashpot_J": ("sphere dashpots", "#CDBDE3", "-."),
+    "sphere_dashpot_J": ("contact dashpots", "#CDBDE3", "-."),
     "friction_J": ("friction", "#6F4FA0", "-."),
     "ground_dashpot_J": ("ground dashpots", "#8C8C8C", (0, (8, 2))),
 }

@@ -8,6 +8,7 @@ import numpy as np
 from taichi_dem.contact.contacts import FARTHEST
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.errors import SimulationDiverged
+from taichi_dem.physics.sphere_pair import DEEPEST_SHARE, SUNK
 from taichi_dem.report.energy_balance import EnergyBalance, unexplained_share
 from taichi_dem.report.readings import Run
 from taichi_dem.report.shared_volume import SharedVolume
@@ -17,9 +18,6 @@ from taichi_dem.step.drivers import CALL_SECONDS
 
 #: Unexplained energy beyond which a run counts as diverged, as a share of the energy present.
 ENERGY_FROM_NOWHERE = 0.5
-#: Share of the smaller body at which two bodies, whose faces all carry spheres, count as one
-#: within the other.
-DEEPEST_SHARE = 0.5
 #: Overlap of two contact spheres beyond recovery, as a share of the distance at which they touch:
 #: their centres are about to pass each other. A small sphere may be inside a large one.
 DEEPEST_OVERLAP = 0.95
@@ -86,8 +84,18 @@ class DivergenceCheck:
 
     def _check_overlap(self):
         contacts = self.run.contacts
-        if contacts is None or not values(contacts.store.near_count):
+        if contacts is None:
             return
+        if values(contacts.store.near_count):
+            self._check_pairs(contacts)
+        marks = values(self.run.state.active_effects, slice(self.run.model.body_count))
+        sunk = np.flatnonzero(marks & np.int64(SUNK))
+        if len(sunk):
+            whom = f"body {sunk[1]}" if len(sunk) == 2 else "another one"
+            share = f"more than {100 * DEEPEST_SHARE:g} % of its volume"
+            raise self._too_deep(int(sunk[0]), f"has shared {share} with {whom}")
+
+    def _check_pairs(self, contacts):
         bodies, _, deepest = contacts.store.near_table()
         pair = int(deepest.argmax())
         if contacts.law.meets_bodies:
@@ -196,7 +204,7 @@ class DivergenceCheck:
         if run.contacts is not None:
             of_contacts = model.materials.of_contacts
             pairs, counts, _ = run.contacts.store.near_table()
-            # Most sphere pairs that a body has with another, over its mass [1/kg].
+            # Most contacts that a body has with another, over its mass [1/kg].
             rates, mass = np.zeros(model.body_count), model.body_mass
             np.maximum.at(rates, pairs, np.maximum(1, counts)[:, None] / mass[pairs])
             rates *= model.contact.areas(model.mesh)

@@ -1,8 +1,8 @@
 """Energy and momentum account of a run, term by term (spec, section 6).
 
-work of loads and supports + energy at the start = kinetic + bond strain + sphere strain
-+ bond dashpots + slip + softening + release + friction + sphere dashpots + ground dashpots
-- injected + residual.
+work of loads and supports + energy at the start = kinetic + bond strain + contact strain
++ bond dashpots + slip + softening + release + friction + contact dashpots + ground dashpots
+- injected + residual. Terms of all contacts, also of whole bodies, are called ``sphere_*``.
 """
 
 from collections.abc import Callable, Mapping
@@ -106,9 +106,9 @@ class EnergyBalance(Kept):
     def tables(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Tables that the terms are summed from [J].
 
-        A row a body: kinetic, loads, supports, sphere dashpots, friction, injected, ground. A row a
-        bond: strain, dashpot, slip, release, softening. A row a pair: strain, dashpots, friction,
-        injected, so far as its first body has not taken them.
+        A row a body: kinetic, loads, supports, dashpots of contacts, friction, injected, ground. A
+        row a bond: strain, dashpot, slip, release, softening. A row a pair: strain, dashpots,
+        friction, injected, so far as its first body has not taken them.
         """
         readings = self.run.readings
         with readings.held():

@@ -77,8 +77,7 @@ def unserved(model: Model) -> dict[str, MissingEffect]:
     roles = {effect.role for effect in model.effects if effect.name}
     material, touch = model.materials, "contact" in roles
     rubs, damps = material.friction > 0.0, material.has_bond_damping
-    # Friction is a dashpot's force up to a limit: without a dashpot springs alone hold.
-    friction = "Friction" if material.friction_has_dashpots else "StickingFriction"
+    sticking = "StickingFriction"
     drags = any(e.role == "friction" and e.name and not e.remembers for e in model.effects)
     stretched = "bonds are stretched past their tensile strength"
     sheared = "bonds are sheared past their Coulomb limit"
@@ -90,11 +89,11 @@ def unserved(model: Model) -> dict[str, MissingEffect]:
         "tension": (roles.isdisjoint(("bond", "tension")), "Softening", stretched),
         "shear": (roles.isdisjoint(("bond", "shear")), "ShearSlip", sheared),
         "dashpot": (damps and "dashpot" not in roles, "BondDamping", strained),
-        "contact": (not touch, "SphereContact", overlap),
-        "friction": (touch and rubs and "friction" not in roles, friction, press, "body"),
+        "contact": (not touch, "BodyContact", overlap),
+        "friction": (touch and rubs and "friction" not in roles, sticking, press, "body"),
         # The words tell the figures, once they are known.
-        "creep": (rubs and drags, "StickingFriction", "", "body"),
-        "bodies": (not touch, "SphereContact", within, "body"),
+        "creep": (rubs and drags, sticking, "", "body"),
+        "bodies": (not touch, "BodyContact", within, "body"),
     }
     return {name: MissingEffect(*need) for name, (missed, *need) in needs.items() if missed}
 

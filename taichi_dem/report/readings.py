@@ -231,7 +231,7 @@ class Readings:
         share: ti.types.ndarray(dtype=ti.f64, ndim=1),
         taken: ti.types.ndarray(dtype=ti.f64, ndim=1),
     ):
-        """Note how far the steps of touching bodies limit their sphere dashpots.
+        """Note how far the steps of touching bodies limit their contact dashpots.
 
         share: least share, where dashpots are limited; else taken: largest part of a speed that
         they take in a step.

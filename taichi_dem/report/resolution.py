@@ -21,20 +21,20 @@ LEAST_SHARE = 0.5
 #: A bond open by this many failure openings when it fails has failed too late: its dashpots,
 #: far stronger than its springs, have acted too long.
 MOST_OPENING = 1.25
-#: Sphere dashpots of a pair take c n dt / m of the speed at which the bodies part or meet; above 1
-#: they reverse it, and throw apart bodies that the springs should part gently.
+#: Contact dashpots of a pair take c n dt / m of the speed at which the bodies part or meet; above
+#: 1 they reverse it, and throw apart bodies that the springs should part gently.
 MOST_TAKEN = 1.0
 #: Largest values for which the step is short enough, with their sentences: less shares of bonds,
-#: openings at failure, less shares of sphere dashpots, and parts of a speed that these take.
+#: openings at failure, less shares of contact dashpots, and parts of a speed that these take.
 _ALLOWED = -LEAST_SHARE, MOST_OPENING, -LEAST_SHARE, MOST_TAKEN
 _TOO_LONG = (
     "the dashpots of {count} bonds, and limits them to less than half, bond {worst} to "
     "{percent:.2g} %: these bonds give way too fast",
     "{count} bonds that failed late, bond {worst} at {value:.2g} times its failure "
     "opening: their dashpots took energy for too long",
-    "the sphere dashpots of {count} bodies, and limits them to less than half, those "
+    "the contact dashpots of {count} bodies, and limits them to less than half, those "
     "of body {worst} to {percent:.2g} %: what is pressed together parts too fast",
-    "the sphere dashpots of {count} bodies: those of body {worst} take {value:.2g} of "
+    "the contact dashpots of {count} bodies: those of body {worst} take {value:.2g} of "
     "a speed in one step, and throw bodies apart that they should stop",
 )
 
@@ -68,9 +68,10 @@ class StepResolution(Kept):
 
     slip: largest residual slip of a bond that held over the shortest edge of its face, the bond,
     when, and the number of bonds that slipped too far. share: least share of its dashpots that each
-    bond kept while it held, (bond_count,). step: shortest step of each body [s]; lightest: mass of
-    the lightest body near it [kg]; pair_share: least recorded share of its contacts; taken: largest
-    part of a speed that they take in a step; all (body_count,).
+    bond kept while it held, (bond_count,). step: shortest step of each body [s]; lightest: least
+    ``mass`` of it and of bodies near it; pair_share: least recorded share of its contacts; taken:
+    largest part of a speed that they take in a step; all (body_count,). mass: of each body over
+    what the dashpot of a contact is multiplied by at most [kg; of whole bodies kg/m2].
     """
 
     kept = "slip", "share", "pair_share", "taken", "step", "lightest"
@@ -80,7 +81,9 @@ class StepResolution(Kept):
         self.slip = np.array([0.0, -1.0, 0.0, 0.0])
         self.share, self.pair_share = np.ones(run.model.bond_count), np.ones(bodies)
         self.taken, self.step = np.zeros(bodies), np.full(bodies, np.inf)
-        self.lightest = run.model.body_mass.copy()
+        contact, mass = run.model.contact, run.model.body_mass
+        self.mass = mass / (1.0 if contact is None else contact.areas(run.model.mesh))
+        self.lightest = self.mass.copy()
         corners = run.model.mesh.points[run.model.topology.vertices]
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
         by_role = run.model.by_role
@@ -116,12 +119,11 @@ class StepResolution(Kept):
 
     def _note_partners(self, contacts):
         """Remember steps and light partners: few contacts last until a recording."""
-        mass = self.run.model.body_mass
-        level = values(self.run.state.level, slice(len(mass)))
+        level = values(self.run.state.level, slice(len(self.mass)))
         self.step = np.minimum(self.step, self.run.schedule.dt0 / 2.0**level)
         pairs, _, _ = contacts.store.near_table()
         for one, other in (pairs.T, pairs.T[::-1]):
-            np.minimum.at(self.lightest, one, mass[other])
+            np.minimum.at(self.lightest, one, self.mass[other])
 
     def findings(self) -> tuple[str, ...]:
         """Sentences about dashpots and failures that the step did not resolve; may be empty."""
@@ -161,14 +163,16 @@ class StepResolution(Kept):
         )
 
     def _contact_shares(self):
-        """Largest share that limited sphere dashpots can have had where they acted, (body_count,).
+        """Largest share that limited contact dashpots can have had where they acted, (body_count,).
 
         The recorded share, or that of a single contact, 1 / X with X = 2 c dt / m; see
         ``stability/body_limits.py``. Contacts that took energy have acted; it is booked to the
         first body of a pair.
         """
-        damping = self.run.model.materials.of_contacts("contact_damping")
-        if self.run.contacts is None or not self.run.advance.limited or not np.any(damping):
+        if self.run.contacts is None or not self.run.advance.limited:
+            return self.pair_share
+        damping = self.run.model.materials.of_contacts(self.run.model.contact.constants[1])
+        if not np.any(damping):
             return self.pair_share
         heat = values(self.run.state.contact_heat, slice(self.run.model.body_count))
         acted = heat[:, :2].sum(axis=1) > 0.0

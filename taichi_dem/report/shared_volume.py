@@ -1,7 +1,7 @@
 """Volume that bodies share: the measure of interpenetration, counted in 512 parts of a body.
 
 Bodies are rigid, so two of them that are not bonded may share volume only where nothing keeps them
-apart: no contact, faces without spheres, or contact that is too soft or too sparse.
+apart: no contact, faces that it leaves out, or contact that is too soft or too sparse.
 """
 
 from dataclasses import dataclass
@@ -61,27 +61,28 @@ class Interpenetration:
 
 
 class SharedVolume(Kept):
-    """Finds bodies within each other, at recording times after which some body has moved.
+    """Finds bodies within each other, at the start and at recording times after some body moved.
 
     Of the last look: pairs (n, 2) that share volume and their share of the smaller body (n,).
-    figures: those of ``worst`` so far.
+    figures: those of ``worst`` so far; first: those at the start.
     """
 
-    kept = "place", "turn", "figures"
+    kept = "place", "turn", "figures", "first"
 
     def __init__(self, run: Run):
         self.run, model = run, run.model
         self.arms = model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
         self.points = [points_of_parts(halvings) for halvings in _HALVINGS]
-        self.place, self.turn = model.centre, np.tile(np.eye(3), (model.body_count, 1, 1))
-        self.figures = np.array([0.0, -1.0, -1.0, 0.0, 0.0])
+        # From nowhere: the first look is never left out.
+        self.place = np.full_like(model.centre, np.inf)
+        self.turn = np.tile(np.eye(3), (model.body_count, 1, 1))
+        self.figures = self.first = np.array([0.0, -1.0, -1.0, 0.0, 0.0])
         self.pairs, self.share = np.zeros((0, 2), dtype=np.int32), np.zeros(0)
 
     @property
     def worst(self) -> Interpenetration:
         """The worst pair so far."""
-        share, first, second, time_s, deep = self.figures.tolist()
-        return Interpenetration(share, (int(first), int(second)), time_s, int(deep))
+        return _told(self.figures)
 
     def sample(self, time_s: float, finished: bool = False) -> None:
         """Compare the bodies where one has moved, or at the end."""
@@ -95,6 +96,8 @@ class SharedVolume(Kept):
             figures[:4] = share, *self.pairs[self.share.argmax()], time_s
         figures[4] = max(figures[4], (self.share > DEEP).sum())
         self.figures = figures
+        if time_s == 0.0:
+            self.first = figures
 
     def _way(self):
         """Longest way of a body since the last look, as a share of its radius."""
@@ -115,21 +118,24 @@ class SharedVolume(Kept):
         return place[bodies, None] + np.einsum("nij,ncj->nci", turn[bodies], self.arms[bodies])
 
     def findings(self) -> tuple[str, ...]:
-        """A sentence where bodies are within each other although contact is listed; or none."""
+        """Sentences where bodies are within each other although contact is listed; or none."""
         contact, worst = self.run.model.contact, self.worst
-        if contact is None or worst.share <= NOTABLE:
-            return ()
+        if contact is None or worst.share <= NOTABLE or worst == _told(self.first):
+            return self.at_start()
         law = type(contact).__name__
         stiffness = contact.constants[0]
         advice = f"a larger {stiffness}, or more points of {law}, keeps them apart"
         if not contact.outer_faces:
             advice = f"{remedy(contact)} lets them touch there too"
-        first, second = worst.bodies
-        return (
-            f"bodies {first} and {second} share {100.0 * worst.share:.2g} % of the smaller one at "
-            f"t = {worst.time_s:.4g} s, and {worst.deep} pairs more than {100.0 * DEEP:g} %: "
-            f"{advice}",
-        )
+        return (*self.at_start(), f"{_words(worst, f't = {worst.time_s:.4g} s')}: {advice}")
+
+    def at_start(self) -> tuple[str, ...]:
+        """A sentence where bodies that may touch begin within each other; or none."""
+        contact, first = self.run.model.contact, _told(self.first)
+        if contact is None or first.share == 0.0:
+            return ()
+        rest = f", or {type(contact).__name__} counts their overlap as rest"
+        return (f"{_words(first, 'the start')}: move them apart{rest * contact.meets_bodies}",)
 
     def _compare(self, corners):
         """Find all pairs and their shares; corners (n, 4, 3) [m]."""
@@ -152,6 +158,20 @@ class SharedVolume(Kept):
         order = np.lexsort(found[strangers][:, [1, 0]].T)
         self.pairs = np.sort(pairs[strangers][order], axis=1)
         self.share = found[strangers][order, 2]
+
+
+def _told(figures):
+    """Figures as an ``Interpenetration``."""
+    share, first, second, time_s, deep = figures.tolist()
+    return Interpenetration(share, (int(first), int(second)), time_s, int(deep))
+
+
+def _words(found, when):
+    """An ``Interpenetration`` at a time as the beginning of a sentence."""
+    return (
+        f"bodies {found.bodies[0]} and {found.bodies[1]} share {100.0 * found.share:.2g} % of the "
+        f"smaller one at {when}, and {found.deep} pairs more than {100.0 * DEEP:g} %"
+    )
 
 
 def _in_rows(corners):

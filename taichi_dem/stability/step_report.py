@@ -37,8 +37,8 @@ class StepReport:
     ----------
     limits : dict
         Largest steps [s] by criterion, shape (body_count,) each: bond_stiffness, bond_dashpot,
-        contact_stiffness and contact_dashpot (every sphere of the worst face in one contact). A
-        criterion whose effect a scene leaves out is missing.
+        contact_stiffness and contact_dashpot (all of the worst face in one contact). A criterion
+        whose effect a scene leaves out is missing.
     altitude_m : ndarray
         Smallest altitude of each body [m], (body_count,).
     aspect_ratio : ndarray
@@ -77,7 +77,7 @@ class StepReport:
             How the method takes dashpots, a key of ``METHODS``: ``"full"``, ``"limited"`` or
             ``"solved"``, which leaves the limit of the springs.
         link : str, default "bond"
-            ``"bond"``, or ``"contact"`` for every sphere of the worst face in one contact.
+            ``"bond"``, or ``"contact"`` for all of the worst face in one contact.
 
         Returns
         -------
@@ -116,7 +116,7 @@ class StepReport:
             criteria.append([name, f"{(binding == name).sum()}", *figures])
         lines = [line for table in (methods, criteria) for line in [*aligned(table), ""]]
         explained = (
-            "in contact: every sphere of the worst face at once; Multirate: of the worst body, as "
+            "in contact: all of the worst face at once; Multirate: of the worst body, as "
             "each has its own; a StepControl keeps to its safety's share of them"
         )
         return "\n".join([*lines, *self._worst(), explained, *warnings])

@@ -60,11 +60,10 @@ class State:
     sums of the sizes of both. tick: present time.
     bad_body: lowest body out of bounds, body_count if none.
     active_effects: bits of each body: of the loads, then the supports, then the ground that changed
-    its motion, CONTACT and RUBBED. limits: tensile strength, cohesion [Pa] and friction coefficient
-    of each pair of materials, whose excess in a bond is noted, without bound where an effect serves
-    them; passed: ticks at
-    which a bond first exceeded its tensile and its shear limit, NEVER before. activity: the
-    ``Activity`` of bonds whose laws act on demand, else None.
+    its motion, CONTACT, RUBBED and SUNK. limits: tensile strength, cohesion [Pa] and friction
+    coefficient of each pair of materials, whose excess in a bond is noted, without bound where an
+    effect serves them; passed: ticks at which a bond first exceeded its tensile and its shear
+    limit, NEVER before. activity: the ``Activity`` of bonds whose laws act on demand, else None.
     """
 
     def __init__(self, tables: Tables):

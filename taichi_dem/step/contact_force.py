@@ -59,7 +59,7 @@ class ContactForce:
             self.contacts.store.heat[p] = self.contacts.store.heat[p] + heat
         if ti.static(self.springs.present):
             self.contacts.book_friction(p, found.slipped)
-        self.contacts.store.deepest[p] = found.deepest
+        self.contacts.note_depth(p, found.deepest)
         if ti.static(self.has_limits):
             self.limits.notice_pair(p, found.near_count, HIT)
 

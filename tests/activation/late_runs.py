@@ -11,8 +11,8 @@ NAMES = {
     "tension": "softening",
     "shear": "shear_slip",
     "dashpot": "bond_damping",
-    "contact": "sphere_contact",
-    "friction": "friction",
+    "contact": "body_contact",
+    "friction": "sticking_friction",
 }
 #: What must have the same bits.
 BITS = (
@@ -61,7 +61,7 @@ def acting(simulation):
     pressed = report.energy_balance["sphere_dashpot"] + report.energy_balance["kinetic"]
     found = {}
     for use in report.effect_activity:
-        rounding = use.effect == "friction" and use.energy_J <= 1e-9 * pressed
+        rounding = use.effect == NAMES["friction"] and use.energy_J <= 1e-9 * pressed
         if use.is_active and not rounding:
             found[use.effect] = use.events
     return found

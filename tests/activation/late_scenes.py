@@ -115,8 +115,8 @@ def strengths(tension=ENDLESS, cohesion=ENDLESS):
 @cache
 def peaks(late):
     """Largest traction of each bond, elastic [Pa], the largest first, and the bonds."""
-    laws = [PeakTension(), PeakShear(), effects.BondDamping(), effects.Friction()]
-    listed = [*laws, effects.SphereContact(outer_faces=True), *late.loads]
+    laws = [PeakTension(), PeakShear(), effects.BondDamping(), effects.StickingFriction()]
+    listed = [*laws, effects.BodyContact(), *late.loads]
     run = simulation(late, Scene(late.mesh, strengths(), listed))
     run.advance_to(round(late.until / STEP))
     law = run.tables.bond.tension if late.role == "tension" else run.tables.bond.shear

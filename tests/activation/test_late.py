@@ -90,7 +90,7 @@ def test_where_it_is_not_needed_it_never_acts(name):
     if late_scene(name).is_limit:
         assert (twin.since[:, int(role == "shear")] == NEVER).all()
     if role == "contact":
-        assert "friction" not in twin.acting
+        assert NAMES["friction"] not in twin.acting
 
 
 @pytest.mark.parametrize("name", SCENES)

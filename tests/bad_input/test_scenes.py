@@ -66,7 +66,7 @@ NOTCHED = {"mesh": CUT, "weaker": {"notch": 0.5}}
 QUIET = Scene(single(), CONCRETE, [effects.QuietBoundary("base")])
 SCENES = {
     "laws of one role": (lambda: scene(effects.Softening(), effects.Softening()), "both take"),
-    "friction alone": (lambda: scene(effects.Friction()), "list SphereContact too"),
+    "friction alone": (lambda: scene(effects.Friction()), "list BodyContact too"),
     "a joint that is not there": (lambda: scene(weaker={"joint": 0.5}), "no face group 'joint'"),
     "a notch outside": (lambda: scene(unbonded=["left"]), "must be of inner faces"),
     "a notch that is a joint": (lambda: scene(**NOTCHED, unbonded=["notch"]), "notch in both"),

@@ -134,24 +134,33 @@ def test_a_motion_that_is_no_number_is_named_and_not_searched_with():
         simulation.advance_to(20)
 
 
-def shot(stiffness, step):
-    """Run of a body that flies at a pair, whose contacts are so stiff [N/m]."""
-    soft = replace(CONCRETE, contact_stiffness=stiffness, contact_damping=0.0)
+def shot(contact, speed, samples, stiffness, step):
+    """Run of a body that flies at a pair [m/s], whose contacts are so stiff, in the law's unit."""
+    constants = dict(zip(contact.constants, (stiffness, 0.0)))
+    soft = replace(CONCRETE, fracture_energy=1e12, **constants)
     parts = {"flying": (single(), (-1e-4, 0.0, 0.0)), "pair": (pair(), (0.05, 0, 0))}
-    velocity = {"flying": (50.0, 0.0, 0.0)}
-    scene = Scene(placed_together(parts), soft, [effects.SphereContact()], velocity=velocity)
-    return simulate(scene, method=Uniform(step), until=2e-3, samples=10, progress=None)
+    moves = {"velocity": {"flying": (speed, 0.0, 0.0)}}
+    scene = Scene(placed_together(parts), soft, [contact], **moves)
+    asked = {"until": 0.1 / speed, "samples": samples, "progress": None}
+    return simulate(scene, method=Uniform(step), **asked)
 
 
-def test_the_stiffness_it_advises_ends_well():
-    """Spheres of 5 mm hold 44 J a body only from 1e6 N/m on: six spheres, k (2 mm)^2 / 2 each."""
-    given, advised = {"contact_stiffness": 1e3, "step": 2e-7}, []
+@pytest.mark.parametrize(
+    ("contact", "speed", "samples", "stiffness"),
+    [(effects.SphereContact(), 50.0, 10, 1e3), (effects.BodyContact(), 500.0, 1, 1e9)],
+)
+def test_the_stiffness_it_advises_ends_well(contact, speed, samples, stiffness):
+    """Spheres of 5 mm hold 44 J a body only from 1e6 N/m on: six spheres, k (2 mm)^2 / 2 each.
+
+    Bodies that pass each other between two samples are found too.
+    """
+    given, advised = {contact.constants[0]: stiffness, "step": 2e-7}, []
     while len(advised) < 6:
         try:
-            account = dict(shot(*given.values()).report.energy_balance)
+            account = dict(shot(contact, speed, samples, *given.values()).report.energy_balance)
             break
         except SimulationDiverged as error:
             given |= error.advice
             advised += error.advice
-    assert "contact_stiffness" in advised
+    assert contact.constants[0] in advised
     assert abs(account.pop("residual")) <= 0.5 * sum(map(abs, account.values()))

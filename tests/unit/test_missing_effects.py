@@ -32,7 +32,10 @@ BROKEN_ONLY = effects.SphereContact(3, outer_faces=False)
     ],
 )
 def test_an_effect_is_watched_for_only_where_none_serves_the_material(material, listed, needs):
-    assert set(unserved(Model(pair(), material, listed))) == needs
+    """And what to list is what a scene takes by default."""
+    found, usual = unserved(Model(pair(), material, listed)), Scene(pair(), material, "all").effects
+    assert set(found) == needs
+    assert {need.effect for need in found.values()} <= {type(effect).__name__ for effect in usual}
 
 
 def missed(mesh, moved, *listed, broken=False):

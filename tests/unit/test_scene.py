@@ -53,7 +53,11 @@ def test_parts_without_contact_are_told_where_they_may_come_to_meet(shift, liste
     ("friction", "damping", "count"),
     [(effects.Friction, 0.0, 1), (effects.Friction, 1.0, 0), (effects.StickingFriction, 0.0, 0)],
 )
-def test_friction_that_no_dashpot_carries_is_told_before_a_run(friction, damping, count):
-    material = replace(CONCRETE, contact_damping=damping)
-    made = Scene(pair(), material, [effects.SphereContact(), friction()])
+@pytest.mark.parametrize("contact", [effects.SphereContact(), effects.BodyContact()])
+def test_friction_that_no_dashpot_carries_is_told_before_a_run(contact, friction, damping, count):
+    """A scene is damped by the dashpots of its contact, and no other."""
+    lossless = {"contact_damping": 0.0, "normal_damping": 0.0, "shear_damping": 0.0}
+    material = replace(CONCRETE, **{**lossless, contact.constants[1]: damping})
+    made = Scene(pair(), material, [contact, friction()])
     assert len(scene_warnings(made)) == count
+    assert made.damped() == (damping > 0.0) and not made.damped(touching=False)

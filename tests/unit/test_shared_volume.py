@@ -1,12 +1,15 @@
 """Volume that bodies share is that of their intersection, by planes and hulls."""
 
+import warnings
+
 import numpy as np
+import pytest
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform
+from taichi_dem import CONCRETE, Scene, Simulation, SimulationDiverged, Uniform, simulate
 from taichi_dem.kit.allocation import assign
-from taichi_dem.mesh.shapes import pair
+from taichi_dem.mesh.shapes import pair, placed_together, single
 from taichi_dem.mesh.tetrahedra import eighths
 from taichi_dem.report.shared_volume import DEEP, NOTABLE, SharedVolume
 from tests.scenes import apart, quaternions
@@ -103,6 +106,25 @@ def test_bonded_bodies_are_left_out_until_their_bond_breaks():
     assign(looked.state.broken_tick, 0)
     ((bodies, share),) = looked.shares(0.49 * looked.model.centre).items()
     assert bodies == (0, 1) and share > DEEP
+
+
+@pytest.mark.parametrize(("shift", "share"), [(0.7, 0.0), (0.4, 14.0), (0.05, 78.0)])
+def test_bodies_that_overlap_at_the_start_are_told_at_once_and_rest_as_they_are(shift, share):
+    """Nothing of their overlap becomes energy; one within the other is refused."""
+    parts = {"one": (single(EDGE), (0.0, 0.0, 0.0)), "other": (single(EDGE), (shift, 0.0, 0.0))}
+    scene = Scene(placed_together(parts), CONCRETE, "auto")
+    asked = {"method": Uniform(1e-7), "until": 1e-5, "samples": 1, "progress": None}
+    words = f"bodies 0 and 1 share {share:.2g} % of the smaller one at the start"
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        if share > 50.0:
+            with pytest.raises(SimulationDiverged, match=r"t = 0 s: .* the scene begins like this"):
+                simulate(scene, **asked)
+            return
+        report = simulate(scene, **asked).report
+    for sentences in ([str(one.message) for one in told], report.needs):
+        assert [words in sentence for sentence in sentences] == [True] * (share > 0.0)
+    assert not any(report.energy_balance.values())
 
 
 def test_the_worst_pair_is_kept_and_survives_a_checkpoint():

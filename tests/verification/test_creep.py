@@ -1,7 +1,7 @@
 """Bodies that creep where friction would hold them are told, and no others are.
 
-A tetrahedron on a slope, of which ``test_sticking_friction`` says how the ground is made: friction
-of 0.4 holds it up to 21.8 degrees.
+Friction without springs is a drag, here of spheres. A tetrahedron on a slope, of which
+``test_sticking_friction`` says how the ground is made: friction of 0.4 holds it up to 21.8 degrees.
 """
 
 import math
@@ -35,8 +35,9 @@ def slope(degrees, above=1e-6, velocity=0.0):
     material = replace(CONCRETE, contact_stiffness=1e4, contact_damping=5.0, friction=MU)
     angle = math.radians(degrees)
     gravity = effects.Gravity((-G * math.cos(angle), G * math.sin(angle), 0.0))
-    moves = [[0.0, 0.0, 0.0], [0.0, velocity, 0.0]]
-    return Scene(mesh, material, "auto", loads=[gravity, effects.Fixed("ground")], velocity=moves)
+    drag = effects.SphereContact(), effects.Friction()
+    listed, moves = [gravity, effects.Fixed("ground"), *drag], [[0.0] * 3, [0.0, velocity, 0.0]]
+    return Scene(mesh, material, "auto", loads=listed, velocity=moves)
 
 
 @pytest.mark.parametrize(

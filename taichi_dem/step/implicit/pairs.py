@@ -147,7 +147,8 @@ class PairDashpots:
                 self.impulse[k] = vec3(0.0)
             if not self.contacts.law.is_within(near, 0.0):
                 parted += self.springs.part(m, k)
-        self.store.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
+        self.contacts.note_depth(p, deepest)
+        self.touching[p], self.branch[p] = end - start, branch
         if end > start:
             around = moment + cross(branch, force)
             self.contacts.add_impulse(p, 0, -force, -around)
