@@ -234,19 +234,11 @@ class BroadPhase:
         gap = norm(self.state.position[j] - self.state.position[i])
         gap -= self.tables.extent[i] + self.tables.extent[j]
         if gap < far:
-            count, gap = self._find(i, j, margin, far, -1)
+            turn, offset = self.contacts.place(i, j)
+            faces = self.breaks.free_faces(i, j)
+            count, gap = self.contacts.law.find(i, j, turn, offset, faces, margin, far)
         keeps = ti.static(self.contacts.law.meets_bodies) and count == self.neighbours.found[k]
         self.neighbours.note_found(k, i, count, self.contacts.paths(i, j) + gap, keeps)
-
-    @ti.func
-    def _find(self, i, j, margin, far, start):
-        """Contacts of two bodies nearer than a margin [m]: number, and the least gap of others.
-
-        start: place in the store from which they are entered, -1 to count them only.
-        """
-        turn, offset = self.contacts.place(i, j)
-        faces = self.breaks.free_faces(i, j)
-        return self.contacts.law.find(i, j, turn, offset, faces, margin, far, self.store, start)
 
     @ti.func
     def _number_pairs(self, one):
@@ -277,10 +269,12 @@ class BroadPhase:
     @ti.func
     def _update_pair(self, k, p):
         """Write the contacts of entry k, and book the energy that new overlaps inject."""
-        count, pair = self.neighbours.found[k], self.store.body[p]
+        count, i, j = self.neighbours.found[k], self.store.body[p][0], self.store.body[p][1]
         if self.neighbours.is_new[k] == 1:
-            margin = self.contacts.margin(pair[0], pair[1])
-            self._find(pair[0], pair[1], margin, margin, self.store.sphere_place[p])
+            turn, offset = self.contacts.place(i, j)
+            faces, margin = self.breaks.free_faces(i, j), self.contacts.margin(i, j)
+            place = self.store.sphere_place[p]
+            self.contacts.law.enter(i, j, turn, offset, faces, margin, place)
             self.store.replace_spheres(p, count)
             if not ti.static(self.contacts.law.meets_bodies):
                 injected = self.breaks.injected(p)

@@ -130,6 +130,7 @@ class BodyContact(SphereContact):
 
     def declare_columns(self, store: PairStore) -> None:
         """Keep q0 [m2] of each pair, and 1 once it is known."""
+        super().declare_columns(store)
         self.rest = store.sphere_column("rest_overlap", real, 2)
 
     def load(self, model: Model) -> None:
@@ -185,16 +186,17 @@ class BodyContact(SphereContact):
         return near
 
     @ti.func
-    def find(self, i, j, turn, offset, faces, margin, far, store: ti.template(), start):
+    def find(self, i, j, turn, offset, faces, margin, far):
         """Bodies i and j make one contact where a ray of one may enter the other soon."""
-        count, gap = 1, margin
-        if start >= 0:
-            store.sphere[start] = [i, j]
-        else:
-            outside = self.gap(i, j, turn, offset)
-            if outside >= margin:
-                count, gap = 0, outside
+        count, gap = 0, self.gap(i, j, turn, offset)
+        if gap < margin:
+            count, gap = 1, margin
         return count, gap
+
+    @ti.func
+    def enter(self, i, j, turn, offset, faces, margin, place):
+        """Enter that contact in the pair store."""
+        self.store.sphere[place] = [i, j]
 
     @ti.func
     def gap(self, a, b, turn, offset):

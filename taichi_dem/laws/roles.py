@@ -79,8 +79,9 @@ MEMBERS = {
         "spheres(model)",
         # Where two bodies are nearest by an entry of the pair store (``SphereContact``).
         "nearest(a, b, turn, offset)",
-        # What of two bodies may touch soon, entered in the pair store; the gap of all else.
-        "find(i, j, turn, offset, faces, margin, far, store, start)",
+        # How much of two bodies may touch soon, and the gap of all else; enters it.
+        "find(i, j, turn, offset, faces, margin, far)",
+        "enter(i, j, turn, offset, faces, margin, place)",
         # Whether a ``Nearest`` is nearer than a margin [m], and the ``Meeting`` there.
         "is_within(near, margin)",
         "meeting(near, k, rotation)",

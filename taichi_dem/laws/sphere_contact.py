@@ -13,6 +13,7 @@ from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.physics.sphere_pair import Nearest, is_within, meeting, normal_force
 from taichi_dem.state.model import Model
+from taichi_dem.state.pair_store import PairStore
 
 #: Entries of a list for each body: a thousand tetrahedra with as many take some GiB.
 _MOST = 100_000
@@ -111,6 +112,10 @@ class SphereContact(Effect):
         """By what the constants are multiplied at most in a contact of each body, (n,) or one."""
         return 1.0
 
+    def declare_columns(self, store: PairStore) -> None:
+        """Keep the pair store, which takes the contacts that are found."""
+        self.store = store
+
     @ti.func
     def nearest(self, a, b, turn, offset):
         """Where two bodies are nearest by an entry (a, b) of the pair store, a ``Nearest``.
@@ -123,13 +128,21 @@ class SphereContact(Effect):
         return Nearest(first=first, apart=apart, reach=size, size=size)
 
     @ti.func
-    def find(self, i, j, turn, offset, faces, margin, far, store: ti.template(), start):
+    def find(self, i, j, turn, offset, faces, margin, far):
         """Number of contacts of bodies i and j with a gap below a margin [m]; least gap of others.
 
         That gap is at most far [m]. turn, offset: as in ``nearest``. faces: bit 4 f + g for free
-        faces f and g. start: place of the pair store from which they are entered, -1 to count them
-        only.
+        faces f and g.
         """
+        return self._compare(i, j, turn, offset, faces, margin, far, -1)
+
+    @ti.func
+    def enter(self, i, j, turn, offset, faces, margin, place):
+        """Enter those contacts in the pair store, from a place on."""
+        self._compare(i, j, turn, offset, faces, margin, margin, place)
+
+    @ti.func
+    def _compare(self, i, j, turn, offset, faces, margin, far, place):
         count, gap = 0, far
         for fg in range(16):
             if (faces >> fg) & 1 == 1:
@@ -142,22 +155,22 @@ class SphereContact(Effect):
                         sphere = self.tables.sphere[a]
                         # One far from the ball around those of the other face is far from all.
                         if squared(middle - sphere.xyz) < (sphere[3] + reach) ** 2:
-                            count, gap = self._find_of(
-                                a, size * second, turn, offset, margin, gap, store, start, count
+                            count, gap = self._compare_one(
+                                a, size * second, turn, offset, margin, gap, place, count
                             )
         return count, gap
 
     @ti.func
-    def _find_of(self, a, first, turn, offset, margin, gap, store: ti.template(), start, count):
-        """Count, and enter, the contacts of sphere a with those of a face, from the first on."""
+    def _compare_one(self, a, first, turn, offset, margin, gap, place, count):
+        """The same of sphere a with those of a face, from the first on."""
         sphere = self.tables.sphere[a]
         for b in range(first, first + self.tables.face_spheres[None]):
             other = self.tables.sphere[b]
             reach = sphere[3] + other[3]
             apart = squared(matvec(turn, other.xyz) + offset - sphere.xyz)
             if apart < (reach + margin) ** 2:
-                if start >= 0:
-                    store.sphere[start + count] = [a, b]
+                if place >= 0:
+                    self.store.sphere[place + count] = [a, b]
                 count += 1
             elif apart < (reach + gap) ** 2:
                 gap = ti.sqrt(apart) - reach

@@ -47,6 +47,12 @@ def row(matrix, r):
 
 
 @expression
+def smallest(vector):
+    """The smallest of four numbers."""
+    return reduce(ti.min, (entry(vector, k) for k in range(4)))
+
+
+@expression
 def raised(matrix, by):
     """A matrix of four rows with a vector added to each."""
     columns = range(matrix.get_shape()[1])
@@ -88,41 +94,36 @@ def inside(start, change):
 
 
 @ti.func
-def least(first, last, g: ti.template()):
-    """Part of a line, between 0 and 1, on which value g is the least of four linear ones."""
-    low, high = 0.0, 1.0
-    for f in ti.static(range(4)):
-        if ti.static(f != g):
-            before, after = first[f] - first[g], last[f] - last[g]
-            if before < 0.0 and after <= 0.0:
-                high = 0.0
-            elif before < 0.0:
-                low = ti.max(low, before / (before - after))
-            elif after < 0.0:
-                high = ti.min(high, before / (before - after))
-    return low, high
-
-
-@ti.func
 def add_ray(total, slope, share, start, change, low, high, centre, end):
     """Add the integral of the least depth over a thin pyramid, and its derivatives by the depths.
 
     low .. high: part of its ray that counts. share: three times its volume.
     """
-    way, first, last = high - low, start + low * change, start + high * change
-    bound = ti.max(first, last).min()
-    for g in ti.static(range(4)):
-        # One that is nowhere below the least of the largest values is nowhere the least.
-        if ti.min(first[g], last[g]) <= bound:
-            since, until = least(first, last, g)
-            if until > since:
-                # Integrals of t^2 and t^3 over the part: a pyramid widens with t^2.
-                since, until = low + since * way, low + until * way
-                square = share / 3.0 * (until**3 - since**3)
-                cube = share / 4.0 * (until**4 - since**4)
-                total += start[g] * square + change[g] * cube
+    least, value, here, rate = 0, 1e300, 0.0, 0.0
+    for f in ti.static(range(4)):
+        there = start[f] + low * change[f]
+        if there < value or (there == value and change[f] < rate):
+            least, value, here, rate = f, there, start[f], change[f]
+    since = low
+    while since < high:
+        # The least of linear depths grows ever more slowly: next is the first that crosses it.
+        until, following, next_here, next_rate = high, least, here, rate
+        for f in ti.static(range(4)):
+            if change[f] < rate:
+                cut = (start[f] - here) / (rate - change[f])
+                if cut < until:
+                    until, following, next_here, next_rate = cut, f, start[f], change[f]
+        until = ti.max(until, since)
+        # Integrals of t^2 and t^3 over the part: a pyramid widens with t^2.
+        square = share / 3.0 * (until**3 - since**3)
+        cube = share / 4.0 * (until**4 - since**4)
+        total += here * square + rate * cube
+        weights = centre * (square - cube) + end * cube
+        for g in ti.static(range(4)):
+            if g == least:
                 for c in ti.static(range(4)):
-                    slope[c, g] += centre[c] * (square - cube) + end[c] * cube
+                    slope[c, g] += weights[c]
+        least, here, rate, since = following, next_here, next_rate, until
     return total, slope
 
 
@@ -152,13 +153,13 @@ def sum_of_rays(
     start = transposed_matvec(depth, centre)
     for face in range(4):
         top = ti.max(start, highest_end(depth, face, least))
-        if top.min() < -far:
-            outside = ti.min(outside, -top.min())
+        if smallest(top) < -far:
+            outside = ti.min(outside, -smallest(top))
         else:
             share = 12.0 * volume * centre[face] / count
             for r in range(face * count // 4, (face + 1) * count // 4):
                 change = transposed_matvec(depth, ends[r])
-                highest = ti.max(start, change).min()
+                highest = smallest(ti.max(start, change))
                 if highest > 0.0:
                     change -= start
                     low, high, apart = inside(start, change)

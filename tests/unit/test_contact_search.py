@@ -19,6 +19,7 @@ class Marked(effects.SphereContact):
 
     def declare_columns(self, store):
         """Declare a vector of a pair, and a number of a sphere pair."""
+        super().declare_columns(store)
         self.vector = store.column("arrow", ti.f64, 3)
         self.of_spheres = store.sphere_column("sphere_mark", ti.i32)
 
