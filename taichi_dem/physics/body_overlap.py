@@ -122,7 +122,7 @@ def add_ray(total, slope, share, start, change, low, high, centre, end):
         for g in ti.static(range(4)):
             if g == least:
                 for c in ti.static(range(4)):
-                    slope[c, g] += weights[c]
+                    slope[c, g] = slope[c, g] + weights[c]
         least, here, rate, since = following, next_here, next_rate, until
     return total, slope
 
