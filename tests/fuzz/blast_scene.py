@@ -93,11 +93,12 @@ class BlastScene:
     def alone(self, size):
         """One body, a pair, or one with neighbours."""
         draws = self.draws
-        height = draws.near(size)
         if draws.chance(0.2):
             count = draws.one_of(1, 2, 3, 4)
             return with_neighbours(size, {k: draws.near(1.0) for k in range(count)})[0]
-        return draws.one_of(single, pair)(draws.given(size), height)
+        if draws.chance(0.5):
+            return single(draws.given(size))
+        return pair(draws.given(size), draws.near(size))
 
     def brick(self, size):
         """A bar of some boxes."""
