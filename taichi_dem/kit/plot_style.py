@@ -2,12 +2,14 @@
 
 import contextlib
 import io
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Optional, Union
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -205,22 +207,60 @@ def filming(
     """A figure, a function that takes it as the next image, and the RGB images taken so far.
 
     size: in inches, at dpi pixels each. style: of matplotlib. The layout stays that of the first
-    image, so that nothing jumps.
+    image, so that nothing jumps. Changes are those of which matplotlib knows: ``Artist.stale``.
     """
     with matplotlib.rc_context(style):
         figure = Figure(figsize=size, dpi=dpi, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         images: list[Image.Image] = []
+        background: Any = None
 
         def shoot():
             """Take the figure as the next image."""
-            if not images:
+            nonlocal background
+            if images:
+                background = _draw_changes(canvas, background)
+            else:
                 _write_plain_numbers(figure)
-            canvas.draw()
+                canvas.draw()
+                figure.set_layout_engine("none")
             images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()))
-            figure.set_layout_engine("none")
 
         yield figure, shoot, images
+
+
+def _draw_changes(canvas, background):
+    """Draw what has changed once and what lies over it; returns the pixels of all else.
+
+    background: what the last call returned, None at first.
+    """
+    figure = canvas.figure
+    moving = [artist for one in (*map(_layers, figure.axes), figure.texts) for artist in _over(one)]
+    if background is None or not all(artist.get_animated() for artist in moving):
+        for artist in moving:
+            artist.set_animated(True)
+        canvas.draw()
+        background = canvas.copy_from_bbox(figure.bbox)
+    canvas.restore_region(background)
+    for artist in moving:
+        artist.draw(canvas.get_renderer())
+        # An empty text is left stale.
+        artist.stale = False
+    return background
+
+
+def _layers(axes):
+    """Artists of axes in the order in which they are drawn."""
+    hidden = [axes.patch]
+    if not axes.axison:
+        hidden += [axes.xaxis, axes.yaxis, *axes.spines.values()]
+    shown = (artist for artist in axes.get_children() if artist not in hidden)
+    return sorted(shown, key=Artist.get_zorder)
+
+
+def _over(layers):
+    """Artists from the first on that has changed, now or before."""
+    return itertools.dropwhile(lambda one: not (one.stale or one.get_animated()), layers)
 
 
 def seconds(value: float) -> str:
