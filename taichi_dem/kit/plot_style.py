@@ -17,11 +17,10 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatterSciNotation
 from PIL import Image
 
-from taichi_dem.kit.files import write_whole
+from taichi_dem.kit.files import write_bytes, write_whole
 from taichi_dem.kit.validation import FileName
 
 STYLE = {
-    "savefig.dpi": 150,
     "font.size": 9.5,
     "axes.titlesize": 10,
     "axes.titlelocation": "left",
@@ -39,8 +38,8 @@ STYLE = {
     "ytick.labelsize": 8.5,
 }
 
-#: Pixels of a PNG picture in a notebook or on a page, per inch.
-PNG_DPI = 110
+#: Pixels of a PNG picture in a notebook or on a page, and of one in a file, per inch.
+PNG_DPI, _FILE_DPI = 110, 150
 #: Okabe and Ito's colours, which colour-blind readers can distinguish.
 BLUE, RED, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#222222", "#8A8A8A"
@@ -162,7 +161,7 @@ def picture(path: Optional[FileName], *shape: Any, **options: Any) -> Iterator[t
         _write_plain_numbers(figure)
         if path is None:
             return
-        write_whole(path, lambda name: figure.savefig(name, format="png"))
+        write_bytes(path, png_of(figure, _FILE_DPI))
 
 
 class _PlainLogFormatter(LogFormatterSciNotation):
@@ -186,17 +185,15 @@ def _write_plain_numbers(figure):
 
 
 def png_of(figure: Figure, dpi: float = PNG_DPI) -> bytes:
-    """A figure as PNG, in bytes; within the block of ``styled``."""
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=dpi)
-    return content.getvalue()
+    """A figure as PNG, in bytes; within the block of ``styled``.
 
-
-def png_as_laid_out(figure: Figure) -> bytes:
-    """The same where all parts have their places; ``savefig`` draws once more, to lay them out."""
-    content = io.BytesIO()
-    figure.set_dpi(PNG_DPI)
-    FigureCanvasAgg(figure).print_png(content)
+    It is drawn once; ``Figure.savefig`` draws a figure twice, to lay it out first.
+    """
+    content, usual = io.BytesIO(), figure.dpi
+    canvas = FigureCanvasAgg(figure)
+    figure.set_dpi(dpi)
+    canvas.print_png(content)
+    figure.set_dpi(usual)
     return content.getvalue()
 
 
