@@ -3,16 +3,18 @@
 The scene of Konno et al., section 4. Expect a crushed zone at the hole, cracks that run out from
 it, and a wedge pushed out of the free face on the right.
 
-    python -m taichi_dem demo                # about half a minute, most of it pictures
-    python -m taichi_dem demo --out mine     # pictures and tables into ./mine
+    python -m taichi_dem demo                    # 20 seconds
+    python -m taichi_dem demo --out mine         # pictures and tables into ./mine
+    python -m taichi_dem demo --all-pictures     # also energy, pressure, since when effects act
 
-Writes pictures, an animation, view.html (a page in which the block turns and plays), history.csv,
-bonds.csv (when each bond broke), the mesh used, CSV of all that is plotted, summary.json and a
-ParaView series to results/blast_demo/.
+Writes cracks.png, blast.gif, view.html (a page in which the block turns and plays), history.csv,
+bonds.csv (when each bond broke), bodies.csv, the mesh used, summary.json and a ParaView series to
+results/blast_demo/.
 """
 
 from argparse import Namespace
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Optional
 
 import numpy as np
@@ -27,12 +29,6 @@ from taichi_dem.mesh.files import read_mesh
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.output.record import write_bodies
-from taichi_dem.plot.series import (
-    level_columns,
-    level_shares,
-    plot_levels,
-)
-from taichi_dem.plot.tables import plot_columns
 from taichi_dem.report.certificate import Certificate
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
@@ -60,6 +56,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     """Run the program on a command line, that of the process by default; returns its exit code."""
     made = study.parser(NAME, __doc__, ("auto", "resident", "parallel"), SETTINGS)
     made.prog, made.entry = "python -m taichi_dem demo", _ENTRY
+    study.add_pictures(made)
     return study.main(run, made, arguments)
 
 
@@ -71,9 +68,9 @@ def run(options: Namespace) -> None:
     given: dict[str, Any] = {name: getattr(options, name) for name in names}
     method = ImplicitDashpots(4e-7)
     result = simulate(scene, method=method, title="blasting", output=options.out, **given)
-    picture(result, options.out)
     print(f"{result.report}\n")
-    study.finish(options, NAME, figures_of(result), [result.report])
+    draw = partial(picture, result, options)
+    study.finish(options, NAME, figures_of(result), [result.report], draw=draw)
 
 
 def figures_of(result: Result) -> dict[str, tuple]:
@@ -133,24 +130,39 @@ def figures_of_certificate(certificate: Optional[Certificate]) -> dict[str, tupl
     }
 
 
-def picture(result: Result, folder: str) -> None:
-    """Draw a blast and write all that is plotted.
+def picture(result: Result, options: Namespace) -> None:
+    """Write bodies.csv, and draw a blast as the options of ``study.add_pictures`` ask.
 
     Parameters
     ----------
     result
         Of a run with frames.
-    folder
-        For the pictures and tables; it is made where there is none.
+    options
+        pictures, and out, the folder of the output; it is made where there is none.
 
     Raises
     ------
     InputError
         When the folder cannot be made or written to.
     """
-    at = study.output_paths(folder)
+    at = study.output_paths(options.out)
+    write_bodies(at("bodies.csv"), result.frames)
+    if options.pictures == "no":
+        return
+    result.plot.cracks(magnify=3.0, path=at("cracks.png"))
+    result.plot.film(at("blast.gif"), magnify=3.0)
+    result.show(at("view.html"), open_browser=False)
+    if options.pictures == "all":
+        _picture_more(result, at)
+
+
+def _picture_more(result, at):
+    """Draw what does not answer the question, and write all that is plotted."""
+    # Imported here, so that matplotlib loads only where a picture is drawn.
+    from taichi_dem.plot.series import level_columns, level_shares, plot_levels
+    from taichi_dem.plot.tables import plot_columns
+
     frames, drawn = result.frames, result.plot
-    write_bodies(at("bodies.csv"), frames)
     for gas in (load for load in result.model.loads if isinstance(load, GasPressure)):
         time_s = np.linspace(0.0, 1.1 * gas.duration, 400)
         pressure = gas.pressure_at(time_s)
@@ -159,7 +171,6 @@ def picture(result: Result, folder: str) -> None:
         write_csv(at("pressure.csv"), {"time_s": time_s, "pressure_pa": pressure})
     drawn.history(path=at("history.png"))
     drawn.energy(path=at("energy.png"))
-    drawn.cracks(magnify=3.0, path=at("cracks.png"))
     if result.acting_since:
         drawn.acting(path=at("acting.png"))
     shares = level_shares([frame.level for frame in frames])
@@ -168,5 +179,3 @@ def picture(result: Result, folder: str) -> None:
         drawn.steps(path=at("steps.png"))
         plot_levels(at("levels.png"), times, shares, result.method.dt0)
         write_csv(at("levels.csv"), {"time_s": times, **level_columns(shares)})
-    drawn.film(at("blast.gif"), magnify=3.0)
-    result.show(at("view.html"), open_browser=False)

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from taichi_dem import InputError, SimulationDiverged
-from taichi_dem.kit.plot_style import png_as_laid_out
+from taichi_dem.kit.plot_style import png_of
 from taichi_dem.kit.session_thread import session
 
 #: A scene of a lesson is too small for two threads: they wait for each other longer than they work.
@@ -65,7 +65,7 @@ def png_like_the_first(figure, name):
     figure.set_layout_engine("none")
     for axes, place in zip(figure.axes, places):
         axes.set_position(place)
-    return png_as_laid_out(figure)
+    return png_of(figure)
 
 
 class Question(NamedTuple):

@@ -2,12 +2,14 @@
 
 import contextlib
 import io
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Optional, Union
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -15,11 +17,10 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatterSciNotation
 from PIL import Image
 
-from taichi_dem.kit.files import write_whole
+from taichi_dem.kit.files import write_bytes, write_whole
 from taichi_dem.kit.validation import FileName
 
 STYLE = {
-    "savefig.dpi": 150,
     "font.size": 9.5,
     "axes.titlesize": 10,
     "axes.titlelocation": "left",
@@ -37,8 +38,8 @@ STYLE = {
     "ytick.labelsize": 8.5,
 }
 
-#: Pixels of a PNG picture in a notebook or on a page, per inch.
-PNG_DPI = 110
+#: Pixels of a PNG picture in a notebook or on a page, and of one in a file, per inch.
+PNG_DPI, _FILE_DPI = 110, 150
 #: Okabe and Ito's colours, which colour-blind readers can distinguish.
 BLUE, RED, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#222222", "#8A8A8A"
@@ -160,7 +161,7 @@ def picture(path: Optional[FileName], *shape: Any, **options: Any) -> Iterator[t
         _write_plain_numbers(figure)
         if path is None:
             return
-        write_whole(path, lambda name: figure.savefig(name, format="png"))
+        write_bytes(path, png_of(figure, _FILE_DPI))
 
 
 class _PlainLogFormatter(LogFormatterSciNotation):
@@ -184,17 +185,15 @@ def _write_plain_numbers(figure):
 
 
 def png_of(figure: Figure, dpi: float = PNG_DPI) -> bytes:
-    """A figure as PNG, in bytes; within the block of ``styled``."""
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=dpi)
-    return content.getvalue()
+    """A figure as PNG, in bytes; within the block of ``styled``.
 
-
-def png_as_laid_out(figure: Figure) -> bytes:
-    """The same where all parts have their places; ``savefig`` draws once more, to lay them out."""
-    content = io.BytesIO()
-    figure.set_dpi(PNG_DPI)
-    FigureCanvasAgg(figure).print_png(content)
+    It is drawn once; ``Figure.savefig`` draws a figure twice, to lay it out first.
+    """
+    content, usual = io.BytesIO(), figure.dpi
+    canvas = FigureCanvasAgg(figure)
+    figure.set_dpi(dpi)
+    canvas.print_png(content)
+    figure.set_dpi(usual)
     return content.getvalue()
 
 
@@ -205,22 +204,60 @@ def filming(
     """A figure, a function that takes it as the next image, and the RGB images taken so far.
 
     size: in inches, at dpi pixels each. style: of matplotlib. The layout stays that of the first
-    image, so that nothing jumps.
+    image, so that nothing jumps. Changes are those of which matplotlib knows: ``Artist.stale``.
     """
     with matplotlib.rc_context(style):
         figure = Figure(figsize=size, dpi=dpi, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         images: list[Image.Image] = []
+        background: Any = None
 
         def shoot():
             """Take the figure as the next image."""
-            if not images:
+            nonlocal background
+            if images:
+                background = _draw_changes(canvas, background)
+            else:
                 _write_plain_numbers(figure)
-            canvas.draw()
+                canvas.draw()
+                figure.set_layout_engine("none")
             images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()))
-            figure.set_layout_engine("none")
 
         yield figure, shoot, images
+
+
+def _draw_changes(canvas, background):
+    """Draw what has changed once and what lies over it; returns the pixels of all else.
+
+    background: what the last call returned, None at first.
+    """
+    figure = canvas.figure
+    moving = [artist for one in (*map(_layers, figure.axes), figure.texts) for artist in _over(one)]
+    if background is None or not all(artist.get_animated() for artist in moving):
+        for artist in moving:
+            artist.set_animated(True)
+        canvas.draw()
+        background = canvas.copy_from_bbox(figure.bbox)
+    canvas.restore_region(background)
+    for artist in moving:
+        artist.draw(canvas.get_renderer())
+        # An empty text is left stale.
+        artist.stale = False
+    return background
+
+
+def _layers(axes):
+    """Artists of axes in the order in which they are drawn."""
+    hidden = [axes.patch]
+    if not axes.axison:
+        hidden += [axes.xaxis, axes.yaxis, *axes.spines.values()]
+    shown = (artist for artist in axes.get_children() if artist not in hidden)
+    return sorted(shown, key=Artist.get_zorder)
+
+
+def _over(layers):
+    """Artists from the first on that has changed, now or before."""
+    return itertools.dropwhile(lambda one: not (one.stale or one.get_animated()), layers)
 
 
 def seconds(value: float) -> str:

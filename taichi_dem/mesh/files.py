@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from xml.sax.saxutils import quoteattr
 
-import meshio
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
@@ -131,6 +130,9 @@ def write_vtu(
 
     cell_data: name -> (body_count, ...).
     """
+    # Imported where a file is read or written: it takes a tenth of a second.
+    import meshio
+
     of_cells = {name: [np.asarray(values)] for name, values in cell_data.items()}
     content = meshio.Mesh(points, [("tetra", tetrahedra)], cell_data=of_cells)
     with renamed_when_done(path) as temporary:
@@ -170,6 +172,8 @@ def _read_raw(path):
 
 
 def _meshio_read(path):
+    import meshio
+
     with np.errstate(over="ignore"):  # an STL's text, tried as if it were binary
         if path.lower().endswith(".msh"):
             return read_gmsh(path)

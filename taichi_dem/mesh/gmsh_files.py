@@ -10,7 +10,6 @@ import tempfile
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import meshio
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
@@ -34,6 +33,8 @@ class PhysicalName(NamedTuple):
 
 def read_gmsh(path: str) -> Any:
     """A Gmsh file of meshio's with groups by PhysicalName; InputError for a bad one."""
+    import meshio
+
     with open(path, "rb") as file:
         content = file.read()
     _refuse_bad(content)

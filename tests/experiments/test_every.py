@@ -264,7 +264,8 @@ def test_every_experiment_has_a_row_and_an_entry_of_the_gallery():
 @pytest.mark.parametrize("name", CASES)
 def test_a_quick_run_ends_well_and_its_key_figures_lie_within_their_bars(name, tmp_path):
     row, folder, report = EVERY[name], tmp_path / "out", tmp_path / "figures.json"
-    done = start(name, "--quick", "--out", folder, report=report)
+    options = ENTRY[name].options.split()
+    done = start(name, "--quick", "--out", folder, *options, report=report)
     assert done.returncode == 0, done.stderr
     # No progress bar, no banner, no warning: a pipe gets lines, and a file stays readable.
     assert [line for line in done.stderr.splitlines() if KNOWN not in line] == []

@@ -50,3 +50,12 @@ def test_what_is_unpacked_runs_and_reads_its_own_mesh(wheel, tmp_path):
     assert done.returncode == 0 and done.stderr == "", done.stderr
     for path in done.stdout.split():
         assert path.startswith(str(tmp_path / "unpacked"))
+
+
+def test_libraries_of_pictures_and_mesh_files_are_imported_where_they_are_used():
+    """They take half of a second, of a program that draws nothing too."""
+    text = "import blast_fracture, sys; print(*{'matplotlib', 'PIL', 'meshio'} & {*sys.modules})"
+    options = {"capture_output": True, "text": True, "cwd": FOLDER / "experiments"}
+    environment = users_environment(PYTHONPATH=str(FOLDER))
+    done = subprocess.run([sys.executable, "-c", text], env=environment, **options)
+    assert (done.stdout, done.stderr) == ("\n", "")

@@ -12,6 +12,7 @@ from taichi_dem.kit.study.cached_result import cached, digest
 from taichi_dem.kit.study.command_line import (
     Parser,
     add_checkpoints,
+    add_pictures,
     bare_parser,
     checkpoint_of,
     exit_code,
@@ -46,6 +47,7 @@ __all__ = [
     "Timing",
     "add_accuracy",
     "add_checkpoints",
+    "add_pictures",
     "add_settings",
     "bare_parser",
     "begin",

@@ -162,6 +162,14 @@ def output_paths(folder: str) -> Callable[[str], str]:
     return functools.partial(os.path.join, output_folder(folder))
 
 
+def add_pictures(made: ArgumentParser) -> None:
+    """Add the options that choose pictures: options.pictures is "key", "all" or "no"."""
+    chosen = made.add_mutually_exclusive_group()
+    for name, words in {"all": "draw more than answers the question", "no": "draw none"}.items():
+        what: Any = {"dest": "pictures", "action": "store_const", "const": name, "default": "key"}
+        chosen.add_argument(f"--{name}-pictures", help=words, **what)
+
+
 def add_checkpoints(made: ArgumentParser) -> None:
     """Add the options of a job that saves itself; see ``checkpoint_of``."""
     words = "save the run every 600s on the wall, 5000steps or 1e-5sim simulated seconds"

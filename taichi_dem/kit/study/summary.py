@@ -8,8 +8,8 @@ import shlex
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Union
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Optional, Union
 
 import numpy as np
 
@@ -42,13 +42,14 @@ def finish(
     *,
     caption: str = "",
     see: str = "",
+    draw: Optional[Callable[[], None]] = None,
 ) -> None:
     """Write summary.json, and caption.txt where there is a caption; print them, and the pictures.
 
     figures: by name, as of ``figure``, or tuples of its arguments.
     runs: reports, objects with compile_seconds and run_seconds, or both sums as a pair of numbers;
     or those of compiling alone: all else since ``main`` began counts as running. see: the picture
-    to look at first.
+    to look at first. draw: draws the pictures, once the figures are printed.
     """
     if isinstance(runs, float):
         runs = runs, time.perf_counter() - options.started - runs
@@ -62,6 +63,8 @@ def finish(
         write_text(os.path.join(options.out, "caption.txt"), caption + "\n")
         print()
         show_paragraph(caption)
+    if draw:
+        draw()
     first = (see, *(entry.pictures if entry else ()))
     show_files(options.out, getattr(options, "began", 0.0), first)
 
