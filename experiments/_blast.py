@@ -22,15 +22,16 @@ EFFECTS = {
     # The paper's reading: faces carry spheres once they break, outer faces never.
     "sphere_contact": partial(effects.SphereContact, outer_faces=False),
     "surface_contact": effects.SphereContact,
-    "body_contact": effects.BodyContact,
+    # As effects="auto" takes it for a block in one piece.
+    "body_contact": partial(effects.BodyContact, outer_faces="once_broken"),
     "friction": effects.Friction,
+    "sticking_friction": effects.StickingFriction,
     "gas_pressure": effects.GasPressure,
     "gravity": effects.Gravity,
     "slip_weakening": partial(effects.SlipWeakening, MODE_TWO),
 }
-#: Those that the paper's scene does not have: weight, contact of all surfaces in place of that of
-#: broken faces, through spheres or of whole bodies, and cohesion that slip degrades.
-OPTIONAL = ("gravity", "surface_contact", "body_contact", "slip_weakening")
+#: Those of the paper's scene, the gas last.
+PAPER = ("bond_damping", "softening", "shear_slip", "sphere_contact", "friction", "gas_pressure")
 
 
 def blast_parser(name, description, drivers=BLAST_DRIVERS, mesh=PAPER_BLOCK, saves=False, **given):
@@ -54,7 +55,7 @@ def run_options(options):
 
 def paper_effects():
     """All effects of the paper's scene."""
-    return [make() for name, make in EFFECTS.items() if name not in OPTIONAL]
+    return [EFFECTS[name]() for name in PAPER]
 
 
 def paper_scene(mesh=PAPER_BLOCK):

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from _blast import BLOCK_STEP, EFFECTS
-from taichi_dem import CONCRETE, Every, ImplicitDashpots, Scene, read_mesh, simulate
+from _blast import BLOCK_STEP
+from taichi_dem import CONCRETE, Every, ImplicitDashpots, Scene, effects, read_mesh, simulate
 from taichi_dem.kit.plot_style import BLACK, BLUE, ORANGE, picture
 from taichi_dem.observers import macro_steps
 
@@ -24,8 +24,7 @@ def blast(row):
     random = np.random.default_rng(row["seed"])
     mesh = moved(read_mesh(row["mesh"]), row["jitter"], random)
     material = stronger(CONCRETE, 1.0 + row["scatter"] * random.standard_normal())
-    loads = [EFFECTS["sphere_contact"](), EFFECTS["gas_pressure"]()]
-    scene = Scene(mesh, material, "auto", loads=loads)
+    scene = Scene(mesh, material, "auto", loads=[effects.GasPressure()])
     given = {"until": row["until"], "samples": row["samples"], "progress": None}
     result = simulate(scene, method=ImplicitDashpots(BLOCK_STEP), **given)
     hole = result.history["hole_radial_displacement_mm"].tolist()

@@ -14,9 +14,9 @@ from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Material, Scene,
 from taichi_dem.demo import figures_of_certificate
 
 #: Effects in the order in which they are added; the load is always there.
-ORDER = ("bond_damping", "softening", "shear_slip", "sphere_contact", "friction")
-#: Contacts with other pairs than those of broken faces: their states are those of an own run.
-REPLACING = ("surface_contact", "body_contact")
+ORDER = ("bond_damping", "softening", "shear_slip", "body_contact", "sticking_friction")
+#: Contacts in place of that of bodies: their states are those of an own run.
+REPLACING = ("sphere_contact", "surface_contact")
 #: Pressure at which no bond of the paper's block reaches its envelope [Pa].
 WEAK = 0.01 * PEAK
 BEST, AUTO, EVERY = "best list", "auto", "all effects"
@@ -81,13 +81,10 @@ def list_costs(scenes, until, step, states, **timing):
 
 
 def scene_of(material, peak, names):
-    """The paper's block under gas of some peak pressure [Pa], with effects by their names.
-
-    names: or "auto", with the paper's contact.
-    """
+    """The paper's block under gas of some peak pressure [Pa], with effects by name, or "auto"."""
     mesh, gas = read_mesh(PAPER_BLOCK), EFFECTS["gas_pressure"](peak=peak)
     if names == AUTO:
-        return Scene(mesh, material, AUTO, loads=[gas, EFFECTS["sphere_contact"]()])
+        return Scene(mesh, material, AUTO, loads=[gas])
     return Scene(mesh, material, [gas, *(EFFECTS[name]() for name in names)])
 
 

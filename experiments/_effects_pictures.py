@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from _effects_tables import chance_in, cost_in, effects_in
+from _effects_tables import ADDED, CONTACTS, chance_in, cost_in, effects_in
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, SKY, area_key, line_key, picture
 
 
@@ -39,7 +39,8 @@ def draw_costs(axes, effects):
         # A zero has no sign.
         words = f"  {round(cost, digits) + 0.0:.{digits}f} %" + ", not resolved" * hidden
         axes.text(max(most, 0.0), place, words.replace("-", "−"), va="center", fontsize=8.5)
-    names = [f"{name}\n(added)" if sign < 0.0 else name for name, _, sign in effects]
+    words = {name: "instead" if name in CONTACTS else "added" for name in ADDED}
+    names = [f"{name}\n({words[name]})" if name in words else name for name, *_ in effects]
     names = [name.replace("_", " ").replace(" and ", "\nand ") for name in names]
     axes.set(yticks=range(len(names)), yticklabels=names)
     axes.set_xlabel("cost: share of a step's time [%], below 0: slower without it")

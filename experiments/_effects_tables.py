@@ -7,8 +7,11 @@ from taichi_dem.kit import study
 from taichi_dem.kit.study.paired_timing import median_interval
 
 LAST_BIT = "all effects, last bit of the load changed"
-#: Rows in which another contact takes the place of that of broken faces through spheres.
-CONTACTS = {"contact of all surfaces": "surface_contact", "contact of bodies": "body_contact"}
+#: Contact and friction in the place of those of bodies, by row: the paper's, then on all faces.
+CONTACTS = {
+    "contact of spheres": ("sphere_contact", "friction"),
+    "spheres on all faces": ("surface_contact", "friction"),
+}
 ADDED = ("rotation", *CONTACTS)
 #: Columns of what an effect adds, and their units.
 ADDS = {"memory_MB": "MB", "compiled_kB": "kB"}
@@ -18,7 +21,7 @@ ENDS = {"ratio": "", "low": "_least", "high": "_most"}
 COUNTS = ("sweeps", "searches", "pairs")
 #: Why a step is dearer without an effect.
 WHY = {
-    "friction": "contacts that nothing slows down stay more, and agree later",
+    "sticking_friction": "contacts that nothing slows down stay more, and agree later",
     "static contact": "particles that would be held have to fly and collide",
     "ejection and static contact": "particles that would be held have to fly and collide",
 }
@@ -159,7 +162,7 @@ def figures_of_effect(group, name, row, complete, sign):
     own, known = group == "blast", not row["failed"]
     key = f"{group}_{name.replace(' ', '_')}"
     if own:
-        key = CONTACTS.get(name, name.split()[0])
+        key = CONTACTS.get(name, name.split())[0]
     found = {}
     for column, unit in ADDS.items():
         more = sign * (complete[column] - row[column]) if known else None

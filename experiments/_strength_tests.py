@@ -12,13 +12,13 @@ import numpy as np
 
 from _meshes import with_moved_nodes
 from taichi_dem.effects import (
+    BodyContact,
     BondDamping,
-    Friction,
     PrescribedMotion,
     ShearSlip,
     SlipWeakening,
     Softening,
-    SphereContact,
+    StickingFriction,
 )
 from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.kit.fixed_order import length
@@ -138,7 +138,7 @@ class StrengthTest:
             motions.append(PrescribedMotion(group, velocity))
         slip = ShearSlip() if slip_energy is None else SlipWeakening(slip_energy)
         laws = [Softening(), slip, BondDamping()]
-        return [*laws, SphereContact(outer_faces=False), Friction(), *motions]
+        return [*laws, BodyContact(), StickingFriction(), *motions]
 
     def _begin(self, simulation, rate):
         """Set the velocities of an even strain rate, so that no wave starts at the ends."""

@@ -51,7 +51,7 @@ SETTINGS = {
     "ratios": (33, 3),
     "cycles": ((150, 20), (5, 5)),
     "particles": (30, 10),
-    "dropped": (0.0155, 0.008),
+    "dropped": (0.02, 0.008),
     "twins": (8, 2),
 }
 ROWS = "kind seed question tolerance_percent value error true holds reached cpu_s"
@@ -125,7 +125,7 @@ def share_held(judged):
 def draw_all(folder, options, judged):
     """Draw all pictures; figures of the papers' scenes."""
     panels, figures = {}, {}
-    panels["paper's blast, hole displacement"], seconds = cost_of_blast(options)
+    panels["paper's block, hole displacement"], seconds = cost_of_blast(options)
     figures["seconds_at_1_percent_blast"] = (seconds, "s")
     late, spent = answered(paper_question(options.later, 0.01))
     figures["seconds_at_1_percent_blast_later"] = (spent, "s")

@@ -3,12 +3,18 @@
 The main job: the scene of Konno et al., section 4, from mesh to crack picture. Expect a crushed
 zone at the hole, cracks that run out from it, and a wedge pushed out of the free face on the right.
 
-    python experiments/blast_fracture.py                  # 20 seconds
+    python experiments/blast_fracture.py                  # 30 seconds
     python experiments/blast_fracture.py --all-pictures   # also energy, pressure, where effects act
     python experiments/blast_fracture.py --until 1e-3     # cracks through to the other faces
     python experiments/blast_fracture.py --method multirate --l 1e-8    # the paper's: three minutes
     python experiments/blast_fracture.py --accuracy 1%         # hole's displacement, with a bar
     python experiments/blast_fracture.py --effects all         # laws evaluated everywhere
+    python experiments/blast_fracture.py --with sphere_contact,friction    # contact of the paper
+
+Bodies touch as wholes and stick until they slip, as in any scene with effects="auto"; the paper has
+spheres behind broken faces, and sliding friction. Without --with and --without the blast is run a
+second time with these, and a table compares both; pictures are of the first run. An effect of
+--with takes the place of the usual one of its kind: surface_contact has spheres on all free faces.
 
 Softening, slip and contact are evaluated only where and when they act, and bodies that no wave has
 reached sleep; the certificate in the report says what acted, since when, and what was left out.
@@ -34,7 +40,7 @@ bonds.csv (when each bond broke), bodies.csv, the mesh used, summary.json and a 
 import sys
 from functools import partial
 
-from _blast import EFFECTS, OPTIONAL, blast_parser, print_quality, run_options
+from _blast import EFFECTS, blast_parser, print_quality, run_options
 from _blast import METHODS as BLAST_METHODS
 from taichi_dem import (
     CONCRETE,
@@ -52,6 +58,7 @@ from taichi_dem.demo import figures_of, picture
 from taichi_dem.kit import study
 from taichi_dem.laws.chosen import WORDS
 from taichi_dem.methods import Multirate, Uniform
+from taichi_dem.simulate import result_of
 
 NAME = "blast_fracture"
 #: Methods of the paper, made of the largest step dt0 [s] and the displacement limit l [m].
@@ -68,6 +75,15 @@ METHODS = {
     "fixed": (Uniform, 1e-8),
 }
 PAPER_DT0, PAPER_L = 1e-8, 1e-7
+#: Contact of the paper, as of --with.
+SPHERES = "sphere_contact,friction"
+#: What is printed of runs with both contacts: header, figure and format.
+SHOWN = {
+    "contact": ("contact", ""),
+    "hole [mm]": ("hole_radial_displacement_mm", ".2f"),
+    "injected at breaks [kJ]": ("injected_kJ", ".1f"),
+    "CPU [s]": ("cpu_s", ".2f"),
+}
 SETTINGS = {
     "dt0": (None, None, study.number(0, 1), "largest step [s], by method"),
     "l": (None, None, study.number(0, 1), "the paper's way of a body in a step [m], 1e-7"),
@@ -88,28 +104,25 @@ def options_parser():
     return made
 
 
-def chosen_effects(added, without):
-    """The paper's effects, with those named in one list and without those of the other."""
-    added, without = ([name for name in text.split(",") if name] for text in (added, without))
-    for name in (*added, *without):
-        if name not in EFFECTS:
-            raise InputError(f"effect must be one of {', '.join(EFFECTS)}, got {name!r}")
-    if "surface_contact" in added or "body_contact" in added:
-        without.append("sphere_contact")
-    names = (name for name in EFFECTS if name not in OPTIONAL or name in added)
-    return [EFFECTS[name]() for name in names if name not in without]
+def effects_named(text, known):
+    """Names of effects in a text, by comma; known: those that there are."""
+    names = [name for name in text.split(",") if name]
+    for name in names:
+        if name not in known:
+            raise InputError(f"effect must be one of {', '.join(known)}, got {name!r}")
+    return names
 
 
-def chosen_scene(options):
-    """The paper's scene, with effects that act where they are needed, or with those asked for."""
-    mesh = read_mesh(options.mesh)
-    acting = chosen_effects(options.added, options.without)
-    if options.without:
-        return Scene(mesh, CONCRETE, acting)
-    # The laws of the material, but for those that are not the usual ones.
-    usual = tuple(EFFECTS[name] for name in ("softening", "bond_damping", "friction"))
-    given = [effect for effect in acting if not isinstance(effect, usual)]
-    return Scene(mesh, CONCRETE, options.effects, loads=given)
+def chosen_scene(options, added):
+    """The block under gas, with the usual effects but for those of added and of options.without."""
+    mesh, names = read_mesh(options.mesh), ["gas_pressure", *effects_named(added, EFFECTS)]
+    given = [make() for name, make in EFFECTS.items() if name in names]
+    scene = Scene(mesh, CONCRETE, options.effects, loads=given)
+    without = effects_named(options.without, [effect.name for effect in scene.effects])
+    if without:
+        listed = [effect for effect in scene.effects if effect.name not in without]
+        scene = Scene(mesh, CONCRETE, listed)
+    return scene
 
 
 def chosen_method(name, dt0, distance):
@@ -126,7 +139,7 @@ def chosen_method(name, dt0, distance):
 def run(options):
     """Run, picture, print."""
     method = chosen_method(options.method, options.dt0, options.l)
-    scene = chosen_scene(options)
+    scene = chosen_scene(options, options.added)
     if options.accuracy is not None:
         return run_to_accuracy(scene, options)
     print_quality(scene)
@@ -138,8 +151,36 @@ def run(options):
             picture(error.result, options)
         raise
     print(f"\n{result.report}\n")
+    figures, reports = figures_of(result), [result.report]
+    if not (options.added or options.without or options.resume):
+        spheres = run_with_spheres(options, method)
+        show_both(result, spheres)
+        figures.update({f"spheres_{name}": one[:2] for name, one in figures_of(spheres).items()})
+        reports.append(spheres.report)
     draw = partial(picture, result, options)
-    study.finish(options, NAME, figures_of(result), [result.report], see="cracks.png", draw=draw)
+    study.finish(options, NAME, figures, reports, see="cracks.png", draw=draw)
+
+
+def run_with_spheres(options, method):
+    """Result of the same blast with the paper's contact, also where that diverges."""
+    given = {name: getattr(options, name) for name in ("until", "driver", "samples")}
+    scene = chosen_scene(options, SPHERES)
+    return result_of(simulate, scene, method=method, title="the paper's contact", **given)
+
+
+def show_both(bodies, spheres):
+    """Print what the contacts of two runs differ in."""
+    runs = {"whole bodies": bodies, "the paper's spheres": spheres}
+    rows = [
+        {
+            "contact": f"{name}, diverged" if run.diverged else name,
+            "cpu_s": run.report.run_cpu_seconds,
+            **{key: one[0] for key, one in figures_of(run).items()},
+        }
+        for name, run in runs.items()
+    ]
+    # A mesh without a hole has no displacement of it.
+    study.show_rows(rows, {header: one for header, one in SHOWN.items() if one[0] in rows[0]})
 
 
 def run_to_accuracy(scene, options):

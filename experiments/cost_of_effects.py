@@ -47,7 +47,7 @@ from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "cost_of_effects"
 #: What cannot stay without it.
-ALONG = {"sphere_contact": ("friction",)}
+ALONG = {"body_contact": ("sticking_friction",)}
 SETTINGS = {
     "until": (2.5e-4, 1e-4, study.number(0, 1), "simulated time of the blast [s], 2.5e-4"),
     "repeats": (1, 1, study.whole(1, 100), "of every run in a process of its own, 1"),
@@ -60,7 +60,7 @@ SETTINGS = {
     "chance": (True, False),
     "ratios": ((0.88, 0.91, 0.94, 0.96, 0.98, 1.0, 1.03), (0.92, 0.98)),
     "cycles": ((60, 20), (10, 4)),
-    "left_out": (ORDER, ("sphere_contact",)),
+    "left_out": (ORDER, ("body_contact",)),
     "added": (ORDER, ()),
     "again": (100, 20),
     "contacts": (CONTACTS, {}),
@@ -137,8 +137,7 @@ def blasts(options):
         for names, scene in scenes.items()
     }
     for scene, contact in options.contacts.items():
-        names = [contact if name == "sphere_contact" else name for name in ORDER]
-        calls[scene] = blast, {**shared, "names": ["gas_pressure", *names]}
+        calls[scene] = blast, {**shared, "names": ["gas_pressure", *ORDER[:3], *contact]}
     if options.chance:
         calls[LAST_BIT] = blast, {**calls[ALL][1], "ulps": 1}
     return calls

@@ -20,7 +20,7 @@ Writes contact.png, contact.csv and summary.json to results/demo_contact/.
 import sys
 from functools import partial
 
-from _blast import EFFECTS, OPTIONAL, blast_parser, run_options
+from _blast import blast_parser, paper_effects, run_options
 from _contact import LAWS, TABLE, Blasts, draw, spreads
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, effects, read_mesh, simulate
 from taichi_dem.kit import study
@@ -42,14 +42,13 @@ SETTINGS = {
 }
 #: Times are of one thread.
 options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS, threads=1)
-#: Effects beside gas and contact.
-OTHERS = set(EFFECTS) - {"gas_pressure", "sphere_contact", *OPTIONAL}
 
 
 def blast(contact, share, options):
     """Blast the block with a contact and a share of the paper's peak; returns the result."""
     gas = effects.GasPressure(peak=share * effects.GasPressure().peak)
-    acting = [*(EFFECTS[name]() for name in EFFECTS if name in OTHERS), contact, gas]
+    acting = [one for one in paper_effects() if one.name not in ("sphere_contact", "gas_pressure")]
+    acting += [contact, gas]
     scene, method = Scene(read_mesh(options.mesh), CONCRETE, acting), ImplicitDashpots(options.step)
     return simulate(scene, method=method, title=contact.name, **run_options(options))
 

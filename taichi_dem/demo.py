@@ -19,7 +19,7 @@ from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem.effects import GasPressure, ShearSlip, SphereContact
+from taichi_dem.effects import GasPressure
 from taichi_dem.kit import study
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.files import write_csv
@@ -62,8 +62,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
 
 def run(options: Namespace) -> None:
     """Blast the block, draw it, print the report and the figures."""
-    loads = [ShearSlip(), SphereContact(outer_faces=False), GasPressure()]
-    scene = Scene(read_mesh(PAPER_BLOCK), CONCRETE, "auto", loads=loads)
+    scene = Scene(read_mesh(PAPER_BLOCK), CONCRETE, "auto", loads=[GasPressure()])
     names = ("until", "driver", "samples", "frames")
     given: dict[str, Any] = {name: getattr(options, name) for name in names}
     method = ImplicitDashpots(4e-7)

@@ -40,9 +40,9 @@ TOUCHING = {
 
 
 def contact_effects():
-    """All effects but loads, spheres on all outer faces."""
+    """All effects but loads; bodies touch at all free faces."""
     bonds = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
-    return [*bonds, effects.SphereContact(outer_faces=True), effects.Friction()]
+    return [*bonds, effects.BodyContact(), effects.StickingFriction()]
 
 
 def soon(trial):

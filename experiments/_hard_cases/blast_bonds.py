@@ -174,7 +174,7 @@ def torn(run, bonds, mass, speed):
 
 @case([name for name in TOUCHING if name != "implicit"], (["implicit"], "failed late"))
 def zero_gap_on_breakage(trial):
-    """A pair torn apart at 200 m/s: its spheres appear where they touch, and give nothing."""
+    """A pair torn apart at 200 m/s: its faces touch as they are set free, and give nothing."""
     run = Run(trial, pair(), velocity=[[-TEARING, 0.0, 0.0], [TEARING, 0.0, 0.0]])
     torn(run, 1, 0.5 * run.mass[0], 2.0 * TEARING)
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from _closed_forms import damped_opening, velocity_after_impact
 from _hard_cases._blast_run import (
+    AREA,
     FREE,
     MASS,
     TOUCHING,
@@ -30,6 +31,8 @@ JUMPING = {
     "controlled": Multirate(8e-8, 5e-9, control=StepControl(level_jump=None)),
     "multirate_held": Multirate(8e-8, 5e-9),
 }
+#: Of cases that know the exact solution of spheres.
+SPHERES = {"effects": [effects.SphereContact(), effects.Friction()]}
 X = np.array([1.0, 0.0, 0.0])
 #: One body moves towards another at rest [m/s].
 MEETING = np.array([X, 0.0 * X])
@@ -59,11 +62,11 @@ def jump_of_ten_levels(trial):
 
 @case(["implicit"], PAIR_TOO_FAST, LIMITED)
 def deep_overlap_at_start(trial):
-    """Two fragments that begin 1 mm inside each other are pushed apart as their dashpots let them.
+    """Two fragments, their spheres 1 mm in each other, are pushed apart as dashpots let them.
 
     Mirror images: six spheres of either face meet, each overlapped by the 1 mm.
     """
-    run = Run(trial, beside(single(), 1e-3 * X, right_half()))
+    run = Run(trial, beside(single(), 1e-3 * X, right_half()), **SPHERES)
     laws = 6.0 * CONCRETE.contact_stiffness, 6.0 * CONCRETE.contact_damping
     way = 1e-3 - damped_opening(0.5 * run.mass[0], *laws, 1e-3, 0.0, run.time_s)
     # Up to 1 % of the overlap: later on those that touch at an angle part before the others.
@@ -76,14 +79,15 @@ def deep_overlap_at_start(trial):
 
 @case(["implicit"], LIMITED)
 def mass_ratio_1e4(trial):
-    """A body of 3.5 mg meets one of 35 g at 1 m/s: dashpots stop the point that meets."""
+    """A body of 3.5 mg meets one of 35 g at 1 m/s: dashpots stop the spheres that meet."""
     small, large = single(0.05 * 1e-4 ** (1.0 / 3.0)), right_half()
     # The spheres stand behind the faces, so that two of them have to be aimed at each other.
     points = [sphere_on_base(mesh) for mesh in (small, large)]
     shift = points[1] - points[0] - 1e-7 * X
     methods = {**TOUCHING, "limited": Uniform(4e-9, dashpot="limited")}
     # The exact solution knows one contact; later the small body has turned, and others meet.
-    run = Run(trial, beside(small, shift, large), 2e-5, methods=methods, velocity=MEETING)
+    motion = {"methods": methods, "velocity": MEETING}
+    run = Run(trial, beside(small, shift, large), 2e-5, **motion, **SPHERES)
     arms = [
         point - body_properties(mesh, CONCRETE.density)[1][0]
         for point, mesh in zip(points, (small, large))
@@ -107,12 +111,12 @@ def sphere_on_base(mesh):
 def damping_ratio_300(trial):
     """Contacts damped 300 times critical bring two bodies to one speed, and never to throw back."""
     mesh = beside(single(), -1e-7 * X, right_half())
-    critical = 2.0 * (0.5 * MASS * CONCRETE.contact_stiffness) ** 0.5
-    material = replace(CONCRETE, contact_damping=300.0 * critical)
+    critical = 2.0 * (0.5 * MASS * AREA * CONCRETE.normal_stiffness) ** 0.5 / AREA
+    material = replace(CONCRETE, normal_damping=300.0 * critical)
     run = Run(trial, mesh, material=material, velocity=MEETING)
     speed = run["velocity"][:, :, 0]
     run.momentum_kept()
-    # The springs hold v^2 / (4 zeta^2) of the energy at most, and give it back in c / k = 12 ms.
+    # The springs hold v^2 / (4 zeta^2) of the energy at most, and give it back in c / k = 3.6 ms.
     run.converged("speed error / first", speed[-1], 0.5, 1.0, formula="1 % of one speed")
     run.draw("speed [m/s]", speed[:, 0])
 

@@ -1,7 +1,8 @@
 """Effects that a scene needs: a bar is pulled open and pressed together, with any effects.
 
 Every choice of effects is a program of its own, and to compile one takes seconds. So answers come
-from two programs, with contact and without, in which the other effects are silent: the same bits.
+from three programs, with contact and friction, with contact alone and without either, in which the
+other effects are silent: the same bits.
 The cost of a choice is measured with its own program, on demand. Dashpots are solved, so that a
 step may be twenty times as long as they would allow. All runs on the thread of the session.
 """
@@ -32,10 +33,12 @@ EFFECTS = {
     "bond_damping": (dem.effects.BondDamping, "dashpots of the bonds"),
     "softening": (dem.effects.Softening, "fracture"),
     "shear_slip": (dem.effects.ShearSlip, "slip in shear"),
-    "sphere_contact": (dem.effects.SphereContact, "contact of fragments"),
-    "friction": (dem.effects.Friction, "friction of fragments"),
+    "body_contact": (dem.effects.BodyContact, "contact of fragments"),
+    "sticking_friction": (dem.effects.StickingFriction, "friction of fragments"),
 }
-ALL, WITHOUT_CONTACT = tuple(EFFECTS), tuple(EFFECTS)[:3]
+ALL = tuple(EFFECTS)
+#: The programs that answer, each with all that can be silent.
+PROGRAMS = ALL[:3], ALL[:4], ALL
 
 
 class Answer:
@@ -61,7 +64,7 @@ class Answer:
 def allowed(names):
     """The effects that can be listed out of names, in order: friction acts in contacts only."""
     kept = set(names)
-    kept -= set() if "sphere_contact" in kept else {"friction"}
+    kept -= set() if "body_contact" in kept else {"sticking_friction"}
     return tuple(name for name in ALL if name in kept)
 
 
@@ -83,7 +86,8 @@ def measured(names, speed, program=None):
 @session.remember
 def outcome(names, speed):
     """The same by a program that is there already, in which other effects stand silent by."""
-    return measured(names, speed, ALL if "sphere_contact" in names else WITHOUT_CONTACT)
+    program = next(program for program in PROGRAMS if {*names} <= {*program})
+    return measured(names, speed, program)
 
 
 @session.remember
@@ -107,8 +111,9 @@ def price(names, speed):
 
 
 def compile_all():
-    """Compile both programs and pull with all effects, so that no later answer waits for it."""
-    dem.Simulation(scene(WITHOUT_CONTACT, WITHOUT_CONTACT, SPEEDS[0]), METHOD).start()
+    """Compile all programs and pull with all effects, so that no later answer waits for it."""
+    for program in PROGRAMS[:-1]:
+        dem.Simulation(scene(program, program, SPEEDS[0]), METHOD).start()
     for speed in SPEEDS:
         outcome(ALL, speed)
 

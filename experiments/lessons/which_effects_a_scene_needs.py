@@ -69,16 +69,16 @@ def _(guesses, mo, questions):
     contact alone | yes: bodies pass through each other :: Nothing breaks, so nothing comes loose
     that could touch. Effects hang together: ask for one, and others follow.
 
-    Take half the time step. How far elsewhere do bodies end, at 2 m/s? :: *by 0.05 % | by 2 % |
+    Take half the time step. How far elsewhere do bodies end, at 2 m/s? :: *by 0.02 % | by 2 % |
     by as much as without friction :: A step of 0.4 µs is twenty times as long as dashpots would
     allow, but they are solved, not stepped. The step is not what to worry about here: friction that
     is missing makes over a thousand times that difference, and no shorter step brings it back.
 
     Friction costs less of a step than can be measured. How far elsewhere do bodies end without
-    it, at 2 m/s? :: by too little to be measured | by about 10 % | *by about 90 % :: Cost and use
-    are two things: dashpots cost a third of a step and contact a sixth, and without them bodies end
-    39 and 144 % elsewhere; without slip they end 0.5 % elsewhere. Leave out one at a time and press
-    the button.
+    it, at 2 m/s? :: by too little to be measured | by about 10 % | *by about 50 % :: Cost and use
+    are two things: dashpots cost a third of a step and contact a quarter, and without them bodies
+    end 41 and 139 % elsewhere; without slip they end 0.07 % elsewhere. Leave out one at a time and
+    press the button.
 
     Fracture takes 2 % of the energy. Can it go? :: *no | yes | only if 2 % of error will do :: It
     *steers*: it takes little and decides where everything goes. The program never drops such an

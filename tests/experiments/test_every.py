@@ -320,7 +320,7 @@ def test_a_quick_bench_measures_waits_and_shares_of_the_floors(tmp_path):
 
 @QUICK
 def test_a_diverging_run_names_body_and_step_and_keeps_the_last_good_output(tmp_path):
-    light = "--without", "sphere_contact,friction", "--out", tmp_path
+    light = "--without", "body_contact,sticking_friction", "--out", tmp_path
     done = start("blast_fracture", "--method", "fixed", "--dt0", "1e-6", *light)
     assert done.returncode == 3 and len(done.stderr.splitlines()) == 1, done.stderr
     for word in ("diverged at t = ", "body ", "try a step of "):

@@ -117,7 +117,7 @@ class CtrlC:
 
 def test_interrupted_blast_goes_on_to_the_same_files(monkeypatch, capsys, tmp_path):
     quick = ["--quick", "--no-pictures", "--threads", "2", "--method", "fixed", "--until", "4e-5"]
-    quick += ["--without", "sphere_contact,friction", "--checkpoint-every", "500steps"]
+    quick += ["--without", "body_contact,sticking_friction", "--checkpoint-every", "500steps"]
 
     def run(folder, *more):
         given = [*quick, "--out", str(tmp_path / folder), *more]
