@@ -102,6 +102,8 @@ class BroadPhase:
         option = _CAPACITIES[int(values(self.full))]
         if option:
             law = type(self.contacts.law).__name__
+            if self.contacts.law.meets_bodies and option == "spheres_per_body":
+                option = "pairs_per_body"
             raise InputError(
                 f"contact lists are full: give {law} a larger {option}, or move solids apart that "
                 "lie in each other"
