@@ -308,19 +308,20 @@ def _run(simulation, recorder, writer, plan, calls):
     marks = sorted(writer.marks(plan.last, plan.dt0).union(*(call.steps for call in calls)))
     for step in (mark for mark in marks if mark * MACRO_TICKS > seen):
 
-        def between(end=step * MACRO_TICKS):
-            """Observe by the clock, and save if due; at a mark its observers come first."""
+        def between(step=step):
+            """Observe by the clock and at the mark, and save if due."""
             tick = int(values(simulation.state.tick))
             if tick < plan.last * MACRO_TICKS:
                 for call in calls:
                     if call.pace is not None and call.pace.should_report():
                         call.observe(view)
-            if tick < end:
-                writer.save_if_needed()
+            if tick >= step * MACRO_TICKS:
+                for call in calls:
+                    if step in call.steps:
+                        call.observe(view)
+            writer.save_if_needed()
 
         simulation.advance_to(step, between)
-        for call in calls:
-            if step in call.steps:
-                call.observe(view)
-        writer.save_if_needed()
+        if step == 0:
+            between()
     writer.save()

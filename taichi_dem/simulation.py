@@ -294,8 +294,7 @@ class Simulation(Uncopied):
         dict of ndarray
             Arrays by name, as in ``State.motion``.
         """
-        motion = self.state.motion()
-        table = self.readings.motion()
+        motion, table = self.state.stored(), self.readings.motion()
         for place, name in enumerate(("velocity", "spin", "angular_momentum")):
             motion[name] = table[:, 3 * place : 3 * place + 3].copy()
         return motion
@@ -330,11 +329,12 @@ class Simulation(Uncopied):
         while values(self.state.tick) < end:
             with self._undivided("it stepped"), self._timed():
                 self.driver.run(end)
-            # A runaway fills the lists: it is named first.
-            self.divergence_check.check(hurried=bool(values(self.state.tick) < end))
-            self._check_capacity()
-            if on_call is not None:
-                on_call()
+            with self.readings.held():
+                # A runaway fills the lists: it is named first.
+                self.divergence_check.check(hurried=bool(values(self.state.tick) < end))
+                self._check_capacity()
+                if on_call is not None:
+                    on_call()
 
     @contextlib.contextmanager
     def _timed(self):

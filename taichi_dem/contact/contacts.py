@@ -97,23 +97,9 @@ class Contacts:
         return norm(apart) - self.tables.sphere[a][3] - self.tables.sphere[b][3]
 
     @ti.func
-    def pair_energy(self, p):
-        """Elastic energy of a pair's overlaps now, and of springs between its spheres [J]."""
-        energy = 0.0
-        pair = self.store.body[p]
-        m = self.tables.pair(pair[0], pair[1])
-        for k in range(self.store.first[p], self.store.last[p]):
-            spheres = self.store.sphere[k]
-            if ti.static(self.law.meets_bodies):
-                near = self.nearest(pair[0], pair[1], spheres[0], spheres[1])
-                met = self.law.meeting(near, k, self.state.rotation[pair[0]])
-                energy += met.area * self.law.stored(m, ti.max(0.0, met.overlap))
-            else:
-                overlap = -self.gap(pair[0], pair[1], spheres[0], spheres[1])
-                energy += self.law.stored(m, ti.max(0.0, overlap))
-            if ti.static(self.remembers):
-                energy += self.friction.stored(m, k)
-        return energy
+    def overlap_energy(self, m, met):
+        """Elastic energy of an overlap where bodies meet, a ``Meeting`` [J]."""
+        return met.area * self.law.stored(m, ti.max(0.0, met.overlap))
 
     @ti.func
     def closer(self, p, margin):
@@ -196,7 +182,7 @@ class Contacts:
         Bodies whose paths cannot have brought them within a margin [m] are not compared again.
         """
         near = Nearest(reach=-AWAY)
-        if self._may_meet(k, i, j, margin):
+        if self.may_meet(k, i, j, margin):
             near = self.law.nearest(self.store.sphere[k][0], self.store.sphere[k][1], turn, offset)
             if ti.static(stepping):
                 self.law.settle(near, k)
@@ -207,7 +193,8 @@ class Contacts:
         return near
 
     @ti.func
-    def _may_meet(self, k, i, j, margin):
+    def may_meet(self, k, i, j, margin):
+        """Whether bodies may be within a margin [m] by entry k, so far as their paths tell."""
         meets = True
         if ti.static(self.law.meets_bodies):
             meets = not self.path[i] + self.path[j] + margin < self.clear_until[k]

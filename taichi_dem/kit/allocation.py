@@ -126,6 +126,7 @@ def _forget_other_sessions() -> None:
     if _bases_of is not impl.get_runtime().prog:
         _bases_of = impl.get_runtime().prog
         _bases.clear()
+        _arrays.clear()
         _destroyed.clear()
 
 
@@ -139,12 +140,16 @@ def array_of(field: ti.Field) -> np.ndarray:
 
     Writing to it writes to the field. It serves as long as the tree exists.
     """
-    root, offset, kind, shape, strides = _layout(field)
-    return _array_at(_base(root) + offset, kind, shape, strides)
+    _forget_other_sessions()
+    if field not in _arrays:
+        root, offset, kind, shape, strides = _layout(field)
+        _arrays[field] = _array_at(_base(root) + offset, kind, shape, strides)
+    return _arrays[field]
 
 
-#: Where fields lie in their trees, which is asked for thousands of times a run.
+#: Where fields lie in their trees, and their arrays, which are asked for thousands of times a run.
 _layouts: weakref.WeakKeyDictionary = weakref.WeakKeyDictionary()
+_arrays: weakref.WeakKeyDictionary = weakref.WeakKeyDictionary()
 
 
 def _layout(field):

@@ -1,35 +1,24 @@
-"""Cache of source lines, so that Taichi reads kernels in half the time.
+"""What Taichi finds out again at every node of a kernel, found once: it reads kernels in less time.
 
-For a possible error message Taichi notes, at every name and operator, the source line and a mark
-below it, broken at 80 characters; and wherever a function is called it parses its source to find
-its end. Together that is half of the time in which it reads the kernels of a step, at each start of
-a program. The results are cached here.
+For a possible error message it notes the source line of every name and operator, broken at 80
+characters, and the stack in which each field is declared; wherever a function is called it looks
+for the end of its source and breaks its lines. Here the line is noted as it is, and sources are
+kept; meanwhile no garbage is collected. The compiled code is the same.
 """
 
 import functools
+import gc
+import sys
 import textwrap
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
-from taichi.lang import kernel_impl
+from taichi.lang import expr, impl, kernel_impl
 from taichi.lang.ast import ast_transformer_utils
 
-#: Lines and marks that are kept; the kernels of a step have some ten thousand.
-_MOST = 1 << 16
-
-
-@functools.lru_cache(maxsize=_MOST)
-def broken(text: str, width: int) -> tuple[str, ...]:
-    """A text in lines of at most some characters, a tuple, as ``textwrap.wrap`` breaks it."""
-    return tuple(textwrap.wrap(text, width))
-
-
-class RememberingWrapper(textwrap.TextWrapper):
-    """A ``textwrap.TextWrapper`` with the usual options that caches its results."""
-
-    def wrap(self, text: str) -> list[str]:
-        """Lines of a text, a list."""
-        return list(broken(text, self.width))
+#: Lines and numbers that are kept; the kernels of a step have some thousand.
+_MOST = 1 << 14
 
 
 def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -48,10 +37,46 @@ def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
     return lines
 
 
+def undisturbed(read: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    """The same function of a tree and a context, during which no garbage is collected."""
+
+    def reading(tree, context):
+        """What the function finds."""
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return read(tree, context)
+        finally:
+            if collects:
+                gc.enable()
+
+    return reading
+
+
+def position(context: Any, node: Any) -> str:
+    """Where a node is in its file, for an error message: its first line, with marks below it."""
+    line, begin = context.src[node.lineno - 1], context.indent + node.col_offset
+    end = context.indent + node.end_col_offset if node.end_lineno == node.lineno else len(line)
+    where = f'File "{context.file}", line {node.lineno + context.lineno_offset}'
+    marks = " " * begin + "^" * (end - begin)
+    return f"{where}, in {context.func.func.__name__}:\n{line}\n{marks}\n"
+
+
+def declared_at(stacklevel: int = 1) -> str:
+    """The line so many levels above the caller, for the whole stack that Taichi keeps."""
+    frame = sys._getframe(1 + stacklevel)
+    return f'  File "{frame.f_code.co_filename}", line {frame.f_lineno}\n'
+
+
 def remember() -> None:
-    """Install both caches in Taichi, where it has the names of Taichi 1.7."""
-    if hasattr(ast_transformer_utils, "TextWrapper"):
-        ast_transformer_utils.TextWrapper = RememberingWrapper
+    """Install all of it, where Taichi has the names of Taichi 1.7."""
     find = getattr(kernel_impl, "getsourcelines", None)
-    if find is not None and not hasattr(find, "cached"):
-        kernel_impl.getsourcelines = remembering(find)
+    if find is None or hasattr(find, "cached"):
+        return
+    fill = functools.lru_cache(_MOST)(textwrap.fill)
+    kernel_impl.getsourcelines = remembering(find)
+    kernel_impl.textwrap = SimpleNamespace(fill=fill, dedent=textwrap.dedent)
+    kernel_impl.transform_tree = undisturbed(kernel_impl.transform_tree)
+    ast_transformer_utils.ASTTransformerContext.get_pos_info = position
+    impl.get_traceback = declared_at
+    expr._check_in_range = functools.lru_cache(_MOST)(expr._check_in_range)

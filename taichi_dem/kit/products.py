@@ -14,7 +14,9 @@ from operator import add
 from typing import Any, Callable
 
 import taichi as ti
+from taichi._lib import core as ti_core
 from taichi.lang import impl
+from taichi.lang.expr import Expr
 
 from taichi_dem.kit.types import mat3, real, vec3, vec6
 
@@ -40,7 +42,12 @@ def expression(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def entry(tensor: Any, *place: int) -> Any:
     """An entry of a vector or matrix in an expression."""
-    return impl.subscript(impl.get_runtime().compiling_callable.ast_builder(), tensor, *place)
+    runtime, group = impl.get_runtime(), ti_core.ExprGroup()
+    for index in place:
+        group.push_back(Expr(index).ptr)
+    info = ti_core.DebugInfo(runtime.get_current_src_info())
+    builder = runtime.compiling_callable.ast_builder()
+    return Expr(builder.expr_subscript(tensor.ptr, group, info))
 
 
 @cache

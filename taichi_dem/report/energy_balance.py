@@ -93,6 +93,9 @@ class EnergyBalance(Kept):
 
     def account(self) -> dict[str, float]:
         """All terms in J by name; residual is the unexplained remainder."""
+        return dict(self.run.readings.once("account", self._account))
+
+    def _account(self):
         terms = {name: 0.0 for name in TERMS if name != "residual"}
         for names, table in zip(_COLUMNS, self.tables()):
             for name, column in zip(names, table.T):

@@ -1,7 +1,7 @@
 """What reports read of a run, by tables that kernels fill, and what they keep of it."""
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar, NamedTuple, Optional
 
 import numpy as np
@@ -31,6 +31,7 @@ class Readings:
         self.tables, self.state, self.advance = tables, state, advance
         self.contacts, self.half_step = advance.contacts, HalfStep(advance)
         self._held: Optional[dict[str, Any]] = None
+        self._rooms: dict[str, np.ndarray] = {}
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
@@ -42,34 +43,42 @@ class Readings:
         finally:
             self._held = outer
 
-    def _once(self, name, shape, fill):
-        """A table that a kernel fills, which inside of ``held`` is asked once under a name."""
+    def once(self, name: str, find: Callable[[], Any]) -> Any:
+        """What a function finds, which inside of ``held`` is asked once under a name."""
         held = {} if self._held is None else self._held
         if name not in held:
-            held[name] = np.zeros(shape)
-            if shape[0]:
-                fill(held[name])
+            held[name] = find()
         return held[name]
+
+    def _room(self, name, *shape):
+        """Zeros for a kernel to fill, in the same memory as before where the shape is the same."""
+        if name not in self._rooms or self._rooms[name].shape != shape:
+            self._rooms[name] = np.zeros(shape)
+        self._rooms[name][:] = 0.0
+        return self._rooms[name]
 
     def contacts_now(self) -> np.ndarray:
         """All that ``_push`` finds of the contacts of every pair, (pairs, 21)."""
-        count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
-        return self._once("contacts", (count, 21), self._push)
+        return self._contacts()[0].copy()
+
+    def _contacts(self):
+        """The same, and impulses [N s] and moments [N m s] of each body in half a step, (n, 6)."""
+        return self.once("contacts", self._pushes)
 
     def _pushes(self):
-        """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
-
-        Summed in the order of the pairs, so that no thread changes a bit.
-        """
-        pushed, table = np.zeros((int(values(self.tables.body_count)), 6)), self.contacts_now()
-        if len(table):
-            bodies = self.contacts.store.near_bodies()
-            for side in range(2):
-                np.add.at(pushed, bodies[:, side], table[:, 6 * side : 6 * side + 6])
-        return pushed
+        pushed = self._room("pushed", int(values(self.tables.body_count)), 6)
+        count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
+        table = self._room("contacts", count, 21)
+        if count:
+            self._push(table, pushed)
+        return table, pushed
 
     @ti.kernel
-    def _push(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+    def _push(
+        self,
+        table: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        pushed: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    ):
         """Impulse [N s] and moment [N m s] of every pair's contacts on both bodies in half a step.
 
         Also the heat of its dashpots and friction by which the booked one is behind [J], sums of
@@ -83,9 +92,16 @@ class Readings:
                 table[a, 6 + k], table[a, 9 + k] = half * found.force[k], half * found.moment_j[k]
             table[a, 12], table[a, 13] = half * found.dragged, half * found.rubbed
             table[a, 14], table[a, 15], table[a, 16] = found.rub, found.bound, found.rubbed
-            table[a, 17] = self.contacts.pair_energy(p)
+            table[a, 17] = found.stored
             for k in ti.static(range(3)):
                 table[a, 18 + k] = self.contacts.store.heat[p][k]
+        # In the order of the pairs, so that no thread changes a bit.
+        ti.loop_config(serialize=True)
+        for side in range(2):
+            for a in range(self.contacts.store.near_count[None]):
+                i = self.contacts.store.body[self.contacts.store.near_slot[a]][side]
+                for k in range(6):
+                    pushed[i, k] = pushed[i, k] + table[a, 6 * side + k]
 
     def bodies(self) -> np.ndarray:
         """Kinetic energy, work of loads, supports, contact heats, ground's heat [J], (n, 7)."""
@@ -94,20 +110,30 @@ class Readings:
 
     def motion(self) -> np.ndarray:
         """Velocity, spin and angular momentum of every body at the time of its position, (n, 9)."""
-        return self._present()[:, 6:15]
+        return self._present()[:, 6:15].copy()
 
     def works(self) -> np.ndarray:
         """Work of each load, of all supports, of each ground, on every body [J], (n, accounts)."""
-        return self._present()[:, 15:]
+        return self._present()[:, 15:].copy()
 
     def step_back(self) -> None:
         """Set the velocities, which are given at time zero, half a step back."""
-        pushed = self._pushes()
-        self._visit(pushed, 1, np.zeros((len(pushed), 16 + len(self.tables.drives))))
+        self._visited(1)
 
     def _present(self):
-        shape = int(values(self.tables.body_count)), 16 + len(self.tables.drives)
-        return self._once("bodies", shape, lambda table: self._visit(self._pushes(), 0, table))
+        return self.once("bodies and bonds", self._visited)[0]
+
+    def _bonds(self):
+        return self.once("bodies and bonds", self._visited)[1]
+
+    def _visited(self, back=0):
+        """Tables of bodies and of bonds."""
+        pushed, bond_count = self._contacts()[1], int(values(self.tables.bond_count))
+        bodies = self._room("bodies", len(pushed), 16 + len(self.tables.drives))
+        # A kernel takes no empty table.
+        bonds = self._room("bonds", max(1, bond_count), 9)
+        self._visit(pushed, back, bodies, bonds)
+        return bodies, bonds[:bond_count]
 
     @ti.kernel
     def _visit(
@@ -115,8 +141,12 @@ class Readings:
         pushed: ti.types.ndarray(dtype=ti.f64, ndim=2),
         back: ti.i32,
         table: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        bonds: ti.types.ndarray(dtype=ti.f64, ndim=2),
     ):
-        """Bring what is recorded of bodies to the present, or set them back; one for all uses."""
+        """Fill in all that is read of bodies, at the present, and of bonds, or set bodies back.
+
+        One kernel for all uses, as each takes its time to compile and to launch.
+        """
         for i in range(self.tables.body_count[None]):
             linear, angular = vec3(0.0), vec3(0.0)
             for k in ti.static(range(3)):
@@ -135,14 +165,16 @@ class Readings:
             for e in ti.static(range(len(self.tables.loads))):
                 table[i, 1] = table[i, 1] + table[i, 15 + e]
             table[i, 2] = table[i, ti.static(15 + len(self.tables.loads))]
+        for b in range(self.tables.bond_count[None]):
+            self._visit_bond(bonds, b)
 
     def bonds(self) -> np.ndarray:
         """Strain, dashpot, slip, release and softening energy of every bond [J], (n, 5)."""
-        return self._bonds()[:, :5]
+        return self._bonds()[:, :5].copy()
 
     def damage(self) -> np.ndarray:
         """Mean damage of the units of every bond, 1 once it is released, (n,)."""
-        return self._bonds()[:, 5]
+        return self._bonds()[:, 5].copy()
 
     def active_bonds(self) -> np.ndarray:
         """Whether each part of its law has changed a unit of every bond, (n, 2)."""
@@ -153,31 +185,25 @@ class Readings:
 
         Zero for released bonds, and for shear laws that keep none.
         """
-        return self._bonds()[:, 8]
+        return self._bonds()[:, 8].copy()
 
-    def _bonds(self):
-        shape = int(values(self.tables.bond_count)), 9
-        return self._once("bonds", shape, self._visit_bonds)
-
-    @ti.kernel
-    def _visit_bonds(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Fill in all that is read of bonds; one kernel, as each takes its time to compile."""
-        for b in range(self.tables.bond_count[None]):
-            table[b, 0] = self.advance.bond_energy(b)
-            if ti.static(self.tables.has_bond_heat):
-                for k in ti.static(range(3)):
-                    table[b, 1 + k] = self.state.bond_heat[b][k]
-                table[b, 1] = table[b, 1] + self.half_step.bond_heat(b)
-            holds = self.state.broken_tick[b] < 0
-            for q in range(3):
-                u = 3 * b + q
-                spent = self.tables.bond.spent(b, u)
-                table[b, 4] = table[b, 4] + self.tables.unit_area[b] * spent
-                if holds:
-                    table[b, 5] = table[b, 5] + self.tables.bond.damage(b, u) / 3.0
-                self._note_laws(table, b, u, holds)
-            if not holds:
-                table[b, 5] = 1.0
+    @ti.func
+    def _visit_bond(self, table: ti.template(), b):
+        table[b, 0] = self.advance.bond_energy(b)
+        if ti.static(self.tables.has_bond_heat):
+            for k in ti.static(range(3)):
+                table[b, 1 + k] = self.state.bond_heat[b][k]
+            table[b, 1] = table[b, 1] + self.half_step.bond_heat(b)
+        holds = self.state.broken_tick[b] < 0
+        for q in range(3):
+            u = 3 * b + q
+            spent = self.tables.bond.spent(b, u)
+            table[b, 4] = table[b, 4] + self.tables.unit_area[b] * spent
+            if holds:
+                table[b, 5] = table[b, 5] + self.tables.bond.damage(b, u) / 3.0
+            self._note_laws(table, b, u, holds)
+        if not holds:
+            table[b, 5] = 1.0
 
     @ti.func
     def _note_laws(self, table: ti.template(), b, u, holds):
@@ -192,9 +218,10 @@ class Readings:
 
     def pairs(self) -> np.ndarray:
         """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""
-        table = self.contacts_now()[:, 17:].copy()
-        table[:, 1:3] += self.contacts_now()[:, 12:14]
-        return table
+        table, _ = self._contacts()
+        found = table[:, 17:].copy()
+        found[:, 1:3] += table[:, 12:14]
+        return found
 
     def momentum(self) -> np.ndarray:
         """Momentum of every body; impulses of loads and supports, their sums and sizes, (n, 14)."""

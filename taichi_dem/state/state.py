@@ -202,13 +202,17 @@ class State:
         position, velocity, spin, angular_momentum (n, 3), orientation (n, 4), rotation (n, 3, 3)
         and level (n,).
         """
-        here = slice(self.body_count)
-        names = (*_GIVEN, "angular_momentum", "rotation", "level")
-        found = {name: values(getattr(self, name), here) for name in names}
+        found = self.stored()
         # The stored spin is that of the orientation before the last turn.
-        inverse = values(self.tables.inertia_inverse, here)
+        inverse = values(self.tables.inertia_inverse, slice(self.body_count))
         found["spin"] = spins(found["rotation"], inverse, found["angular_momentum"])
         return found
+
+    def stored(self) -> dict[str, np.ndarray]:
+        """The same arrays with the spin that the fields have, that before the last turn."""
+        here = slice(self.body_count)
+        names = (*_GIVEN, "angular_momentum", "rotation", "level")
+        return {name: values(getattr(self, name), here) for name in names}
 
     def fields(self) -> dict[str, ti.Field]:
         """Every field that changes, and those of the bound effects, by name."""

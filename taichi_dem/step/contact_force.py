@@ -15,9 +15,10 @@ class PairForces:
 
     force: on the second [N]. moment_i, moment_j: about the centre of each [N m]. dragged, rubbed:
     power that dashpots and friction take [W]. slipped: energy of springs that slipped or parted
-    [J]. rub, bound: sums of the sizes of friction and of its limits [N]. deepest: largest overlap
-    over the sum of the radii. near_count: spheres within a margin. active: CONTACT and RUBBED,
-    where spheres push and rub.
+    [J]. rub, bound: sums of the sizes of friction and of its limits [N]. stored: elastic energy of
+    overlaps and of springs between spheres; not found in a step [J]. deepest: largest overlap over
+    the sum of the radii. near_count: spheres within a margin. active: CONTACT and RUBBED, where
+    spheres push and rub.
     """
 
     force: vec3
@@ -28,6 +29,7 @@ class PairForces:
     slipped: real
     rub: real
     bound: real
+    stored: real
     deepest: real
     near_count: ti.i32
     active: ti.i64
@@ -113,8 +115,12 @@ class ContactForce:
                 found.rub += norm(rub)
                 found.bound += self.tables.friction.limit(m, push)
                 found.deepest = ti.max(found.deepest, self._depth(near, overlap))
+                if ti.static(not stepping):
+                    found.stored += self.contacts.overlap_energy(m, met)
             elif ti.static(stepping):
                 found.slipped += self.springs.part(m, k)
+            if ti.static(not stepping):
+                found.stored += self.springs.stored(m, k)
         return found
 
     @ti.func

@@ -9,6 +9,7 @@ from typing import Any
 
 import taichi as ti
 
+from taichi_dem.kit.launch import Launch
 from taichi_dem.step.phases import Step
 
 #: The parallel driver is called for about this long [s] between two checks of divergence, progress
@@ -29,27 +30,34 @@ class Resident:
 
     def __init__(self, step: Step):
         self.step = step
+        self._launch_steps, self._launch_search = Launch(self._steps), Launch(self._search)
 
     def begin(self) -> None:
         """Run the phases of the start; compiles the kernel."""
         # Calls are short first, as the cost of a step is not known yet.
         self.substeps = 4
         self.step.start(0)
-        self._run(1, 0, 1)
+        self._launch_steps(1, 0, 1)
         self.step.start(1)
 
     def prepare(self) -> None:
         """Make a requested search, without a step."""
-        self._run(0, 0, 0)
+        self.few(0, 0)
 
-    def few(self, end_tick: int, substeps: int) -> None:
-        """Advance some substeps, or to a tick or the next halt."""
-        self._run(0, end_tick, substeps)
+    def few(self, end_tick: int, substeps: int) -> int:
+        """Advance some substeps, or to a tick or the next halt; how many."""
+        done = 0
+        while True:
+            found = self._launch_steps(0, end_tick, substeps - done)
+            if found >= 0:
+                return done + found
+            done += -1 - found
+            self._launch_search()
 
     def run(self, end_tick: int) -> None:
         """Advance to a tick, to the next halt, or for about _KERNEL_SECONDS."""
         start = time.perf_counter()
-        done = self._run(0, end_tick, self.substeps)
+        done = self.few(end_tick, self.substeps)
         seconds = max(time.perf_counter() - start, 1e-5)
         if done == self.substeps:
             grown = int(done * _KERNEL_SECONDS / seconds)
@@ -57,17 +65,17 @@ class Resident:
             self.substeps = max(1, min(4 * self.substeps, grown, _MAX_SUBSTEPS))
 
     @ti.kernel
-    def _run(self, begin: ti.i32, end_tick: ti.i64, substeps: ti.i32) -> ti.i32:
-        # At the start the bonds act alone: what takes longest to compile is compiled once.
+    def _steps(self, begin: ti.i32, end_tick: ti.i64, substeps: ti.i32) -> ti.i32:
+        # Returns the substeps done, or -1 less them where a search is called for. At the start the
+        # bonds act alone: what takes longest to compile is compiled once.
         done = 0
         low = ti.static(self.step.schedule.low)
         ti.loop_config(serialize=True)
         for s in range(substeps + 1):
             if ti.static(self.step.has_contact):
-                while begin == 0 and self.step.search.is_requested() == 1:
-                    for count, item in ti.static(self.step.search.phases):
-                        for a in range(count()):
-                            item(a)
+                if begin == 0 and self.step.search.is_requested() == 1:
+                    done = -1 - done
+                    break
             finished = self.step.state.tick[None] >= end_tick or self.step.halted() == 1
             if s == substeps or (finished and begin == 0):
                 break
@@ -80,6 +88,16 @@ class Resident:
             done = s + 1
         return done
 
+    @ti.kernel
+    def _search(self):
+        # A kernel of its own, as the time to compile grows faster than a kernel.
+        ti.loop_config(serialize=True)
+        for _ in range(1):
+            while self.step.search.is_requested() == 1:
+                for count, item in ti.static(self.step.search.phases):
+                    for a in range(count()):
+                        item(a)
+
 
 @ti.data_oriented
 class Parallel:
@@ -89,17 +107,18 @@ class Parallel:
 
     def __init__(self, step: Step):
         self.step = step
+        self._parts = tuple(Launch(self._run, part) for part in range(len(step.parts)))
 
     def begin(self) -> None:
         """Run the phases of the start; compiles their kernels."""
         self.step.start(0)
-        self._run(len(self.step.parts) - 1, 0, 0, 1)
+        self._parts[-1](0, 0, 1)
         self.step.start(1)
 
     def prepare(self) -> None:
         """Make a requested search, without a step; compiles the kernels."""
-        for part in range(len(self.step.parts)):
-            self._run(part, 0, 0, 0)
+        for launch in self._parts:
+            launch(0, 0, 0)
         if self.step.has_contact:
             self.step.search.renew()
 
@@ -118,10 +137,10 @@ class Parallel:
     def _substep(self, end_tick):
         """Run all parts of a substep, and a requested search; nonzero at the end or a halt."""
         state = 0
-        for part in range(len(self.step.parts)):
-            state = self._run(part, end_tick, 1, 1)
+        for part, launch in enumerate(self._parts):
+            state = launch(end_tick, 1, 1)
             while self.step.repeats(part):
-                state = self._run(part, end_tick, 1, 1)
+                state = launch(end_tick, 1, 1)
         if state & _SEARCH:
             self.step.search.renew()
         return state & ~_SEARCH

@@ -51,3 +51,11 @@ class TangentialSprings:
         if ti.static(self.present):
             energy = self.friction.part(m, k)
         return energy
+
+    @ti.func
+    def stored(self, m, k):
+        """Energy of the spring of sphere pair k [J]; 0 without springs."""
+        energy = 0.0
+        if ti.static(self.present):
+            energy = self.friction.stored(m, k)
+        return energy

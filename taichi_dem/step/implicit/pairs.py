@@ -310,27 +310,31 @@ class PairDashpots:
         found, m = PairForces(), self.tables.pair(i, j)
         for k in range(self.store.first[p], self.store.last[p]):
             pushed = self.impulse[k] / dt
-            a, b = self.store.sphere[k][0], self.store.sphere[k][1]
-            near = self.contacts.law.nearest(a, b, turn, offset)
-            met = self.contacts.law.meeting(near, k, self.state.rotation[i])
-            arm = met.arm - branch
-            found.force += pushed
-            found.moment_i -= cross(met.arm, pushed)
-            found.moment_j += cross(arm, pushed)
-            velocity = self._velocity(i, j, met.arm, arm)
-            rate, pressed = dot(velocity, met.normal), dot(pushed, met.normal)
-            if ti.static(self.of_bodies):
-                found.moment_i -= pressed * met.couple
-                found.moment_j += pressed * met.couple
-                rate += dot(met.couple, self.state.spin[j] - self.state.spin[i])
-            spring = met.area * self.contacts.law.elastic(m, ti.max(met.overlap, 0.0))
-            found.dragged += (spring - pressed) * rate
-            rub = pushed - pressed * met.normal
-            if ti.static(self.springs.present):
-                rub -= self.springs.force(m, k, self.state.rotation[i])
-            found.rubbed -= dot(rub, velocity)
-            found.rub += norm(rub)
-            found.bound += self.tables.friction.limit(m, pressed)
+            # A pair that has stayed apart has no force, and need not be compared.
+            if squared(pushed) > 0.0 or self.contacts.may_meet(k, i, j, 0.0):
+                a, b = self.store.sphere[k][0], self.store.sphere[k][1]
+                near = self.contacts.law.nearest(a, b, turn, offset)
+                met = self.contacts.law.meeting(near, k, self.state.rotation[i])
+                arm = met.arm - branch
+                found.force += pushed
+                found.moment_i -= cross(met.arm, pushed)
+                found.moment_j += cross(arm, pushed)
+                velocity = self._velocity(i, j, met.arm, arm)
+                rate, pressed = dot(velocity, met.normal), dot(pushed, met.normal)
+                if ti.static(self.of_bodies):
+                    found.moment_i -= pressed * met.couple
+                    found.moment_j += pressed * met.couple
+                    rate += dot(met.couple, self.state.spin[j] - self.state.spin[i])
+                spring = met.area * self.contacts.law.elastic(m, ti.max(met.overlap, 0.0))
+                found.dragged += (spring - pressed) * rate
+                rub = pushed - pressed * met.normal
+                if ti.static(self.springs.present):
+                    rub -= self.springs.force(m, k, self.state.rotation[i])
+                found.rubbed -= dot(rub, velocity)
+                found.rub += norm(rub)
+                found.bound += self.tables.friction.limit(m, pressed)
+                found.stored += self.contacts.overlap_energy(m, met)
+            found.stored += self.springs.stored(m, k)
         return found
 
     @ti.func
