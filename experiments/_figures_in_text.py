@@ -30,6 +30,8 @@ def keep_figures(out, root, names):
         if summary and not summary["quick"]:
             values = {key: one["value"] for key, one in summary["figures"].items()}
             made_by = {key: summary[key] for key in ("command", "machine", "versions")}
+            # Where its files lay is of no use to a reader.
+            made_by["command"] = made_by["command"].partition(" --out ")[0]
             kept[name] = {"figures": values, **made_by}
             renewed.append(name)
     write_text(path, json.dumps(kept, indent=1, sort_keys=True) + "\n")

@@ -10,11 +10,12 @@ zone at the hole, cracks that run out from it, and a wedge pushed out of the fre
     python experiments/blast_fracture.py --accuracy 1%         # hole's displacement, with a bar
     python experiments/blast_fracture.py --effects all         # laws evaluated everywhere
     python experiments/blast_fracture.py --with sphere_contact,friction    # contact of the paper
+    python experiments/blast_fracture.py --compare         # both contacts in a table
 
 Bodies touch as wholes and stick until they slip, as in any scene with effects="auto"; the paper has
-spheres behind broken faces, and sliding friction. Without --with and --without the blast is run a
-second time with these, and a table compares both; pictures are of the first run. An effect of
---with takes the place of the usual one of its kind: surface_contact has spheres on all free faces.
+spheres behind broken faces, and sliding friction. With --compare the blast is run a second time
+with these; pictures are of the first run. An effect of --with takes the place of the usual one of
+its kind: surface_contact has spheres on all free faces.
 
 Softening, slip and contact are evaluated only where and when they act, and bodies that no wave has
 reached sleep; the certificate in the report says what acted, since when, and what was left out.
@@ -99,6 +100,7 @@ def options_parser():
     made.add_argument("--with", dest="added", default="", help="effects to add, by comma")
     words = "auto: only where they act; all: everywhere; by default auto"
     made.add_argument("--effects", choices=WORDS, default=WORDS[0], help=words)
+    made.add_argument("--compare", action="store_true", help="run it with the paper's contact too")
     study.add_accuracy(made, "the displacement of the hole")
     study.add_pictures(made)
     return made
@@ -152,7 +154,7 @@ def run(options):
         raise
     print(f"\n{result.report}\n")
     figures, reports = figures_of(result), [result.report]
-    if not (options.added or options.without or options.resume):
+    if options.compare:
         spheres = run_with_spheres(options, method)
         show_both(result, spheres)
         figures.update({f"spheres_{name}": one[:2] for name, one in figures_of(spheres).items()})
