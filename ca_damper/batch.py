@@ -174,7 +174,7 @@ class Batch(LoadedScenes):
         initial += np.column_stack([more, for_all("velocity", velocity, self.count)])
         check_finite_start(initial)
         warn_outside(self)
-        self._tell_compiling("placing", 0.2)
+        self._tell_compiling("placing", 2)
         coupling.start(np.ascontiguousarray(initial))
         self._started, self._told = True, 0
         self.time_origin[:] = 0.0
@@ -486,7 +486,7 @@ class Batch(LoadedScenes):
         engine = self.engine
         if not engine.is_compiled:
             started = time.perf_counter()
-            self._tell_compiling("time step", 0.4)
+            self._tell_compiling("time step", 3)
             engine.coupling.advance(0.0)
             self.compile_seconds += time.perf_counter() - started
             engine.is_compiled = True

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Optional
+from typing import ClassVar, Optional
 
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.progress.progress import Listener, Pace, Progress
@@ -17,6 +17,7 @@ _GROWTH = 0.1
 class BatchProgress(Progress):
     """Progress of a batch. steps: scene-steps done."""
 
+    phase: ClassVar[str] = "stepping"
     steps: int
 
     @property

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from taichi_dem.kit.plot_style import STYLE, filming, write_gif
+from taichi_dem.kit.progress.progress import drawing
 from taichi_dem.plot.bodies import ALONG_Z, draw_bodies, frame_block, move_bodies
 from taichi_dem.plot.view import View
 
@@ -31,6 +32,7 @@ def moving_picture(path, size, milliseconds):
     size: in inches, at most 4 each way for a GIF of 400 pixels. milliseconds: a frame. The layout
     is that of the first frame.
     """
+    drawing(path)
     with filming(size, _DPI, _SMALL) as (figure, shoot, images):
         yield figure, shoot
     write_gif(path, [image.reduce(2) for image in images], milliseconds, 48)

@@ -22,7 +22,7 @@ from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
 from taichi_dem.saving import arrays_of, writer_of
 from taichi_dem.scene import Scene, scene_warnings
-from taichi_dem.simulation import Simulation
+from taichi_dem.simulation import PARTS, Simulation
 from taichi_dem.state.timeline import MACRO_TICKS
 
 #: Progress is reported this often [s].
@@ -262,7 +262,7 @@ def _started(simulation):
     """A simulation ready to step and its recorder, with all kernels compiled."""
     recorder = Recorder(simulation, *watched_groups(simulation.scene))
     simulation.start()
-    compiling("recording", 0.95)
+    compiling("recording", PARTS, PARTS)
     recorder.compile()
     return simulation, recorder
 

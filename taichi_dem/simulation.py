@@ -43,6 +43,8 @@ from taichi_dem.step_control import CRITERIA
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
+#: Parts in which the kernels of a run are compiled, the last of them the recording's.
+PARTS = 5
 
 
 def _part(name) -> Any:
@@ -105,7 +107,7 @@ class Simulation(Uncopied):
         choice("driver", driver, ("auto", *DRIVERS))
         runtime.check_thread("simulation")
         started = time.perf_counter()
-        compiling("set-up", 0.0)
+        compiling("set-up", 1, PARTS)
         self.scene, self.method = scene, method
         self.model = Model(scene.mesh, scene.body_materials, scene.effects)
         name = driver_name(driver, self.model.bond_count)
@@ -239,7 +241,7 @@ class Simulation(Uncopied):
         if opened:
             return
         started = time.perf_counter()
-        compiling("time step", 0.2)
+        compiling("time step", 2, PARTS)
         with self._undivided("it was started"):
             self._start()
         self.compile_seconds += time.perf_counter() - started
@@ -252,10 +254,11 @@ class Simulation(Uncopied):
             self.state.expose(self.model.topology, self.model.contact.outer_faces is True)
         self.driver.begin()
         if self.contacts is not None:
+            compiling("contact search", 3, PARTS)
             self.broad_phase.ask(everywhere=True)
         self.driver.prepare()
         self._check_capacity()
-        compiling("energy balance", 0.85)
+        compiling("energy balance", 4, PARTS)
         self.readings.step_back()
         self._open_balance()
         self.sample()

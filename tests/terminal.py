@@ -13,6 +13,8 @@ from tests.processes import users_environment
 
 #: What a terminal obeys instead of showing: colours, moves of the cursor, lines erased.
 _ORDERS = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
+#: What a program writes to a pipe as a phase of a job begins.
+_PHASE = re.compile(r".+: (compiling|stepping|running|drawing)")
 
 
 class Seen(NamedTuple):
@@ -53,3 +55,10 @@ def _read(descriptor):
         return os.read(descriptor, 65536)
     except OSError:
         return b""
+
+
+def phases_of(text):
+    """Lines of standard error that tell a phase of a program, and all others."""
+    lines = text.splitlines()
+    phases = [line for line in lines if _PHASE.fullmatch(line)]
+    return phases, [line for line in lines if line not in phases]

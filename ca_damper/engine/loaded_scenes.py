@@ -30,6 +30,9 @@ from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, instance, positive, whole
 
+#: Parts in which the kernels of a batch are compiled.
+_PARTS = 3
+
 
 class LoadedScenes(Uncopied):
     """A filling and a table of scenes on an engine; the arguments are those of a Batch.
@@ -71,7 +74,7 @@ class LoadedScenes(Uncopied):
         asked = self.filling, kind, self.excitation.kind, counts, self._more_sizes
         self._engine = borrow(*asked, owner=self)
         engine = self.engine
-        self._tell_compiling("set-up", 0.0)
+        self._tell_compiling("set-up", 1)
         engine.clear()
         engine.load(self.filling, self.table, rtol, atol, self.excitation)
         if self.modal is not None:
@@ -231,10 +234,10 @@ class LoadedScenes(Uncopied):
         engine = self.engine
         return engine.table.in_use(engine.coupling.attempts)
 
-    def _tell_compiling(self, part: str, share: float) -> None:
+    def _tell_compiling(self, part: str, number: int) -> None:
         """Report that a part is compiled next, unless another batch has had it compiled."""
         if not self.engine.is_compiled:
-            compiling(part, share)
+            compiling(part, number, _PARTS)
 
     def _momentum_error(self) -> float:
         return self.engine.account.error(self.sample()["momentum"]) if self._started else 0.0

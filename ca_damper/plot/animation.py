@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from taichi_dem.kit.plot_style import STYLE, filming, write_gif
+from taichi_dem.kit.progress.progress import drawing
 from taichi_dem.kit.validation import FileName
 
 _DPI = 100
@@ -20,6 +21,7 @@ def moving_picture(
 
     size: in inches, at 100 pixels an inch. The layout is that of the first frame.
     """
+    drawing(path)
     with filming(size, _DPI, _SMALL) as (figure, shoot, images):
         yield figure, shoot
     write_gif(path, images, milliseconds)

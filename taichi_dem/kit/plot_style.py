@@ -18,6 +18,7 @@ from matplotlib.ticker import LogFormatterSciNotation
 from PIL import Image
 
 from taichi_dem.kit.files import write_bytes, write_whole
+from taichi_dem.kit.progress.progress import drawing
 from taichi_dem.kit.validation import FileName
 
 STYLE = {
@@ -156,6 +157,8 @@ def picture(path: Optional[FileName], *shape: Any, **options: Any) -> Iterator[t
 
     path: None for no file. Raises InputError when the file cannot be written.
     """
+    if path is not None:
+        drawing(path)
     with styled(*shape, **options) as (figure, axes):
         yield figure, axes
         _write_plain_numbers(figure)

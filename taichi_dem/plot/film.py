@@ -9,6 +9,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm
 
 from taichi_dem.kit.plot_style import STYLE, filming, write_gif
+from taichi_dem.kit.progress.progress import drawing
 from taichi_dem.kit.validation import FileName
 from taichi_dem.output.record import Frame
 from taichi_dem.output.run_tables import RunTables
@@ -38,6 +39,7 @@ def plot_film(
     Needs a frame. magnify: of the displacement. axis: towards the viewer. One palette for all
     frames, no dithering and few colours keep 40 frames small.
     """
+    drawing(path)
     view, model, frames = View(axis), result.model, result.frames
     broken_time = result.broken_time
     edges = speed_edges(frames)

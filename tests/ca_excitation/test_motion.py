@@ -178,7 +178,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(tmp_path):
     whole = shake(Automaton(), motion, **few)
 
     def stop(progress):
-        if progress.phase == "running":
+        if progress.phase == "stepping":
             os.kill(os.getpid(), signal.SIGINT)
 
     with pytest.raises(Interrupted):

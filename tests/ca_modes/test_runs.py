@@ -68,7 +68,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(tmp_path):
     file, whole = tmp_path / "run.npz", shaken()
 
     def stop(progress):
-        if progress.phase == "running":
+        if progress.phase == "stepping":
             os.kill(os.getpid(), signal.SIGINT)
 
     with pytest.raises(Interrupted):

@@ -29,7 +29,7 @@ class CtrlCAt:
         self.left = call
 
     def __call__(self, progress):
-        self.left -= progress.phase == "running"
+        self.left -= progress.phase == "stepping"
         if self.left == 0:
             os.kill(os.getpid(), signal.SIGINT)
 

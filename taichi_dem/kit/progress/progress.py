@@ -2,10 +2,13 @@
 
 import contextlib
 import math
+import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import ClassVar
+
+from taichi_dem.kit.validation import FileName
 
 #: Share of a job below which its first calls, which take longer than later ones, rule its speed.
 LEAST_SHARE = 0.01
@@ -40,9 +43,9 @@ class Progress:
         return ""
 
     def __str__(self):
-        """Percent done, time left and speed in one line."""
-        parts = f"{100.0 * self.share:3.0f} %", time_left(self.seconds_left), self.speed
-        return ", ".join(part for part in parts if part)
+        """Phase, percent done, time left and speed in one line."""
+        done = f"{self.phase} {100.0 * self.share:3.0f} %"
+        return ", ".join(part for part in (done, time_left(self.seconds_left), self.speed) if part)
 
 
 @dataclass(frozen=True)
@@ -60,8 +63,9 @@ class Counted(Progress):
 
 @dataclass(frozen=True)
 class Worded(Progress):
-    """Progress of a job that says in words how fast it is, or how much is done."""
+    """Progress of a run that says in words how fast it is, or how much is done."""
 
+    phase: ClassVar[str] = "stepping"
     words: str
 
     @property
@@ -72,10 +76,15 @@ class Worded(Progress):
 
 @dataclass(frozen=True)
 class Compiling(Progress):
-    """Progress of compiling kernels before the first step. part: which of them, in words."""
+    """Progress of compiling kernels before the first step.
+
+    part: which of them, in words; it is the one of this number of all parts.
+    """
 
     phase: ClassVar[str] = "compiling"
     part: str
+    number: int
+    total: int
 
     @property
     def seconds_left(self) -> float:
@@ -83,9 +92,20 @@ class Compiling(Progress):
         return math.inf
 
     def __str__(self):
-        """Share done and part being compiled, in one line."""
-        share = f"{100.0 * self.share:3.0f} %"
-        return f"{share}, compiling {self.part} kernels, the next start is faster"
+        """Number and name of the part, in one line."""
+        return f"compiling {self.number} of {self.total}, {self.part}, the next start is faster"
+
+
+@dataclass(frozen=True)
+class Drawing(Progress):
+    """Progress of drawing, after the run. file: name of the picture that is next."""
+
+    phase: ClassVar[str] = "drawing"
+    file: str
+
+    def __str__(self):
+        """The picture."""
+        return f"drawing {self.file}"
 
 
 def time_left(seconds: float) -> str:
@@ -117,13 +137,13 @@ class Pace:
 #: Function that is called with the progress of a job.
 Listener = Callable[[Progress], object]
 
-#: Listeners to compiling, the innermost last, and since when each listens [s].
+#: Listeners to compiling and drawing, the innermost last, and since when each listens [s].
 _listeners: list[tuple[Listener, float]] = []
 
 
 @contextlib.contextmanager
 def listening(listener: Listener) -> Iterator[None]:
-    """Call listener(Compiling) whenever kernels are compiled in the block; inner blocks win."""
+    """Call listener with a Compiling or Drawing where one begins in the block; inner blocks win."""
     _listeners.append((listener, time.perf_counter()))
     try:
         yield
@@ -131,8 +151,17 @@ def listening(listener: Listener) -> Iterator[None]:
         _listeners.pop()
 
 
-def compiling(part: str, share: float) -> None:
-    """Report that a part of the kernels is compiled next; share: of all of them."""
+def compiling(part: str, number: int, total: int) -> None:
+    """Report that a part of the kernels is compiled next, the one of a number of all parts."""
+    _tell(Compiling, (number - 1) / total, part, number, total)
+
+
+def drawing(path: FileName) -> None:
+    """Report that a picture is drawn next, by its path."""
+    _tell(Drawing, 1.0, os.path.basename(path))
+
+
+def _tell(kind, share, *more):
     if _listeners:
         listener, since = _listeners[-1]
-        listener(Compiling(share, time.perf_counter() - since, part))
+        listener(kind(share, time.perf_counter() - since, *more))

@@ -1,4 +1,4 @@
-"""A progress bar on a terminal and in Jupyter; silent elsewhere."""
+"""A progress bar on a terminal and in Jupyter; elsewhere a line a phase, or nothing."""
 
 import contextlib
 import html
@@ -21,14 +21,17 @@ _NARROW = 70
 _open_bars: list["ProgressBar"] = []
 #: Blocks of ``no_bars`` that are open now.
 _silent_blocks: list[object] = []
+#: For each block of ``phase_lines`` the titles and phases that have had their line.
+_said: list[set[tuple[str, str]]] = []
 
 
 class ProgressBar:
     """Bar with percent, time left and speed, from entering to leaving its block.
 
     It is drawn on stderr where that is a terminal, and in the cell of a Jupyter notebook; it leaves
-    nothing behind. Call it with a Progress; while kernels are compiled in its block it says so by
-    itself.
+    nothing behind. A program of the experiments has a line a phase instead where stderr is a pipe
+    or a file. Call it with a Progress; while kernels are compiled and pictures are drawn in its
+    block it says so by itself.
 
     Parameters
     ----------
@@ -113,6 +116,16 @@ def no_bars() -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def phase_lines() -> Iterator[None]:
+    """In the block write a line a phase of each title, where stderr is neither of both."""
+    _said.append(set())
+    try:
+        yield
+    finally:
+        _said.pop()
+
+
+@contextlib.contextmanager
 def reporting(progress: Union[Listener, str, None], title: str) -> Iterator[Optional[Listener]]:
     """Listener to the Progress of a job for its argument ``progress``; None for silence.
 
@@ -184,6 +197,23 @@ class _Terminal:
         self._bar.stop()
 
 
+class _Phases:
+    """A line on stderr for each phase of each title."""
+
+    def __init__(self, title):
+        self._title = title
+
+    def show(self, progress):
+        """Write the line where there was none."""
+        phase = self._title, progress.phase
+        if phase not in _said[-1]:
+            _said[-1].add(phase)
+            print(": ".join(phase), file=sys.stderr, flush=True)
+
+    def close(self):
+        """Leave the lines as written."""
+
+
 class _PlainTerminal:
     """Lines on a terminal that cannot move its cursor: parts of compiling, tenths of the run."""
 
@@ -192,8 +222,7 @@ class _PlainTerminal:
 
     def show(self, progress):
         """Write a line where there is something new."""
-        steps = 100 if progress.phase == "compiling" else 10
-        now = progress.phase, int(steps * progress.share)
+        now = progress.phase, getattr(progress, "file", int(10 * progress.share))
         if now != self._said:
             self._said = now
             print(f"{self._title}: {progress}", file=sys.stderr, flush=True)
@@ -231,7 +260,7 @@ def _display_for(title):
     if shell is not None:
         return _Notebook(title, sys.modules["IPython"].display.display)
     if sys.stderr is None or not sys.stderr.isatty():
-        return _Nothing()
+        return _Phases(title) if _said and sys.stderr is not None else _Nothing()
     return _PlainTerminal(title) if os.environ.get("TERM") == "dumb" else _Terminal(title)
 
 

@@ -20,7 +20,7 @@ from taichi_dem.kit.children import Terminated, ending_children
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, older_files, output_folder
 from taichi_dem.kit.progress.lasting_output import lasting_output
-from taichi_dem.kit.progress.progress_bar import no_bars
+from taichi_dem.kit.progress.progress_bar import no_bars, phase_lines
 from taichi_dem.kit.study.entries import Entry, entry_of
 from taichi_dem.kit.study.look import show_opening
 from taichi_dem.kit.study.settings import Settings, add_settings, take_settings
@@ -263,6 +263,8 @@ def _loudness(options):
         if options.quiet:
             stack.enter_context(no_bars())
             warnings.simplefilter("ignore")
+        else:
+            stack.enter_context(phase_lines())
         yield
 
 

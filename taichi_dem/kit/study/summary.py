@@ -15,6 +15,7 @@ import numpy as np
 
 from taichi_dem.kit import runtime
 from taichi_dem.kit.files import write_text
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.provenance import commit, processor
 from taichi_dem.kit.study.look import print_figures, show_files
 from taichi_dem.kit.terminal import show_paragraph
@@ -64,7 +65,8 @@ def finish(
         print()
         show_paragraph(caption)
     if draw:
-        draw()
+        with ProgressBar(name):
+            draw()
     first = (see, *(entry.pictures if entry else ()))
     show_files(options.out, getattr(options, "began", 0.0), first)
 

@@ -11,6 +11,7 @@ from typing import Any, Optional
 
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.files import write_text
+from taichi_dem.kit.progress.progress import drawing
 from taichi_dem.kit.validation import FileName, flag, path_name
 
 _HERE = Path(__file__).resolve().parent
@@ -81,6 +82,8 @@ def show_page(
     """
     wanted = _is_on_desktop() if open_browser is None else flag("open_browser", open_browser)
     name = None if path is None else path_name("path", path)
+    if name is not None:
+        drawing(name)
     text = _page_text(scripts, **content)
     if name is None:
         name = os.path.join(tempfile.mkdtemp(prefix="taichi_dem_"), "view.html")
