@@ -19,6 +19,7 @@ summary.json to results/damper_demo/.
 
 from argparse import Namespace
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Optional
 
 import numpy as np
@@ -102,7 +103,6 @@ def let_go(options: Namespace, name: str) -> None:
     pair = [_batch(one, *alone, **recorded) for one in (rigid, shown)]
     fixed, free = (_filmed(batch, options.shown) for batch in pair)
     figures = figures_of(decays, options)
-    write(at, decays, (fixed, free), shown, options)
     words, report = sentences(decays, shown, options), reports[shown.label]
     report.write(at("report.json"))
     write_text(at("caption.txt"), " ".join(words) + "\n")
@@ -111,7 +111,8 @@ def let_go(options: Namespace, name: str) -> None:
     print(f"\n{report}\n")
     parts = "compile_seconds", "run_seconds"
     spent = [sum(getattr(one, part) for one in (*reports.values(), *pair)) for part in parts]
-    study.finish(options, name, figures, (spent[0], spent[1]))
+    draw = partial(write, at, decays, (fixed, free), shown, options)
+    study.finish(options, name, figures, (spent[0], spent[1]), draw=draw)
     if report.certificate is not None:
         add_to_summary(options.out, certificate=report.certificate.as_dict())
 

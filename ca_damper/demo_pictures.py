@@ -10,11 +10,8 @@ import numpy as np
 from ca_damper.decay import logarithmic_decrement
 from ca_damper.film import Film
 from ca_damper.oscillator import Oscillator
-from ca_damper.plot import Box, Hanging, film_hanging
-from ca_damper.viewer import show_containers
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import BLACK, GREY, picture, styles_of
 
 #: Cycles are counted down to this amplitude; decrements are means above and below two [mm].
 LEVEL, _ABOVE, _BELOW = 10.0, 12.0, 6.0
@@ -102,6 +99,11 @@ def write(
 
     films: of the container with fixed particles, and with those of the filling, which are free.
     """
+    # Imported here, so that matplotlib loads only where a picture is drawn.
+    from ca_damper.plot import Box, Hanging, film_hanging
+    from ca_damper.viewer import show_containers
+    from taichi_dem.kit.plot_style import GREY, styles_of
+
     cycles = {"cycle": np.arange(1, 1 + decays["rigid"].amplitude.shape[1])}
     for label, decay in decays.items():
         for count in decay.counts:
@@ -136,6 +138,8 @@ def _stacked(frame, box):
 
 def plot_decay(path: str, decays: Mapping[str, Decay], count: int, top: float) -> None:
     """Amplitude over cycles of a number of particles, free and fixed; top: of the start [mm]."""
+    from taichi_dem.kit.plot_style import BLACK, GREY, picture, styles_of
+
     with picture(path, size=(7.0, 4.6)) as (_, axes):
         axes.axhline(LEVEL, color=BLACK, linewidth=0.8)
         dotted = {"linestyle": ":", "label": "peak acceleration 1 g"}
