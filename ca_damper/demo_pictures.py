@@ -1,7 +1,7 @@
 """Pictures and words of the demonstration: a container with free particles beside a rigid mass."""
 
 from argparse import Namespace
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Optional
 
@@ -88,14 +88,19 @@ def _expected():
     return {"cycles_rigid_N30_expected": (_RIGID_EXPECTED, "1"), **grains, **decrements}
 
 
-def write(
-    at: Callable[[str], str],
-    decays: Mapping[str, Decay],
-    films: tuple[Film, Film],
-    filling: Any,
-    options: Namespace,
+def write_decays(path: str, decays: Mapping[str, Decay]) -> None:
+    """Write the amplitudes of all cycles as a CSV file."""
+    cycles = {"cycle": np.arange(1, 1 + decays["rigid"].amplitude.shape[1])}
+    for label, decay in decays.items():
+        for count in decay.counts:
+            cycles[f"amplitude_mm_{label}_N{count}"] = decay.amplitudes(count)
+    write_csv(path, cycles)
+
+
+def draw_films(
+    path: str, page: Optional[str], films: tuple[Film, Film], options: Namespace
 ) -> None:
-    """Write the curves, their table and the animation.
+    """Write the animation, and the page that plays it, None for none.
 
     films: of the container with fixed particles, and with those of the filling, which are free.
     """
@@ -104,12 +109,7 @@ def write(
     from ca_damper.viewer import show_containers
     from taichi_dem.kit.plot_style import GREY, styles_of
 
-    cycles = {"cycle": np.arange(1, 1 + decays["rigid"].amplitude.shape[1])}
-    for label, decay in decays.items():
-        for count in decay.counts:
-            cycles[f"amplitude_mm_{label}_N{count}"] = decay.amplitudes(count)
-    write_csv(at("decay.csv"), cycles)
-    plot_decay(at("decay.png"), decays, options.particles, options.amplitude)
+    filling = films[1].filling
     box, style = Box.of(filling), styles_of([filling.label])[filling.label]
     # The rigid mass moves as smoothly as the structure: its box is not staggered.
     plain = Box(box.width, box.height, box.diameter)
@@ -121,8 +121,9 @@ def write(
         Hanging(f"{options.particles} free", box, free, style.colour, curves[1]),
     ]
     speed = 1e-3 * options.amplitude * 2.0 * np.pi * Oscillator().natural_frequency
-    film_hanging(at("damper.gif"), pair, speed)
-    show_containers(pair, at("view.html"), open_browser=False)
+    film_hanging(path, pair, speed)
+    if page:
+        show_containers(pair, page, open_browser=False)
 
 
 def counted(particles: int) -> str:
