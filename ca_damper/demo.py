@@ -66,8 +66,8 @@ SETTINGS = {
     # Those of the animation.
     "shown": (5, 2),
 }
-#: Cycles of a decay, samples in each, frames in a cycle of the animation.
-CYCLES, SAMPLES, FRAMES = 45, 40, 8
+#: Cycles of a decay, as many as decay.png shows; samples in each, frames in one of the animation.
+CYCLES, SAMPLES, FRAMES = 26, 40, 8
 _ENTRY = Entry(
     name=NAME,
     part="",
