@@ -6,7 +6,7 @@ resonance can be missed: a faster decay is damping. The particles damp as long a
 peak acceleration is above about 1 g; below it they lie on the floor, and the structure's own
 damping is left. Try other numbers of particles and places to let go from.
 
-    python -m ca_damper demo                                   # 15 seconds
+    python -m ca_damper demo                                   # 10 seconds
     python -m ca_damper demo --particles 50 --amplitude 40
     python -m ca_damper demo --filling spheres
     python -m ca_damper demo --all-pictures     # also a page that plays the film
@@ -73,8 +73,8 @@ _ENTRY = Entry(
     part="",
     question="What does a handful of grains in a box do to its vibration?",
     look="",
-    time="15 s",
-    quick="10 s",
+    time="10 s",
+    quick="7 s",
     pictures=("damper.gif", "decay.png", "view.html"),
     figures=("cycles_*", "decrement_*"),
 )

@@ -6,7 +6,7 @@ resonance can be missed: a faster decay is damping. The particles damp as long a
 peak acceleration is above about 1 g; below it they lie on the floor, and the structure's own
 damping is left. Try other numbers of particles and places to let go from.
 
-    python experiments/demo_damper.py                                  # 15 seconds
+    python experiments/demo_damper.py                                  # 10 seconds
     python experiments/demo_damper.py --particles 50 --amplitude 40
     python experiments/demo_damper.py --filling spheres
     python experiments/demo_damper.py --all-pictures                   # also a page that plays
