@@ -18,7 +18,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-from taichi.lang import expr, impl, kernel_impl
+from taichi.lang import expr, impl, kernel_impl, snode
 from taichi.lang.ast import ast_transformer_utils
 
 #: Lines and numbers that are kept; the kernels of a step have some thousand.
@@ -26,19 +26,19 @@ _MOST = 1 << 14
 
 
 def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Source lines of a function and their first number, as from find; cached."""
+    """What find tells of the source of a function, cached."""
     cached = {}
 
-    def lines(function):
-        """Source lines of a function and the number of the first."""
+    def found(function):
+        """What there is of a function."""
         # Equal code of two files may differ in annotations, which are not part of it.
         key = (function.__code__.co_filename, function.__code__)
         if key not in cached:
             cached[key] = find(function)
         return cached[key]
 
-    lines.cached = cached  # type: ignore[attr-defined]
-    return lines
+    found.cached = cached  # type: ignore[attr-defined]
+    return found
 
 
 def undisturbed(read: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
@@ -89,10 +89,11 @@ def remember() -> None:
         return
     fill = functools.lru_cache(_MOST)(textwrap.fill)
     kernel_impl.getsourcelines = remembering(find)
+    kernel_impl.getsourcefile = remembering(kernel_impl.getsourcefile)
     kernel_impl.textwrap = SimpleNamespace(fill=fill, dedent=textwrap.dedent)
     kernel_impl.transform_tree = undisturbed(kernel_impl.transform_tree)
     ast_transformer_utils.ASTTransformerContext.get_pos_info = position
-    impl.get_traceback = declared_at
+    impl.get_traceback = snode.get_traceback = declared_at
     expr._check_in_range = functools.lru_cache(_MOST)(expr._check_in_range)
     if hasattr(kernel_impl, "_KERNEL_CLASS_STACKFRAME_STMT_RES"):
         kernel_impl._inside_class = inside_class
