@@ -26,6 +26,7 @@ from ca_damper.checks import (
 from ca_damper.engine.launches import Launches
 from ca_damper.engine.loaded_scenes import LoadedScenes
 from ca_damper.engine.modal_mount import ModalMount
+from ca_damper.engine.recorder import ROOM
 from ca_damper.excitation.excitation import Excitation
 from ca_damper.filling import Filling
 from ca_damper.progress import BatchProgress
@@ -265,8 +266,9 @@ class Batch(LoadedScenes):
         if not self.going_on:
             self._check_cycle_is_full()
         steps = self.steps_per_cycle.astype(np.int64)
-        self._set_recorder((transient + measured) * steps, record_every)
-        self._go((transient + measured) * steps, transient * steps, progress)
+        every = whole("record_every", record_every, 0, _MOST_STEPS)
+        self._set_recorder((transient + measured) * steps, every)
+        self._go((transient + measured) * steps, transient * steps, progress, every)
         record = self._read_cycles(measured)
         cycles = measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
         self.periods = periods_of(cycles)
@@ -299,6 +301,7 @@ class Batch(LoadedScenes):
         """
         counts = for_all("cycles", cycles, self.count, self.measured_cycles).astype(np.int64)
         self._check_cycle_is_full()
+        self._recording = None
         self._go(counts * self.steps_per_cycle, np.zeros_like(counts), progress)
         record = self._read_cycles(int(counts.max()))
         return tuple(one[:count].copy() for one, count in zip(record, counts))
@@ -322,8 +325,46 @@ class Batch(LoadedScenes):
             ``if_diverged="raise"``.
         """
         self._check_started()
+        self._recording = None
         steps = for_all("steps", steps, self.count, _MOST_STEPS).astype(np.int64)
         self._go(steps, steps, progress)
+
+    def record(
+        self, steps: int, every: int, late: int = 0, progress: Optional[Listener] = None
+    ) -> dict[str, np.ndarray]:
+        """Advance every scene by a number of steps, with samples taken inside the kernel.
+
+        Parameters
+        ----------
+        steps : int
+            Number of steps.
+        every : int
+            Steps between samples.
+        late : int, default 0
+            Steps since the last sample was due: below ``every``, and 0 for a sample at once.
+        progress : callable, optional
+            As in ``run``.
+
+        Returns
+        -------
+        dict
+            Arrays (samples, scenes) by name, as those of ``sample``; none of the end.
+
+        Raises
+        ------
+        InputError
+            A number is out of range, or the samples would be more than 32.
+        SimulationDiverged
+            As in ``advance``.
+        """
+        self._check_started()
+        every = whole("every", every, 1, _MOST_STEPS)
+        late = whole("late", late, 0, every - 1)
+        steps = whole("steps", steps, 1, min(ROOM * every - late, _MOST_STEPS))
+        begin, self._recording = self._read_status()[0].astype(np.int64), None
+        ways = np.full(self.count, steps)
+        self._go(ways, ways, progress, every, late)
+        return self._recorded(begin, steps, every, late)
 
     @contextlib.contextmanager
     def checkpointed(
@@ -452,12 +493,23 @@ class Batch(LoadedScenes):
         """Effects that acted and from when, what was left out with its size, what was audited."""
         return certificate_of(self)
 
-    def _go(self, steps: np.ndarray, before_measuring: np.ndarray, progress: Any) -> None:
-        """Take every scene a number of steps on, in launches of bounded length."""
+    def _go(
+        self,
+        steps: np.ndarray,
+        before_measuring: np.ndarray,
+        progress: Any,
+        every: int = 0,
+        late: int = 0,
+    ) -> None:
+        """Take every scene a number of steps on, in launches of bounded length.
+
+        every, late: as of a Recorder.
+        """
         if not (progress is None or callable(progress)):
             raise InputError(f"progress must be a function or None, got {shown(progress)}")
         if not self.going_on:
             self._aim(steps, before_measuring)
+            self.engine.recorder.aim(every, late)
         self.going_on = False
         self._compile()
         self._launch_until_done(steps, progress)

@@ -6,19 +6,22 @@ resonance can be missed: a faster decay is damping. The particles damp as long a
 peak acceleration is above about 1 g; below it they lie on the floor, and the structure's own
 damping is left. Try other numbers of particles and places to let go from.
 
-    python -m ca_damper demo                                   # 15 seconds
+    python -m ca_damper demo                                   # 10 seconds
     python -m ca_damper demo --particles 50 --amplitude 40
     python -m ca_damper demo --filling spheres
+    python -m ca_damper demo --all-pictures     # also a page that plays the film
 
 The film shows one filling; all figures are those of both, as medians over nine starts, five in a
 quick run. An amplitude is sqrt(2) times the RMS displacement of a cycle of the empty container.
 
-Writes damper.gif, view.html (the same to play), decay.png, decay.csv, caption.txt, report.json and
-summary.json to results/damper_demo/.
+Writes damper.gif, decay.png, decay.csv, caption.txt, report.json and summary.json to
+results/damper_demo/; with --all-pictures view.html, the film to play, with --no-pictures neither
+picture nor film.
 """
 
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, Optional
 
 import numpy as np
@@ -26,7 +29,15 @@ import numpy as np
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
 from ca_damper.certificate import EFFECTS
-from ca_damper.demo_pictures import LEVEL, Decay, figures_of, sentences, write
+from ca_damper.demo_pictures import (
+    LEVEL,
+    Decay,
+    draw_films,
+    figures_of,
+    plot_decay,
+    sentences,
+    write_decays,
+)
 from ca_damper.film import Film, film
 from ca_damper.fixed_mass import RigidMass
 from ca_damper.oscillator import Oscillator
@@ -55,16 +66,16 @@ SETTINGS = {
     # Those of the animation.
     "shown": (5, 2),
 }
-#: Cycles of a decay, samples in each, frames in a cycle of the animation.
-CYCLES, SAMPLES, FRAMES = 45, 40, 8
+#: Cycles of a decay, as many as decay.png shows; samples in each, frames in one of the animation.
+CYCLES, SAMPLES, FRAMES = 26, 40, 8
 _ENTRY = Entry(
     name=NAME,
     part="",
     question="What does a handful of grains in a box do to its vibration?",
     look="",
-    time="15 s",
-    quick="10 s",
-    pictures=("damper.gif", "view.html", "decay.png"),
+    time="10 s",
+    quick="7 s",
+    pictures=("damper.gif", "decay.png", "view.html"),
     figures=("cycles_*", "decrement_*"),
 )
 
@@ -73,6 +84,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     """Run the program on a command line, that of the process by default; returns its exit code."""
     made = study.parser(NAME, __doc__, settings=SETTINGS)
     made.prog, made.entry = "python -m ca_damper demo", _ENTRY
+    study.add_pictures(made)
     return study.main(lambda options: let_go(options, NAME), made, arguments)
 
 
@@ -91,37 +103,56 @@ def let_go(options: Namespace, name: str) -> None:
     counts, starts = sorted({*COUNTS, options.particles}), options.seed + np.arange(options.starts)
     scenes = np.repeat(counts, options.starts), np.tile(starts, len(counts))
     jobs = [(rigid, counts, options.seed), *((one, *scenes) for one in fillings.values())]
-    recorded: dict[str, Any] = {"measured_cycles": CYCLES, "recorded_samples": 2 * SAMPLES * CYCLES}
-    batches = {job[0].label: _batch(*job, options, **recorded) for job in jobs}
+    batches = {job[0].label: _batch(*job, options) for job in jobs}
     at = study.output_paths(options.out)
     decays = {label: _decay(counts, batch) for label, batch in batches.items()}
     reports = {label: batch.report() for label, batch in batches.items()}
+    # Their engines are idle again.
     batches.clear()
-    # Recorded as the others were, so that they run in the same engines, which are idle again.
-    alone = options.particles, options.seed, options
-    pair = [_batch(one, *alone, **recorded) for one in (rigid, shown)]
-    fixed, free = (_filmed(batch, options.shown) for batch in pair)
-    figures = figures_of(decays, options)
-    write(at, decays, (fixed, free), shown, options)
+    write_decays(at("decay.csv"), decays)
     words, report = sentences(decays, shown, options), reports[shown.label]
     report.write(at("report.json"))
     write_text(at("caption.txt"), " ".join(words) + "\n")
     for sentence in words:
         show_paragraph(sentence)
     print(f"\n{report}\n")
-    parts = "compile_seconds", "run_seconds"
-    spent = [sum(getattr(one, part) for one in (*reports.values(), *pair)) for part in parts]
-    study.finish(options, name, figures, (spent[0], spent[1]))
+    draw = partial(picture, decays, (rigid, shown), options)
+    study.finish(options, name, figures_of(decays, options), reports.values(), draw=draw)
     if report.certificate is not None:
         add_to_summary(options.out, certificate=report.certificate.as_dict())
 
 
-def _batch(filling: Any, particles: Any, seeds: Any, options: Namespace, **more: Any) -> Batch:
-    """Containers on a base at rest, let go from the amplitude asked for."""
+def picture(decays: Mapping[str, Decay], fillings: Sequence[Any], options: Namespace) -> None:
+    """Draw decays, and film fixed and free particles, as ``study.add_pictures`` has it asked.
+
+    Parameters
+    ----------
+    decays
+        By the label of their filling.
+    fillings
+        Of the film: the fixed particles, and the free ones.
+    options
+        As of ``let_go``.
+    """
+    if options.pictures == "no":
+        return
+    at = study.output_paths(options.out)
+    plot_decay(at("decay.png"), decays, options.particles, options.amplitude)
+    fixed, free = (_filmed(one, options) for one in fillings)
+    page = at("view.html") if options.pictures == "all" else None
+    draw_films(at("damper.gif"), page, (fixed, free), options)
+
+
+def _batch(filling: Any, particles: Any, seeds: Any, options: Namespace) -> Batch:
+    """Containers on a base at rest, let go from the amplitude asked for.
+
+    All have the same room for results, so that those of the film run in the engines of the others.
+    """
     chosen = isinstance(filling, FILLINGS[options.filling])
     dt = options.dt if chosen and options.dt else filling.default_dt
     table = SceneTable(particles, seeds, dt, Oscillator().natural_frequency, 0.0)
-    batch = Batch(filling, table, effects=options.effects, **more)
+    room: dict[str, Any] = {"measured_cycles": CYCLES, "recorded_samples": 2 * SAMPLES * CYCLES}
+    batch = Batch(filling, table, effects=options.effects, **room)
     batch.start(displacement=1e-3 * options.amplitude)
     return batch
 
@@ -134,8 +165,9 @@ def _decay(counts: Sequence[int], batch: Batch) -> Decay:
     return Decay(counts, np.sqrt(2.0) * cycles.rms_by_cycle, batch.time_series()["x"].T)
 
 
-def _filmed(batch: Batch, cycles: int) -> Film:
+def _filmed(filling: Any, options: Namespace) -> Film:
     """The first cycles of a container."""
+    batch = _batch(filling, options.particles, options.seed, options)
     steps = int(batch.steps_per_cycle[0])
     samples, frames = (max(1, steps // number) for number in (SAMPLES, FRAMES))
-    return film(batch, cycles * steps, sample_every=samples, frame_every=frames)
+    return film(batch, options.shown * steps, sample_every=samples, frame_every=frames)

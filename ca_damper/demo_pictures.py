@@ -1,7 +1,7 @@
 """Pictures and words of the demonstration: a container with free particles beside a rigid mass."""
 
 from argparse import Namespace
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Optional
 
@@ -10,11 +10,8 @@ import numpy as np
 from ca_damper.decay import logarithmic_decrement
 from ca_damper.film import Film
 from ca_damper.oscillator import Oscillator
-from ca_damper.plot import Box, Hanging, film_hanging
-from ca_damper.viewer import show_containers
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import BLACK, GREY, picture, styles_of
 
 #: Cycles are counted down to this amplitude; decrements are means above and below two [mm].
 LEVEL, _ABOVE, _BELOW = 10.0, 12.0, 6.0
@@ -91,23 +88,28 @@ def _expected():
     return {"cycles_rigid_N30_expected": (_RIGID_EXPECTED, "1"), **grains, **decrements}
 
 
-def write(
-    at: Callable[[str], str],
-    decays: Mapping[str, Decay],
-    films: tuple[Film, Film],
-    filling: Any,
-    options: Namespace,
-) -> None:
-    """Write the curves, their table and the animation.
-
-    films: of the container with fixed particles, and with those of the filling, which are free.
-    """
+def write_decays(path: str, decays: Mapping[str, Decay]) -> None:
+    """Write the amplitudes of all cycles as a CSV file."""
     cycles = {"cycle": np.arange(1, 1 + decays["rigid"].amplitude.shape[1])}
     for label, decay in decays.items():
         for count in decay.counts:
             cycles[f"amplitude_mm_{label}_N{count}"] = decay.amplitudes(count)
-    write_csv(at("decay.csv"), cycles)
-    plot_decay(at("decay.png"), decays, options.particles, options.amplitude)
+    write_csv(path, cycles)
+
+
+def draw_films(
+    path: str, page: Optional[str], films: tuple[Film, Film], options: Namespace
+) -> None:
+    """Write the animation, and the page that plays it, None for none.
+
+    films: of the container with fixed particles, and with those of the filling, which are free.
+    """
+    # Imported here, so that matplotlib loads only where a picture is drawn.
+    from ca_damper.plot import Box, Hanging, film_hanging
+    from ca_damper.viewer import show_containers
+    from taichi_dem.kit.plot_style import GREY, styles_of
+
+    filling = films[1].filling
     box, style = Box.of(filling), styles_of([filling.label])[filling.label]
     # The rigid mass moves as smoothly as the structure: its box is not staggered.
     plain = Box(box.width, box.height, box.diameter)
@@ -119,8 +121,9 @@ def write(
         Hanging(f"{options.particles} free", box, free, style.colour, curves[1]),
     ]
     speed = 1e-3 * options.amplitude * 2.0 * np.pi * Oscillator().natural_frequency
-    film_hanging(at("damper.gif"), pair, speed)
-    show_containers(pair, at("view.html"), open_browser=False)
+    film_hanging(path, pair, speed)
+    if page:
+        show_containers(pair, page, open_browser=False)
 
 
 def counted(particles: int) -> str:
@@ -136,6 +139,8 @@ def _stacked(frame, box):
 
 def plot_decay(path: str, decays: Mapping[str, Decay], count: int, top: float) -> None:
     """Amplitude over cycles of a number of particles, free and fixed; top: of the start [mm]."""
+    from taichi_dem.kit.plot_style import BLACK, GREY, picture, styles_of
+
     with picture(path, size=(7.0, 4.6)) as (_, axes):
         axes.axhline(LEVEL, color=BLACK, linewidth=0.8)
         dotted = {"linestyle": ":", "label": "peak acceleration 1 g"}

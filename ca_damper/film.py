@@ -6,6 +6,7 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
+from ca_damper.engine.recorder import ROOM
 from ca_damper.measures import SAMPLE_UNITS
 from ca_damper.progress import Stages
 from ca_damper.record import Frame, frames_of, inner_size
@@ -195,28 +196,31 @@ def film(
         raise InputError(f"batch must be a Batch that has been started, got {shown(batch)}")
     steps = whole("steps", steps, 1, _MOST_STEPS)
     samples = _marks("sample_every", sample_every, steps)
-    frames = _marks("frame_every", frame_every, steps) if frame_every is not None else set()
-    marks = sorted(samples | frames | {steps})
+    frames = _marks("frame_every", frame_every, steps) if frame_every is not None else range(0)
+    # The kernel takes the samples; they are read at every frame, and where it has no more room.
+    room = samples.step * ROOM
+    ends = sorted({*range(room, steps, room), *frames[1:], steps})
     rows, shots = [], []
     with reporting(progress, "film") as report_progress:
-        tell = Stages(report_progress, [mark / steps for mark in marks[1:]])
-        for before, mark in zip([0, *marks], marks):
-            if mark > before:
-                batch.advance(mark - before, tell)
-            present = batch.sample()
-            if mark in samples:
-                rows.append(present)
-            if mark in frames:
-                shots.append(frames_of(batch, present))
-    history = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+        tell = Stages(report_progress, [end / steps for end in ends])
+        for begin, end in zip([0, *ends], ends):
+            if begin in frames:
+                shots.append(frames_of(batch))
+            rows.append(batch.record(end - begin, samples.step, begin % samples.step, tell))
+    present = batch.sample()
+    if steps in samples:
+        rows.append({name: values[None] for name, values in present.items()})
+    if steps in frames:
+        shots.append(frames_of(batch, present))
+    history = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
     return Film(history, tuple(zip(*shots)), batch.filling, batch.mount)
 
 
 def _marks(name, every, steps):
-    """Steps at which to record, from 0 on; InputError where they are too many to be kept."""
+    """Range of steps at which to record; InputError where they are too many to be kept."""
     if whole(name, every, 1, _MOST_STEPS) * _MOST_MARKS < steps:
         raise InputError(
             f"{name} must be at least {-(-steps // _MOST_MARKS)} in a film of {steps} steps, "
             f"got {every}"
         )
-    return set(range(0, steps + 1, every))
+    return range(0, steps + 1, int(every))

@@ -6,9 +6,10 @@ resonance can be missed: a faster decay is damping. The particles damp as long a
 peak acceleration is above about 1 g; below it they lie on the floor, and the structure's own
 damping is left. Try other numbers of particles and places to let go from.
 
-    python experiments/demo_damper.py                                  # 15 seconds
+    python experiments/demo_damper.py                                  # 10 seconds
     python experiments/demo_damper.py --particles 50 --amplitude 40
     python experiments/demo_damper.py --filling spheres
+    python experiments/demo_damper.py --all-pictures                   # also a page that plays
 
 The film shows one filling; all figures are those of both, as medians over nine starts, five in a
 quick run. An amplitude is sqrt(2) times the RMS displacement of a cycle of the empty container.
@@ -19,18 +20,24 @@ where friction makes them); "listed", the default, takes the fillings as they ar
 ``python -m ca_damper demo`` is the same job where only the package is installed: the scene and what
 is measured of it stand in ca_damper/demo.py.
 
-Writes damper.gif, view.html (the same to play), decay.png, decay.csv, caption.txt, report.json and
-summary.json to results/demo_damper/.
+Writes damper.gif, decay.png, decay.csv, caption.txt, report.json and summary.json to
+results/demo_damper/; with --all-pictures view.html, the film to play, with --no-pictures neither
+picture nor film.
 """
 
 import sys
-from functools import partial
 
 from ca_damper import demo
 from taichi_dem.kit import study
 
 NAME = "demo_damper"
-options_parser = partial(study.parser, NAME, __doc__, settings=demo.SETTINGS)
+
+
+def options_parser():
+    """Options of this experiment."""
+    made = study.parser(NAME, __doc__, settings=demo.SETTINGS)
+    study.add_pictures(made)
+    return made
 
 
 def run(options):

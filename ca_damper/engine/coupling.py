@@ -36,8 +36,8 @@ _F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 class Coupling:
     """Filling, container and clock of all scenes, tied together.
 
-    device: what ``filling.bind`` gave. account: a MomentumAccount. recorder: a Recorder or a
-    NoRecorder. gravity [m/s^2]. record: of the measured cycles, shape (scenes, cycles, columns of
+    device: what ``filling.bind`` gave. account: a MomentumAccount. recorder: a Recorder. gravity
+    [m/s^2]. record: of the measured cycles, shape (scenes, cycles, columns of
     ``measures.COLUMNS``).
     """
 
@@ -130,9 +130,14 @@ class Coupling:
     @ti.func
     def _record(self, s, before):
         """Take a sample at the beginning of a step if one is due."""
-        if ti.static(self.recorder.active):
-            y, since = self.container.base(s), self.step[s] - self.begin[s]
-            self.recorder.note(s, since, before, y, self.force[s])
+        since = self.step[s] - self.begin[s]
+        self.recorder.note(s, since, before, self.force[s], self._present)
+
+    @ti.func
+    def _present(self, s, motion):
+        """Quantities of ``measures.SAMPLE`` between two steps."""
+        y, energy, momentum = self.container.base(s), self.device.energy(s), self.device.momentum(s)
+        return motion.x, motion.v, motion.a, y, self.force[s], energy, momentum
 
     @ti.func
     def _book(self, s, before, action, attempts):
@@ -199,10 +204,9 @@ class Coupling:
     def sample(self, values: _F64):
         """Fill values[k, s] with the quantities of ``measures.SAMPLE``."""
         for s in range(self.table.scenes[None]):
-            motion = self.container.motion(s)
-            values[0, s], values[1, s], values[2, s] = motion.x, motion.v, motion.a
-            values[3, s], values[4, s] = self.container.base(s), self.force[s]
-            values[5, s], values[6, s] = self.device.energy(s), self.device.momentum(s)
+            present = self._present(s, self.container.motion(s))
+            for k in ti.static(range(len(measures.SAMPLE))):
+                values[k, s] = present[k]
 
     def read_status(self) -> np.ndarray:
         """Step, position in the cycle, and status of all scenes, (3, scenes)."""

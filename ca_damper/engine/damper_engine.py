@@ -13,7 +13,7 @@ from ca_damper.engine.excited_container import excited_container
 from ca_damper.engine.group_coupling import GroupCoupling
 from ca_damper.engine.modal_container import ModalContainer
 from ca_damper.engine.modal_mount import ModalKind
-from ca_damper.engine.recorder import NoRecorder, Recorder
+from ca_damper.engine.recorder import ROOM, Recorder
 from ca_damper.excitation.excitation import Excitation, ExcitationKind
 from ca_damper.filling import LEAST_PLACES, check_device, check_places, structure_of
 from ca_damper.gravity import gravity_along
@@ -23,8 +23,8 @@ from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.engine_pool import Engine, EnginePool
 from taichi_dem.kit.errors import InputError
 
-#: Least room for scenes, measured cycles, and places of a scene: below, nothing is saved.
-_LEAST = (64, 32, *(LEAST_PLACES,) * 32)
+#: Least room for scenes, measured cycles, samples, and places of a scene: below, nothing is saved.
+_LEAST = (64, 32, ROOM, *(LEAST_PLACES,) * 32)
 _SINE = Excitation()
 
 
@@ -33,7 +33,7 @@ class EngineStructure:
     """Compiled structure of a batch: key of its filling's structure, mount, names of sizes.
 
     mount: its word, or a ModalKind. excitation: kind of it. filling: one of that structure, which
-    declares the fields. A batch with a size called "samples" has a recorder.
+    declares the fields.
     """
 
     key: Hashable
@@ -55,14 +55,14 @@ class DamperEngine(Engine):
 
     def declare(self) -> None:
         """Declare the fields of all parts."""
-        scenes, cycles, *places = self.capacity
+        scenes, cycles, samples, *places = self.capacity
         sizes = dict(zip(self.structure.sizes, places))
-        self.table = SceneFields(scenes, {"cycles": cycles, **sizes})
+        self.table = SceneFields(scenes, {"cycles": cycles, "samples": samples, **sizes})
         self.clock = Clock(self.table)
         self.container = self._container()
         self.device = self._bound()
         self.account = MomentumAccount(self.table)
-        self.recorder = Recorder(self.table) if "samples" in sizes else NoRecorder()
+        self.recorder = Recorder(self.table)
         parts = self.container, self.device, self.account, self.recorder
         coupling = GroupCoupling if isinstance(self.structure.mount, ModalKind) else Coupling
         self.coupling = coupling(self.table, self.clock, *parts)
@@ -116,19 +116,19 @@ def borrow(
     filling: Any,
     mount: Hashable,
     kind: ExcitationKind,
-    counts: tuple[int, int],
+    counts: tuple[int, int, int],
     more: dict[str, int],
     owner: Any,
 ) -> DamperEngine:
     """An engine in which so many scenes of a filling find room, for an owner; or InputError.
 
-    mount: its word, or a ModalKind. counts: scenes and measured cycles. more: sizes by name beside
-    those of the filling.
+    mount: its word, or a ModalKind. counts: scenes, measured cycles and samples. more: sizes by
+    name beside those of the filling.
     """
     structure = structure_of(filling)
     check_places(counts[0], max((1, *tuple(structure.sizes.values())[:1])))
     sizes = {**structure.sizes, **more}
     asked = EngineStructure(structure.key, mount, kind, tuple(sizes), filling)
-    capacity = (counts[0], max(1, counts[1]), *sizes.values())
+    capacity = (*counts, *sizes.values())
     engine: DamperEngine = _POOL.borrow(asked, capacity, filling, owner)
     return engine

@@ -18,7 +18,6 @@ from ca_damper.checks import (
 from ca_damper.engine.damper_engine import DamperEngine, borrow
 from ca_damper.engine.divergence import divergence
 from ca_damper.engine.modal_mount import ModalMount, checked_mount
-from ca_damper.engine.recorder import SAMPLED
 from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import Filling, check_filling, structure_of
 from ca_damper.scenes.scene_memory import SceneMemory
@@ -67,9 +66,7 @@ class LoadedScenes(Uncopied):
         self.excitation = checked_excitation(excitation, mount)
         self.recorded_samples = checked_samples(recorded_samples, self.count)
         self._more_sizes = self.excitation.sizes(self.count)
-        if self.recorded_samples:
-            self._more_sizes["samples"] = self.recorded_samples
-        counts = self.count, self.measured_cycles
+        counts = self.count, self.measured_cycles, self.recorded_samples
         kind = self.mount if self.modal is None else self.modal.kind
         asked = self.filling, kind, self.excitation.kind, counts, self._more_sizes
         self._engine = borrow(*asked, owner=self)
@@ -132,8 +129,9 @@ class LoadedScenes(Uncopied):
     @property
     def memory(self) -> SceneMemory:
         """State of the batch on the device, as arrays."""
-        sizes = {"cycles": max(1, self.measured_cycles), **structure_of(self.filling).sizes}
-        return SceneMemory(self.engine, {**sizes, **self._more_sizes})
+        sizes = {"cycles": max(1, self.measured_cycles), "samples": self.recorded_samples}
+        places = {**structure_of(self.filling).sizes, **self._more_sizes}
+        return SceneMemory(self.engine, {**sizes, **places})
 
     @property
     def time_s(self) -> np.ndarray:
@@ -175,12 +173,10 @@ class LoadedScenes(Uncopied):
         if self._recording is None:
             raise InputError("record_every of a run must be at least 1 before time_series, got 0")
         steps, every, count = self._recording
-        read = self.engine.recorder.read(count).transpose(1, 2, 0)
-        end = self.sample()
-        end["force"] = self.engine.recorder.mean_force(end["force"], steps - every * (count - 1))
-        series = {
-            name: np.concatenate([read[:, k], end[name][None]]) for k, name in enumerate(SAMPLED)
-        }
+        recorder, end = self.engine.recorder, self.sample()
+        end["force"] = recorder.mean_force(end["force"], steps - every * (count - 1))
+        read = recorder.read_series(0, count)
+        series = {name: np.concatenate([of, end[name][None]]) for name, of in read.items()}
         # Counted back from the present, as the run may have gone on from a checkpoint.
         marks = self._read_status()[0] - steps + np.append(every * np.arange(count), steps)[:, None]
         series["time_s"] = self.time_origin + marks * self.table.column("dt")
@@ -189,8 +185,7 @@ class LoadedScenes(Uncopied):
         return series
 
     def _set_recorder(self, steps: np.ndarray, every: int) -> None:
-        """Record the next run of so many steps, (scenes,), every so many of them."""
-        every = whole("record_every", every, 0, 2**31 - 1)
+        """Note that the next run, of so many steps, (scenes,), records every so many of them."""
         self._recording = None
         if every:
             count = -(-int(steps.max()) // every)
@@ -205,7 +200,20 @@ class LoadedScenes(Uncopied):
                     f"{self.recorded_samples}"
                 )
             self._recording = int(steps.max()), every, count
-        self.engine.recorder.aim(every)
+
+    def _recorded(self, begin: np.ndarray, steps: int, every: int, late: int) -> dict[str, Any]:
+        """Samples of a run of so many steps that began at steps ``begin``, as those of ``sample``.
+
+        late: as of a Recorder. A scene that diverged stopped at a step of its own: its samples are
+        NaN from there on, and its time stands still. Arrays are (samples, scenes).
+        """
+        marks = begin + np.arange(-late % every, steps, every)[:, None]
+        read = self.engine.recorder.read(-(-late // every), -(-(late + steps) // every))
+        now, lost = self._read_status()[0], self.diverged
+        time_s = self.time_origin + np.minimum(marks, now) * self.table.column("dt")
+        gone = lost & (marks >= now)
+        values = {name: np.where(gone, np.nan, read[name]) for name in measures.SAMPLE}
+        return {"time_s": time_s, **values}
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Positions and velocities of the particles of a scene.

@@ -1,6 +1,4 @@
-"""Samples of a run at even intervals, taken inside the kernel; or none."""
-
-from typing import Any
+"""Samples of a run at even intervals, taken inside the kernel."""
 
 import numpy as np
 import taichi as ti
@@ -8,57 +6,59 @@ import taichi as ti
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
 
-#: Quantities of a sample: of container and base, and the filling's mean force since the last one.
-SAMPLED = ("x", "v", "y", "force")
-
-
-@ti.data_oriented
-class NoRecorder:
-    """Nothing is recorded, and nothing of it compiled."""
-
-    active = False
-
-    def aim(self, every: int) -> None:
-        """Nothing to set."""
+#: Quantities kept of all samples: the force is the filling's mean since the sample before.
+SERIES = ("x", "v", "y", "force")
+#: Quantities kept of the last samples only, and their number; the force is that of the last step.
+LATEST, ROOM = ("a", "force", "energy", "momentum"), 32
 
 
 @ti.data_oriented
 class Recorder:
-    """Samples of every scene, every so many steps of a run from its beginning on.
+    """Samples of every scene, every so many steps of a run.
 
-    every: steps between samples, 0 for none. samples: (scenes, samples) of SAMPLED; the force is
-    the mean over the steps since the sample before, in the first one that of the last step. pushed:
-    sum of the forces since the last sample, but for that of the last step [N].
+    every: steps between samples, 0 for none. late: steps before the run since the last sample was
+    due; the first of the run is then in place 1. series: (scenes, places) of SERIES; the mean force
+    in a sample at the beginning of the run is that of the step before. latest: (scenes, ROOM) of
+    LATEST. pushed: sum of the forces since the last sample, but for that of the last step [N].
     """
-
-    active = True
 
     def __init__(self, table: SceneFields):
         self.table = table
-        self.every = ti.field(ti.i32, shape=())
-        self.samples = table.vector(len(SAMPLED), ti.f64, "samples")
+        self.every, self.late = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
+        self.series = table.vector(len(SERIES), ti.f64, "samples")
+        self.latest = table.vector(len(LATEST), ti.f64, ROOM)
         self.pushed = table.field(ti.f64)
 
-    def aim(self, every: int) -> None:
-        """Set the steps between samples of the next run, 0 for none."""
+    def aim(self, every: int, late: int) -> None:
+        """Set the steps between samples of the next run, and those before it since the last."""
         assign(self.every, every)
+        assign(self.late, late)
 
     @ti.func
-    def note(self, s, step, motion, y, force):
-        """Take a sample at the beginning of a step of the run, if one is due; force: before it."""
-        every = self.every[None]
+    def note(self, s, step, motion, force, quantities: ti.template()):
+        """Take a sample at the beginning of a step of the run, if one is due; force: before it.
+
+        quantities: ti.func of (s, motion) that returns those of ``measures.SAMPLE``.
+        """
+        every, since = self.every[None], self.late[None] + step
         if every > 0:
             total = self.pushed[s] + force
-            if step % every == 0:
-                mean = force if step == 0 else total / every
-                self.samples[s, step // every] = ti.Vector([motion.x, motion.v, y, mean])
+            if since % every == 0:
+                k, mean = since // every, force if step == 0 else total / every
+                x, v, a, y, last, energy, momentum = quantities(s, motion)
+                self.series[s, k] = ti.Vector([x, v, y, mean])
+                self.latest[s, k % ROOM] = ti.Vector([a, last, energy, momentum])
                 total = 0.0
             self.pushed[s] = total
 
-    def read(self, count: int) -> np.ndarray:
-        """The first samples of all scenes in use, (scenes, count, SAMPLED)."""
-        found: Any = self.table.in_use(self.samples)[:, :count]
-        return np.array(found)
+    def read_series(self, first: int, end: int) -> dict[str, np.ndarray]:
+        """Samples in places from first to before end, (samples, scenes) by the names of SERIES."""
+        return dict(zip(SERIES, self.table.in_use(self.series)[:, first:end].transpose(2, 1, 0)))
+
+    def read(self, first: int, end: int) -> dict[str, np.ndarray]:
+        """The same by those of ``measures.SAMPLE``, of the last ROOM samples at most."""
+        latest = self.table.in_use(self.latest)[:, np.arange(first, end) % ROOM]
+        return {**self.read_series(first, end), **dict(zip(LATEST, latest.transpose(2, 1, 0)))}
 
     def mean_force(self, last: np.ndarray, steps: int) -> np.ndarray:
         """Mean force since the last sample, so many steps ago; last: that of the last step."""

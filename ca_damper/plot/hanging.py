@@ -56,7 +56,8 @@ def film_hanging(path: FileName, containers: Sequence[Hanging], fastest: float) 
         figure.colorbar(hung[0].drawn.particles, ax=bench, label=words, **bar)
         dots = [_curve(curve, one, first[0].time_s) for one in containers]
         curve.set(ylim=(-1e3 * swing, 1e3 * swing), xlabel="time [s]", ylabel="displacement [mm]")
-        curve.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
+        # Under the dots, which move: what lies over them is drawn again for each frame.
+        curve.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0)).set_zorder(1)
         for shots in zip(*(one.frames for one in containers)):
             for one, dot, frame in zip(hung, dots, shots):
                 one.show(frame)

@@ -4,17 +4,21 @@ For a possible error message it notes the source line of every name and operator
 characters, and the stack in which each field is declared; wherever a function is called it looks
 for the end of its source and breaks its lines. Here the line is noted as it is, and sources are
 kept; meanwhile no garbage is collected. The compiled code is the same.
+
+For each function that it decorates it asks ``inspect`` for a line of source, which goes through all
+modules: a third of the time in which the packages are imported. Here the line is read.
 """
 
 import functools
 import gc
+import linecache
 import sys
 import textwrap
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-from taichi.lang import expr, impl, kernel_impl
+from taichi.lang import expr, impl, kernel_impl, snode
 from taichi.lang.ast import ast_transformer_utils
 
 #: Lines and numbers that are kept; the kernels of a step have some thousand.
@@ -22,19 +26,19 @@ _MOST = 1 << 14
 
 
 def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Source lines of a function and their first number, as from find; cached."""
+    """What find tells of the source of a function, cached."""
     cached = {}
 
-    def lines(function):
-        """Source lines of a function and the number of the first."""
+    def found(function):
+        """What there is of a function."""
         # Equal code of two files may differ in annotations, which are not part of it.
         key = (function.__code__.co_filename, function.__code__)
         if key not in cached:
             cached[key] = find(function)
         return cached[key]
 
-    lines.cached = cached  # type: ignore[attr-defined]
-    return lines
+    found.cached = cached  # type: ignore[attr-defined]
+    return found
 
 
 def undisturbed(read: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
@@ -68,6 +72,16 @@ def declared_at(stacklevel: int = 1) -> str:
     return f'  File "{frame.f_code.co_filename}", line {frame.f_lineno}\n'
 
 
+def inside_class(level_of_class_stackframe: int) -> bool:
+    """Whether the frame so many levels up begins a class, as Taichi's function of that name."""
+    try:
+        frame = sys._getframe(level_of_class_stackframe)
+    except ValueError:
+        return False
+    line = linecache.getline(frame.f_code.co_filename, frame.f_lineno, frame.f_globals).strip()
+    return any(one.match(line) for one in kernel_impl._KERNEL_CLASS_STACKFRAME_STMT_RES)
+
+
 def remember() -> None:
     """Install all of it, where Taichi has the names of Taichi 1.7."""
     find = getattr(kernel_impl, "getsourcelines", None)
@@ -75,8 +89,11 @@ def remember() -> None:
         return
     fill = functools.lru_cache(_MOST)(textwrap.fill)
     kernel_impl.getsourcelines = remembering(find)
+    kernel_impl.getsourcefile = remembering(kernel_impl.getsourcefile)
     kernel_impl.textwrap = SimpleNamespace(fill=fill, dedent=textwrap.dedent)
     kernel_impl.transform_tree = undisturbed(kernel_impl.transform_tree)
     ast_transformer_utils.ASTTransformerContext.get_pos_info = position
-    impl.get_traceback = declared_at
+    impl.get_traceback = snode.get_traceback = declared_at
     expr._check_in_range = functools.lru_cache(_MOST)(expr._check_in_range)
+    if hasattr(kernel_impl, "_KERNEL_CLASS_STACKFRAME_STMT_RES"):
+        kernel_impl._inside_class = inside_class

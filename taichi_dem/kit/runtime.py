@@ -29,6 +29,9 @@ from taichi_dem.kit.kernel_source_cache import remember
 from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, whole
 
+# Before any other module has Taichi decorate its functions.
+remember()
+
 ARCHITECTURES = ("cpu", "cuda")
 
 
@@ -306,7 +309,6 @@ def _initialise(wanted):
     if wanted.arch == "cpu":
         unrolling.switch_off()
     keeps, folder = kernel_cache(impl.default_cfg().offline_cache_file_path)
-    remember()
     with settings_hidden(), _quietly(), interrupts_deferred(), _failures_in_words():
         ti.init(
             arch=ti.cuda if wanted.arch == "cuda" else ti.cpu,

@@ -14,7 +14,9 @@ from ca_damper import (
     RigidMass,
     SceneTable,
     SimulationDiverged,
+    film,
 )
+from ca_damper.engine.recorder import ROOM
 from ca_damper.scenes.clock import steps_per_cycle
 from taichi_dem import Checkpoint
 from tests.ca_oscillator.kicks import BAD_SEED, Kicks
@@ -163,3 +165,39 @@ def test_the_end_of_a_scene_does_not_end_the_others(tmp_path):
     assert batch.diverged.tolist() == [False, True, False]
     for name, values in batch.sample().items():
         assert np.isfinite(values).tolist() == [True, name == "time_s", True]
+
+
+def test_a_film_has_the_bits_of_single_samples():
+    """More samples than find room at once, frames between them, and a scene that diverges."""
+    kicks = {"strength": 1e-3, "diverges_at": 340}
+    batch, single = diverging("nan", **kicks), diverging("nan", **kicks)
+    with pytest.warns(UserWarning, match=ONE_OF_THREE):
+        batch.advance(3)
+        found = film(batch, 703, sample_every=7, frame_every=50, progress=None)
+        single.advance(3)
+        rows = []
+        for _ in range(101):
+            rows.append(single.sample())
+            single.advance(7)
+    assert len(rows) > ROOM
+    for name, values in found.history.items():
+        assert np.array_equal(values, [row[name] for row in rows], equal_nan=True), name
+    for s, frames in enumerate(found.frames):
+        assert len(frames) == 15
+        for k in (0, 7, 14):
+            frame, row = frames[k], rows[50 * k // 7]
+            shown = frame.time_s, frame.x, frame.y
+            wanted = row["time_s"][s], row["x"][s], row["y"][s]
+            assert np.array_equal(shown, wanted, equal_nan=True)
+
+
+def test_steps_after_a_recorded_run_are_not_recorded():
+    """They would be written where there is no room for them."""
+    batch = Batch(RigidMass(), SceneTable(3, 1, 1e-3, 6.0, 0.6e-3), recorded_samples=167)
+    batch.start()
+    batch.run(1, 0, record_every=1)
+    last, steps = batch.time_series()["x"], batch.steps_per_cycle[0]
+    batch.advance(10 * steps)
+    assert np.array_equal(batch.engine.recorder.read_series(0, steps)["x"], last[:-1])
+    with pytest.raises(InputError, match="record_every of a run must be at least 1"):
+        batch.time_series()

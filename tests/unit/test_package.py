@@ -54,7 +54,8 @@ def test_what_is_unpacked_runs_and_reads_its_own_mesh(wheel, tmp_path):
 
 def test_libraries_of_pictures_and_mesh_files_are_imported_where_they_are_used():
     """They take half of a second, of a program that draws nothing too."""
-    text = "import blast_fracture, sys; print(*{'matplotlib', 'PIL', 'meshio'} & {*sys.modules})"
+    named = "import blast_fracture, demo_damper, sys"
+    text = f"{named}; print(*{{'matplotlib', 'PIL', 'meshio'}} & {{*sys.modules}})"
     options = {"capture_output": True, "text": True, "cwd": FOLDER / "experiments"}
     environment = users_environment(PYTHONPATH=str(FOLDER))
     done = subprocess.run([sys.executable, "-c", text], env=environment, **options)

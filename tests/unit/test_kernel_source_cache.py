@@ -1,0 +1,53 @@
+"""What is found once for Taichi says what Taichi finds: places of errors, methods of a class."""
+
+import re
+
+import pytest
+import taichi as ti
+
+
+class Sum:
+    """A sum of a member and a number."""
+
+    def __init__(self):
+        self.first = 2
+
+    @ti.func
+    def of(self, x):
+        return self.first + x
+
+
+@ti.data_oriented
+class Sums:
+    """Sums in a kernel."""
+
+    def __init__(self):
+        self.one = Sum()
+
+    @ti.kernel
+    def of(self, x: ti.i32) -> ti.i32:
+        return self.one.of(x)
+
+
+@ti.func
+def _unknown(x):
+    return x + _nowhere  # noqa: F821
+
+
+@ti.kernel
+def _calls_it():
+    for i in range(2):
+        _unknown(i)
+
+
+def test_functions_in_a_class_are_its_methods():
+    assert Sums().of(3) == 5
+
+
+def test_an_error_names_its_place_in_every_function_on_the_way():
+    for _ in range(2):
+        with pytest.raises(ti.TaichiCompilationError) as caught:
+            _calls_it()
+        said = str(caught.value)
+        assert re.findall(r"in (_\w+):\n", said) == ["_calls_it", "_unknown"], said
+        assert "return x + _nowhere" in said and 'Name "_nowhere" is not defined' in said
