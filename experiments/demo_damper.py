@@ -6,13 +6,14 @@ resonance can be missed: a faster decay is damping. The particles damp as long a
 peak acceleration is above about 1 g; below it they lie on the floor, and the structure's own
 damping is left. Try other numbers of particles and places to let go from.
 
-    python experiments/demo_damper.py                                  # 10 seconds
+    python experiments/demo_damper.py                                  # 6 seconds
     python experiments/demo_damper.py --particles 50 --amplitude 40
-    python experiments/demo_damper.py --filling spheres
+    python experiments/demo_damper.py --filling spheres                # in place of the automaton
+    python experiments/demo_damper.py --compare                        # figures of both
     python experiments/demo_damper.py --all-pictures                   # also a page that plays
 
-The film shows one filling; all figures are those of both, as medians over nine starts, five in a
-quick run. An amplitude is sqrt(2) times the RMS displacement of a cycle of the empty container.
+Figures are medians over nine starts, five in a quick run. An amplitude is sqrt(2) times the RMS
+displacement of a cycle of the empty container.
 
 With --effects auto the program computes the effects that the scene calls for (the spheres turn
 where friction makes them); "listed", the default, takes the fillings as they are.
@@ -36,7 +37,7 @@ NAME = "demo_damper"
 def options_parser():
     """Options of this experiment."""
     made = study.parser(NAME, __doc__, settings=demo.SETTINGS)
-    study.add_pictures(made)
+    demo.add_options(made)
     return made
 
 
