@@ -14,7 +14,8 @@ class Figure(NamedTuple):
     """Repeated measurements of one quantity.
 
     values: in a unit. bound: what is wanted, in words. work: least work of what takes the time, or
-    of one of those that are counted; None where nothing bounds it.
+    of one of those that are counted; None where nothing bounds it. then: what it was before the
+    work on waits, at 1e0e56e, in words.
     """
 
     name: str
@@ -22,6 +23,7 @@ class Figure(NamedTuple):
     values: Sequence[float]
     bound: str = ""
     work: Optional[Work] = None
+    then: str = ""
 
     @property
     def middle(self):

@@ -1,97 +1,154 @@
-"""Seconds before the first step, each in a new process: first and second scene, ten scenes."""
+"""Waits of a user: before the first step, from a command to its pictures, for another scene."""
 
 import os
+import subprocess
+import sys
 import tempfile
 import time
+from collections import defaultdict
+from pathlib import Path
 
 import numpy as np
 from taichi.lang.ast.ast_transformer_utils import Builder
+from taichi.lang.kernel_impl import Kernel
 
 from _bench_figure import Figure
-from _blast import paper_effects, paper_scene
-from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Simulation, effects, simulate
+from _blast import paper_scene
+from ca_damper import Automaton, Batch, SceneTable
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, effects, simulate
 from taichi_dem.kit.study import call_in_process, clock
 from taichi_dem.mesh.shapes import bar
 
-#: Processes of each kind, and of those of ten scenes that are timed.
-ROUNDS, TEN = 1, 1
-#: Gas peaks of the ten scenes [Pa], their end [s]; the step of all scenes here [s].
+#: Processes with an empty cache of kernels of their own, and with one that it has filled.
+COLD, WARM = 3, 5
+#: Gas peaks of ten scenes [Pa], their end [s]; the step of all scenes here, and the demo's end [s].
 PEAKS = np.linspace(400e6, 650e6, 10)
-UNTIL, STEP = 1e-4, 4e-7
+UNTIL, STEP, DEMO = 1e-4, 4e-7, 5e-4
+HERE = Path(__file__).parent
+#: Programs by name: script, options, whether it is run cold too, what is wanted [s], and what it
+#: took before the work on waits (1e0e56e) [s].
+PROGRAMS = {
+    "blast_fracture": ("blast_fracture.py", (), False, (5.5,), (11.4,)),
+    "blast_fracture --no-pictures": ("blast_fracture.py", ("--no-pictures",), False, (3.0,), ()),
+    "demo_damper": ("demo_damper.py", (), True, (3.5, 5.0), (8.2, 9.6)),
+}
 
 
-def first_step(begun):
-    """Wall time from the start of Python, of ``time.time()``, to the end of the first step."""
-    Simulation(paper_scene(), Multirate()).advance_to(1)
-    return time.time() - begun
+def default_blast(**gas):
+    """The scene of the demonstration, with other numbers of the gas pressure."""
+    return Scene(paper_scene().mesh, CONCRETE, "auto", loads=[effects.GasPressure(**gas)])
 
 
-def two_scenes():
-    """Time before the first step of a session's first scene, and of one of another mesh."""
-    # Imports the reader of meshes.
-    paper_scene()
-    first = clock()
-    Simulation(paper_scene(), ImplicitDashpots(STEP)).start()
-    second = clock()
-    mesh = bar(1.0, 0.25, (8, 2, 2))
-    Simulation(pressed(mesh, group="left"), ImplicitDashpots(STEP)).start()
-    return second - first, clock() - second
+def default_damper():
+    """Grains in a container, of the default filling."""
+    return Batch(Automaton(), SceneTable(30, 1, 1e-4))
 
 
-def pressed(mesh, **gas):
-    """A scene with the paper's effects and other numbers of the gas pressure."""
-    return Scene(mesh, CONCRETE, [*paper_effects()[:-1], effects.GasPressure(**gas)])
+def sizes_of_kernels():
+    """Of every kernel of the default scenes: tree nodes, and CPU seconds to read and to load it.
+
+    A list of name, nodes and both times; the load has one launch in it.
+    """
+    found, now = defaultdict(lambda: [0, 0.0, 0.0]), [""]
+    visit, read, launch = Builder.__call__, Kernel.materialize, Kernel.launch_kernel
+
+    def counting(self, context, node):
+        found[now[0]][0] += 1
+        return visit(self, context, node)
+
+    def timed(work, place):
+        def method(self, *given, **more):
+            fresh, begun = len(self.compiled_kernels), time.process_time()
+            now[0] = self.func.__qualname__.replace(".<locals>", "")
+            result = work(self, *given, **more)
+            if (place == 2 and id(self) not in loaded) or len(self.compiled_kernels) > fresh:
+                found[now[0]][place] += time.process_time() - begun
+                loaded.add(id(self) if place == 2 else 0)
+            return result
+
+        return method
+
+    loaded = set()
+    Builder.__call__, Kernel.materialize = counting, timed(read, 1)
+    Kernel.launch_kernel = timed(launch, 2)
+    simulate(default_blast(), method=ImplicitDashpots(STEP), until=STEP, progress=None)
+    batch = default_damper()
+    batch.start()
+    batch.advance(1)
+    Builder.__call__, Kernel.materialize, Kernel.launch_kernel = visit, read, launch
+    return [[name, *sizes] for name, sizes in found.items()]
+
+
+def waits_of_scenes():
+    """Of a session [s]: import, before the first step, of a second scene, around the steps.
+
+    Import: beyond that of Taichi and NumPy. Around: samples, checks and report of the demo, once
+    all is compiled.
+    """
+    code = "import time, numpy, taichi; t = time.process_time(); import taichi_dem; "
+    line = [sys.executable, "-c", code + "print(time.process_time() - t)"]
+    imported = float(subprocess.run(line, check=True, capture_output=True, text=True).stdout)
+    demo = {"method": ImplicitDashpots(STEP), "until": DEMO, "frames": 40, "progress": None}
+    first = simulate(default_blast(), **demo).report.compile_seconds
+    begun = clock()
+    report = simulate(default_blast(), **demo).report
+    around = clock() - begun - report.compile_seconds - report.run_cpu_seconds
+    mesh, gas = bar(1.0, 0.25, (8, 2, 2)), effects.GasPressure(group="left")
+    begun = clock()
+    other = Scene(mesh, CONCRETE, "auto", loads=[gas])
+    second = simulate(other, method=ImplicitDashpots(STEP), until=STEP, progress=None)
+    return imported, first, second.report.compile_seconds, around
 
 
 def ten_scenes(count=None):
     """Time of the scenes of the paper's block, or the first of them, in a row to ``UNTIL``."""
     started = clock()
     for peak in PEAKS[:count].tolist():
-        scene = pressed(paper_scene().mesh, peak=peak)
+        scene = default_blast(peak=peak)
         simulate(scene, method=ImplicitDashpots(STEP), until=UNTIL, progress=None)
     return clock() - started
 
 
-def tree_nodes():
-    """Nodes of Python's trees that Taichi visits to compile the steps of the default blast."""
-    visited, visit = [0], Builder.__call__
-
-    def counting(self, context, node):
-        visited[0] += 1
-        return visit(self, context, node)
-
-    scene = Scene(paper_scene().mesh, CONCRETE, "auto", loads=[effects.GasPressure()])
-    made = Simulation(scene, ImplicitDashpots(STEP), "resident")
-    Builder.__call__ = counting
-    made.driver.begin()
-    return visited[0]
+def seconds_of(script, options, cache):
+    """Wall time of a program, from its command to its end, with a folder as cache of kernels."""
+    own = {"TI_OFFLINE_CACHE": "1", "TI_OFFLINE_CACHE_FILE_PATH": str(cache)}
+    with tempfile.TemporaryDirectory() as out:
+        line = [sys.executable, str(HERE / script), *options, "--out", out]
+        begun = time.perf_counter()
+        subprocess.run(line, check=True, capture_output=True, env={**os.environ, **own})
+        return time.perf_counter() - begun
 
 
 def measure(quick):
-    """Yield the waits; quick: of one process, and not of ten scenes.
-
-    A cold process has an empty cache of kernels of its own, a warm one that of a process before.
-    """
-    first, second, step = {}, {}, {}
+    """Yield the waits; quick: of one process each, and not of ten scenes."""
+    cold, warm = (1, 1) if quick else (COLD, WARM)
     with tempfile.TemporaryDirectory() as folder:
-        for k in range(1 if quick else ROUNDS):
-            cache = os.path.join(folder, f"cache-{k}")
-            for state in ("cold", "warm"):
-                waits = call_in_process(two_scenes, cache=cache)
-                for found, value in zip((first, second), waits):
-                    found.setdefault(state, []).append(value)
-                if not quick:
-                    wait = call_in_process(first_step, cache=cache, begun=time.time())
-                    step.setdefault(state, []).append(wait)
-        for state, bound, wall in (("cold", "<= 10", "<= 15"), ("warm", "<= 3", "<= 3")):
-            yield Figure(f"first_scene_{state}_seconds", "s", first[state], bound)
-            if not quick:
-                yield Figure(f"first step, {state} cache", "s", step[state], wall)
-        nodes = call_in_process(tree_nodes)
-        yield Figure("tree_nodes_of_a_step", "1", [nodes], "<= 35500")
-        yield Figure("second_scene_seconds", "s", second["warm"], "<= 0.1")
+        caches = [os.path.join(folder, f"{k}") for k in range(cold)]
+        fresh = [call_in_process(waits_of_scenes, cache=cache) for cache in caches]
+        kept = [call_in_process(waits_of_scenes, cache=caches[0]) for _ in range(warm)]
+        imported, first, second, around = zip(*kept)
+        yield Figure("import_seconds", "s", imported, "<= 0.2", then="0.4")
+        yield Figure("first_scene_cold_seconds", "s", [one[1] for one in fresh], "<= 6", then="10")
+        yield Figure("first_scene_warm_seconds", "s", first, "<= 1.8", then="3.9")
+        yield Figure("second_scene_seconds", "s", second, "<= 0.1", then="0.03")
+        yield Figure("around_the_steps_seconds", "s", around, "<= 0.15", then="1.4")
+        yield from programs(folder, caches[0], cold, warm)
+        for name, nodes, read, load in call_in_process(sizes_of_kernels, cache=caches[0]):
+            yield Figure(f"{name}, nodes", "1", [nodes])
+            yield Figure(f"{name}, read and loaded", "s", [read + load])
         if not quick:
-            # One scene fills the cache.
-            call_in_process(ten_scenes, cache=cache, count=1)
-            ten = [call_in_process(ten_scenes, cache=cache) for _ in range(TEN)]
-            yield Figure("ten_scenes_seconds", "s", ten, "<= 10")
+            ten = call_in_process(ten_scenes, cache=caches[0])
+            yield Figure("ten_scenes_seconds", "s", [ten], "<= 10")
+
+
+def programs(folder, cache, cold, warm):
+    """Whole programs, first once in a cache of their own that is empty, then with a full one."""
+    for name, (script, options, is_cold, wanted, then) in PROGRAMS.items():
+        empty = [Path(folder, f"{name}-{k}") for k in range(cold * is_cold)]
+        found = [[], [seconds_of(script, options, one) for one in empty]]
+        seconds_of(script, options, cache)
+        found[0] += [seconds_of(script, options, cache) for _ in range(warm)]
+        for place, state in enumerate(("warm", "cold")[: len(wanted)]):
+            more = {"then": f"{then[place]:g}" if then else ""}
+            bound = f"<= {wanted[place]:g}"
+            yield Figure(f"{name}, {state}", "s of wall", found[place], bound, **more)

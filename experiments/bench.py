@@ -47,7 +47,7 @@ def run(options):
     # Floors are the figures with such a unit.
     rates = {one.name: 1e9 * one.middle for one in figures if one.unit in ("GB/s", "GFlop/s")}
     rows = [row_of(one, one.share(rates)) for one in figures]
-    header = ["figure", "median", "spread", "unit", "bound", "share of the floor"]
+    header = ["figure", "median", "spread", "unit", "bound", "then", "share of the floor"]
     study.print_table(rows, header)
     write_json(os.path.join(folder, "bench.json"), figures, rates)
     history = os.path.join(folder, "bench_history.jsonl")
@@ -79,7 +79,7 @@ def row_of(one, share):
     """Cells of a figure in the table."""
     spread = f"{min(one.values):.3g} .. {max(one.values):.3g}"
     of_floor = "" if share is None else f"{100 * share:.3g} %"
-    return one.name, f"{one.middle:.3g}", spread, one.unit, one.bound, of_floor
+    return one.name, f"{one.middle:.3g}", spread, one.unit, one.bound, one.then, of_floor
 
 
 def write_json(path, figures, rates):

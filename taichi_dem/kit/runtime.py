@@ -23,7 +23,7 @@ from taichi_dem.kit.environment import (  # isort: skip
 import taichi as ti
 from taichi.lang import impl
 
-from taichi_dem.kit import unrolling
+from taichi_dem.kit import llvm_options
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.kernel_source_cache import remember
 from taichi_dem.kit.uncopied import Uncopied
@@ -307,7 +307,7 @@ def _initialise(wanted):
     if wanted.arch == "cuda" and not cuda_present():
         raise InputError("arch 'cuda' was asked for, but no CUDA device answers here: use 'cpu'")
     if wanted.arch == "cpu":
-        unrolling.switch_off()
+        llvm_options.switch_off()
     keeps, folder = kernel_cache(impl.default_cfg().offline_cache_file_path)
     with settings_hidden(), _quietly(), interrupts_deferred(), _failures_in_words():
         ti.init(

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, NamedTuple, Optional
 
 import numpy as np
 import taichi as ti
+from taichi.lang import impl
 
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import values
@@ -19,6 +20,9 @@ from taichi_dem.step.advance import Advance
 from taichi_dem.step.multirate.half_step import HalfStep
 from taichi_dem.step.multirate.schedule import Schedule
 
+#: Bodies up to which loops over them are serial.
+_FEW = 4096
+
 
 @ti.data_oriented
 class Readings:
@@ -30,6 +34,8 @@ class Readings:
     def __init__(self, tables: Tables, state: State, advance: Advance):
         self.tables, self.state, self.advance = tables, state, advance
         self.contacts, self.half_step = advance.contacts, HalfStep(advance)
+        # A loop over few bodies takes less time than two threads to be told of it.
+        self.small = tables.capacity.bodies < _FEW and impl.current_cfg().arch != ti.cuda
         self._held: Optional[dict[str, Any]] = None
         self._rooms: dict[str, np.ndarray] = {}
 
@@ -84,6 +90,7 @@ class Readings:
         Also the heat of its dashpots and friction by which the booked one is behind [J], sums of
         friction, of its limit [N] and of its power [W], its strain and booked heats [J].
         """
+        ti.loop_config(serialize=ti.static(self.small))
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
             found, half = self.advance.forces_now(p), self.half_step.pair_step(p)
@@ -147,6 +154,7 @@ class Readings:
 
         One kernel for all uses, as each takes its time to compile and to launch.
         """
+        ti.loop_config(serialize=ti.static(self.small))
         for i in range(self.tables.body_count[None]):
             linear, angular = vec3(0.0), vec3(0.0)
             for k in ti.static(range(3)):
@@ -165,6 +173,7 @@ class Readings:
             for e in ti.static(range(len(self.tables.loads))):
                 table[i, 1] = table[i, 1] + table[i, 15 + e]
             table[i, 2] = table[i, ti.static(15 + len(self.tables.loads))]
+        ti.loop_config(serialize=ti.static(self.small))
         for b in range(self.tables.bond_count[None]):
             self._visit_bond(bonds, b)
 
@@ -263,6 +272,7 @@ class Readings:
         share: least share, where dashpots are limited; else taken: largest part of a speed that
         they take in a step.
         """
+        ti.loop_config(serialize=ti.static(self.small))
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
             count = self.contacts.touching(p)

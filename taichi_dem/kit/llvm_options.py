@@ -1,7 +1,9 @@
-"""LLVM's run-time unrolling switched off: kernels compile in three quarters of the time.
+"""Passes of LLVM switched off that cost time at each start and gain none in a step.
 
-LLVM repeats the body of each small loop eight times, and most of ours turn but a few times. Taichi
-has no switch for it; that of LLVM is called by its address, where Taichi's library tells it.
+LLVM repeats the body of each small loop eight times, and most of ours turn but a few times: without
+that kernels compile in three quarters of the time. The others work on machine code, which is made
+anew from the cache of kernels at each start: without them a fifth sooner. Taichi has no switch for
+any; those of LLVM are called by an address, where Taichi's library tells it.
 """
 
 import ctypes
@@ -17,15 +19,22 @@ import taichi as ti
 #: Of the ELF format: an entry of a table of symbols, and the kind of section that is one.
 _SYMBOL = np.dtype([("name", "<u4"), ("kind", "<u4"), ("value", "<u8"), ("size", "<u8")])
 _TABLE = 2
-#: The option is that of LLVM 15, which ends the process on one that it does not know.
-_VERSION, _OPTION = (1, 7, 4), b"-unroll-runtime=false"
+#: Options of LLVM 15, which ends the process on one that it does not know.
+_VERSION = (1, 7, 4)
+_OPTIONS = (
+    b"-unroll-runtime=false",
+    b"-disable-lsr",
+    b"-disable-machine-cse",
+    b"-disable-post-ra",
+    b"-enable-misched=false",
+)
 _LIBRARY = "taichi._lib.core.taichi_python"
 _PARSE, _KNOWN = b"LLVMParseCommandLineOptions", b"PyInit_taichi_python"
 
 
 @functools.cache
 def switch_off() -> bool:
-    """Switch it off for all kernels to come; whether that could be done."""
+    """Switch them off for all kernels to come; whether that could be done."""
     path = getattr(sys.modules.get(_LIBRARY), "__file__", None)
     if path is None or sys.platform != "linux" or ti.__version__ != _VERSION:
         return False
@@ -34,7 +43,7 @@ def switch_off() -> bool:
         return False
     known = ctypes.cast(ctypes.CDLL(path)[_KNOWN.decode()], ctypes.c_void_p).value or 0
     parse = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.c_void_p, ctypes.c_char_p)
-    words = (ctypes.c_char_p * 2)(b"taichi", _OPTION)
+    words = (ctypes.c_char_p * (1 + len(_OPTIONS)))(b"taichi", *_OPTIONS)
     parse(known + found[_PARSE] - found[_KNOWN])(len(words), words, None)
     return True
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from taichi_dem.kit import unrolling
+from taichi_dem.kit import llvm_options
 from tests.processes import users_environment
 from tests.scenes import ROOT
 
@@ -49,4 +49,4 @@ def test_a_session_leaves_loops_unrepeated(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="programs are ELF files on Linux")
 def test_a_file_without_the_names_has_no_addresses():
-    assert unrolling.addresses(sys.executable, [b"no such name"]) == {}
+    assert llvm_options.addresses(sys.executable, [b"no such name"]) == {}
