@@ -21,7 +21,7 @@ from typing import Any
 from taichi.lang import expr, impl, kernel_impl, snode
 from taichi.lang.ast import ast_transformer_utils
 
-#: Lines and numbers that are kept; the kernels of a step have some thousand.
+#: Numbers of which each range is kept; the kernels of a step have some hundred.
 _MOST = 1 << 14
 
 
@@ -39,6 +39,13 @@ def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
     found.cached = cached  # type: ignore[attr-defined]
     return found
+
+
+def filled(line: str, tabsize: int, width: int) -> str:
+    """A line of source with spaces for tabs and none at its end, as ``textwrap.fill`` makes it."""
+    if len(line) < width:
+        return line.expandtabs(tabsize).rstrip()
+    return textwrap.fill(line, tabsize=tabsize, width=width)
 
 
 def undisturbed(read: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
@@ -87,13 +94,13 @@ def remember() -> None:
     find = getattr(kernel_impl, "getsourcelines", None)
     if find is None or hasattr(find, "cached"):
         return
-    fill = functools.lru_cache(_MOST)(textwrap.fill)
     kernel_impl.getsourcelines = remembering(find)
     kernel_impl.getsourcefile = remembering(kernel_impl.getsourcefile)
-    kernel_impl.textwrap = SimpleNamespace(fill=fill, dedent=textwrap.dedent)
+    kernel_impl.textwrap = SimpleNamespace(fill=filled, dedent=textwrap.dedent)
     kernel_impl.transform_tree = undisturbed(kernel_impl.transform_tree)
     ast_transformer_utils.ASTTransformerContext.get_pos_info = position
     impl.get_traceback = snode.get_traceback = declared_at
-    expr._check_in_range = functools.lru_cache(_MOST)(expr._check_in_range)
+    for name in ("_check_in_range", "_clamp_unsigned_to_range"):
+        setattr(expr, name, functools.lru_cache(_MOST)(getattr(expr, name)))
     if hasattr(kernel_impl, "_KERNEL_CLASS_STACKFRAME_STMT_RES"):
         kernel_impl._inside_class = inside_class
