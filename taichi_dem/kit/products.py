@@ -40,17 +40,12 @@ def expression(function: Callable[..., Any]) -> Callable[..., Any]:
     return built
 
 
-@cache
-def _number(index):
-    """A whole number in expressions; one for all, as thousands of them take their time."""
-    return Expr(index).ptr
-
-
 def entry(tensor: Any, *place: int) -> Any:
     """An entry of a vector or matrix in an expression."""
     runtime, group = impl.get_runtime(), ti_core.ExprGroup()
     for index in place:
-        group.push_back(_number(index))
+        # Numbers kept for other kernels would crash Taichi: it writes into them.
+        group.push_back(Expr(index).ptr)
     info = ti_core.DebugInfo(runtime.get_current_src_info())
     builder = runtime.compiling_callable.ast_builder()
     return Expr(builder.expr_subscript(tensor.ptr, group, info))
