@@ -141,6 +141,8 @@ def chosen_method(name, dt0, distance):
 def run(options):
     """Run, picture, print."""
     method = chosen_method(options.method, options.dt0, options.l)
+    if options.compare and (options.added or options.without):
+        raise InputError("compare must be left out with --with and --without: it runs two lists")
     scene = chosen_scene(options, options.added)
     if options.accuracy is not None:
         return run_to_accuracy(scene, options)
@@ -187,7 +189,7 @@ def show_both(bodies, spheres):
 
 def run_to_accuracy(scene, options):
     """Find the first goal that the scene has to an accuracy; print and write the answer."""
-    study.check_accuracy(options, ("dt0", "l"))
+    study.check_accuracy(options, ("dt0", "l", "compare"))
     at = study.output_paths(options.out)
     in_a_hole = "hole" in scene.mesh.groups
     goal = goals.hole_displacement() if in_a_hole else goals.kinetic_energy()
