@@ -179,7 +179,7 @@ def values(field: ti.Field, wanted: Any = ...) -> np.ndarray:
     """Copy of entries of a field; wanted: their slice or their numbers, all by default."""
     if impl.current_cfg().arch == ti.cuda or not in_tree(field):
         return field.to_numpy()[wanted]
-    ti.sync()
+    impl.get_runtime().prog.synchronize()
     return np.array(array_of(field)[wanted])
 
 

@@ -1,31 +1,36 @@
-"""Launches of a kernel from a context that is made once: 8 us of Python instead of 60."""
+"""Launches of a kernel from a context that is made once: 6 us of Python instead of 100."""
 
-from typing import Any
+from typing import Any, Union
 
+import numpy as np
 from taichi.lang import impl
 from taichi.lang.exception import handle_exception_from_cpp
 
 
 class Launch:
-    """A kernel of an object, called with the same templates and other whole numbers each time.
+    """A kernel of an object, called with the same templates and other values each time.
 
-    kernel: bound method with templates first, then numbers, that returns a number or nothing. The
-    first call is one of Taichi's own.
+    kernel: bound method with templates first, then whole numbers and contiguous arrays, that
+    returns a whole number or nothing. The first call is one of Taichi's own.
     """
 
     def __init__(self, kernel: Any, *templates: Any):
         self._kernel, self._templates = kernel, templates
         self._ready: Any = None
 
-    def __call__(self, *numbers: int) -> Any:
-        """Run it with these numbers; what it returns."""
+    def __call__(self, *values: Union[int, np.ndarray]) -> Any:
+        """Run it with these values; what it returns."""
         if self._ready is None:
-            found = self._kernel(*self._templates, *numbers)
-            self._ready = self._prepared(numbers)
+            found = self._kernel(*self._templates, *values)
+            self._ready = self._prepared(values)
             return found
         program, compiled, context, returns = self._ready
-        for place, number in enumerate(numbers):
-            context.set_arg_int((place,), number)
+        for place, value in enumerate(values):
+            if isinstance(value, np.ndarray):
+                where = value.ctypes.data, value.nbytes, value.shape
+                context.set_arg_external_array_with_shape((place,), *where, 0)
+            else:
+                context.set_arg_int((place,), value)
         try:
             program.launch_kernel(compiled, context)
         except Exception as error:
@@ -35,10 +40,10 @@ class Launch:
         program.synchronize()
         return context.get_struct_ret_int((0,))
 
-    def _prepared(self, numbers):
+    def _prepared(self, values):
         """Taichi's program, the compiled kernel, its context, and whether it returns a number."""
         kernel, owner = self._kernel._primal, self._kernel._kernel_owner
-        key = kernel.ensure_compiled(owner, *self._templates, *numbers)
+        key = kernel.ensure_compiled(owner, *self._templates, *values)
         found, program = kernel.compiled_kernels[key], impl.get_runtime().prog
         compiled = program.compile_kernel(program.config(), program.get_device_caps(), found)
         return program, compiled, found.make_launch_context(), kernel.return_type is not None

@@ -10,6 +10,7 @@ from taichi.lang import impl
 
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.products import norm
 from taichi_dem.kit.types import vec3
 from taichi_dem.state.activity import PARTS
@@ -38,6 +39,7 @@ class Readings:
         self.small = tables.capacity.bodies < _FEW and impl.current_cfg().arch != ti.cuda
         self._held: Optional[dict[str, Any]] = None
         self._rooms: dict[str, np.ndarray] = {}
+        self._launch_push, self._launch_visit = Launch(self._push), Launch(self._visit)
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
@@ -76,7 +78,7 @@ class Readings:
         count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
         table = self._room("contacts", count, 21)
         if count:
-            self._push(table, pushed)
+            self._launch_push(table, pushed)
         return table, pushed
 
     @ti.kernel
@@ -139,7 +141,7 @@ class Readings:
         bodies = self._room("bodies", len(pushed), 16 + len(self.tables.drives))
         # A kernel takes no empty table.
         bonds = self._room("bonds", max(1, bond_count), 9)
-        self._visit(pushed, back, bodies, bonds)
+        self._launch_visit(pushed, back, bodies, bonds)
         return bodies, bonds[:bond_count]
 
     @ti.kernel
