@@ -19,11 +19,11 @@ fi
 #    may offer a name that does not run.
 usable() {
     "$1" -c 'import sys; v = sys.version_info[:2]
-sys.exit(not ((3, 9) <= v <= (3, 13) and sys.implementation.name == "cpython"))' >/dev/null 2>&1
+sys.exit(not ((3, 11) <= v <= (3, 13) and sys.implementation.name == "cpython"))' >/dev/null 2>&1
 }
 
 find_python() {
-    for name in python3 python3.13 python3.12 python3.11 python3.10 python3.9 python; do
+    for name in python3 python3.13 python3.12 python3.11 python; do
         if usable "$name"; then
             say "$name"
             return
@@ -33,10 +33,10 @@ find_python() {
 
 if [ -n "${PYTHON:-}" ]; then
     python=$PYTHON
-    usable "$python" || refuse "PYTHON=$python does not run or is not CPython 3.9 to 3.13."
+    usable "$python" || refuse "PYTHON=$python does not run or is not CPython 3.11 to 3.13."
 else
     python=$(find_python)
-    [ -n "$python" ] || refuse "No CPython 3.9 to 3.13 found (taichi 1.7.4 has wheels for these" \
+    [ -n "$python" ] || refuse "No CPython 3.11 to 3.13 found (taichi 1.7.4 has wheels for these" \
         "only): install one, or name one with make venv PYTHON=/path/to/python3.12."
 fi
 version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')

@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Sequence
-from typing import Optional
 
 import ca_damper
 from taichi_dem.kit import listing
@@ -19,7 +18,7 @@ def sections() -> list[tuple[str, list]]:
     ]
 
 
-def main(arguments: Optional[Sequence[str]] = None) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     return listing.run(ca_damper, sections(), arguments)
 

@@ -7,7 +7,7 @@ Its device may have ``first_steps(effects)`` and ``audit()``, as that of the sph
 """
 
 from collections.abc import Mapping
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -44,7 +44,7 @@ def certificate_of(batch: Any) -> Certificate:
     )
 
 
-def periods_of(cycles: Cycles) -> Optional[Periods]:
+def periods_of(cycles: Cycles) -> Periods | None:
     """Which scenes are periodic over the measured cycles; None for fewer than two."""
     measured = cycles.record.shape[1]
     if measured < 2:

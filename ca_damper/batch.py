@@ -7,7 +7,7 @@ numbers (see ``engine/damper_engine.py``).
 import contextlib
 import time
 from collections.abc import Iterator, Mapping
-from typing import Any, Optional, Union
+from typing import Any
 
 import numpy as np
 
@@ -119,18 +119,18 @@ class Batch(LoadedScenes):
         effects: str = "listed",
         excitation: Any = None,
         recorded_samples: int = 0,
-        structure: Optional[ModalMount] = None,
+        structure: ModalMount | None = None,
         if_diverged: str = "nan",
     ):
         self.asked_effects = choice("effects", effects, EFFECTS)
         filling, self.estimates = activated(filling, table, effects)
         many = measured_cycles, rtol, atol, excitation, recorded_samples, structure, if_diverged
         super().__init__(filling, table, mount, *many)
-        self.periods: Optional[Periods] = None
+        self.periods: Periods | None = None
         self.launches, self.compile_seconds = Launches(self.count), 0.0
         # Whether the present run goes on from a checkpoint.
         self.going_on = False
-        self.writer: Union[CheckpointWriter, NoCheckpointWriter] = NoCheckpointWriter()
+        self.writer: CheckpointWriter | NoCheckpointWriter = NoCheckpointWriter()
 
     def __repr__(self) -> str:
         return in_brief(self, self.filling.label, f"{self.count:,} scenes", f"on the {self.mount}")
@@ -230,7 +230,7 @@ class Batch(LoadedScenes):
         self,
         transient_cycles: int,
         measured_cycles: int,
-        progress: Optional[Listener] = None,
+        progress: Listener | None = None,
         *,
         record_every: int = 0,
     ) -> measures.Cycles:
@@ -274,9 +274,7 @@ class Batch(LoadedScenes):
         self.periods = periods_of(cycles)
         return cycles
 
-    def measure_each(
-        self, cycles: Any, progress: Optional[Listener] = None
-    ) -> tuple[np.ndarray, ...]:
+    def measure_each(self, cycles: Any, progress: Listener | None = None) -> tuple[np.ndarray, ...]:
         """Go on by a number of cycles for each scene, and measure all of them.
 
         Parameters
@@ -306,7 +304,7 @@ class Batch(LoadedScenes):
         record = self._read_cycles(int(counts.max()))
         return tuple(one[:count].copy() for one, count in zip(record, counts))
 
-    def advance(self, steps: Any, progress: Optional[Listener] = None) -> None:
+    def advance(self, steps: Any, progress: Listener | None = None) -> None:
         """Advance every scene by a number of steps without measuring.
 
         Parameters
@@ -330,7 +328,7 @@ class Batch(LoadedScenes):
         self._go(steps, steps, progress)
 
     def record(
-        self, steps: int, every: int, late: int = 0, progress: Optional[Listener] = None
+        self, steps: int, every: int, late: int = 0, progress: Listener | None = None
     ) -> dict[str, np.ndarray]:
         """Advance every scene by a number of steps, with samples taken inside the kernel.
 
@@ -406,7 +404,7 @@ class Batch(LoadedScenes):
         saved = RunSnapshot(identity, self.memory, {"batch": self, **dict(owners)})
         if arrays:
             saved.restore(arrays, resume)
-        writer: Union[CheckpointWriter, NoCheckpointWriter] = NoCheckpointWriter()
+        writer: CheckpointWriter | NoCheckpointWriter = NoCheckpointWriter()
         if checkpoint:
             writer = CheckpointWriter(checkpoint, saved, self._now)
         with writer as self.writer:

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any, Optional
+from typing import Any
 
 from taichi_dem.kit.audit import Audit
 from taichi_dem.kit.display import counted, in_brief
@@ -79,7 +79,7 @@ class Onset:
 
     effect: str
     scenes: int
-    since_s: Optional[float]
+    since_s: float | None
 
     def __str__(self) -> str:
         if self.since_s is None:
@@ -142,8 +142,8 @@ class Certificate:
     onsets: tuple[Onset, ...] = ()
     left_out: tuple[Estimate, ...] = ()
     estimates: tuple[Estimate, ...] = ()
-    audit: Optional[Audit] = None
-    periods: Optional[Periods] = None
+    audit: Audit | None = None
+    periods: Periods | None = None
 
     @property
     def failure(self) -> str:

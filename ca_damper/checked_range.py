@@ -2,7 +2,7 @@
 
 import warnings
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Optional
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,7 +55,7 @@ class Driven(NamedTuple):
     acceleration: np.ndarray
 
 
-def checked_range(batch: Any) -> Optional[CheckedRange]:
+def checked_range(batch: Any) -> CheckedRange | None:
     """Of a batch; None where its filling names no range."""
     if not hasattr(batch.filling, "checked_range"):
         return None

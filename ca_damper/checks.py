@@ -1,6 +1,6 @@
 """Checks of the input of a batch, before its kernels are compiled."""
 
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def check_record_fits(scenes: int, measured_cycles: int) -> None:
         )
 
 
-def for_all(name: str, value: Any, scenes: int, most: Optional[int] = None) -> np.ndarray:
+def for_all(name: str, value: Any, scenes: int, most: int | None = None) -> np.ndarray:
     """One number for all scenes or one for each, (scenes,); InputError for anything else.
 
     most: the largest of whole numbers from zero; None for any numbers.

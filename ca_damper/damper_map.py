@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Optional, Union
+from typing import Any
 
 import numpy as np
 
@@ -181,15 +181,15 @@ class DamperMap(Tabulated):
 def damper_map(
     filling: Filling,
     *,
-    amplitudes: Union[float, Sequence[float]],
-    frequencies: Union[float, Sequence[float]],
-    particles: Union[int, Sequence[int]],
-    clearances: Union[float, Sequence[float], None] = None,
-    seeds: Union[int, Sequence[int]] = 3,
-    dt: Optional[float] = None,
+    amplitudes: float | Sequence[float],
+    frequencies: float | Sequence[float],
+    particles: int | Sequence[int],
+    clearances: float | Sequence[float] | None = None,
+    seeds: int | Sequence[int] = 3,
+    dt: float | None = None,
     transient_cycles: int = 50,
     measured_cycles: int = 50,
-    progress: Union[Listener, str, None] = AUTO,
+    progress: Listener | str | None = AUTO,
 ) -> DamperMap:
     """Loss and apparent mass of a driven damper over all its axes.
 

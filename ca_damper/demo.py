@@ -23,7 +23,7 @@ picture nor film.
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -81,7 +81,7 @@ _ENTRY = Entry(
 )
 
 
-def main(arguments: Optional[Sequence[str]] = None) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program on a command line, that of the process by default; returns its exit code."""
     made = study.parser(NAME, __doc__, settings=SETTINGS)
     made.prog, made.entry = "python -m ca_damper demo", _ENTRY

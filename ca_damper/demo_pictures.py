@@ -3,7 +3,7 @@
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -47,14 +47,14 @@ class Decay:
         """Median over the starts of the amplitude of every cycle [mm]."""
         return 1e3 * np.median(self._of(self.amplitude, count), axis=0)
 
-    def cycles(self, count: int) -> Optional[int]:
+    def cycles(self, count: int) -> int | None:
         """Cycles until the amplitude is below ``LEVEL``, a median; None where it stays above."""
         below = 1e3 * self._of(self.amplitude, count) < LEVEL
         ends = np.where(below.any(axis=1), below.argmax(axis=1), np.inf)
         middle = float(np.median(ends))
         return int(middle) if np.isfinite(middle) else None
 
-    def decrements(self, count: int) -> tuple[Optional[float], Optional[float]]:
+    def decrements(self, count: int) -> tuple[float | None, float | None]:
         """Mean decrement above 12 mm and below 6 mm; None where no cycle is there."""
         found = [logarithmic_decrement(x) for x in self._of(self.x, count)]
         size, lost = (np.concatenate(arrays) for arrays in zip(*found))
@@ -97,9 +97,7 @@ def write_decays(path: str, decays: Mapping[str, Decay]) -> None:
     write_csv(path, cycles)
 
 
-def draw_films(
-    path: str, page: Optional[str], films: tuple[Film, Film], options: Namespace
-) -> None:
+def draw_films(path: str, page: str | None, films: tuple[Film, Film], options: Namespace) -> None:
     """Write the animation, and the page that plays it, None for none.
 
     films: of the container with fixed particles, and with those of the filling, which are free.

@@ -7,7 +7,7 @@ batch of a filling with the same ``Structure``. ``fixed_mass.py`` has a complete
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import Any, Optional, Protocol, Union
+from typing import Any, Protocol
 
 import numpy as np
 import taichi as ti
@@ -131,7 +131,7 @@ class Filling(Protocol):
         """Mass of a particle [kg]."""
 
     @property
-    def gravity(self) -> Union[float, tuple]:
+    def gravity(self) -> float | tuple:
         """Gravity on the particles [m/s^2]: downwards, or (to the right, downwards)."""
 
     @property
@@ -139,7 +139,7 @@ class Filling(Protocol):
         """Effects that it computes, in words for the report."""
 
     @property
-    def step_bound(self) -> Optional[tuple[float, str]]:
+    def step_bound(self) -> tuple[float, str] | None:
         """Longest step that it allows or advises [s], and why; None where any will do."""
 
     def check(self, particles: int, dt: float) -> None:

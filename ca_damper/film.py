@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Optional, Union
+from typing import Any
 
 import numpy as np
 
@@ -52,10 +52,10 @@ class Film:
 
     def show(
         self,
-        path: Optional[FileName] = None,
+        path: FileName | None = None,
         *,
-        scenes: Optional[Sequence[int]] = None,
-        open_browser: Optional[bool] = None,
+        scenes: Sequence[int] | None = None,
+        open_browser: bool | None = None,
     ) -> WebPage:
         """Write one HTML page that plays containers and grains side by side, without a network.
 
@@ -158,8 +158,8 @@ def film(
     steps: int,
     *,
     sample_every: int = 1,
-    frame_every: Optional[int] = None,
-    progress: Union[Listener, str, None] = AUTO,
+    frame_every: int | None = None,
+    progress: Listener | str | None = AUTO,
 ) -> Film:
     """Run a batch of few scenes on by a number of steps and record it.
 

@@ -7,7 +7,7 @@ takes up its new speed at once.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Optional, Union
+from typing import Any
 
 import numpy as np
 
@@ -52,9 +52,9 @@ class Sweep:
 
     up: Response
     down: Response
-    report: Optional[Report] = None
-    up_error: Optional[np.ndarray] = None
-    down_error: Optional[np.ndarray] = None
+    report: Report | None = None
+    up_error: np.ndarray | None = None
+    down_error: np.ndarray | None = None
 
     def __repr__(self):
         shows = self.shows_hysteresis
@@ -124,17 +124,17 @@ class Sweep:
 def sweep_up_and_down(
     filling: Filling,
     *,
-    particles: Union[int, Sequence[int]],
-    ratios: Union[float, Sequence[float], np.ndarray],
-    seeds: Union[int, Sequence[int]] = 5,
-    oscillator: Optional[Oscillator] = None,
-    dt: Optional[float] = None,
+    particles: int | Sequence[int],
+    ratios: float | Sequence[float] | np.ndarray,
+    seeds: int | Sequence[int] = 5,
+    oscillator: Oscillator | None = None,
+    dt: float | None = None,
     transient_cycles: int = 60,
     measured_cycles: int = 20,
     start: str = "rest",
-    progress: Union[Listener, str, None] = AUTO,
-    checkpoint: Optional[Checkpoint] = None,
-    resume: Optional[FileName] = None,
+    progress: Listener | str | None = AUTO,
+    checkpoint: Checkpoint | None = None,
+    resume: FileName | None = None,
 ) -> Sweep:
     """Go up through the ratios and down again without a new start.
 

@@ -6,9 +6,10 @@ returns one value for each seed, or a row of them:
     largest_swing = Goal("largest swing", "m", "extreme", lambda found: found.amplitude[0].max(0))
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 
@@ -75,7 +76,7 @@ class Goal:
                 )
             return
         ratios = several("ratios of a goal", self.ratios, positive)
-        if any(a >= b for a, b in zip(ratios, ratios[1:])):
+        if any(a >= b for a, b in itertools.pairwise(ratios)):
             raise InputError(f"ratios of a goal must ascend, got {shown(self.ratios)}")
         object.__setattr__(self, "ratios", ratios)
 
@@ -177,7 +178,7 @@ def apparent_mass_at(ratio: float) -> Goal:
     return _measure_at("apparent mass", "kg", "apparent_mass", ratio)
 
 
-def response_curve(ratios: Union[Sequence[float], np.ndarray]) -> Goal:
+def response_curve(ratios: Sequence[float] | np.ndarray) -> Goal:
     """RMS displacement at each of some frequency ratios.
 
     Parameters

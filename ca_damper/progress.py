@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Optional
+from typing import ClassVar
 
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.progress.progress import Listener, Pace, Progress
@@ -33,7 +33,7 @@ class Stages:
     at which the stages end.
     """
 
-    def __init__(self, progress: Optional[Listener], ends: Sequence[float]):
+    def __init__(self, progress: Listener | None, ends: Sequence[float]):
         self.progress, self.ends, self.stage = progress, ends, 0
         self.before = BatchProgress(0.0, 0.0, 0)
         self.pace = Pace(_LEAST_SECONDS)
@@ -66,7 +66,7 @@ class OpenEnded:
     progress: called with a BatchProgress, or None for nobody.
     """
 
-    def __init__(self, progress: Optional[Listener]):
+    def __init__(self, progress: Listener | None):
         self.progress, self.runs, self.before = progress, 0, BatchProgress(0.0, 0.0, 0)
         self.pace = Pace(_LEAST_SECONDS)
 

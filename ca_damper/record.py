@@ -1,7 +1,7 @@
 """One scene at one time, as it is kept for pictures."""
 
 from dataclasses import dataclass
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -37,13 +37,13 @@ class Frame:
     y: float
     position: np.ndarray
     velocity: np.ndarray
-    diameter: Optional[np.ndarray] = None
+    diameter: np.ndarray | None = None
 
     def __repr__(self):
         return by_fields(self)
 
 
-def frames_of(batch: Any, present: Optional[dict[str, np.ndarray]] = None) -> tuple[Frame, ...]:
+def frames_of(batch: Any, present: dict[str, np.ndarray] | None = None) -> tuple[Frame, ...]:
     """A Frame of every scene of a batch as it is now.
 
     present: what ``Batch.sample`` has just given, if it has been asked.

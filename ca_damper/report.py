@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import asdict, dataclass
-from typing import Any, Optional
+from typing import Any
 
 from ca_damper.certificate import Certificate
 from ca_damper.checked_range import CheckedRange
@@ -81,20 +81,20 @@ class Report:
     particles: tuple[int, int]
     dt_s: tuple[float, float]
     simulated_s: float
-    step_bound: Optional[tuple[float, str]]
+    step_bound: tuple[float, str] | None
     momentum_error: float
     scene_steps: int
     particle_steps: int
     container_evaluations: int
     compile_seconds: float
     run_seconds: float
-    order: Optional[int] = None
-    sampling: Optional[tuple[int, float]] = None
-    certificate: Optional[Certificate] = None
+    order: int | None = None
+    sampling: tuple[int, float] | None = None
+    certificate: Certificate | None = None
     diverged: tuple[str, ...] = ()
     excitation: tuple[str, ...] = ()
     transient: str = ""
-    checked: Optional[CheckedRange] = None
+    checked: CheckedRange | None = None
 
     def __repr__(self):
         particles = f"{_range(self.particles)} particles"

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Optional, Union
+from typing import Any
 
 import numpy as np
 
@@ -107,7 +107,7 @@ class Response(Tabulated):
     damping_ratio: np.ndarray
     energy: np.ndarray
     rms_about_all: np.ndarray
-    report: Optional[Report] = None
+    report: Report | None = None
 
     def __repr__(self):
         highest = f"largest RMS {1e3 * np.fmax.reduce(self.rms, axis=None, initial=np.nan):.4g} mm"
@@ -230,19 +230,19 @@ class Response(Tabulated):
 def frequency_response(
     filling: Filling,
     *,
-    particles: Union[int, Sequence[int]],
-    ratios: Union[float, Sequence[float], np.ndarray],
-    seeds: Union[int, Sequence[int]] = 5,
-    oscillator: Optional[Oscillator] = None,
-    dt: Optional[float] = None,
-    base_amplitude: Union[float, Sequence[float], None] = None,
+    particles: int | Sequence[int],
+    ratios: float | Sequence[float] | np.ndarray,
+    seeds: int | Sequence[int] = 5,
+    oscillator: Oscillator | None = None,
+    dt: float | None = None,
+    base_amplitude: float | Sequence[float] | None = None,
     transient_cycles: int = 150,
     measured_cycles: int = 20,
     start: str = "rest",
     effects: str = "listed",
-    progress: Union[Listener, str, None] = AUTO,
-    checkpoint: Optional[Checkpoint] = None,
-    resume: Optional[FileName] = None,
+    progress: Listener | str | None = AUTO,
+    checkpoint: Checkpoint | None = None,
+    resume: FileName | None = None,
 ) -> Any:
     """Response curves of a filling, all scenes in one batch.
 
@@ -355,12 +355,12 @@ class Grid:
     def __init__(
         self,
         filling: Filling,
-        particles: Union[int, Sequence[int]],
-        ratios: Union[float, Sequence[float], np.ndarray],
-        seeds: Union[int, Sequence[int]],
-        oscillator: Optional[Oscillator],
-        dt: Optional[float],
-        base_amplitude: Union[float, Sequence[float], None] = None,
+        particles: int | Sequence[int],
+        ratios: float | Sequence[float] | np.ndarray,
+        seeds: int | Sequence[int],
+        oscillator: Oscillator | None,
+        dt: float | None,
+        base_amplitude: float | Sequence[float] | None = None,
     ):
         self.filling = check_filling(filling)
         self.oscillator = Oscillator() if oscillator is None else oscillator

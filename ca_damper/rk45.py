@@ -12,7 +12,6 @@ and Wanner, Solving Ordinary Differential Equations I, section II.4.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Optional
 
 import numpy as np
 import taichi as ti
@@ -175,8 +174,8 @@ def solve(
     *,
     rtol: float = 1e-6,
     atol: float = 1e-9,
-    at: Optional[ArrayLike] = None,
-    first: Optional[float] = None,
+    at: ArrayLike | None = None,
+    first: float | None = None,
     most_attempts: int = MOST_ATTEMPTS,
 ) -> Solution:
     """Solve dy/dt = rhs(t, y) from y(span[0]) = y0 to span[1] in Python.

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Optional, Union
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +73,7 @@ class TimeHistory(Tabulated):
     force: np.ndarray
     rms: np.ndarray
     peak: np.ndarray
-    report: Optional[Report] = None
+    report: Report | None = None
 
     def __repr__(self) -> str:
         axes = f"particles {listed(self.particles)}, {counted(len(self.seeds), 'seed')}"
@@ -151,21 +151,21 @@ class TimeHistory(Tabulated):
 
 def shake(
     filling: Filling,
-    excitation: Union[Signal, Excitation],
+    excitation: Signal | Excitation,
     *,
-    particles: Union[int, Sequence[int]],
-    seeds: Union[int, Sequence[int]] = 5,
-    oscillator: Optional[Oscillator] = None,
-    dt: Optional[float] = None,
+    particles: int | Sequence[int],
+    seeds: int | Sequence[int] = 5,
+    oscillator: Oscillator | None = None,
+    dt: float | None = None,
     mount: str = "spring",
-    duration: Optional[float] = None,
+    duration: float | None = None,
     interval: float = 1e-3,
     displacement: float = 0.0,
     velocity: float = 0.0,
     effects: str = "listed",
-    progress: Union[Listener, str, None] = AUTO,
-    checkpoint: Optional[Checkpoint] = None,
-    resume: Optional[FileName] = None,
+    progress: Listener | str | None = AUTO,
+    checkpoint: Checkpoint | None = None,
+    resume: FileName | None = None,
 ) -> TimeHistory:
     """Shake a structure and record its motion.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Optional, Union
+from typing import Any
 
 import numpy as np
 
@@ -88,7 +88,7 @@ class StructureHistory(Tabulated):
     force: np.ndarray
     rms: np.ndarray
     peak: np.ndarray
-    report: Optional[Report] = None
+    report: Report | None = None
 
     def __repr__(self) -> str:
         number = len(self.boxes)
@@ -146,20 +146,20 @@ class StructureHistory(Tabulated):
 def shake_structure(
     filling: Filling,
     structure: ModalStructure,
-    boxes: Union[Box, Sequence[Box]],
-    excitation: Union[Signal, Excitation],
+    boxes: Box | Sequence[Box],
+    excitation: Signal | Excitation,
     *,
-    seeds: Union[int, Sequence[int]] = 5,
-    dt: Optional[float] = None,
-    duration: Optional[float] = None,
+    seeds: int | Sequence[int] = 5,
+    dt: float | None = None,
+    duration: float | None = None,
     interval: float = 1e-3,
-    force_place: Optional[int] = None,
+    force_place: int | None = None,
     displacement: Any = 0.0,
     velocity: Any = 0.0,
     effects: str = "listed",
-    progress: Union[Listener, str, None] = AUTO,
-    checkpoint: Optional[Checkpoint] = None,
-    resume: Optional[FileName] = None,
+    progress: Listener | str | None = AUTO,
+    checkpoint: Checkpoint | None = None,
+    resume: FileName | None = None,
 ) -> StructureHistory:
     """Shake a structure with boxes and record its motion.
 

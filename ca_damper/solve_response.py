@@ -8,7 +8,7 @@ the step leave a bar that is narrow enough. Nothing begins again that can go on.
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Optional, Union
+from typing import Any
 
 import numpy as np
 
@@ -45,15 +45,15 @@ def solve_response(
     filling: Filling,
     *,
     particles: int,
-    goal: Union[Goal, Sequence[Goal]],
+    goal: Goal | Sequence[Goal],
     tolerance: float = 0.01,
     confidence: float = 0.95,
-    budget_s: Optional[float] = None,
-    oscillator: Optional[Oscillator] = None,
-    ratios: Optional[tuple[float, float]] = None,
-    seeds: Union[int, Sequence[int], None] = None,
-    plan: Optional[Plan] = None,
-    progress: Union[Listener, str, None] = AUTO,
+    budget_s: float | None = None,
+    oscillator: Oscillator | None = None,
+    ratios: tuple[float, float] | None = None,
+    seeds: int | Sequence[int] | None = None,
+    plan: Plan | None = None,
+    progress: Listener | str | None = AUTO,
 ) -> Any:
     """Value of one or several goals, with an error bar.
 

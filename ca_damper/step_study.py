@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from operator import attrgetter
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class StepStudy:
         self.runs: dict[float, list[Response]] = {}
         self.failures: dict[float, str] = {}
         self.reference: dict[str, Any] = {}
-        self.roundoff: Optional[float] = None
+        self.roundoff: float | None = None
         self.compile_s = 0.0
 
     def make_reference(self, dt: float, count: int) -> dict[str, Any]:
@@ -94,7 +94,7 @@ class StepStudy:
         """Curve of the reference, mean over its seeds [m], (ratios,)."""
         return self.rms.mean(axis=1)
 
-    def curve(self, dt: Optional[float] = None) -> np.ndarray:
+    def curve(self, dt: float | None = None) -> np.ndarray:
         """Mean over the seeds at a step, the finest by default [m], (ratios,)."""
         return self.runs[dt or min(self.runs)][0].rms[0].mean(axis=1)
 

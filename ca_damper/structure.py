@@ -16,7 +16,7 @@ that the others lend to a place where a force acts, and their resonances.
 """
 
 from dataclasses import dataclass
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -105,7 +105,7 @@ class ModalStructure:
         mass: ArrayLike,
         stiffness: ArrayLike,
         damping_ratios: ArrayLike,
-        modes: Optional[int] = None,
+        modes: int | None = None,
     ) -> "ModalStructure":
         """Structure of the lowest modes of K phi = w^2 M phi.
 
@@ -315,7 +315,7 @@ class Box:
 
     place: int
     particles: int
-    seed: Optional[int] = None
+    seed: int | None = None
 
     def __post_init__(self) -> None:
         for name, most in (("place", MOST_PLACES - 1), ("particles", 2**31 - 1)):

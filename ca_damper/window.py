@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Optional, Union
+from typing import Any, NamedTuple
 
 from ca_damper.checks import MOST_SEED
 from ca_damper.excitation.excitation import Excitation, excitation_of
@@ -34,7 +34,7 @@ def window(duration: float, dt: float, interval: Any) -> Window:
     return Window(duration, samples, every, duration / (samples * every))
 
 
-def run_duration(excitation: Excitation, duration: Optional[float]) -> float:
+def run_duration(excitation: Excitation, duration: float | None) -> float:
     """Duration asked for, or that of the excitation [s]; InputError for one without an end."""
     own = float(excitation.duration(1)[0])
     if duration is None and math.isinf(own):
@@ -42,7 +42,7 @@ def run_duration(excitation: Excitation, duration: Optional[float]) -> float:
     return own if duration is None else positive("duration", duration)
 
 
-def run_seeds(seeds: Union[int, Sequence[int]]) -> tuple[int, ...]:
+def run_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
     """Seeds given as their number or one by one; InputError."""
     given: Any = seeds
     if not hasattr(seeds, "__iter__") or isinstance(seeds, (str, bytes, dict)):

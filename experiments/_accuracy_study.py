@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -73,7 +73,7 @@ class Judged:
         return (kind, asked.seed, *found, self.seconds)
 
 
-def judged_blast(question: Any) -> Optional[Judged]:
+def judged_blast(question: Any) -> Judged | None:
     """A question to the blast answered, beside the value at a step 16 times finer.
 
     None where one of them is refused: a bar that is crushed to rubble fills its lists.
@@ -88,7 +88,7 @@ def judged_blast(question: Any) -> Optional[Judged]:
     return Judged(question, answer, seconds, math.nan if true is None else true)
 
 
-def judged_damper(question: Any) -> Optional[Judged]:
+def judged_damper(question: Any) -> Judged | None:
     """A question to the damper answered, beside the mean of finer runs with other seeds.
 
     None where its budget ends before there is anything to tell.
@@ -138,7 +138,7 @@ def _scanned(question, others):
     return [(words, made) for words, made in found if HOPELESS * made.dt0 > longest]
 
 
-def _fixed_run(question, words, method) -> Optional[FixedRun]:
+def _fixed_run(question, words, method) -> FixedRun | None:
     """One run of the scan; None where it diverges, or is refused as too long a step."""
     spent, rows = [], 100 if question.goal.kind == "extreme" else 1
     looks = {"samples": rows, "frames": 1, "progress": None}
@@ -156,7 +156,7 @@ def _fixed_run(question, words, method) -> Optional[FixedRun]:
     return FixedRun(words, question.goal.value(result), min(spent))
 
 
-def cheapest(runs: list[FixedRun], true: float, tolerance: float) -> Optional[FixedRun]:
+def cheapest(runs: list[FixedRun], true: float, tolerance: float) -> FixedRun | None:
     """Cheapest run that is off by a share of the true value at most; None if there is none."""
     good = [run for run in runs if abs(run.value - true) <= tolerance * abs(true)]
     return min(good, key=lambda run: run.seconds, default=None)

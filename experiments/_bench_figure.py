@@ -1,8 +1,8 @@
 """A figure of the bench, its share of the machine's floor, and candidates that take turns."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from statistics import median
-from typing import Callable, NamedTuple, Optional
+from typing import NamedTuple
 
 from taichi_dem.kit.study.floors import Work
 
@@ -22,7 +22,7 @@ class Figure(NamedTuple):
     unit: str
     values: Sequence[float]
     bound: str = ""
-    work: Optional[Work] = None
+    work: Work | None = None
     then: str = ""
 
     @property

@@ -7,7 +7,6 @@ rebalancing (Konno et al., 3.2, Figs 8 and 9).
 """
 
 from dataclasses import dataclass
-from typing import Optional
 
 import numpy as np
 
@@ -36,7 +35,7 @@ class SharedWork:
     total: float
     seconds: np.ndarray
     elapsed: float
-    cuts: Optional[np.ndarray] = None
+    cuts: np.ndarray | None = None
 
     @property
     def workers(self):

@@ -3,7 +3,6 @@
 import inspect
 import sys
 from collections.abc import Sequence
-from typing import Optional
 
 import taichi_dem
 from taichi_dem import effects, materials, mesh, meshes, methods
@@ -42,7 +41,7 @@ def _rows(members):
     return rows
 
 
-def main(arguments: Optional[Sequence[str]] = None) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     return listing.run(taichi_dem, sections(), arguments)
 

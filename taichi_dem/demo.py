@@ -15,7 +15,7 @@ results/blast_demo/.
 from argparse import Namespace
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -52,7 +52,7 @@ _ENTRY = Entry(
 )
 
 
-def main(arguments: Optional[Sequence[str]] = None) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program on a command line, that of the process by default; returns its exit code."""
     made = study.parser(NAME, __doc__, ("auto", "resident", "parallel"), SETTINGS)
     made.prog, made.entry = "python -m taichi_dem demo", _ENTRY
@@ -117,7 +117,7 @@ def figures_of(result: Result) -> dict[str, tuple]:
     }
 
 
-def figures_of_certificate(certificate: Optional[Certificate]) -> dict[str, tuple]:
+def figures_of_certificate(certificate: Certificate | None) -> dict[str, tuple]:
     """What acted only where needed: evaluations spared, time asleep, misses of the audit."""
     if certificate is None:
         return {}

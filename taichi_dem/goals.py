@@ -7,7 +7,7 @@ A goal of one's own takes a line; its function gets a ``Result`` with a frame at
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +65,7 @@ class Goal:
     function: Callable[[Result], float] = field(repr=False)
     kind: str = "value"
     averaged: bool = False
-    check: Optional[Callable[[Scene], Any]] = field(default=None, repr=False)
+    check: Callable[[Scene], Any] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         word("name of a goal", self.name)

@@ -2,7 +2,7 @@
 
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Any, Optional
+from typing import Any
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import between, choice, plain_fields, positive, shown
@@ -43,9 +43,9 @@ class Method:
     name: Any
     uniform: bool = True
     neighbour: str = "held"
-    control: Optional[StepControl] = None
+    control: StepControl | None = None
     dashpot: str = "full"
-    distance: Optional[float] = None
+    distance: float | None = None
     solves: bool = False
     steps_ahead: Any = 0.0
 
@@ -84,7 +84,7 @@ def structure_of(method: Any) -> Hashable:
     return type(method), method.neighbour, method.dashpot, method.distance is None, rule
 
 
-def order_of(method: Any, damped: bool, varying: bool) -> Optional[int]:
+def order_of(method: Any, damped: bool, varying: bool) -> int | None:
     """Order of the error in the step between events.
 
     A class that is derived from a method declares an order of its own, or none: its ``advance`` may
@@ -140,7 +140,7 @@ class _Explicit(Method):
         rule = self.control or (StepControl() if self.dashpot == "limited" else None)
         return rule.ahead if rule is not None else 0.0
 
-    def order(self, damped: bool, varying: bool) -> Optional[int]:
+    def order(self, damped: bool, varying: bool) -> int | None:
         """Order of the error in the step, see ``order_of``.
 
         Dashpots lag by half a step; limited ones are those of another material at each step.
@@ -195,8 +195,8 @@ class Uniform(_Explicit):
     """
 
     dt0: float = 1e-8
-    distance: Optional[float] = None
-    control: Optional[StepControl] = None
+    distance: float | None = None
+    control: StepControl | None = None
     dashpot: str = "full"
 
 
@@ -238,7 +238,7 @@ class Multirate(_Explicit):
     dt0: float = 1e-8
     distance: float = 1e-8
     neighbour: str = "held"
-    control: Optional[StepControl] = None
+    control: StepControl | None = None
     dashpot: str = "full"
 
     uniform = False

@@ -1,8 +1,9 @@
 """Observers of a run: objects that ``simulate`` calls with a read-only view of it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Callable, ClassVar, Optional, Protocol, Union
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -61,10 +62,10 @@ class Every:
     [0, 2, 4, 5]
     """
 
-    time_s: Optional[float] = None
-    steps: Optional[int] = None
-    samples: Optional[int] = None
-    wall_s: Optional[float] = None
+    time_s: float | None = None
+    steps: int | None = None
+    samples: int | None = None
+    wall_s: float | None = None
 
     def __post_init__(self):
         plain_fields(self)
@@ -195,7 +196,7 @@ class Observer(Protocol):
     """
 
     @property
-    def when(self) -> Union[Every, At]:
+    def when(self) -> Every | At:
         """Times of the calls."""
 
     def observe(self, view: "RunView") -> None:
@@ -237,13 +238,13 @@ class Collector:
     ['cpu']
     """
 
-    def __init__(self, when: Union[Every, At], **read: Callable[["RunView"], Any]):
+    def __init__(self, when: Every | At, **read: Callable[["RunView"], Any]):
         self.when, self.read = instance("when", when, (Every, At)), read
         for name, function in read.items():
             if not callable(function):
                 raise InputError(f"{name} must be a function of a RunView, got {shown(function)}")
         self.rows: dict[str, list] = {name: [] for name in read}
-        self.view: Optional[RunView] = None
+        self.view: RunView | None = None
 
     def __repr__(self) -> str:
         return in_brief(self, ", ".join(self.rows))

@@ -5,7 +5,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MethodType, SimpleNamespace
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -76,7 +76,7 @@ class Result(RunTables):
     peak_speed: np.ndarray
     report: Report
     diverged: str = ""
-    start: Optional[dict[str, np.ndarray]] = None
+    start: dict[str, np.ndarray] | None = None
     acting_since: dict[str, np.ndarray] = field(default_factory=dict)
     receivers: Mapping[str, Received] = field(default_factory=dict)
 
@@ -100,7 +100,7 @@ class Result(RunTables):
         return titled(title, *shown, warning=self.diverged)
 
     @property
-    def certificate(self) -> Optional[Certificate]:
+    def certificate(self) -> Certificate | None:
         """What acted and what was left out, with effects="auto"; else None."""
         return self.report.certificate
 
@@ -152,9 +152,7 @@ class Result(RunTables):
         if self.frames:
             write_paraview(place, self.model, self.frames, name, self.acting_since)
 
-    def show(
-        self, path: Optional[FileName] = None, *, open_browser: Optional[bool] = None
-    ) -> WebPage:
+    def show(self, path: FileName | None = None, *, open_browser: bool | None = None) -> WebPage:
         """Write one HTML page in which the block turns and its frames play, without a network.
 
         Parameters

@@ -1,6 +1,6 @@
 """What a checkpoint of a run holds, whether one fits a run, and how a run is resumed."""
 
-from typing import Any, Optional, Union
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from taichi_dem.state.timeline import MACRO_TICKS
 
 def arrays_of(
     scene: Scene, method: Method, checkpoint: Any, resume: Any, last: int
-) -> Optional[dict[str, np.ndarray]]:
+) -> dict[str, np.ndarray] | None:
     """Arrays by name to resume from, or None; last: number of largest steps of the run.
 
     Raises InputError for an unusable checkpoint.
@@ -36,7 +36,7 @@ def arrays_of(
 
 def writer_of(
     simulation: Simulation, recorder: Recorder, checkpoint: Any, resume: Any, arrays: Any
-) -> Union[CheckpointWriter, NoCheckpointWriter]:
+) -> CheckpointWriter | NoCheckpointWriter:
     """Writer of checkpoints, after a resumed run has been restored."""
     if arrays:
         saved_run(simulation, recorder).restore(arrays, resume)

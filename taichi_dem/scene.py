@@ -2,7 +2,7 @@
 
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Optional
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -104,7 +104,7 @@ class Scene:
     effects: Any = ()
     max_speed: float = 1e4
     loads: Iterable[Effect] = ()
-    sleep: Optional[float] = None
+    sleep: float | None = None
     unbonded: Iterable[str] = ()
     weaker: Mapping[str, float] = field(default_factory=dict)
     materials: Mapping[str, Material] = field(default_factory=dict)

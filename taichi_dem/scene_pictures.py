@@ -1,13 +1,11 @@
 """How meshes and scenes are drawn before a run; matplotlib loads with the first picture."""
 
-from typing import Union
-
 from taichi_dem.kit.pictures import drawn_by
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.scene import Scene
 
 
-def picture_of(thing: Union[Mesh, Scene]) -> bytes:
+def picture_of(thing: Mesh | Scene) -> bytes:
     """The mesh coloured by group, of a scene with what acts on each group, as PNG."""
     # Imported here, so that matplotlib loads only where a picture is shown.
     from taichi_dem.plot.groups import picture_of_groups

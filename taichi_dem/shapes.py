@@ -11,7 +11,6 @@ edge; planes are met exactly, and round walls by polygons whose corners lie on t
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Union
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from taichi_dem.mesh.mesh import Mesh
 _ON = 1e-6
 
 
-def block(size: Union[float, Sequence[float]], *, element: float) -> Mesh:
+def block(size: float | Sequence[float], *, element: float) -> Mesh:
     """Make a box from the origin to (x, y, z) = ``size``.
 
     Parameters
@@ -136,7 +135,7 @@ def plate(
     height: float,
     thickness: float,
     element: float,
-    hole: Union[float, Sequence[float], None] = None,
+    hole: float | Sequence[float] | None = None,
 ) -> Mesh:
     """Make a plate from the origin, with a hole where asked for.
 

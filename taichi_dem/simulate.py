@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Optional, Union
+from typing import Any, NamedTuple
 
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.checkpoint import Checkpoint
@@ -38,11 +38,11 @@ def simulate(
     driver: str = "auto",
     samples: int = 200,
     frames: int = 0,
-    progress: Union[Listener, str, None] = AUTO,
+    progress: Listener | str | None = AUTO,
     title: str = "simulating",
-    output: Optional[FileName] = None,
-    checkpoint: Optional[Checkpoint] = None,
-    resume: Optional[FileName] = None,
+    output: FileName | None = None,
+    checkpoint: Checkpoint | None = None,
+    resume: FileName | None = None,
     observers: Sequence[Observer] = (),
 ) -> Result:
     """Run a scene to a time and return the result.
@@ -137,7 +137,7 @@ def run_simulation(
     until: float,
     samples: int = 200,
     frames: int = 0,
-    progress: Union[Listener, str, None] = AUTO,
+    progress: Listener | str | None = AUTO,
     title: str = "simulating",
     observers: Sequence[Observer] = (),
     brief: bool = False,
@@ -174,7 +174,7 @@ class Call(NamedTuple):
 
     observe: Callable[[RunView], object]
     steps: set[int]
-    pace: Optional[Pace] = None
+    pace: Pace | None = None
 
 
 class _Plan:
@@ -191,7 +191,7 @@ class _Plan:
         samples: int,
         frames: int,
         observers: Sequence[Observer],
-        progress: Union[Listener, str, None],
+        progress: Listener | str | None,
     ):
         self.dt0, self.last = method.dt0, macro_steps(until, method.dt0)
         whole("samples", samples, 1, MOST_CALLS)

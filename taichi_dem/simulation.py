@@ -5,7 +5,7 @@ import copy
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -176,7 +176,7 @@ class Simulation(Uncopied):
         yield
         self.cut_short = ""
 
-    def reset(self, scene: Optional[Scene] = None, method: Optional[Method] = None) -> None:
+    def reset(self, scene: Scene | None = None, method: Method | None = None) -> None:
         """Begin again at time zero as the scene says, optionally with another scene or method.
 
         Parameters
@@ -308,7 +308,7 @@ class Simulation(Uncopied):
         self.divergence_check.check_shared(self.shared_volume)
         self.step_resolution.sample(self.time_s)
 
-    def advance_to(self, macro_step: int, on_call: Optional[Callable[[], object]] = None) -> None:
+    def advance_to(self, macro_step: int, on_call: Callable[[], object] | None = None) -> None:
         """Step until a number of largest steps.
 
         Parameters

@@ -1,7 +1,6 @@
 """An output of a scene to a tolerance: the program chooses method and step, and gives a bar."""
 
 import math
-from typing import Optional, Union
 
 from taichi_dem.accuracy.job import Job
 from taichi_dem.accuracy.search import Search
@@ -21,9 +20,9 @@ def solve(
     goal: Goal,
     tolerance: float = 0.01,
     confidence: float = 0.95,
-    budget_s: Optional[float] = None,
-    plan: Optional[Plan] = None,
-    progress: Union[Listener, str, None] = AUTO,
+    budget_s: float | None = None,
+    plan: Plan | None = None,
+    progress: Listener | str | None = AUTO,
 ) -> Answer:
     """Output of a scene at a time, with an error bar as narrow as asked.
 

@@ -1,7 +1,6 @@
 """Rules for the step of a body, evaluated by the schedule at the body's own times."""
 
 from dataclasses import dataclass
-from typing import Optional
 
 import numpy as np
 import taichi as ti
@@ -66,7 +65,7 @@ class StepControl:
 
     safety: float = 0.25
     angle: float = 0.02
-    level_jump: Optional[int] = 2
+    level_jump: int | None = 2
     ahead: float = 2.0
     dashpot_floor: float = 0.0
 

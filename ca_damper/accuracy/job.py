@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Optional
+from typing import Any
 
 from ca_damper.accuracy.plan import DamperPlan
 from ca_damper.fixed_mass import Empty, RigidMass
@@ -30,13 +30,13 @@ class Job:
     filling: Any
     particles: int
     oscillator: Oscillator
-    span: Optional[tuple[float, float]]
-    fixed: Optional[tuple[int, ...]]
+    span: tuple[float, float] | None
+    fixed: tuple[int, ...] | None
     goals: tuple[Goal, ...] = ()
     tolerance: float = 0.01
     confidence: float = 0.95
     budget_s: float = math.inf
-    plan: Optional[DamperPlan] = None
+    plan: DamperPlan | None = None
     listener: Any = field(default=None, repr=False)
 
     def first_step(self) -> float:

@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Optional
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,13 +45,13 @@ class SceneRuns:
     """
 
     def __init__(
-        self, filling: Any, particles: int, oscillator: Oscillator, progress: Optional[Listener]
+        self, filling: Any, particles: int, oscillator: Oscillator, progress: Listener | None
     ):
         self.filling, self.particles, self.oscillator = filling, particles, oscillator
         self.progress = progress
         self.cpu_s, self.steps, self._pace = 0.0, 0, math.inf
         self._homes: dict[SceneKey, tuple[_Home, int]] = {}
-        self._present: Optional[tuple[_Home, Batch]] = None
+        self._present: tuple[_Home, Batch] | None = None
         self._records: dict[SceneKey, np.ndarray] = {}
 
     @property

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from numbers import Integral
-from typing import Any, Optional
+from typing import Any
 
 from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting
 from ca_damper.automaton.accumulator import READINGS
@@ -117,7 +117,7 @@ class Automaton:
     """
 
     accounting: str = "all"
-    static_contact: Optional[bool] = None
+    static_contact: bool | None = None
     restitution: float = 0.75
     wall_restitution: float = 0.75
     pair_rule: str = "both"
@@ -130,12 +130,12 @@ class Automaton:
     particle_mass: float = 0.2e-3
     gravity: float = 10.0
     v_max: float = 5.0
-    start: Optional[tuple] = None
+    start: tuple | None = None
     traversal: str = "list"
     ledger: bool = False
     rules: str = "place"
-    friction: Optional[float] = None
-    wall_friction: Optional[float] = None
+    friction: float | None = None
+    wall_friction: float | None = None
 
     def __post_init__(self) -> None:
         plain_fields(self)
@@ -271,7 +271,7 @@ class Automaton:
         return self.width / self.v_max
 
     @property
-    def order(self) -> Optional[int]:
+    def order(self) -> int | None:
         """Order of the error in the step; without some of the impulses there is none."""
         return 1 if self.accounting == "all" else None
 

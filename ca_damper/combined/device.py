@@ -7,7 +7,7 @@ In short steps the container is foreseen from its motion at the beginning and it
 structure moves it at the end of the whole step only.
 """
 
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -156,7 +156,7 @@ class DeviceCombined:
         rest = tuple(name for name in effects if name != FLIGHTS)
         return {**self.spheres.first_steps(rest), FLIGHTS: first}
 
-    def audit(self) -> Optional[Audit]:
+    def audit(self) -> Audit | None:
         """Audit of the contact tests that short steps skipped."""
         return self.spheres.audit()
 

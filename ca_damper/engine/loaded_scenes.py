@@ -5,7 +5,7 @@ and compile nothing, once its last owner is gone.
 """
 
 import warnings
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -50,7 +50,7 @@ class LoadedScenes(Uncopied):
         atol: float,
         excitation: Any = None,
         recorded_samples: int = 0,
-        structure: Optional[ModalMount] = None,
+        structure: ModalMount | None = None,
         if_diverged: str = "nan",
     ):
         runtime.session()
@@ -82,10 +82,10 @@ class LoadedScenes(Uncopied):
         # Scenes of which a warning has told that they diverged.
         self._told = 0
         # Steps of the last run if it was recorded, those between samples, and number of samples.
-        self._recording: Optional[tuple[int, int, int]] = None
+        self._recording: tuple[int, int, int] | None = None
 
     @property
-    def _has_box(self) -> Optional[np.ndarray]:
+    def _has_box(self) -> np.ndarray | None:
         """Scenes with a box, (scenes,); None for all."""
         return None if self.modal is None else self.modal.has_box(self.count)
 

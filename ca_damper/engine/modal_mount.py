@@ -5,7 +5,7 @@ that the motion of every place is measured and recorded.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Optional
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class ModalMount:
     """
 
     def __init__(
-        self, structure: ModalStructure, places: Sequence[int], force_place: Optional[int] = None
+        self, structure: ModalStructure, places: Sequence[int], force_place: int | None = None
     ):
         self.structure = instance("structure", structure, ModalStructure)
         whole("modes of a structure with boxes", structure.mode_count, 1, MOST_MODES)
@@ -117,7 +117,7 @@ class ModalMount:
         return [self.scene_places[:k] for k in range(self.group)]
 
 
-def checked_mount(mount: Any, structure: Any) -> tuple[str, Optional[ModalMount]]:
+def checked_mount(mount: Any, structure: Any) -> tuple[str, ModalMount | None]:
     """Word for the mount of a batch, and the ModalMount if it has one; InputError."""
     word = choice("mount", mount, MOUNTS)
     if structure is None:

@@ -2,7 +2,6 @@
 
 import csv
 import math
-from typing import Optional
 
 import numpy as np
 
@@ -26,7 +25,7 @@ COLUMNS = {
 
 
 def from_csv(
-    path: FileName, column: Optional[str] = None, *, correct_baseline: bool = False
+    path: FileName, column: str | None = None, *, correct_baseline: bool = False
 ) -> Signal:
     """Signal from a CSV file, such as a measured motion of a base.
 

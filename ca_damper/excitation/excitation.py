@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Optional, Union
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -99,8 +99,8 @@ class Excitation:
         A member is no Signal, or the sequence is empty.
     """
 
-    base: Union[Signal, Sequence[Signal], None] = None
-    force: Union[SineForce, Signal, Sequence[Signal], None] = None
+    base: Signal | Sequence[Signal] | None = None
+    force: SineForce | Signal | Sequence[Signal] | None = None
 
     def __post_init__(self) -> None:
         for name in ("base", "force"):
@@ -244,7 +244,7 @@ def _identity(value: Any) -> str:
     return identity_of(given)
 
 
-def _signals(name: str, value: Any) -> Optional[tuple[Signal, ...]]:
+def _signals(name: str, value: Any) -> tuple[Signal, ...] | None:
     """InputError unless a value is a Signal, several or None."""
     given = (value,) if isinstance(value, Signal) else value
     if given is None:

@@ -5,7 +5,7 @@ cycle it is off by 2e-6 of the amplitude, and its second derivative by (2 pi / 4
 """
 
 import math
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def sines(
     *,
     phases: Any = 0.0,
     of: str = "value",
-    step: Optional[float] = None,
+    step: float | None = None,
 ) -> Signal:
     """Sum of sines, amplitude * sin(2 pi frequency t + phase).
 
@@ -98,7 +98,7 @@ def sweep(
     *,
     way: str = "linear",
     of: str = "value",
-    step: Optional[float] = None,
+    step: float | None = None,
 ) -> Signal:
     """Sine whose frequency goes from ``low`` to ``high``, or down.
 
@@ -159,7 +159,7 @@ def random_vibration(
     *,
     seed: int = 1,
     of: str = "acceleration",
-    step: Optional[float] = None,
+    step: float | None = None,
 ) -> Signal:
     """Stationary random vibration of a one-sided power spectral density.
 

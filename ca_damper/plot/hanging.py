@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Optional
 
 import numpy as np
 
@@ -29,7 +28,7 @@ class Hanging:
     box: Box
     frames: Sequence[Frame]
     colour: str
-    curve: Optional[tuple[np.ndarray, np.ndarray]] = None
+    curve: tuple[np.ndarray, np.ndarray] | None = None
 
     def __repr__(self):
         return in_brief(self, self.title, f"{len(self.frames)} frames")

@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Mapping
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -44,7 +44,7 @@ def picture_of_response(response: Any, rows: Any) -> Any:
         return png_of(figure)
 
 
-def picture_rms(path: Optional[FileName], response: Any) -> Figure:
+def picture_rms(path: FileName | None, response: Any) -> Figure:
     """RMS over frequency for every particle number, and of the empty container."""
     with picture(path, size=(7.2, 4.0)) as (figure, axis):
         _draw_rms(axis, response)
@@ -71,7 +71,7 @@ def _explain_curves(axis, response):
     axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def picture_measure(path: Optional[FileName], response: Any, name: str) -> Figure:
+def picture_measure(path: FileName | None, response: Any, name: str) -> Figure:
     """A measure of a response over frequency, for every particle number."""
     with picture(path, size=(7.2, 4.0)) as (figure, axis):
         for k, particles in enumerate(response.particles):
@@ -84,7 +84,7 @@ def picture_measure(path: Optional[FileName], response: Any, name: str) -> Figur
     return figure
 
 
-def picture_peaks(path: Optional[FileName], response: Any) -> Figure:
+def picture_peaks(path: FileName | None, response: Any) -> Figure:
     """Place and height of the peaks of a response over the particle number."""
     with picture(path, 1, 2, size=(8.4, 3.6)) as (figure, (place, height)):
         _draw_peaks(place, height, {response.label: response})
@@ -223,7 +223,7 @@ def _draw_measures(column, response, k, particle_mass):
     _band(column[1], response.ratios, response.loss_factor[k], colour, None)
 
 
-def picture_hysteresis(path: Optional[FileName], sweeps: Mapping[str, Any]) -> Figure:
+def picture_hysteresis(path: FileName | None, sweeps: Mapping[str, Any]) -> Figure:
     """Sweeps up and down, the state carried on: a column a filling, a row a particle number."""
     particles = next(iter(sweeps.values())).up.particles
     count = len(sweeps)

@@ -1,6 +1,6 @@
 """Pictures of a response or a sweep, one function each: ``response.plot``, ``sweep.plot``."""
 
-from typing import Any, Optional
+from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -30,7 +30,7 @@ class ResponsePlots:
     def __init__(self, response: Any):
         self._response = response
 
-    def curves(self, measure: str = "rms", *, path: Optional[FileName] = None) -> Figure:
+    def curves(self, measure: str = "rms", *, path: FileName | None = None) -> Figure:
         """Draw a measure over frequency: median over seeds, shaded from lowest to highest.
 
         Parameters
@@ -43,7 +43,7 @@ class ResponsePlots:
             return picture_rms(path, self._response)
         return picture_measure(path, self._response, measure)
 
-    def peaks(self, *, path: Optional[FileName] = None) -> Figure:
+    def peaks(self, *, path: FileName | None = None) -> Figure:
         """Draw place and height of the peaks over the particle number."""
         return picture_peaks(path, self._response)
 
@@ -54,6 +54,6 @@ class SweepPlots:
     def __init__(self, sweep: Any):
         self._sweep = sweep
 
-    def hysteresis(self, *, path: Optional[FileName] = None) -> Figure:
+    def hysteresis(self, *, path: FileName | None = None) -> Figure:
         """Draw the RMS over frequency, up and down, each seed a line."""
         return picture_hysteresis(path, {self._sweep.up.label: self._sweep})

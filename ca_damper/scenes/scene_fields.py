@@ -5,7 +5,7 @@ read from fields at run time, so that a batch of another size compiles nothing.
 """
 
 from dataclasses import dataclass
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -14,7 +14,7 @@ from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.allocation import assign, values
 
 #: Length of an axis of a field: a number, or the name of one of the sizes.
-Length = Union[int, str]
+Length = int | str
 
 
 @dataclass(frozen=True, eq=False)

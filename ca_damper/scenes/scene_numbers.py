@@ -1,7 +1,7 @@
 """Numbers of the scenes of a batch, checked against its filling, with steps that fit the cycle."""
 
 from collections.abc import Sequence
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +22,7 @@ class SceneNumbers:
     filling refuses or a step out of range.
     """
 
-    def __init__(self, filling: Any, table: SceneTable, has_box: Optional[np.ndarray] = None):
+    def __init__(self, filling: Any, table: SceneTable, has_box: np.ndarray | None = None):
         self.filling, self.table = filling, table.copy()
         self.has_box = has_box
         structure = zip(*map(self.table.column, _STRUCTURE))

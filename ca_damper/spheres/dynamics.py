@@ -10,7 +10,7 @@ Spheres move in the frame at rest, not in the container's: their gain of momentu
 contacts and gravity, to round-off, and the impacts on the container are its exact counterpart.
 """
 
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -309,7 +309,7 @@ class DeviceSpheres:
         """Step in which each of the named effects first acted, infinite if never, (scenes,)."""
         return self.effect_activity.first_steps(effects)
 
-    def audit(self) -> Optional[Audit]:
+    def audit(self) -> Audit | None:
         """Audit of the contact tests that were skipped; None where all are made."""
         return self.search.found()
 

@@ -4,8 +4,6 @@ How much they did is sampled when a scene is checked for divergence: to ask in e
 cost a fifth of it. When each acted for the first time is noted in the step itself.
 """
 
-from typing import Optional
-
 import numpy as np
 import taichi as ti
 
@@ -104,13 +102,13 @@ class EffectActivity:
 
 
 def _use(
-    name: str, touches: int, share: Optional[float], whole: str, steers: bool, kept: str
+    name: str, touches: int, share: float | None, whole: str, steers: bool, kept: str
 ) -> EffectUse:
     return EffectUse(
         name, "touches seen", touches, share=share, whole=whole, steers=steers, kept=kept
     )
 
 
-def _share(sums: np.ndarray, which: int) -> Optional[float]:
+def _share(sums: np.ndarray, which: int) -> float | None:
     """None for no part at all: spheres may rub on walls alone, which is not seen."""
     return float(sums[which] / sums.sum()) if sums[which] > 0.0 else None

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from operator import mul
-from typing import ClassVar, Optional, Union
+from typing import ClassVar
 
 from ca_damper.certificate import NEGLIGIBLE, Estimate
 from ca_damper.filling import LEAST_PLACES, DeviceFilling, Structure
@@ -134,13 +134,13 @@ class Spheres:
     particle_mass: float = 0.2e-3
     width: float = 60e-3
     height: float = 96e-3
-    gravity: Union[float, tuple] = 9.8
+    gravity: float | tuple = 9.8
     rotation: bool = False
     search: str = "cells"
-    start: Optional[tuple] = None
+    start: tuple | None = None
     friction_law: str = "viscous"
-    sizes: Optional[tuple] = None
-    start_velocity: Optional[tuple] = None
+    sizes: tuple | None = None
+    start_velocity: tuple | None = None
 
     label: ClassVar[str] = "dem"
     default_dt: ClassVar[float] = 2e-5

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +22,7 @@ _SCRIPT = Path(__file__).resolve().with_name("containers.js")
 
 
 def show_film(
-    film: Any, scenes: Sequence[int], path: Optional[FileName], open_browser: Optional[bool]
+    film: Any, scenes: Sequence[int], path: FileName | None, open_browser: bool | None
 ) -> WebPage:
     """Write the page of a ``Film``; scenes: numbers of those shown; as of ``Film.show``."""
     # A filling without a box of its own is drawn in that of the spheres.
@@ -40,8 +40,8 @@ def show_film(
 
 def show_containers(
     containers: Sequence[Hanging],
-    path: Optional[FileName],
-    open_browser: Optional[bool] = None,
+    path: FileName | None,
+    open_browser: bool | None = None,
     *,
     mount: str = "spring",
     notes: Sequence[str] = (),

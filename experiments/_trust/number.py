@@ -1,7 +1,6 @@
 """A number that others have published or derived, and ours beside it."""
 
 from dataclasses import dataclass, field
-from typing import Optional
 
 import numpy as np
 
@@ -21,8 +20,8 @@ class Number:
     source: str
     published: float
     values: np.ndarray
-    low: Optional[float] = None
-    high: Optional[float] = None
+    low: float | None = None
+    high: float | None = None
     note: str = ""
     #: Widest error that counts as agreement where no range is given, as a share.
     allowed: float = field(default=0.01)

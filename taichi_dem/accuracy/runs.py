@@ -1,7 +1,7 @@
 """Runs of one question: by level of the step, and twins that differ by one rounding."""
 
 import math
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -31,13 +31,13 @@ class Runs:
     sentence of the last run that diverged.
     """
 
-    def __init__(self, job: Job, listen: Optional[Listener]):
+    def __init__(self, job: Job, listen: Listener | None):
         self.job, self._listen = job, listen
         self.seconds, self.count, self.failure = 0.0, 0, ""
         self.results: dict[int, Result] = {}
         self.cost: dict[int, float] = {}
-        self._simulation: Optional[Simulation] = None
-        self._known: dict[tuple[int, int, bool], Optional[float]] = {}
+        self._simulation: Simulation | None = None
+        self._known: dict[tuple[int, int, bool], float | None] = {}
 
     def value(self, level: int, twin: int = 0, tight: bool = False) -> Any:
         """Goal of a run at a level; None for one that diverged.

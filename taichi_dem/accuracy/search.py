@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class Search:
     """
 
     def __init__(
-        self, job: Job, budget: float, listen: Optional[Callable[[Any], Any]], first: int = 0
+        self, job: Job, budget: float, listen: Callable[[Any], Any] | None, first: int = 0
     ):
         self.job, self.budget = job, budget
         self.runs = Runs(job, listen)
@@ -120,7 +120,7 @@ class Search:
             return self.runs.value(level)
         return mean_and_deviation(self._sample(level))[0]
 
-    def _step(self, count: Optional[int] = None) -> StepError:
+    def _step(self, count: int | None = None) -> StepError:
         """Error of the step, and of sweeps whose tolerance falls with it; count: of levels."""
         levels = self.levels[:count]
         values = [self._value(level) for level in levels]

@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,9 +69,9 @@ class Checkpoint:
     """
 
     path: FileName
-    every_steps: Optional[int] = None
-    every_s: Optional[float] = None
-    every_wall_s: Optional[float] = None
+    every_steps: int | None = None
+    every_s: float | None = None
+    every_wall_s: float | None = None
 
     def __post_init__(self):
         plain_fields(self)

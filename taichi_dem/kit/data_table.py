@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,7 +56,7 @@ class Table(dict[str, np.ndarray]):
     def __init__(
         self,
         columns: Mapping[str, ArrayLike],
-        units: Optional[Mapping[str, str]] = None,
+        units: Mapping[str, str] | None = None,
         index: str = "row",
     ):
         instance("columns", columns, Mapping)

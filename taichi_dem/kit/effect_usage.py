@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, nan
-from typing import Any, Optional
+from typing import Any
 
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import in_brief
@@ -58,13 +58,13 @@ class EffectUse:
     what: str
     events: int
     of: int = 0
-    energy_J: Optional[float] = None
-    share: Optional[float] = None
+    energy_J: float | None = None
+    share: float | None = None
     whole: str = "the energy put in"
     steers: bool = False
     kept: str = ""
     rounding: bool = False
-    since_s: Optional[float] = None
+    since_s: float | None = None
     where: str = ""
     evaluations: int = 0
     skipped: int = 0
@@ -138,7 +138,7 @@ class Advice:
     uses: tuple[EffectUse, ...]
     missing: tuple
     tolerance: float
-    shown: Optional[Mapping[str, float]] = None
+    shown: Mapping[str, float] | None = None
     left_out: tuple = ()
 
     @property

@@ -8,7 +8,7 @@ engine, and one whose engines are all in use another.
 import gc
 import weakref
 from collections.abc import Hashable, Iterable, Sequence
-from typing import Any, Optional
+from typing import Any
 
 import taichi as ti
 from taichi.lang import impl
@@ -35,7 +35,7 @@ class Engine(Uncopied):
     def __init__(self, structure: Any, capacity: Iterable[int]):
         self.structure, self.capacity = structure, tuple(capacity)
         self.session = runtime.session()
-        self.owner: Optional[weakref.ref] = None
+        self.owner: weakref.ref | None = None
         self._used = False
         self.tree = FieldTree(self.advice)
         with self.tree:
@@ -98,7 +98,7 @@ class EnginePool(Uncopied):
 
     def __init__(self, kind: type[Engine], least: Iterable[int]):
         self.kind, self.least = kind, tuple(least)
-        self._session: Optional[runtime.Session] = None
+        self._session: runtime.Session | None = None
         self._engines: dict[Hashable, list[Engine]] = {}
         runtime.when_cleared(self._forget)
         _pools.append(self)

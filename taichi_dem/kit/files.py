@@ -7,7 +7,6 @@ import platform
 import re
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from typing import Optional
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +29,7 @@ _WRITTEN = (
     *(".vtu", ".xyz"),
 )
 
-_claims: Optional[dict[str, int]] = None
+_claims: dict[str, int] | None = None
 
 
 def output_folder(path: FileName) -> str:

@@ -4,7 +4,7 @@ import dataclasses
 import os
 import sys
 import warnings
-from typing import NamedTuple, Optional
+from typing import NamedTuple
 
 _PACKAGES = tuple(
     os.path.join(os.path.dirname(os.path.dirname(os.path.dirname(__file__))), name, "")
@@ -55,7 +55,7 @@ def likely_unit(value: float, quantity: Quantity) -> str:
     return next(within, "")
 
 
-def in_unit(name: str, value: float, quantity: Quantity, told_by: Optional[float] = None) -> float:
+def in_unit(name: str, value: float, quantity: Quantity, told_by: float | None = None) -> float:
     """The value; UnitWarning where it looks as if it were given in another unit.
 
     told_by: number whose size tells it, such as the density for a mass; None for the value itself.

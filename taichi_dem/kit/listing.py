@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Optional
 
 from taichi_dem.kit.progress.lasting_output import lasting_output
 from taichi_dem.kit.terminal import show_heading, show_names
@@ -28,7 +27,7 @@ _PACKAGES = ("taichi_dem", "ca_damper")
 
 
 def run(
-    package: ModuleType, sections: Iterable[Section], arguments: Optional[Sequence[str]] = None
+    package: ModuleType, sections: Iterable[Section], arguments: Sequence[str] | None = None
 ) -> int:
     """Print the sections of a package, its experiments and where its documentation is.
 
@@ -59,7 +58,7 @@ def run(
     return 0
 
 
-def first_line(docstring: Optional[str]) -> str:
+def first_line(docstring: str | None) -> str:
     """First line of a docstring, "" where there is none."""
     return inspect.cleandoc(docstring or "").partition("\n")[0]
 

@@ -5,7 +5,7 @@ import io
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Optional, Union
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -55,7 +55,7 @@ class MethodStyle:
     label: str
     colour: str
     marker: str
-    line: Union[str, tuple[float, tuple[float, ...]]] = "-"
+    line: str | tuple[float, tuple[float, ...]] = "-"
 
 
 _LONG_DASHES, _DASH_DOT_DOT = (0.0, (8.0, 2.0)), (0.0, (5.0, 1.5, 1.0, 1.5, 1.0, 1.5))
@@ -152,7 +152,7 @@ def styled(
 
 
 @contextlib.contextmanager
-def picture(path: Optional[FileName], *shape: Any, **options: Any) -> Iterator[tuple[Figure, Any]]:
+def picture(path: FileName | None, *shape: Any, **options: Any) -> Iterator[tuple[Figure, Any]]:
     """A figure and its axes, as of ``styled``, written as PNG when the block ends well.
 
     path: None for no file. Raises InputError when the file cannot be written.

@@ -8,10 +8,11 @@ They are plain functions that write expressions: where a kernel is compiled, Tai
 does not walk through their source anew at each call.
 """
 
+from collections.abc import Callable
 from functools import cache, reduce
 from itertools import product
 from operator import add
-from typing import Any, Callable
+from typing import Any
 
 import taichi as ti
 from taichi._lib import core as ti_core

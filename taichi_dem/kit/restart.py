@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping
-from typing import Optional, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -105,7 +105,7 @@ class CheckpointWriter:
     ):
         self.checkpoint, self.snapshot, self.now = checkpoint, snapshot, now
         self.timer, self.stop = SaveTimer(checkpoint), StopRequests()
-        self.saved_s: Optional[float] = None
+        self.saved_s: float | None = None
         self.timer.saved_at(*now())
 
     def __enter__(self) -> "CheckpointWriter":
@@ -170,10 +170,10 @@ class NoCheckpointWriter:
 
 
 def opened(
-    checkpoint: Optional[Checkpoint],
-    resume: Optional[FileName],
+    checkpoint: Checkpoint | None,
+    resume: FileName | None,
     identity: Callable[[], Mapping[str, str]],
-) -> Optional[dict[str, np.ndarray]]:
+) -> dict[str, np.ndarray] | None:
     """Check, before any costly work, that a run can be saved and resumed.
 
     checkpoint: a Checkpoint or None. resume: file to go on from, or None. identity: gives that of

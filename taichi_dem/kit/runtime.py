@@ -54,7 +54,7 @@ class Settings:
     debug: bool
 
 
-_current: Optional[Settings] = None
+_current: Settings | None = None
 _session: Optional["Session"] = None
 _on_clear: list[Callable[[], object]] = []
 #: Threads that start or stop Taichi at once do so one after the other.
@@ -86,7 +86,7 @@ class Session(Uncopied):
         return impl.get_runtime().prog is self.program
 
 
-def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False) -> Settings:
+def start(arch: str = "cpu", threads: int | None = None, debug: bool = False) -> Settings:
     """Start Taichi, or do nothing when it already runs with these settings.
 
     Parameters
@@ -260,7 +260,7 @@ def check_thread(what: str) -> None:
         )
 
 
-def settings() -> Optional[Settings]:
+def settings() -> Settings | None:
     """Settings of the running session.
 
     Returns

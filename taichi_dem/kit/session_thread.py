@@ -7,9 +7,9 @@ is handed to this thread, which keeps its results for the next user.
 
 import functools
 import threading
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Callable, Optional
+from typing import Any
 
 from taichi_dem.kit import runtime
 
@@ -20,10 +20,10 @@ class SessionThread:
     threads: of the CPU, as in ``runtime.start``.
     """
 
-    def __init__(self, threads: Optional[int] = None):
+    def __init__(self, threads: int | None = None):
         self.threads, self._lock = threads, threading.Lock()
-        self._pool: Optional[ThreadPoolExecutor] = None
-        self._thread: Optional[threading.Thread] = None
+        self._pool: ThreadPoolExecutor | None = None
+        self._thread: threading.Thread | None = None
         self._kept: dict[Hashable, Any] = {}
 
     def ask(self, work: Callable, *arguments: Any) -> Any:

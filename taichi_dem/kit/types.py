@@ -1,7 +1,5 @@
 """Number types shared by all kernels: double precision, small vectors and matrices."""
 
-from typing import Union
-
 import numpy as np
 import taichi as ti
 
@@ -13,4 +11,4 @@ vec6 = ti.types.vector(6, ti.f64)
 mat3 = ti.types.matrix(3, 3, ti.f64)
 
 #: On the host: one number, or an array of them.
-FloatOrArray = Union[float, np.ndarray]
+FloatOrArray = float | np.ndarray

@@ -6,7 +6,7 @@ import math
 import numbers
 import os
 from collections.abc import Callable, Collection
-from typing import Any, TypeVar, Union
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length
 
 #: Name of a file or folder.
-FileName = Union[str, os.PathLike]
+FileName = str | os.PathLike
 #: Result of the check of one value.
 Checked = TypeVar("Checked")
 
@@ -183,7 +183,7 @@ def word(name: str, value: Any) -> str:
     return value
 
 
-def instance(name: str, value: Any, kind: Union[type, tuple[type, ...]]) -> Any:
+def instance(name: str, value: Any, kind: type | tuple[type, ...]) -> Any:
     """The value; InputError unless it is an object of a class, or of one of several."""
     kinds = kind if isinstance(kind, tuple) else (kind,)
     if not isinstance(value, kinds):

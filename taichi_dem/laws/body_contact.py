@@ -1,7 +1,7 @@
 """Contact of whole bodies, whose energy is that of the volume in which they overlap."""
 
 from dataclasses import replace
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -92,7 +92,7 @@ class BodyContact(SphereContact):
     def __init__(
         self,
         parts: int = 3,
-        outer_faces: Union[bool, str] = True,
+        outer_faces: bool | str = True,
         skin: float = 0.0075,
         neighbours_per_body: int = 192,
         pairs_per_body: int = 48,

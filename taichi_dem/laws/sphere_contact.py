@@ -1,6 +1,6 @@
 """Contact of fragments through spheres on their broken faces (Konno et al., 2.2, Fig. 5)."""
 
-from typing import Any, Union
+from typing import Any
 
 import taichi as ti
 
@@ -21,7 +21,7 @@ _MOST = 100_000
 ONCE_BROKEN = "once_broken"
 
 
-def _outer_faces(value: Any) -> Union[bool, str]:
+def _outer_faces(value: Any) -> bool | str:
     """The value; InputError unless it is True, False or "once_broken"."""
     if isinstance(value, str) and value != ONCE_BROKEN:
         raise InputError(f"outer_faces must be True, False or {ONCE_BROKEN!r}, got {shown(value)}")
@@ -77,7 +77,7 @@ class SphereContact(Effect):
     def __init__(
         self,
         divisions: int = 5,
-        outer_faces: Union[bool, str] = True,
+        outer_faces: bool | str = True,
         skin: float = 0.015,
         neighbours_per_body: int = 64,
         pairs_per_body: int = 24,

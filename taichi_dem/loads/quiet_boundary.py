@@ -4,8 +4,6 @@ Source: J. Lysmer and R. L. Kuhlemeyer, Finite dynamic model for infinite media,
 ASCE 95(EM4), 1969, 859-877, eq. 1 and 2.
 """
 
-from typing import Optional
-
 import numpy as np
 import taichi as ti
 
@@ -63,9 +61,7 @@ class QuietBoundary(Effect):
 
     role = "ground"
 
-    def __init__(
-        self, group: str, p_speed: Optional[float] = None, s_speed: Optional[float] = None
-    ):
+    def __init__(self, group: str, p_speed: float | None = None, s_speed: float | None = None):
         self.group = word("group", group)
         self.p_speed = None if p_speed is None else positive("p_speed", p_speed)
         self.s_speed = None if s_speed is None else positive("s_speed", s_speed)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 
@@ -180,7 +180,7 @@ class BodyMaterials:
 
 
 #: One material for all bodies, or those of each.
-AnyMaterial = Union[Material, BodyMaterials]
+AnyMaterial = Material | BodyMaterials
 
 
 def body_materials(mesh: Mesh, material: Any, by_group: Any = _NONE) -> BodyMaterials:

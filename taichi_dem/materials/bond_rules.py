@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, Union
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -184,7 +184,7 @@ class ContactShareOfCritical(ContactRule):
 
 
 #: A number that holds for all bonds or contacts, or a rule.
-Constant = Union[float, Rule]
+Constant = float | Rule
 
 
 @dataclass(frozen=True, repr=False)

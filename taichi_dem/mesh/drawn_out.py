@@ -5,8 +5,8 @@ and, in a regular triangular lattice, inside; they are joined by Delaunay's rule
 middle of their neighbours, a few times over.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Callable
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 

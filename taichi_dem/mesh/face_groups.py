@@ -1,7 +1,6 @@
 """Groups of inner faces chosen by where they are, for notches and joints (NumPy only)."""
 
 from collections.abc import Sequence
-from typing import Optional
 
 import numpy as np
 
@@ -27,7 +26,7 @@ def with_cut(
     name: str,
     point: Sequence[float],
     normal: Sequence[float],
-    chosen: Optional[Choice] = None,
+    chosen: Choice | None = None,
 ) -> Mesh:
     """The mesh with one more group: the faces along which a plane divides the bodies.
 

@@ -8,7 +8,6 @@ curve, and a step takes 1.6 times as long.
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Optional
 
 import numpy as np
 
@@ -27,7 +26,7 @@ _WELD = 1e-6
 _BITS = 20
 
 
-def join(*meshes: Mesh, names: Optional[Sequence[str]] = None, bonded: bool = False) -> Mesh:
+def join(*meshes: Mesh, names: Sequence[str] | None = None, bonded: bool = False) -> Mesh:
     """Make one mesh of several.
 
     Parameters

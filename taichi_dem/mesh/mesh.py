@@ -4,7 +4,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import InitVar, dataclass, field
 from types import MappingProxyType
-from typing import Any, ClassVar, Optional
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -220,7 +220,7 @@ def checked_mesh(
     weld_tolerance: float = 0.0,
     keep_coincident: bool = False,
     *,
-    body_groups: Optional[Mapping[str, ArrayLike]] = None,
+    body_groups: Mapping[str, ArrayLike] | None = None,
 ) -> Mesh:
     """Build a Mesh from arrays; repair and report small defects, refuse others.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, Optional, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -82,7 +82,7 @@ class MeshMethods:
         *,
         by: Sequence[float] = (0.0, 0.0, 0.0),
         turned: Sequence[float] = (0.0, 0.0, 0.0),
-        about: Optional[Sequence[float]] = None,
+        about: Sequence[float] | None = None,
     ) -> Made:
         """Return the mesh at another place: turned, then shifted.
 

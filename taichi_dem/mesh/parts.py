@@ -3,7 +3,7 @@
 NumPy only: it is asked before a run, and at recording times.
 """
 
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 
@@ -94,7 +94,7 @@ def _flights(scene, part):
 def parts_under(mesh: Mesh, effect: Any, part: np.ndarray) -> np.ndarray:
     """Whether a load, support or ground acts on each part, (part_count,)."""
     marks = np.zeros(part.max() + 1, dtype=bool)
-    body: Union[slice, np.ndarray] = slice(None)
+    body: slice | np.ndarray = slice(None)
     if hasattr(effect, "group"):
         body, _ = faces_of_group(mesh, topology_of(mesh), effect.group)
     marks[part[body]] = True

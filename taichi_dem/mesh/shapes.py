@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Sequence
-from typing import Optional
 
 import numpy as np
 
@@ -27,7 +26,7 @@ def single(edge: float = 0.05) -> Mesh:
     return checked_mesh(points, [[0, 1, 2, 3]], groups)
 
 
-def pair(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
+def pair(edge: float = 0.05, height: float | None = None) -> Mesh:
     """Two equal tetrahedra that share the face in x = 0; body 0 lies at x < 0, body 1 at x > 0.
 
     edge, height: [m]; regular ones where no height is given.  Groups: left and right, the free

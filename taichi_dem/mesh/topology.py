@@ -6,7 +6,7 @@ Local face f of a body is the face opposite its local vertex f.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 
 #: Density of all bodies [kg/m3], or of each, (body_count,).
-Density = Union[float, np.ndarray]
+Density = float | np.ndarray
 #: Share of the mesh's extent by which a point may lie outside of a body: rounding.
 _ROUNDING = 1e-9
 

@@ -1,7 +1,6 @@
 """How peak particle velocities fall with the distance from a blast hole."""
 
 from dataclasses import dataclass
-from typing import Optional
 
 import numpy as np
 
@@ -74,7 +73,7 @@ class Attenuation:
 
 
 def attenuation_of(
-    model: Model, peak_speed: np.ndarray, group: str, radius: Optional[float] = None
+    model: Model, peak_speed: np.ndarray, group: str, radius: float | None = None
 ) -> Attenuation:
     """Measure the attenuation in a run.
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Union
 
 import numpy as np
 
@@ -73,7 +72,7 @@ class Receivers:
     def __init__(
         self,
         points: Mapping[str, Sequence[float]],
-        when: Union[Every, At, None] = None,
+        when: Every | At | None = None,
     ):
         if not isinstance(points, Mapping) or not points:
             raise InputError(f"points must be a dict of name to (x, y, z), got {shown(points)}")

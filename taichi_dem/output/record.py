@@ -4,7 +4,7 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -280,8 +280,8 @@ def write_paraview(
     folder: FileName,
     model: Model,
     frames: Sequence[Frame],
-    name: Optional[str] = None,
-    acting_since: Optional[Mapping[str, np.ndarray]] = None,
+    name: str | None = None,
+    acting_since: Mapping[str, np.ndarray] | None = None,
 ) -> None:
     """Write frames as a ParaView series: folder/name.pvd and a VTU file a frame.
 

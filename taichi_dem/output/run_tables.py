@@ -1,6 +1,6 @@
 """What a finished run gives: tables, and files for other programs."""
 
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -141,9 +141,7 @@ class RunTables:
         shares = {f"{name}_share": history[f"{name}_J"] / safe for name in terms}
         return Table({"time_s": time_s, "given_J": given, **shares}, index="time_s")
 
-    def attenuation(
-        self, group: Optional[str] = None, radius: Optional[float] = None
-    ) -> Attenuation:
+    def attenuation(self, group: str | None = None, radius: float | None = None) -> Attenuation:
         """Peak velocity of every body over its distance from a hole.
 
         Parameters

@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Iterator, Sequence
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 from matplotlib.collections import PolyCollection
@@ -45,7 +45,7 @@ def plot_cracks(
     *,
     magnify: float = 5.0,
     axis: Sequence[float] = ALONG_Z,
-    path: Optional[FileName] = None,
+    path: FileName | None = None,
 ) -> Figure:
     """Draw broken faces by time of breaking, at rest and as the block is in a frame (Fig 12).
 
@@ -144,7 +144,7 @@ def _panels(path, view, model, columns, extra, names) -> Iterator[Any]:
 
 
 def plot_steps(
-    result: Any, *, axis: Sequence[float] = ALONG_Z, path: Optional[FileName] = None
+    result: Any, *, axis: Sequence[float] = ALONG_Z, path: FileName | None = None
 ) -> Figure:
     """Draw the step of every body at several times (Konno et al., Fig 13).
 
@@ -176,7 +176,7 @@ def plot_steps(
 
 
 def plot_acting(
-    result: RunTables, *, axis: Sequence[float] = ALONG_Z, path: Optional[FileName] = None
+    result: RunTables, *, axis: Sequence[float] = ALONG_Z, path: FileName | None = None
 ) -> Figure:
     """Draw the bodies at rest, coloured by the time from which an effect acts; a panel each."""
     model, acting_since, until = result.model, result.acting_since, result.frames[-1].time_s

@@ -1,7 +1,7 @@
 """Bodies coloured by a value, lines by another: what all pictures of a block are made of."""
 
 from collections.abc import Sequence
-from typing import Any, Optional
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -61,7 +61,7 @@ def draw_lines(axes: Any, segments: np.ndarray, values: np.ndarray, **look: Any)
 def draw_bodies(
     axes: Any,
     model: Model,
-    frame: Optional[Frame],
+    frame: Frame | None,
     values: np.ndarray,
     *,
     magnify: float = 1.0,
@@ -86,7 +86,7 @@ def draw_bodies(
 def move_bodies(
     drawn: Any,
     model: Model,
-    frame: Optional[Frame],
+    frame: Frame | None,
     values: np.ndarray,
     *,
     magnify: float = 1.0,

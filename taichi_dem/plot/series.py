@@ -1,7 +1,7 @@
 """Curves over time: energy, levels."""
 
 from collections.abc import Iterable
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -37,7 +37,7 @@ def _span(axes, time):
     axes.set_xlim(0.0, time[-1] if time[-1] > 0.0 else 1.0)
 
 
-def plot_energy(result: RunTables, *, path: Optional[FileName] = None) -> Figure:
+def plot_energy(result: RunTables, *, path: FileName | None = None) -> Figure:
     """Draw the terms of the energy balance over time, and what is unexplained."""
     history = result.history
     time = 1e3 * history["time_s"]

@@ -1,7 +1,7 @@
 """Pictures of what a result has calculated: columns, shares, fragments, cracks, the block."""
 
 from collections.abc import Sequence
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import ListedColormap
@@ -28,7 +28,7 @@ _AT_HOLE = ("monitor_displacement_mm", "hole_radial_displacement_mm")
 
 
 def plot_history(
-    result: RunTables, names: Optional[Sequence[str]] = None, *, path: Optional[FileName] = None
+    result: RunTables, names: Sequence[str] | None = None, *, path: FileName | None = None
 ) -> Figure:
     """Draw columns of the history over time.
 
@@ -47,12 +47,12 @@ def plot_history(
     return plot_columns(path, history, names)
 
 
-def plot_crack_area(result: RunTables, *, path: Optional[FileName] = None) -> Figure:
+def plot_crack_area(result: RunTables, *, path: FileName | None = None) -> Figure:
     """Draw the area of all cracks over time."""
     return plot_columns(path, result.crack_area(), ["crack_area_m2"])
 
 
-def plot_columns(path: Optional[FileName], table: Table, names: Sequence[str]) -> Figure:
+def plot_columns(path: FileName | None, table: Table, names: Sequence[str]) -> Figure:
     """Draw columns of a table over its time_s; those of one unit share a panel."""
     names = choices("names", names, [name for name in table if name != "time_s"])
     units = list(dict.fromkeys(table.units[name] for name in names))
@@ -84,7 +84,7 @@ def _draw(axes, time, table, names, unit):
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def plot_energy_shares(result: RunTables, *, path: Optional[FileName] = None) -> Figure:
+def plot_energy_shares(result: RunTables, *, path: FileName | None = None) -> Figure:
     """Draw every term of the energy balance as a share of the energy given, over time.
 
     What is missing to 100 % is unexplained.
@@ -108,9 +108,7 @@ def plot_energy_shares(result: RunTables, *, path: Optional[FileName] = None) ->
     return figure
 
 
-def plot_fragments(
-    result: RunTables, frame: int = -1, *, path: Optional[FileName] = None
-) -> Figure:
+def plot_fragments(result: RunTables, frame: int = -1, *, path: FileName | None = None) -> Figure:
     """Draw the share of the mass that passes a sieve over its opening, in a frame.
 
     Shaded: the sizes of single bodies, below which the mesh and not the material decides.
@@ -139,7 +137,7 @@ def plot_rose(
     axis: Sequence[float] = ALONG_Z,
     *,
     sectors: int = 36,
-    path: Optional[FileName] = None,
+    path: FileName | None = None,
 ) -> Figure:
     """Draw crack area by direction in a plane; arguments as of ``Result.rose``.
 
@@ -180,10 +178,10 @@ def _emptiest(rose):
 
 def plot_attenuation(
     result: RunTables,
-    group: Optional[str] = None,
+    group: str | None = None,
     *,
     nearest: float = 4.0,
-    path: Optional[FileName] = None,
+    path: FileName | None = None,
 ) -> Figure:
     """Draw peak velocities over the distance from a hole, with a power law.
 
@@ -236,7 +234,7 @@ def plot_block(
     colour: str = "speed",
     magnify: float = 1.0,
     axis: Sequence[float] = ALONG_Z,
-    path: Optional[FileName] = None,
+    path: FileName | None = None,
 ) -> Figure:
     """Draw the bodies in a frame where they are, coloured by a value.
 

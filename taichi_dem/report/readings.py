@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, ClassVar, NamedTuple, Optional
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import taichi as ti
@@ -37,7 +37,7 @@ class Readings:
         self.contacts, self.half_step = advance.contacts, HalfStep(advance)
         # A loop over few bodies takes less time than two threads to be told of it.
         self.small = tables.capacity.bodies < _FEW and impl.current_cfg().arch != ti.cuda
-        self._held: Optional[dict[str, Any]] = None
+        self._held: dict[str, Any] | None = None
         self._rooms: dict[str, np.ndarray] = {}
         self._launch_push, self._launch_visit = Launch(self._push), Launch(self._visit)
 
@@ -298,7 +298,7 @@ class Run(NamedTuple):
     schedule: Schedule
     advance: Advance
     readings: Readings
-    contacts: Optional[Contacts]
+    contacts: Contacts | None
 
 
 class Kept:

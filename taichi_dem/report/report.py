@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Optional
+from typing import Any
 
 from taichi_dem.kit.accuracy import plans
 from taichi_dem.kit.display import in_brief
@@ -115,10 +115,10 @@ class Report:
     round_off_J: float = 0.0
     unconverged_steps: int = 0
     worst_residual: float = 0.0
-    interpenetration: Optional[Interpenetration] = None
+    interpenetration: Interpenetration | None = None
     bond_slip: tuple = ()
     known_error: str = ""
-    certificate: Optional[Certificate] = None
+    certificate: Certificate | None = None
 
     def __repr__(self):
         took = f"{self.run_seconds:.3g} s run"
@@ -170,7 +170,7 @@ class Report:
         whole = "the energy held" if held > given else "it"
         return f"{100.0 * self.energy_residual_fraction:.3g} % of {whole}"
 
-    def advice(self, tolerance: float = 0.0, shown: Optional[Mapping[str, float]] = None) -> Advice:
+    def advice(self, tolerance: float = 0.0, shown: Mapping[str, float] | None = None) -> Advice:
         """Advice on the effects, of which runs without some have shown a difference, by name.
 
         Parameters

@@ -4,7 +4,7 @@ A body's rates change only where a bond breaks or a contact comes near or leaves
 listed, and their rates found anew at the start of the next substep.
 """
 
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -69,7 +69,7 @@ class StabilityLimits:
 
     constant_fields = ("dashpot_table", "spring_table")
 
-    def __init__(self, tables: Tables, state: State, contacts: Optional[Contacts], method: Method):
+    def __init__(self, tables: Tables, state: State, contacts: Contacts | None, method: Method):
         self.tables, self.state, self.contacts = tables, state, contacts
         rule, self.controlled = method.control or StepControl(), method.control is not None
         self.has_contact = contacts is not None

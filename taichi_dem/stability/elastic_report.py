@@ -2,7 +2,6 @@
 
 import contextlib
 from dataclasses import dataclass
-from typing import Optional
 
 import numpy as np
 
@@ -42,7 +41,7 @@ class ElasticReport:
     """
 
     stiffness: MeshStiffness
-    asked: Optional[tuple[float, float]]
+    asked: tuple[float, float] | None
     crack_length: np.ndarray
     element_size: np.ndarray
     steps: StepReport
@@ -128,7 +127,7 @@ def element_sizes(mesh: Mesh) -> np.ndarray:
     return np.cbrt(6.0 * np.sqrt(2.0) * volumes(mesh))
 
 
-def _asked(material: Material) -> Optional[tuple[float, float]]:
+def _asked(material: Material) -> tuple[float, float] | None:
     """E [Pa] and Poisson's ratio for which a material was made, None where it names none."""
     normal, shear = material.normal_stiffness, material.shear_stiffness
     if isinstance(normal, ModulusOverDistance) and isinstance(shear, ModulusOverDistance):

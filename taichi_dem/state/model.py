@@ -1,9 +1,9 @@
 """Constants of a scene as arrays: bodies, bonds and contact spheres."""
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cached_property
-from typing import Any, Callable
+from typing import Any
 
 import numpy as np
 

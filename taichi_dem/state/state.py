@@ -1,7 +1,5 @@
 """Everything that changes in a run; checkpoints hold this and the effects' own state."""
 
-from typing import Optional
-
 import numpy as np
 import taichi as ti
 from numpy.typing import ArrayLike
@@ -114,9 +112,9 @@ class State:
     def set_motion(
         self,
         position: ArrayLike,
-        orientation: Optional[ArrayLike] = None,
-        velocity: Optional[ArrayLike] = None,
-        spin: Optional[ArrayLike] = None,
+        orientation: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        spin: ArrayLike | None = None,
     ) -> None:
         """Set the motion of all bodies, arrays of a row each or one row for all.
 

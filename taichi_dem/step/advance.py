@@ -7,8 +7,6 @@ with opposite signs; a body takes the sum at its own time (Konno et al., 3.1, eq
 += T, then x += dt v and q = exp(dt w) q, with the spin w in the middle of the turn.
 """
 
-from typing import Optional
-
 import taichi as ti
 
 from taichi_dem.kit.products import dot, squared
@@ -33,7 +31,7 @@ class Advance(BondStep, ContactForce, BodyLoads):
 
     staggered = True
 
-    def __init__(self, schedule: Schedule, solver: Optional[Solver] = None):
+    def __init__(self, schedule: Schedule, solver: Solver | None = None):
         self.schedule, self.tables, self.state = schedule, schedule.tables, schedule.state
         tables = self.tables
         self.on_demand = tables.on_demand and not tables.bond.is_null

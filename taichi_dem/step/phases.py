@@ -1,7 +1,7 @@
 """The phases of a substep in their order, and those of the start of a run."""
 
 from collections.abc import Callable
-from typing import Any, Optional
+from typing import Any
 
 import taichi as ti
 
@@ -30,7 +30,7 @@ class Step:
     and after them.
     """
 
-    def __init__(self, advance: Advance, search: Optional[BroadPhase]):
+    def __init__(self, advance: Advance, search: BroadPhase | None):
         self.advance, self.schedule, self.search = advance, advance.schedule, search
         self.has_contact = search is not None
         self.state = advance.state

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +29,7 @@ _NEVER, _ALWAYS = 3e38, -1.0
 _PLAIN, _CRACK = (228, 224, 214), {"label": "cracks", "colour": (20, 20, 23)}
 
 
-def show_block(result: Any, path: Optional[FileName], open_browser: Optional[bool]) -> WebPage:
+def show_block(result: Any, path: FileName | None, open_browser: bool | None) -> WebPage:
     """Write the page of a ``Result``; arguments and errors as of ``Result.show``."""
     model, report = result.model, result.report
     body, face, breaks, edges = visible_faces(model, result.broken_time)

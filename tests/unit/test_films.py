@@ -1,5 +1,7 @@
 """Images of a film, of which only changes are drawn, are those of figures drawn as a whole."""
 
+import itertools
+
 import numpy as np
 
 from taichi_dem.kit import plot_style
@@ -32,4 +34,4 @@ def test_drawing_only_what_changes_leaves_the_same_pixels(monkeypatch):
     monkeypatch.setattr(plot_style, "_draw_changes", lambda canvas, _: canvas.draw())
     whole = images_of_a_film()
     assert all(np.array_equal(one, other) for one, other in zip(made, whole))
-    assert all((one != other).any() for one, other in zip(made, made[1:]))
+    assert all((one != other).any() for one, other in itertools.pairwise(made))

@@ -1,5 +1,7 @@
 """Order of the step, and one answer: one step for all, neighbours held or drifted, or solved."""
 
+import itertools
+
 import numpy as np
 import pytest
 import taichi as ti
@@ -94,7 +96,7 @@ def bars():
 def orders(moving, levels, damped):
     """Observed orders: with x = x0 + C dt^p, differences of successive runs fall 2^p-fold."""
     runs = [moving.position_after(steps, levels, damped) for steps in STEPS]
-    gaps = [np.linalg.norm(a - b) for a, b in zip(runs, runs[1:])]
+    gaps = [np.linalg.norm(a - b) for a, b in itertools.pairwise(runs)]
     return np.log2(np.array(gaps[:-1]) / gaps[1:])
 
 
@@ -181,7 +183,7 @@ def test_solved_dashpots_are_of_second_order_before_anything_breaks():
         assert simulation.report().broken_faces == 0
         places.append(simulation.motion()["position"])
         simulation.close()
-    coarse, fine = (np.linalg.norm(a - b) for a, b in zip(places, places[1:]))
+    coarse, fine = (np.linalg.norm(a - b) for a, b in itertools.pairwise(places))
     moved = np.linalg.norm(places[-1] - simulation.model.centre)
     assert fine > 1e-5 * moved
     assert coarse / fine == pytest.approx(4.0, rel=0.002)

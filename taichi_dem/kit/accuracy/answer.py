@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import reduce
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +16,7 @@ _MOST_DIGITS, _LEAST_UNIT = 17, 1e-15
 #: Least power of ten that is a number.
 _LEAST_POWER = -323
 #: A number, or one for each place of a curve.
-Values = Union[float, np.ndarray]
+Values = float | np.ndarray
 
 
 @dataclass(frozen=True)

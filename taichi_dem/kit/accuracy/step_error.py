@@ -7,7 +7,6 @@ off three runs, and believed where their differences shrink as an order in range
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Optional
 
 from taichi_dem.kit.accuracy.student import t_quantile
 
@@ -40,7 +39,7 @@ class StepError:
 def step_error(
     values: Sequence[float],
     declared: float = 2.0,
-    steps: Optional[Sequence[float]] = None,
+    steps: Sequence[float] | None = None,
     *,
     least: float = 0.0,
     smooth: bool = False,

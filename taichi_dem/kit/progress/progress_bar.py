@@ -6,7 +6,6 @@ import os
 import sys
 import time
 from collections.abc import Iterator
-from typing import Optional, Union
 
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
@@ -126,7 +125,7 @@ def phase_lines() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def reporting(progress: Union[Listener, str, None], title: str) -> Iterator[Optional[Listener]]:
+def reporting(progress: Listener | str | None, title: str) -> Iterator[Listener | None]:
     """Listener to the Progress of a job for its argument ``progress``; None for silence.
 
     "auto" gives a bar where somebody watches. A function is also told of compiling.

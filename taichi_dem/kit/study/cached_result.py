@@ -3,9 +3,9 @@
 import hashlib
 import importlib.util
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, write_text

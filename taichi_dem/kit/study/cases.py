@@ -8,9 +8,9 @@ import difflib
 import math
 import time
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Callable, NamedTuple, Optional
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -123,12 +123,12 @@ class Trial:
     method: str
     quick: bool
     limits: list[Limit] = field(default_factory=list)
-    curve: Optional[Curve] = None
+    curve: Curve | None = None
     warnings: list[str] = field(default_factory=list)
     compile_s: float = 0.0
     status: str = FAILED
     words: str = ""
-    worst: Optional[Limit] = None
+    worst: Limit | None = None
     seconds: float = 0.0
 
     def __repr__(self) -> str:

@@ -4,7 +4,6 @@ import math
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import Optional
 
 from taichi_dem.kit.plot_style import BLACK, GREY, RED, line_key, picture, power, styles_of
 from taichi_dem.kit.study.cases import FAILED, PASSED, REFUSED, Trial
@@ -43,7 +42,7 @@ def _looks_of(trials, alias):
 
 
 def picture_cases(
-    path: str, trials: Sequence[Trial], columns: int = 3, alias: Optional[Alias] = None
+    path: str, trials: Sequence[Trial], columns: int = 3, alias: Alias | None = None
 ) -> None:
     """A panel a case with the curves of its methods; one case alone with its question."""
     cases, looks = _distinct(trials, "case"), _looks_of(trials, alias)
@@ -110,7 +109,7 @@ def _verdict(own):
     return ", ".join(said)
 
 
-def picture_margins(path: str, trials: Sequence[Trial], alias: Optional[Alias] = None) -> None:
+def picture_margins(path: str, trials: Sequence[Trial], alias: Alias | None = None) -> None:
     """A panel a package, a row a case, a mark a method: its margin, or that it refuses."""
     packages = dict.fromkeys(trial.case.package for trial in trials)
     panels = {name: [trial for trial in trials if trial.case.package == name] for name in packages}

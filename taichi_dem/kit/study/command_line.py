@@ -10,9 +10,9 @@ import sys
 import time
 import warnings
 from argparse import ArgumentParser, Namespace
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from types import MappingProxyType
-from typing import Any, Callable, NoReturn, Optional
+from typing import Any, NoReturn
 
 from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
@@ -39,7 +39,7 @@ class Parser(argparse.ArgumentParser):
     """
 
     settings: Settings = MappingProxyType({})
-    entry: Optional[Entry] = None
+    entry: Entry | None = None
 
     def error(self, message: str) -> NoReturn:
         """Turn a wrong command line into an InputError."""
@@ -121,7 +121,7 @@ def several(kind: Callable[[str], Any]) -> Callable[[str], list]:
 
 def parser(
     name: str,
-    description: Optional[str],
+    description: str | None,
     drivers: Sequence[str] = (),
     settings: Settings = MappingProxyType({}),
     **defaults: Any,
@@ -146,7 +146,7 @@ def parser(
     return made
 
 
-def bare_parser(name: str, description: Optional[str]) -> Parser:
+def bare_parser(name: str, description: str | None) -> Parser:
     """Parser of a script with the one option that every script has."""
     plain: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
     made = Parser(prog=f"python experiments/{name}.py", description=description, **plain)
@@ -195,7 +195,7 @@ def checkpoint_of(
 def main(
     run: Callable[[Namespace], None],
     made: Parser,
-    arguments: Optional[Sequence[str]] = None,
+    arguments: Sequence[str] | None = None,
 ) -> int:
     """Parse, say what is done, start Taichi, run; returns the exit code of ``exit_code``.
 
@@ -233,9 +233,9 @@ def _sweep(run, made, options, given):
 
 
 def main_of_tool(
-    work: Callable[[Namespace], Optional[int]],
+    work: Callable[[Namespace], int | None],
     made: Parser,
-    arguments: Optional[Sequence[str]] = None,
+    arguments: Sequence[str] | None = None,
 ) -> int:
     """Parse and do work(options), as loud as --quiet and --json say; as ``exit_code``."""
 
@@ -301,7 +301,7 @@ def say(words: str) -> None:
         print(" ".join(words.split()), file=sys.stderr, flush=True)
 
 
-def exit_code(work: Callable[[], Optional[int]]) -> int:
+def exit_code(work: Callable[[], int | None]) -> int:
     """Exit code of a program that does work(): 0 done, or what work returns.
 
     2 bad input, 3 diverged, 130 interrupted by Ctrl-C, 128 + its number by another signal, which

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, Optional, Union
+from typing import Any
 
 #: File of the entries in the folder of the scripts.
 ENTRIES = "_gallery_pages.txt"
@@ -48,7 +48,7 @@ class Entry:
         return f"{words} core" if words.endswith(" on one") else f"{words} on two cores"
 
 
-def read_entries(path: Union[str, Path]) -> tuple[Entry, ...]:
+def read_entries(path: str | Path) -> tuple[Entry, ...]:
     """Entries of a text file: "# part", "## name", and lines "field: text", indented to go on."""
     part, found = "", []
     for block in Path(path).read_text(encoding="utf-8").split("\n\n"):
@@ -62,7 +62,7 @@ def read_entries(path: Union[str, Path]) -> tuple[Entry, ...]:
     return tuple(found)
 
 
-def entry_of(run: Callable) -> Optional[Entry]:
+def entry_of(run: Callable) -> Entry | None:
     """Entry of the script in which a function is defined; None where it has none."""
     try:
         script = Path(inspect.getfile(inspect.unwrap(run)))

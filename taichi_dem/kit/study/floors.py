@@ -5,9 +5,8 @@ these rates over the time that was measured.
 """
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Callable
 
 import taichi as ti
 

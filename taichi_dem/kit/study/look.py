@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping
-from typing import Any, Optional
+from typing import Any
 
 from taichi_dem.kit.files import older_files
 from taichi_dem.kit.study.entries import Entry, is_key_figure
@@ -14,7 +14,7 @@ _MOST = 12
 _PICTURES = (".png", ".gif", ".mp4", ".html")
 
 
-def show_opening(description: Optional[str], entry: Optional[Entry], quick: bool = False) -> None:
+def show_opening(description: str | None, entry: Entry | None, quick: bool = False) -> None:
     """Print what a program does, and how long it is expected to take where that is known."""
     line = entry.question if entry else (description or "").strip().partition("\n")[0]
     show_heading(line)
@@ -24,7 +24,7 @@ def show_opening(description: Optional[str], entry: Optional[Entry], quick: bool
         print(f"Takes about {entry.expected_time(quick)}{smaller}.\n", flush=True)
 
 
-def print_figures(figures: Mapping[str, dict], entry: Optional[Entry] = None) -> None:
+def print_figures(figures: Mapping[str, dict], entry: Entry | None = None) -> None:
     """Print figures of summary.json, beside the paper's values where it gives any.
 
     entry: of the study; with one only the key figures are printed, those of a paper first, and no

@@ -3,7 +3,6 @@
 import glob
 import os
 from collections.abc import Mapping
-from typing import Optional
 
 
 def thread_seconds() -> dict[int, float]:
@@ -15,7 +14,7 @@ def thread_seconds() -> dict[int, float]:
     return found
 
 
-def busiest_seconds(before: Mapping[int, float], after: Mapping[int, float]) -> Optional[float]:
+def busiest_seconds(before: Mapping[int, float], after: Mapping[int, float]) -> float | None:
     """CPU seconds between two ``thread_seconds`` that no further core would have saved.
 
     They are those of the main thread, which waits while others work, and of the busiest of the

@@ -9,11 +9,10 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Optional, Union
+from typing import Any
 from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader
-from PIL import Image
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, write_text, write_whole
@@ -33,7 +32,7 @@ _MOST_KEY_FIGURES = 12
 Row = tuple[str, str, str]
 
 
-def markdown_table(entries: Sequence[Entry], root: Union[str, Path], pictures: str) -> str:
+def markdown_table(entries: Sequence[Entry], root: str | Path, pictures: str) -> str:
     """Table of all entries for a file of a folder root, each with its picture where there is one.
 
     pictures: folder of theirs, as NAME.png, from root.
@@ -80,8 +79,8 @@ def _write_thumbnail(root, entry):
 
 
 def shrink_picture(
-    entry: Entry, root: str, folder: Union[str, Path], side: int, colours: int
-) -> Optional[str]:
+    entry: Entry, root: str, folder: str | Path, side: int, colours: int
+) -> str | None:
     """Small copy of a study's first picture in a folder; its path, None without a picture.
 
     side: the widest [pixels]. Raises InputError when the picture cannot be read or the copy not be
@@ -97,6 +96,8 @@ def shrink_picture(
 
 def _write_small(name, source, side, colours):
     """Write a picture, the last image of a film, within a side [pixels] as PNG."""
+    from PIL import Image
+
     with Image.open(source) as image:
         image.seek(getattr(image, "n_frames", 1) - 1)
         made = image.convert("RGB")
@@ -139,7 +140,7 @@ def _shown(page, root, failed):
     )
 
 
-def read_text(path: Union[str, Path]) -> str:
+def read_text(path: str | Path) -> str:
     """Text of a file, "" where there is none that can be read."""
     try:
         return Path(path).read_text(encoding="utf-8").strip()
@@ -147,7 +148,7 @@ def read_text(path: Union[str, Path]) -> str:
         return ""
 
 
-def read_json(path: Union[str, Path]) -> dict:
+def read_json(path: str | Path) -> dict:
     """Content of a JSON file, an empty dict where there is none that can be read."""
     try:
         content = json.loads(read_text(path))

@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Union
 
 from taichi_dem.kit import children
 from taichi_dem.kit.files import output_folder, write_text
@@ -14,7 +13,7 @@ from taichi_dem.kit.study.results_page import CAPTION, RUN, Entry
 
 
 def run_entries(
-    scripts: Union[str, Path],
+    scripts: str | Path,
     entries: Sequence[Entry],
     root: str,
     *,
@@ -37,7 +36,7 @@ def run_entries(
     return failed
 
 
-def run_entry(scripts: Union[str, Path], entry: Entry, root: str, quick: bool = False) -> str:
+def run_entry(scripts: str | Path, entry: Entry, root: str, quick: bool = False) -> str:
     """Run a study and note what it printed, for its page; returns why it failed, or ""."""
     folder = output_folder(os.path.join(root, entry.name))
     # None of an earlier run shall pass for this one's.

@@ -9,7 +9,7 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Optional, Union
+from typing import Any
 
 import numpy as np
 
@@ -38,12 +38,12 @@ def figure(value: Any, unit: str, paper: Any = None) -> dict:
 def finish(
     options: Namespace,
     name: str,
-    figures: Mapping[str, Union[dict, tuple]],
-    runs: Union[Iterable, tuple[float, float], float],
+    figures: Mapping[str, dict | tuple],
+    runs: Iterable | tuple[float, float] | float,
     *,
     caption: str = "",
     see: str = "",
-    draw: Optional[Callable[[], None]] = None,
+    draw: Callable[[], None] | None = None,
 ) -> None:
     """Write summary.json, and caption.txt where there is a caption; print them, and the pictures.
 

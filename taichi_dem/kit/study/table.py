@@ -1,8 +1,8 @@
 """A table of a study, declared once: computed, printed, and given as figures of summary.json."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from operator import attrgetter
-from typing import Any, Callable, NamedTuple, Union
+from typing import Any, NamedTuple
 
 from taichi_dem.kit.study.summary import figure
 from taichi_dem.kit.study.tables import show_rows
@@ -19,7 +19,7 @@ class Column(NamedTuple):
     format: as of ``show_rows``.
     """
 
-    value: Union[str, int, Callable[[Any], Any]]
+    value: str | int | Callable[[Any], Any]
     header: str = ""
     format: str = ""
     unit: str = ""

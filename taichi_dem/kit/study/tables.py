@@ -1,7 +1,7 @@
 """Tables of a study: printed, and written as CSV."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Optional, Union
+from typing import Any
 
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.terminal import print_table
@@ -12,9 +12,7 @@ def columns_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, list]:
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
-def write_rows(
-    path: str, rows: Sequence, names: Optional[Union[str, Sequence[str]]] = None
-) -> None:
+def write_rows(path: str, rows: Sequence, names: str | Sequence[str] | None = None) -> None:
     """Write rows as CSV.
 
     rows: dicts with the same keys, or cells under names of columns, a sequence or words.

@@ -2,9 +2,9 @@
 
 import statistics
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, Callable
+from typing import Any
 
 from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError

@@ -9,7 +9,6 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Optional
 
 from taichi_dem.kit.study.tables import write_rows
 from taichi_dem.kit.study.timing import Timing
@@ -30,7 +29,7 @@ class Point:
     label: str
     evaluations: float
     error: float = math.nan
-    seconds: Optional[Timing] = None
+    seconds: Timing | None = None
     residual: float = math.nan
     failure: str = ""
 
@@ -45,7 +44,7 @@ class Answer:
     """The cheapest point of a method for an error, or None and the reason."""
 
     method: str
-    point: Optional[Point]
+    point: Point | None
     reason: str = ""
 
 
@@ -74,8 +73,8 @@ def cheapest(
     points: Sequence[Point],
     target: float,
     floors: Mapping[str, float],
-    method: Optional[str] = None,
-) -> tuple[Optional[float], Optional[str]]:
+    method: str | None = None,
+) -> tuple[float | None, str | None]:
     """Seconds and name of the cheapest method for an error, or of one method; None for neither."""
     found = [a for a in answers(points, target, floors) if method in (None, a.method)]
     point = found[0].point

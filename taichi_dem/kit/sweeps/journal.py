@@ -6,7 +6,6 @@ import json
 import os
 import warnings
 from collections.abc import Iterable
-from typing import Optional
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, write_text
@@ -26,7 +25,7 @@ class Journal:
     a folder that cannot be written to, or holds the jobs of another function.
     """
 
-    def __init__(self, folder: Optional[FileName], identity: str):
+    def __init__(self, folder: FileName | None, identity: str):
         self.folder = "" if folder is None else output_folder(folder)
         self.kept = 0
         if self.folder:

@@ -9,7 +9,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Generator, Iterable
 from multiprocessing import connection
-from typing import Any, Optional
+from typing import Any
 
 from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError
@@ -46,7 +46,7 @@ class _Worker:
             ) from None
         theirs.close()
         self.ready = False
-        self.job: Optional[Job] = None
+        self.job: Job | None = None
 
     def give(self, job: Job) -> None:
         """Have a job run; one that is lost is noticed when its answer is awaited."""

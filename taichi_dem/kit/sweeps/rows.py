@@ -8,7 +8,7 @@ import itertools
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 
@@ -16,11 +16,11 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, is_whole, path_name, shown
 
 #: A value of a table.
-Value = Union[bool, int, float, str]
+Value = bool | int | float | str
 #: A row by column name.
 Row = dict[str, Value]
 #: What a sweep takes for a table.
-TableLike = Union[Sequence[Mapping[str, Any]], Mapping[str, Sequence], FileName]
+TableLike = Sequence[Mapping[str, Any]] | Mapping[str, Sequence] | FileName
 #: Column of the seeds of rows.
 SEED = "seed"
 #: Names of columns that a sweep adds to its result.

@@ -4,7 +4,7 @@ import contextlib
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Optional, Union
+from typing import Any
 
 from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError
@@ -29,11 +29,11 @@ def sweep(
     function: Work,
     table: TableLike,
     *,
-    workers: Optional[int] = None,
+    workers: int | None = None,
     client: Any = None,
-    out: Optional[FileName] = None,
+    out: FileName | None = None,
     seed: int = 0,
-    progress: Union[Listener, str, None] = AUTO,
+    progress: Listener | str | None = AUTO,
 ) -> SweepTable:
     """Run a function on each row of a table, many rows at a time.
 
@@ -103,7 +103,7 @@ def run_missing(
     *,
     count: int,
     client: Any = None,
-    progress: Union[Listener, str, None] = AUTO,
+    progress: Listener | str | None = AUTO,
 ) -> list[Record]:
     """Records of jobs, of which those that the journal lacks are run; count: of processes."""
     leave_unless_main()
@@ -137,7 +137,7 @@ def _collect(ended: Iterator[tuple[Job, Record]], records, journal, count):
         raise InputError(f"{error}{kept}") from None
 
 
-def _counter(listen: Optional[Listener], total: int) -> Callable[[int], None]:
+def _counter(listen: Listener | None, total: int) -> Callable[[int], None]:
     """Function that tells a listener how many jobs of a number are done."""
     started = time.perf_counter()
 

@@ -7,7 +7,7 @@ import tempfile
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Optional
+from typing import Any
 
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.files import write_text
@@ -51,8 +51,8 @@ class WebPage(os.PathLike):
 
 
 def show_page(
-    path: Optional[FileName],
-    open_browser: Optional[bool],
+    path: FileName | None,
+    open_browser: bool | None,
     scripts: Sequence[FileName],
     **content: Any,
 ) -> WebPage:

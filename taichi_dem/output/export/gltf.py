@@ -1,5 +1,6 @@
 """A run as a glTF scene (.glb) for browsers and Blender: every fragment moves as a rigid piece."""
 
+import itertools
 import json
 import struct
 from typing import Any
@@ -88,7 +89,7 @@ def _motions(model, frames, of_body):
     places, rotations = zip(*(rigid_motion(model, frame, of_body) for frame in frames))
     turns = np.array(list(map(quaternions_of, rotations)))
     # q and -q are one rotation; between two frames the shorter way is meant.
-    for before, turn in zip(turns, turns[1:]):
+    for before, turn in itertools.pairwise(turns):
         turn *= np.where((turn * before).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
     return np.array(places), turns
 

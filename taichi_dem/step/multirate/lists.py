@@ -1,7 +1,7 @@
 """Lists of members for a phase: those active at a tick, by falling level; all; one."""
 
 from collections.abc import Callable
-from typing import Any, Optional
+from typing import Any
 
 import taichi as ti
 
@@ -35,7 +35,7 @@ class Everyone:
     number: field of how many. slots: field of their numbers, None for 0 .. number - 1.
     """
 
-    def __init__(self, number: ti.Field, slots: Optional[ti.Field] = None):
+    def __init__(self, number: ti.Field, slots: ti.Field | None = None):
         self.number, self.slots, self.has_slots = number, slots, slots is not None
 
     @ti.func

@@ -4,7 +4,7 @@ Levels change seldom compared with their use, so a change of a body's level move
 entries.
 """
 
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -44,7 +44,7 @@ class Schedule(Members):
     evaluated in the same substeps, and the bonds whose laws were called.
     """
 
-    def __init__(self, tables: Tables, state: State, contacts: Optional[Contacts], method: Method):
+    def __init__(self, tables: Tables, state: State, contacts: Contacts | None, method: Method):
         self.tables, self.state, self.contacts = tables, state, contacts
         self.has_limits = method.control is not None or method.dashpot == "limited"
         self.limits: Any = None
