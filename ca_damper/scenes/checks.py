@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper import measures
 from ca_damper.excitation.excitation import Excitation, excitation_of
+from ca_damper.report import measures
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import LARGEST, choice, progress_option, shown, told_apart, whole
 

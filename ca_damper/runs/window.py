@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from ca_damper.checks import MOST_SEED
 from ca_damper.excitation.excitation import Excitation, excitation_of
+from ca_damper.scenes.checks import MOST_SEED
 from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE, MOST_STEPS_PER_CYCLE
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import positive, several, shown, told_apart, whole

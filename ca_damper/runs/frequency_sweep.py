@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.checks import check_run
 from ca_damper.filling import Filling
-from ca_damper.measures import MEASURE_UNITS
 from ca_damper.oscillator import Oscillator
-from ca_damper.progress import Stages
-from ca_damper.report import Report
-from ca_damper.response import Grid, Response
-from ca_damper.steady_state import ROUNDING, half_width
+from ca_damper.report.measures import MEASURE_UNITS
+from ca_damper.report.progress import Stages
+from ca_damper.report.report import Report
+from ca_damper.report.steady_state import ROUNDING, half_width
+from ca_damper.runs.response import Grid, Response
+from ca_damper.scenes.checks import check_run
 from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import in_brief

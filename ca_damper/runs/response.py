@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.amplitude_response import AmplitudeResponse
 from ca_damper.batch import Batch
-from ca_damper.checks import MOST_SCENES, MOST_SEED, check_run
 from ca_damper.filling import Filling, check_filling
-from ca_damper.measures import MEASURE_UNITS, Cycles, column_of, peak
 from ca_damper.oscillator import Oscillator
-from ca_damper.report import Report
+from ca_damper.report.measures import MEASURE_UNITS, Cycles, column_of, peak
+from ca_damper.report.report import Report
+from ca_damper.report.steady_state import LEAST_TESTED, change_of_halves, half_width
+from ca_damper.runs.amplitude_response import AmplitudeResponse
+from ca_damper.scenes.checks import MOST_SCENES, MOST_SEED, check_run
 from ca_damper.scenes.clock import automatic_dt, steps_per_cycle
 from ca_damper.scenes.table import SceneTable
-from ca_damper.steady_state import LEAST_TESTED, change_of_halves, half_width
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.data_table import Table, Tabulated, dataset
 from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded

@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 
 from ca_damper.batch import Batch
-from ca_damper.checks import MOST_SCENES, MOST_SEED, STARTS, check_run
 from ca_damper.engine.modal_mount import ModalMount
 from ca_damper.excitation.excitation import Excitation
 from ca_damper.excitation.signal import Signal
 from ca_damper.filling import Filling, check_filling
-from ca_damper.measures import history_dataset
-from ca_damper.report import Report
+from ca_damper.report.measures import history_dataset
+from ca_damper.report.report import Report
+from ca_damper.runs.window import one_for_all, run_duration, run_seeds, window
+from ca_damper.scenes.checks import MOST_SCENES, MOST_SEED, STARTS, check_run
 from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE, automatic_dt
 from ca_damper.scenes.table import SceneTable
 from ca_damper.structure import Box, ModalStructure
-from ca_damper.window import one_for_all, run_duration, run_seeds, window
 from taichi_dem.kit.checkpoint import Checkpoint, identity_of
 from taichi_dem.kit.data_table import Table, Tabulated
 from taichi_dem.kit.display import counted, in_brief

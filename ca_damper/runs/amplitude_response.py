@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ca_damper.measures import MEASURE_UNITS
+from ca_damper.report.measures import MEASURE_UNITS
 from taichi_dem.kit.data_table import Table, Tabulated
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.optional import optional
 from taichi_dem.kit.validation import choice
 
 if TYPE_CHECKING:
-    from ca_damper.response import Response
+    from ca_damper.runs.response import Response
 
 
 @dataclass(frozen=True, eq=False)

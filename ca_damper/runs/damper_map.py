@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from ca_damper.batch import Batch
-from ca_damper.checks import MOST_CYCLES, MOST_SCENES, MOST_SEED
-from ca_damper.collect_and_collide import CollectAndCollide, collect_and_collide
 from ca_damper.filling import Filling, check_filling
-from ca_damper.progress import Stages
-from ca_damper.report import Report
+from ca_damper.report.progress import Stages
+from ca_damper.report.report import Report
+from ca_damper.scenes.checks import MOST_CYCLES, MOST_SCENES, MOST_SEED
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.scenes.table import SceneTable
+from ca_damper.theory.collect_and_collide import CollectAndCollide, collect_and_collide
 from taichi_dem.kit.data_table import Table, Tabulated, dataset
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.errors import InputError
