@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.decay import logarithmic_decrement
-from ca_damper.film import Film
 from ca_damper.oscillator import Oscillator
+from ca_damper.runs.film import Film
+from ca_damper.theory.decay import logarithmic_decrement
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.files import write_csv
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.response import Response
+from ca_damper.runs.response import Response
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, instance, positive, several, shown, word

@@ -23,8 +23,8 @@ from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import Filling, check_filling
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
-from ca_damper.progress import OpenEnded
-from ca_damper.response import Grid
+from ca_damper.report.progress import OpenEnded
+from ca_damper.runs.response import Grid
 from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan, doubted
 from taichi_dem.kit.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
 from taichi_dem.kit.accuracy.student import t_quantile

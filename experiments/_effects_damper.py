@@ -9,7 +9,7 @@ from dataclasses import asdict
 import numpy as np
 
 from _effects_runs import damper_batch
-from ca_damper.lattice import DOWN, HELD, UP
+from ca_damper.automaton.lattice import DOWN, HELD, UP
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.field_memory import FieldMemory

@@ -11,10 +11,10 @@ from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.accuracy.steady_runs import SteadyRuns
 from ca_damper.accuracy.step_part import StepPart, step_part
 from ca_damper.goals import Goal
-from ca_damper.measures import MEASURE_UNITS
 from ca_damper.oscillator import Oscillator
-from ca_damper.response import Response
-from ca_damper.steady_state import BATCHES, correlation_factor
+from ca_damper.report.measures import MEASURE_UNITS
+from ca_damper.report.steady_state import BATCHES, correlation_factor
+from ca_damper.runs.response import Response
 from taichi_dem.kit.accuracy.answer import ErrorParts, Values
 from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.display import by_fields

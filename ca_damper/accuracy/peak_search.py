@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ca_damper.measures import peak, vertex
+from ca_damper.report.measures import peak, vertex
 from taichi_dem.kit.errors import InputError
 
 #: Frequencies of the first look, evenly over the range.

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ca_damper.batch import Batch
-from ca_damper.measures import COLUMNS, Cycles
 from ca_damper.oscillator import Oscillator
-from ca_damper.response import measures_of
+from ca_damper.report.measures import COLUMNS, Cycles
+from ca_damper.runs.response import measures_of
 from ca_damper.scenes.clock import steps_per_cycle
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.progress.progress import Listener

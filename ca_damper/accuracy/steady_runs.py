@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
-from ca_damper.steady_state import BATCHES, SteadyPart, steady_part
+from ca_damper.report.steady_state import BATCHES, SteadyPart, steady_part
 
 # Cycles of a scene after which it is taken as it is, with what its drift is known to be.
 _MOST_CYCLES = 20_000

@@ -9,7 +9,7 @@ walls out, ``reset`` starts from zero at every turn, and ``kept`` keeps the sum.
 
 import taichi as ti
 
-from ca_damper.lattice import Lattice
+from ca_damper.automaton.lattice import Lattice
 
 READINGS = ("signed", "signed_through_walls", "reset", "kept")
 

@@ -6,7 +6,7 @@ a result below zero sends that particle back.
 
 import taichi as ti
 
-from ca_damper.lattice import DIRECTIONS, turned_back
+from ca_damper.automaton.lattice import DIRECTIONS, turned_back
 
 
 @ti.func

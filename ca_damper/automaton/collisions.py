@@ -15,8 +15,8 @@ from ca_damper.automaton.conflict_resolution import above_others, rank
 from ca_damper.automaton.event_counts import HOLDS, WALLS
 from ca_damper.automaton.event_counts import PAIRS as PAIRS_MET
 from ca_damper.automaton.impulse_balance import PAIRS
-from ca_damper.lattice import EMPTY, WALL, mirrored, turned_back
-from ca_damper.random_numbers import DEFLECT, EVENT, bits, unit
+from ca_damper.automaton.lattice import EMPTY, WALL, mirrored, turned_back
+from ca_damper.engine.random_numbers import DEFLECT, EVENT, bits, unit
 from ca_damper.scenes.scene_fields import SceneFields
 
 NOTHING, JOIN, FLOOR, SIDE, PAIR = range(5)

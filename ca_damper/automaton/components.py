@@ -10,10 +10,10 @@ from ca_damper.automaton.accumulator import Accumulator
 from ca_damper.automaton.conflict_resolution import ConflictResolution
 from ca_damper.automaton.event_counts import EventCounts
 from ca_damper.automaton.impulse_balance import ImpulseBalance, NoImpulseBalance
+from ca_damper.automaton.lattice import Lattice
 from ca_damper.automaton.state import Cells
 from ca_damper.automaton.static_contact import NoStaticContact, StaticContact
 from ca_damper.automaton.traversal import traversal_of
-from ca_damper.lattice import Lattice
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.random_numbers import bits
+from ca_damper.engine.random_numbers import bits
 from ca_damper.scenes.scene_fields import SceneFields
 
 #: Room for cell numbers in a rank.

@@ -9,12 +9,12 @@ from ca_damper.automaton.collisions import Collisions
 from ca_damper.automaton.components import assemble
 from ca_damper.automaton.ejection import Ejection
 from ca_damper.automaton.impulse_balance import GRAVITY, QUANTUM
+from ca_damper.automaton.lattice import DIRECTIONS, DOWN, EMPTY, HELD, WALL, unit_vectors
 from ca_damper.automaton.lattice_device import LatticeDevice
 from ca_damper.automaton.placement import DrawnCells, NamedCells
 from ca_damper.automaton.transport import Transport
+from ca_damper.engine.random_numbers import stream
 from ca_damper.filling import Action
-from ca_damper.lattice import DIRECTIONS, DOWN, EMPTY, HELD, WALL, unit_vectors
-from ca_damper.random_numbers import stream
 from ca_damper.scenes.scene_fields import SceneFields
 
 

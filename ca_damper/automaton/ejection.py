@@ -12,8 +12,8 @@ from typing import Any
 import taichi as ti
 
 from ca_damper.automaton.event_counts import PUSHES
+from ca_damper.automaton.lattice import DIRECTIONS, DOWN, HELD, UP
 from ca_damper.automaton.staircase import Staircase
-from ca_damper.lattice import DIRECTIONS, DOWN, HELD, UP
 from ca_damper.scenes.scene_fields import SceneFields
 
 

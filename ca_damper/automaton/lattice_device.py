@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from ca_damper.lattice import Geometry
+from ca_damper.automaton.lattice import Geometry
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 

@@ -11,9 +11,9 @@ from ca_damper.automaton.device import DeviceAutomaton
 from ca_damper.automaton.known_range import range_of
 from ca_damper.automaton.lattice_device import LatticeDevice
 from ca_damper.automaton.place.device import PlaceAutomaton
-from ca_damper.checked_range import CheckedRange, Driven
-from ca_damper.contracts import check_members, members_of
 from ca_damper.filling import Structure
+from ca_damper.report.checked_range import CheckedRange, Driven
+from ca_damper.scenes.contracts import check_members, members_of
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import GRAIN, GRAIN_MASS, in_unit

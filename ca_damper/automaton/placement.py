@@ -4,7 +4,7 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.random_numbers import START, uniform
+from ca_damper.engine.random_numbers import START, uniform
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.lattice import EMPTY
+from ca_damper.automaton.lattice import EMPTY
 from ca_damper.scenes.scene_fields import SceneFields
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.lattice import DOWN, HELD, UP, WALL
+from ca_damper.automaton.lattice import DOWN, HELD, UP, WALL
 from ca_damper.scenes.scene_fields import SceneFields
 
 

@@ -5,8 +5,8 @@ from typing import Any
 import taichi as ti
 
 from ca_damper.automaton.conflict_resolution import rank
-from ca_damper.lattice import DOWN, EMPTY
-from ca_damper.random_numbers import MOVE
+from ca_damper.automaton.lattice import DOWN, EMPTY
+from ca_damper.engine.random_numbers import MOVE
 from ca_damper.scenes.scene_fields import SceneFields
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.lattice import EMPTY, WALL
+from ca_damper.automaton.lattice import EMPTY, WALL
 from ca_damper.scenes.scene_fields import SceneFields
 
 

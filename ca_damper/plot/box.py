@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
-from ca_damper.record import Frame, inner_size
+from ca_damper.report.record import Frame, inner_size
 from taichi_dem.kit.plot_style import BLACK, BLUE, RED
 
 #: Vertical speed of particles: falling, at rest, rising.

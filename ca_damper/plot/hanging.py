@@ -7,7 +7,7 @@ import numpy as np
 
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox
-from ca_damper.record import Frame
+from ca_damper.report.record import Frame
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.plot_style import BLACK
 from taichi_dem.kit.validation import FileName

@@ -8,7 +8,7 @@ import numpy as np
 
 from ca_damper.plot.box import SPEEDS, Box
 from ca_damper.plot.hanging import Hanging
-from ca_damper.record import Frame
+from ca_damper.report.record import Frame
 from ca_damper.spheres import Spheres
 from taichi_dem.kit.display import counted, listed
 from taichi_dem.kit.plot_style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, table_of

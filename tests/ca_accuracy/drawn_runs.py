@@ -7,7 +7,7 @@ import numpy as np
 from ca_damper import Automaton, Oscillator, goals
 from ca_damper.accuracy.error_reduction import Reduction
 from ca_damper.accuracy.job import Job
-from ca_damper.measures import MEASURE_UNITS
+from ca_damper.report.measures import MEASURE_UNITS
 
 
 class DrawnRuns:

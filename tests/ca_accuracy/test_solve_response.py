@@ -22,7 +22,7 @@ from ca_damper import (
 from ca_damper.accuracy import steady_runs
 from ca_damper.accuracy.job import Job
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
-from ca_damper.certificate import Certificate
+from ca_damper.report.certificate import Certificate
 from taichi_dem.kit.audit import Audit
 from tests.paper import outside, paper
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ca_damper.steady_state import (
+from ca_damper.report.steady_state import (
     FALSE_ALARMS,
     LEAST_CYCLES,
     mean_and_error,

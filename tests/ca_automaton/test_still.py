@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ca_damper.lattice import EMPTY, HELD, WALL
+from ca_damper.automaton.lattice import EMPTY, HELD, WALL
 from tests.ca_automaton.shaken import Shaken
 from tests.paper import paper
 

@@ -18,9 +18,9 @@ from ca_damper.automaton.place.disc_blows import (
     most_drag,
     speed_change,
 )
+from ca_damper.engine.random_numbers import LINE as LINE_DRAW
+from ca_damper.engine.random_numbers import bits, unit
 from ca_damper.filling import Blows, Recoil
-from ca_damper.random_numbers import LINE as LINE_DRAW
-from ca_damper.random_numbers import bits, unit
 from ca_damper.scenes.scene_fields import SceneFields
 
 

@@ -4,9 +4,9 @@ from typing import Any
 
 import taichi as ti
 
+from ca_damper.automaton.lattice import EMPTY, UP
 from ca_damper.automaton.place.claims import ACROSS, ALONG, rank_in_phase
-from ca_damper.lattice import EMPTY, UP
-from ca_damper.random_numbers import HOP, bits, unit
+from ca_damper.engine.random_numbers import HOP, bits, unit
 from ca_damper.scenes.scene_fields import SceneFields
 
 _NOWHERE = -1

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from ca_damper.random_numbers import EVENT, bits, scrambled
+from ca_damper.engine.random_numbers import EVENT, bits, scrambled
 
 #: Phases of a step, by rising rank.
 BLOWS, ACROSS, ALONG = range(3)

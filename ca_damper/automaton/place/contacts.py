@@ -4,10 +4,10 @@ from typing import Any
 
 import taichi as ti
 
+from ca_damper.automaton.lattice import HELD, UP, WALL
 from ca_damper.automaton.place.claims import BLOWS, SLOTS, rank_in_phase
 from ca_damper.automaton.place.disc_blows import chord, contact_rate
-from ca_damper.lattice import HELD, UP, WALL
-from ca_damper.random_numbers import GLANCE, SIDE, bits, scrambled, unit
+from ca_damper.engine.random_numbers import GLANCE, SIDE, bits, scrambled, unit
 from ca_damper.scenes.scene_fields import SceneFields
 
 #: Kinds of event: at floor or ceiling, at a side wall, coming to rest, in a column, across columns.

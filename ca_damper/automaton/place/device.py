@@ -9,6 +9,7 @@ import taichi as ti
 from ca_damper.automaton.components import Parameters
 from ca_damper.automaton.conflict_resolution import ConflictResolution
 from ca_damper.automaton.event_counts import EventCounts
+from ca_damper.automaton.lattice import HELD, UP, Lattice
 from ca_damper.automaton.lattice_device import LatticeDevice
 from ca_damper.automaton.place.blows import Collisions
 from ca_damper.automaton.place.changes import Changes
@@ -17,9 +18,8 @@ from ca_damper.automaton.place.heap import Heap
 from ca_damper.automaton.place.transport import PlaceTransport
 from ca_damper.automaton.placement import DrawnCells, NamedCells
 from ca_damper.automaton.traversal import traversal_of
+from ca_damper.engine.random_numbers import stream
 from ca_damper.filling import Action
-from ca_damper.lattice import HELD, UP, Lattice
-from ca_damper.random_numbers import stream
 from ca_damper.scenes.scene_fields import SceneFields
 
 

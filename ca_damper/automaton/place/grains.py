@@ -4,8 +4,8 @@ from typing import Any
 
 import taichi as ti
 
+from ca_damper.automaton.lattice import HELD, UP
 from ca_damper.automaton.state import Cells
-from ca_damper.lattice import HELD, UP
 from ca_damper.scenes.scene_fields import SceneFields
 
 

@@ -4,8 +4,8 @@ from typing import Any
 
 import taichi as ti
 
+from ca_damper.automaton.lattice import EMPTY, UP
 from ca_damper.automaton.staircase import Staircase
-from ca_damper.lattice import EMPTY, UP
 
 
 @ti.data_oriented

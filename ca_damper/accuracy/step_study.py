@@ -8,11 +8,11 @@ import numpy as np
 
 from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import Filling
-from ca_damper.force_check import checked_response
-from ca_damper.gravity import gravity_along
-from ca_damper.measures import curve_distance, seed_variance
 from ca_damper.oscillator import Oscillator
-from ca_damper.response import Response, frequency_response
+from ca_damper.report.measures import curve_distance, seed_variance
+from ca_damper.runs.force_check import checked_response
+from ca_damper.runs.response import Response, frequency_response
+from ca_damper.scenes.gravity import gravity_along
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.plot_style import seconds
 from taichi_dem.kit.study.timing import Timing

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.certificate import Certificate, Estimate, Periods, onset
 from ca_damper.filling import check_filling
-from ca_damper.measures import Cycles
+from ca_damper.report.certificate import Certificate, Estimate, Periods, onset
+from ca_damper.report.measures import Cycles
+from ca_damper.report.steady_state import period
 from ca_damper.scenes.table import SceneTable
-from ca_damper.steady_state import period
 
 #: Difference of cycles up to which they are alike, as a share of the first harmonic.
 ALIKE = 1e-3

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from ca_damper.engine.recorder import ROOM
-from ca_damper.measures import SAMPLE_UNITS
-from ca_damper.progress import Stages
-from ca_damper.record import Frame, frames_of, inner_size
+from ca_damper.report.measures import SAMPLE_UNITS
+from ca_damper.report.progress import Stages
+from ca_damper.report.record import Frame, frames_of, inner_size
 from taichi_dem.kit.data_table import dataset
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError

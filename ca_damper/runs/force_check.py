@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.measures import Cycles
 from ca_damper.oscillator import Oscillator
-from ca_damper.response import Grid, Response
+from ca_damper.report.measures import Cycles
+from ca_damper.runs.response import Grid, Response
 
 
 def force_mismatch(

@@ -1,6 +1,6 @@
 """Effects of a filling that a run needed."""
 
-from ca_damper.report import Report
+from ca_damper.report.report import Report
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import fraction

@@ -4,8 +4,8 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ca_damper.certificate import Certificate
-from ca_damper.checked_range import CheckedRange
+from ca_damper.report.certificate import Certificate
+from ca_damper.report.checked_range import CheckedRange
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.files import write_text
