@@ -283,7 +283,7 @@ def _result(simulation, recorder, writer, plan, tell, brief=False, start=None):
         scene=simulation.scene,
         method=simulation.method,
         model=simulation.model,
-        history=recorder.history(),
+        series=recorder.history(),
         frames=tuple(recorder.frames),
         broken_time=recorder.broken_time(),
         peak_speed=recorder.peak_speed,
