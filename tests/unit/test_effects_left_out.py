@@ -31,8 +31,8 @@ def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(scene
     silent = result_of(pulled(*(law().silent() for law in LAWS)))
     assert len(ENGINES._engines) == before
     without = result_of(pulled())
-    for key, values in silent.history.items():
-        assert values.tobytes() == without.history[key].tobytes(), key
+    for key, values in silent.series.items():
+        assert values.tobytes() == without.series[key].tobytes(), key
     for frame, other in zip(silent.frames, without.frames):
         assert frame.position.tobytes() == other.position.tobytes()
     assert silent.report.effects == without.report.effects

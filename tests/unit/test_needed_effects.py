@@ -45,8 +45,8 @@ def test_dropping_effects_that_never_acted_changes_no_bit(gentle):
     assert "softening" in advice.inactive and advice.missing == ()
     assert "gravity" not in advice.droppable
     again = ran(*(make() for make in GENTLE if make.name not in advice.inactive))
-    for name, column in gentle.history.items():
-        np.testing.assert_array_equal(again.history[name], column, err_msg=name)
+    for name, column in gentle.series.items():
+        np.testing.assert_array_equal(again.series[name], column, err_msg=name)
 
 
 def test_weight_of_all_is_all_the_work(gentle):

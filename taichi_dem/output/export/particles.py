@@ -7,7 +7,13 @@ import numpy as np
 from taichi_dem.kit.extended_xyz import XyzFrame, write_extended_xyz
 from taichi_dem.kit.validation import FileName, choice
 from taichi_dem.mesh.tetrahedra import signed_volumes
-from taichi_dem.output.fragments import fragment_of_body, fragments_of, quaternions_of, rigid_motion
+from taichi_dem.output.fragments import (
+    fragment_of_body,
+    fragments_of,
+    quaternions_of,
+    rigid_motion,
+    vectors_of,
+)
 
 
 def write_particles(path: FileName, result: Any, of: str) -> None:
@@ -57,7 +63,8 @@ def _bodies(result, frame):
 
 
 def _fragments(result, frame):
-    found = fragments_of(result.model, frame, result.broken_time)
-    centre, rotation = rigid_motion(result.model, frame, found.of_body)
-    radius, velocity = 0.5 * found["diameter_m"], found.vectors("velocity")
+    of_body = fragment_of_body(result.model, result.broken_time <= frame.time_s)
+    found = fragments_of(result.model, frame, of_body)
+    centre, rotation = rigid_motion(result.model, frame, of_body)
+    radius, velocity = 0.5 * found["diameter_m"], vectors_of(found, "velocity")
     return centre, radius, velocity, rotation, found["mass_kg"], found["fragment"]

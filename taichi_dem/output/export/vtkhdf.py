@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.files import write_bytes
-from taichi_dem.kit.optional import optional
 from taichi_dem.kit.validation import FileName
 from taichi_dem.output.record import body_corners, cell_data, corners_of_bodies
 
@@ -36,7 +35,9 @@ def write_vtkhdf(path: FileName, result: Any) -> None:
     -----
     Format: VTK File Formats, section VTKHDF, unstructured grid over time, version 2.0.
     """
-    h5py, model, frames = optional("h5py"), result.model, result.frames
+    import h5py
+
+    model, frames = result.model, result.frames
     # In memory: HDF5 on a full disk fails when it closes the file, and then again at the end.
     content = io.BytesIO()
     with h5py.File(content, "w") as file:
