@@ -208,7 +208,7 @@ def main(
 
     def work(options):
         if options.sweep is not None:
-            return _sweep(run, made, options, given)
+            return run_sweep(run, made, options, given)
         if options.workers is not None:
             raise InputError(f"workers must be left out without --sweep, got {options.workers}")
         take_settings(options, made.settings)
@@ -223,13 +223,6 @@ def main(
         return 0
 
     return main_of_tool(work, made, arguments)
-
-
-def _sweep(run, made, options, given):
-    """Run the job for each row of a table; returns the exit code."""
-    if options.json:
-        raise InputError("json must be left out with --sweep, which writes sweep.csv")
-    return run_sweep(run, made, options, given)
 
 
 def main_of_tool(
