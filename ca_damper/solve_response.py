@@ -25,17 +25,22 @@ from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
 from ca_damper.report.progress import OpenEnded
 from ca_damper.runs.response import Grid
-from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan, doubted
-from taichi_dem.kit.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.bars.answer import (
+    Answer,
+    ErrorParts,
+    Plan,
+    branched,
+    branches_of,
+    cost_curve,
+    doubted,
+)
+from taichi_dem.kit.bars.chance import clusters_of, t_quantile
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, between, finite, instance, positive, shown
 
-# Tolerances whose cost an answer tells.
-_ASKED_OFTEN = (0.1, 0.03, 0.01, 0.003)
 # A run that diverges is repeated at a shorter step so often.
 _MOST_SHORTENED = 6
 _SHORTER = 1.5
@@ -88,7 +93,7 @@ def solve_response(
     Returns
     -------
     Answer or tuple of Answer
-        The tuple for several goals. A BranchedAnswer where seeds come to several steady motions.
+        The tuple for several goals. It has branches where seeds come to several steady motions.
 
     Raises
     ------
@@ -195,17 +200,15 @@ def _answer(job: Job, done: Reduction, found: Estimate) -> Answer:
     base: dict[str, Any] = {"goal": goal.name, "unit": goal.unit, "plan": _plan(job, done)}
     base.update(result=response, tolerance=job.tolerance, confidence=job.confidence)
     branches = _branches(job, done, found)
-    if len(branches) > 1:
-        first, words = branches[0], sentence(branches, goal.unit)
+    if branches:
         step = _step_of(branches, done.steps, found, job.confidence)
-        parts = ErrorParts(step=step, chance=first.error)
-        found_value = {"value": first.value, "parts": parts}
-        return BranchedAnswer(**base, **found_value, shortfall=words, branches=branches)
+        made = Answer(**base, value=value, parts=parts)
+        return branched(made, branches, step, "seed", "took {} steady motions")
     words = shortfall(found, job.tolerance, done.ended)
     if job.is_drawn and len(done.seeds) == 1:
         words = "; ".join(filter(None, (words, ONE_SEED)))
     made = Answer(**base, value=value, parts=parts, shortfall=words)
-    return replace(made, cost_curve=tuple(_expenses(job, done, made)))
+    return replace(made, cost_curve=_cost_curve(job, done, made))
 
 
 def _told(goal, value, parts):
@@ -266,19 +269,20 @@ def _plan(job, done):
     )
 
 
-def _expenses(job, done, made):
+def _cost_curve(job, done, made):
     """Costs of usual tolerances: that of the cycles and seeds beyond the transients grows as 1/x^2.
 
     One that has been reached costs what was paid at most.
     """
-    paid, fixed = (
-        done.runs.cpu_s,
-        done.pilot_s + done.transient_share() * (done.runs.cpu_s - done.pilot_s),
-    )
     if not math.isfinite(made.share) or made.share <= 0.0:
-        return
-    for tolerance in sorted({*_ASKED_OFTEN, job.tolerance}, reverse=True):
-        is_paid = tolerance == job.tolerance and made.reached
+        return ()
+    paid = done.runs.cpu_s
+    fixed = done.pilot_s + done.transient_share() * (paid - done.pilot_s)
+
+    def cost(tolerance):
+        if tolerance == job.tolerance and made.reached:
+            return paid, True
         wider = made.share / tolerance
-        more = max(1.0, wider * wider)
-        yield Expense(tolerance, paid if is_paid else fixed + (paid - fixed) * more, is_paid)
+        return fixed + (paid - fixed) * max(1.0, wider * wider), False
+
+    return tuple(cost_curve(job.tolerance, cost))

@@ -2,11 +2,10 @@
 
 import math
 
-from taichi_dem.accuracy.job import Job
+from taichi_dem.accuracy.runs import Job
 from taichi_dem.accuracy.search import Search
 from taichi_dem.goals import Goal
-from taichi_dem.kit.accuracy import plans
-from taichi_dem.kit.accuracy.answer import Answer, Plan
+from taichi_dem.kit.bars.answer import Answer, Plan, known_partings
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive
@@ -76,5 +75,5 @@ def solve(
     with reporting(progress, goal.name) as report_progress:
         answer = Search(job, budget, report_progress, first).answer()
     if math.isfinite(answer.plan.parting_s):
-        plans.remember(kind_of(scene), plans.parting(answer.plan.parting_s, until))
+        known_partings[kind_of(scene)] = answer.plan.parting
     return answer

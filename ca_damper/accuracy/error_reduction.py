@@ -19,7 +19,7 @@ from ca_damper.accuracy.peak_search import Lattice, PeakSearch
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.accuracy.steady_runs import BudgetSpent, SteadyRuns
 from ca_damper.goals import Goal
-from taichi_dem.kit.accuracy.branches import clusters_of
+from taichi_dem.kit.bars.chance import clusters_of
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import told_apart

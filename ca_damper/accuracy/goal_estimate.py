@@ -15,8 +15,8 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.report.measures import MEASURE_UNITS
 from ca_damper.report.steady_state import BATCHES, correlation_factor
 from ca_damper.runs.response import Response
-from taichi_dem.kit.accuracy.answer import ErrorParts, Values
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.bars.answer import ErrorParts, Values
+from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.display import by_fields
 
 # Values that are rounding, as a share of one of their unit's size.

@@ -9,7 +9,7 @@ from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
 from ca_damper.spheres.options import Spheres
-from taichi_dem.kit.accuracy.branches import LEAST_SEEDS
+from taichi_dem.kit.bars.chance import LEAST_SEEDS
 
 # First coarse step by the filling's own and by its bound, which is that of safe runs.
 _OF_DEFAULT, _OF_BOUND = 1.5, 1.4

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from taichi_dem.kit.accuracy.answer import Plan
+from taichi_dem.kit.bars.answer import Plan
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
 

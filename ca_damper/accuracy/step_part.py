@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.display import by_fields
 
 #: Error of the finest step by Richardson: times this.

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from taichi_dem.kit.accuracy.step_error import SEEN, step_error
+from taichi_dem.kit.bars.step import SEEN, step_error
 
 STEPS = ([1.0, 0.5, 0.25], [1.0, 0.25, 0.125], [1.0, 0.5, 0.125], [3.0, 1.0, 0.5])
 

@@ -5,7 +5,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from taichi_dem.kit.accuracy.answer import Answer
+from taichi_dem.kit.bars.answer import Answer
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.study.command_line import tolerance
 from taichi_dem.kit.study.tables import write_rows

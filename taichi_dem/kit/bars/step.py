@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.bars.chance import t_quantile
 
 #: Orders that are believed: between these and the declared one plus the last.
 _LEAST_ORDER, _MORE = 0.5, 0.5
