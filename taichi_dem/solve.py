@@ -8,7 +8,7 @@ from taichi_dem.goals import Goal
 from taichi_dem.kit.bars.answer import Answer, Plan, known_partings
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive
+from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive, whole
 from taichi_dem.scene import Scene, kind_of
 
 
@@ -70,7 +70,7 @@ def solve(
     between("tolerance", tolerance, SMALLEST, 1.0)
     between("confidence", confidence, SMALLEST, math.nextafter(1.0, 0.0))
     budget = math.inf if budget_s is None else positive("budget_s", budget_s)
-    first = 0 if plan is None else instance("plan", plan, Plan).begin
+    first = 0 if plan is None else whole("begin of plan", instance("plan", plan, Plan).begin, 0, 99)
     job = Job(scene, until, goal, tolerance, confidence)
     with reporting(progress, goal.name) as report_progress:
         answer = Search(job, budget, report_progress, first).answer()
