@@ -19,7 +19,7 @@ from ca_damper.report.report import Report
 from ca_damper.report.steady_state import ROUNDING, half_width
 from ca_damper.runs.response import Grid, Response
 from ca_damper.scenes.checks import check_run
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.progress.progress import Listener

@@ -1,20 +1,23 @@
-"""An answer to a question that was asked with a tolerance: value, error bar, and its price."""
+"""An answer to a question that was asked with a tolerance: value, error bar, and its cost."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import reduce
 from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.bars.chance import mean_and_deviation, share_error, t_quantile
 from taichi_dem.kit.display import by_fields, counted, in_brief
 
+#: Tolerances of which an answer tells the cost.
+TOLERANCES = (0.1, 0.03, 0.01, 0.003)
+#: Sentences about runs that differ by one rounding, by the kind of their scenes (``kind_of``).
+known_partings: dict[Hashable, str] = {}
 #: Digits that a number has, and unit of the last of them below which it is written with a power of
 #: ten.
 _MOST_DIGITS, _LEAST_UNIT = 17, 1e-15
-#: Least power of ten that is a number.
-_LEAST_POWER = -323
 #: A number, or one for each place of a curve.
 Values = float | np.ndarray
 
@@ -45,10 +48,10 @@ class ErrorParts:
     @property
     def total(self) -> Values:
         """Half-width of the whole bar, in the unit of the value."""
-        return _total([getattr(self, part.name) for part in fields(self)])
+        total = reduce(np.hypot, (getattr(self, part.name) for part in fields(self)))
+        return total if isinstance(total, np.ndarray) else float(total)
 
-    def __repr__(self):
-        return by_fields(self)
+    __repr__ = by_fields
 
     def __str__(self):
         found = {part.name: largest(getattr(self, part.name)) for part in fields(self)}
@@ -94,8 +97,8 @@ class Plan:
         CPU time of the runs that chose the method and step [s].
     final_s : float
         CPU time of the runs that gave the answer [s].
-    begin : int, default 0
-        Level of the step at which a question of a similar scene may begin.
+    begin : object, default 0
+        Where a similar question may begin: a level of the step, or a stage of the damper's runs.
     parting_s : float, default math.inf
         Simulated time from which runs that differ by one rounding differ by more than was allowed
         [s]; infinite if never.
@@ -105,7 +108,7 @@ class Plan:
     runs: int
     pilot_s: float
     final_s: float
-    begin: int = 0
+    begin: Any = 0
     parting_s: float = math.inf
 
     @property
@@ -115,9 +118,43 @@ class Plan:
 
     def __str__(self):
         words = f"{self.method}; {self.seconds:.2g} s, of which pilot {self.pilot_s:.2g} s"
-        if math.isinf(self.parting_s):
-            return words
-        return f"{words}; runs that differ by one rounding part from {self.parting_s:.2g} s"
+        return words if math.isinf(self.parting_s) else f"{words}; {self.parting}"
+
+    @property
+    def parting(self) -> str:
+        """When runs that differ by one rounding part, in words."""
+        return f"runs that differ by one rounding part from {self.parting_s:.2g} s"
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One of several ends of a question.
+
+    Parameters
+    ----------
+    value : float
+        Mean over its runs, in the unit of the goal.
+    error : float
+        Half-width of the bar of the mean, in the unit of the goal.
+    share : float
+        Share of all runs that came to it.
+    share_error : float
+        Half-width of the bar of that share.
+    seeds : tuple of int
+        Seeds of its runs.
+    """
+
+    value: float
+    error: float
+    share: float
+    share_error: float
+    seeds: tuple[int, ...]
+
+    def in_words(self, unit: str, runs: str) -> str:
+        """Value, bar and share in words; runs: what a seed stands for, in the plural."""
+        end = f" {unit}" if unit != "1" else ""
+        share = f"{100.0 * self.share:.0f} +- {100.0 * self.share_error:.0f} %"
+        return f"{self.value:.6g} +- {self.error:.2g}{end} for {share} of the {runs}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +168,8 @@ class Answer:
     unit : str
         Unit of the value, ``"1"`` for none.
     value : float or ndarray
-        A number, or one for each place of a curve, in the unit of the goal.
+        A number, or one for each place of a curve, in the unit of the goal; that of the most
+        frequent branch where there are several.
     parts : ErrorParts
         Half-widths of the error bar by source.
     tolerance : float
@@ -147,6 +185,8 @@ class Answer:
     shortfall : str, default ""
         Why the answer is not what was asked for, and what would help: the error is larger, or the
         run itself is in doubt. ``""`` where it is neither.
+    branches : tuple of Branch, default ()
+        Ends to which the runs of a question without a single answer came, the most frequent first.
 
     Examples
     --------
@@ -162,8 +202,9 @@ class Answer:
     confidence: float
     plan: Plan
     result: Any = None
-    cost_curve: Sequence[Expense] = field(default_factory=tuple)
+    cost_curve: Sequence[Expense] = ()
     shortfall: str = ""
+    branches: tuple[Branch, ...] = ()
 
     @property
     def error(self) -> Values:
@@ -192,12 +233,9 @@ class Answer:
 
     def __str__(self):
         lines = [f"{self._bar()} ({self.parts}); {self.plan}", self.shortfall]
-        lines += [f"warning: {need}" for need in self._needs()]
-        return "\n".join(filter(None, lines))
-
-    def _needs(self):
-        """What the report of the finest run warns of; a Response has none."""
-        return getattr(getattr(self.result, "report", None), "needs", ())
+        # What the report of the finest run warns of; a Response has none.
+        needs = getattr(getattr(self.result, "report", None), "needs", ())
+        return "\n".join(filter(None, [*lines, *(f"warning: {need}" for need in needs)]))
 
     def _bar(self):
         if isinstance(self.value, np.ndarray):
@@ -214,12 +252,43 @@ def doubted(answer: Answer, *reasons: str) -> Answer:
     return replace(answer, shortfall="; ".join(filter(None, (answer.shortfall, *reasons))))
 
 
-def _total(parts):
-    """Root of the sum of squares, of numbers of any size."""
-    # Not math.hypot, which gives NaN close to the largest number.
-    with np.errstate(over="ignore"):
-        total = reduce(np.hypot, parts)
-    return total if isinstance(total, np.ndarray) else float(total)
+def branched(
+    answer: Answer, branches: tuple[Branch, ...], step: Values, run: str, ends: str
+) -> Answer:
+    """The answer of a question with several ends: that of the most frequent.
+
+    step: error of it by the step. run: what a seed stands for, in the singular. ends: what they
+    did, with a place for how many.
+    """
+    total = counted(sum(len(branch.seeds) for branch in branches), run)
+    each = "; ".join(branch.in_words(answer.unit, f"{run}s") for branch in branches)
+    words = f"no single number: {total} {ends.format(len(branches))}: {each}"
+    first = branches[0]
+    parts = ErrorParts(step=step, solver=answer.parts.solver, chance=first.error)
+    return replace(answer, value=first.value, parts=parts, shortfall=words, branches=branches)
+
+
+def branches_of(
+    values: np.ndarray, clusters: Sequence[np.ndarray], seeds: Sequence[int], error: float, t: float
+) -> tuple[Branch, ...]:
+    """Branches of clusters; error: standard error of a value by sampling, t: its quantile."""
+    return tuple(_branch(values[part], part, seeds, error, t) for part in clusters)
+
+
+def _branch(values, part, seeds, error, t):
+    count = len(part)
+    half = t * error / math.sqrt(count)
+    mean, deviation = mean_and_deviation(values)
+    if count > 1:
+        half = max(half, t_quantile(0.95, count - 1) * deviation / math.sqrt(count))
+    named = tuple(seeds[k] for k in sorted(part.tolist()))
+    return Branch(mean, half, count / len(seeds), share_error(count, len(seeds)), named)
+
+
+def cost_curve(tolerance: float, cost: Callable[[float], tuple[float, bool]]) -> Iterator[Expense]:
+    """Costs of usual tolerances and the one that was asked; cost: CPU time [s], whether spent."""
+    for one in sorted({*TOLERANCES, tolerance}, reverse=True):
+        yield Expense(one, *cost(one))
 
 
 def largest(values: Values) -> float:
@@ -241,5 +310,5 @@ def _places(error):
     """Power of ten of the second digit of an error, of the first where that is at least 3."""
     if not math.isfinite(error):
         return -math.inf
-    power = max(_LEAST_POWER, math.floor(math.log10(error)))
+    power = math.floor(math.log10(error))
     return power if error / 10.0**power >= 3.0 else power - 1

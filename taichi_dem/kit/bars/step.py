@@ -1,8 +1,10 @@
-"""Error of the step, from values at several steps that chance blurs.
+"""Error of the step, from runs at falling steps.
 
-Where twice and four times the step change a value as an order would let them, that order says how
-far the finest is off. Where they do not, the method has no limit to be seen at these steps: each
-value is then a draw, and another step, however fine, would give another.
+Richardson's extrapolation as the grid convergence index takes it (Roache 1994): an order is read
+off three runs, and believed where their differences shrink as an order in range would let them.
+``step_error`` is of values without chance; ``step_part`` of values that chance blurs: where they
+have no order in range, the method has no limit to be seen at these steps, and each value is a draw,
+as that of another step, however fine, would be.
 """
 
 import math
@@ -11,17 +13,89 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.kit.accuracy.student import t_quantile
-from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.bars.chance import t_quantile
 
-#: Error of the finest step by Richardson: times this.
+#: Factor on the error of a finest run whose order has been seen.
 SAFETY = 1.25
-# Orders that are in range: from the least one to the declared one and so much.
-_LEAST_ORDER, _MORE = 0.5, 1.5
+#: Orders that are believed: from the least one to the declared one and so much, which is more where
+#: chance blurs it.
+_LEAST_ORDER, _MORE, _MORE_BLURRED = 0.5, 0.5, 1.5
 # Standard errors beyond which a difference is not chance, and changes are not those of an order.
 _SEEN, _OTHER_ORDER = 2.0, 2.5
 # Differences that are rounding, as a share of the value.
 _ROUNDING = 1e-9
+#: Degrees of freedom of Student's t with whose quantiles all errors grow with the confidence.
+_FREEDOM = 4
+_BISECTIONS = 50
+
+
+@dataclass(frozen=True)
+class StepError:
+    """What runs at falling steps say of the finest one.
+
+    error: half-width about its value. order: that was seen, NaN where differences do not shrink as
+    those of an order would.
+    """
+
+    error: float
+    order: float = math.nan
+
+    @property
+    def regular(self) -> bool:
+        """Whether an order was seen."""
+        return not math.isnan(self.order)
+
+
+def step_error(
+    values: Sequence[float],
+    declared: float = 2.0,
+    steps: Sequence[float] | None = None,
+    *,
+    least: float = 0.0,
+    smooth: bool = False,
+    confidence: float = 0.95,
+) -> StepError:
+    """Error of the last of at least two values, at falling steps.
+
+    declared: order of the method where all is smooth. steps: of any unit; h, h/2, h/4 and so on if
+    None. least: difference that is believed, at least, of the last two values: what they may have
+    in common by chance. smooth: whether nothing happens at an instant, so that the declared order
+    may be trusted before it was seen.
+    Where no order is seen, the error is that of first order; of a smooth run 1.5 times that of
+    the declared one.
+    """
+    if steps is None:
+        steps = [2.0**-k for k in range(len(values))]
+    wider = t_quantile(confidence, _FREEDOM) / t_quantile(0.95, _FREEDOM)
+    last = max(abs(values[-1] - values[-2]), least)
+    shrinking = steps[-2] / steps[-1]
+    if len(values) > 2:
+        order = _order(values[-3:], steps[-3:], declared + _MORE)
+        if order > _LEAST_ORDER:
+            trusted = min(order, declared)
+            return StepError(wider * SAFETY * last / (shrinking**trusted - 1.0), trusted)
+    unseen = 1.5 / (shrinking**declared - 1.0) if smooth else 1.0 / (shrinking - 1.0)
+    return StepError(wider * unseen * last)
+
+
+def _order(values, steps, most):
+    """Order that three values at falling steps show, NaN for none in (0, most]."""
+    before, after = values[1] - values[0], values[2] - values[1]
+    if after == 0.0:
+        return math.nan
+    found, low, high = before / after, 1e-3, most
+    if not _ratio(steps, low) <= found <= _ratio(steps, high):
+        return math.nan
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _ratio(steps, middle) < found else (low, middle)
+    return high
+
+
+def _ratio(steps, order):
+    """First over second difference of three values whose error is a power of the step."""
+    a, b, c = (step**order for step in steps)
+    return (a - b) / (b - c)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +110,6 @@ class StepPart:
     error: np.ndarray
     regular: np.ndarray
     is_seen: bool
-
-    def __repr__(self) -> str:
-        return by_fields(self)
 
     @property
     def is_regular(self) -> bool:
@@ -85,7 +156,7 @@ def _in_range(values, noise, order):
     Then the change to the finest is a share of the one before, between two bounds; chance as a
     whole may take it out of them.
     """
-    high, low = (_beyond(values, noise, power) for power in (_LEAST_ORDER, order + _MORE))
+    high, low = (_beyond(values, noise, power) for power in (_LEAST_ORDER, order + _MORE_BLURRED))
     return (high * low <= 0.0) | (np.minimum(np.abs(high), np.abs(low)) < _OTHER_ORDER)
 
 
