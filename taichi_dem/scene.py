@@ -30,8 +30,7 @@ from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials, body_materials
 from taichi_dem.materials.bond_rules import typical_of
 from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.parts import may_meet, parts_of
-from taichi_dem.mesh.topology import check_free
+from taichi_dem.mesh.topology import check_free, may_meet, parts_of
 from taichi_dem.state.model import MANY
 
 #: Share of an opening at which a law begins, and of a mean speed, at which no body wakes others.

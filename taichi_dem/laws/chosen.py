@@ -13,7 +13,7 @@ from taichi_dem.laws.roles import check_activation
 from taichi_dem.laws.sphere_contact import ONCE_BROKEN
 from taichi_dem.materials.body_materials import BodyMaterials
 from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.parts import parts_of
+from taichi_dem.mesh.topology import parts_of
 from taichi_dem.state.model import SINGLE
 
 AUTO, ALL, LISTED = "auto", "all", "listed"

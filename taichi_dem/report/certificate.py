@@ -10,7 +10,7 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.kit.audit import Audit
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.effect_usage import EffectUse
-from taichi_dem.mesh.parts import parts_of
+from taichi_dem.mesh.topology import parts_of
 from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.report.effects import on_demand
 from taichi_dem.report.estimates import AIR, BENDS, WEIGHT, Estimate, PartScales

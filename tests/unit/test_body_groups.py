@@ -5,9 +5,9 @@ import pytest
 
 from _meshes import mirrored_copies
 from taichi_dem import read_mesh
-from taichi_dem.mesh.face_groups import with_cut
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.mesh.joined import in_space_order
+from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.mesh.shapes import bar, placed_together
 
 ORE = ("ore", lambda x: x[:, 0] > 0.5)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import PAPER_BLOCK, read_mesh
-from taichi_dem.mesh.colouring import edge_colours
-from taichi_dem.mesh.topology import topology_of
+from taichi_dem.mesh.topology import edge_colours, topology_of
 
 #: A tetrahedron has four faces, so no body has more links.
 DEGREE = 4
