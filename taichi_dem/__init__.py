@@ -47,8 +47,7 @@ from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate
 from taichi_dem.simulation import Simulation
 from taichi_dem.solve import solve
-from taichi_dem.stability.elastic_report import elastic_report
-from taichi_dem.stability.step_report import step_report
+from taichi_dem.stability.step_report import elastic_report, step_report
 from taichi_dem.step_control import StepControl
 
 __all__ = [

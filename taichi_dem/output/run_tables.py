@@ -7,13 +7,12 @@ import numpy as np
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, whole
-from taichi_dem.output.attenuation import Attenuation, attenuation_of
 from taichi_dem.output.cracks import Rose, cracks_of, rose_of
 from taichi_dem.output.export.gltf import write_gltf
 from taichi_dem.output.export.particles import write_particles
 from taichi_dem.output.export.vtkhdf import write_vtkhdf
 from taichi_dem.output.fragments import Fragments, fragments_of
-from taichi_dem.output.hole_monitor import watched_groups
+from taichi_dem.output.hole_monitor import Attenuation, attenuation_of, watched_groups
 from taichi_dem.output.record import Frame
 from taichi_dem.report.energy_balance import GIVEN, HELD, TERMS
 from taichi_dem.scene import Scene
@@ -210,7 +209,7 @@ class RunTables:
         path : str or path
             Such as ``"run.glb"``.
         colour : str
-            One of ``taichi_dem.output.body_values.COLOURS``, in the last frame: violet is 0, yellow
+            One of ``taichi_dem.output.fragments.COLOURS``, in the last frame: violet is 0, yellow
             the value that 2 % of the bodies exceed.
         seconds : float
             How long the animation lasts [s].

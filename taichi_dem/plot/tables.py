@@ -13,7 +13,7 @@ from taichi_dem.kit.display import scale
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, SPARE_COLOURS, area_key, picture
 from taichi_dem.kit.units import without_unit
 from taichi_dem.kit.validation import FileName, choices, positive, unit_vector
-from taichi_dem.output.body_values import COLOURS, body_values, scale_end
+from taichi_dem.output.fragments import COLOURS, body_values, scale_end
 from taichi_dem.output.run_tables import RunTables
 from taichi_dem.plot.bodies import ALONG_Z, JOINT, draw_bodies, frame_block
 from taichi_dem.plot.series import ENERGY_TERMS
@@ -244,7 +244,7 @@ def plot_block(
     frame : int
         Number of the frame.
     colour : {"speed", "peak_speed", "displacement", "damage", "level", "fragment"}
-        ``taichi_dem.output.body_values.COLOURS``.
+        ``taichi_dem.output.fragments.COLOURS``.
     magnify : float
         Factor of the displacement.
     axis : sequence of 3 floats

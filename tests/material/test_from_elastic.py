@@ -5,7 +5,7 @@ import pytest
 
 from taichi_dem import InputError, Scene, Simulation, Uniform, effects, elastic_report
 from taichi_dem.materials.bond_rules import bond_geometry
-from taichi_dem.materials.moduli import bond_moduli
+from taichi_dem.materials.material import bond_moduli
 from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.state.model import Model

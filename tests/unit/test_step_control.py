@@ -24,7 +24,7 @@ from taichi_dem.elasticity.rates import (
 )
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.mesh.topology import faces_of_group, topology_of
-from taichi_dem.stability.stable_step import (
+from taichi_dem.stability.body_limits import (
     dashpot_limit,
     dashpot_step,
     spring_limit,

@@ -25,8 +25,7 @@ from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import pair, placed_together, single
 from taichi_dem.mesh.topology import topology_of
-from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED
-from taichi_dem.stability.stable_step import dashpot_step, spring_step
+from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED, dashpot_step, spring_step
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL
 
 STILL = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))

@@ -11,8 +11,12 @@ from taichi_dem.kit.files import write_bytes
 from taichi_dem.kit.validation import FileName, positive
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
 from taichi_dem.mesh.topology import skin
-from taichi_dem.output.body_values import shares_of_scale
-from taichi_dem.output.fragments import fragment_of_body, quaternions_of, rigid_motion
+from taichi_dem.output.fragments import (
+    fragment_of_body,
+    quaternions_of,
+    rigid_motion,
+    shares_of_scale,
+)
 from taichi_dem.state.model import centres
 
 #: Colours from low to high, viridis in nine steps, and that of crack faces; sRGB.
