@@ -25,7 +25,7 @@ from taichi_dem.output.record import (
     write_paraview,
 )
 from taichi_dem.output.run_tables import RunTables
-from taichi_dem.report.certificate import Certificate
+from taichi_dem.report.effects import Certificate
 from taichi_dem.report.report import Report
 from taichi_dem.scene import Scene
 from taichi_dem.state.model import Model

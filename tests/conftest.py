@@ -18,7 +18,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 from taichi_dem import InputError, runtime
 from taichi_dem.kit.allocation import field_bytes, tree_count
-from taichi_dem.step.auto_driver import CPU_ONLY
+from taichi_dem.step.drivers import CPU_ONLY
 from tests import arch
 
 pytest_plugins = ("tests.attacks", "tests.compiler", "tests.own_engines")

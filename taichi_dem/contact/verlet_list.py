@@ -5,9 +5,8 @@ It contains all bodies, free or not, so one list serves many searches.
 
 import taichi as ti
 
-from taichi_dem.contact.cell_grid import CellGrid
+from taichi_dem.contact.cell_grid import CellGrid, Reach
 from taichi_dem.contact.contacts import Contacts
-from taichi_dem.contact.reach import Reach
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real
 from taichi_dem.methods import Method

@@ -8,9 +8,7 @@ from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, whole
 from taichi_dem.output.cracks import Rose, cracks_of, rose_of
-from taichi_dem.output.export.gltf import write_gltf
-from taichi_dem.output.export.particles import write_particles
-from taichi_dem.output.export.vtkhdf import write_vtkhdf
+from taichi_dem.output.export import write_gltf, write_particles, write_vtkhdf
 from taichi_dem.output.fragments import Fragments, fragments_of
 from taichi_dem.output.hole_monitor import Attenuation, attenuation_of, watched_groups
 from taichi_dem.output.record import Frame
@@ -191,7 +189,7 @@ class RunTables:
         path : str or path
             Such as ``"run.xyz"``.
         of : {"bodies", "fragments"}
-            What a particle is (``taichi_dem.output.export.particles``).
+            What a particle is (``taichi_dem.output.export``).
 
         Raises
         ------

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from taichi_dem.kit.plot_style import PURPLE, RED, picture, seconds
 from taichi_dem.kit.validation import FileName
 from taichi_dem.output.run_tables import RunTables
-from taichi_dem.plot.bodies import shades
+from taichi_dem.plot.view import shades
 
 #: Energy terms from the bottom of the stack up, with colours and dashes: blue is held, orange lost
 #: in bonds, purple in contacts; within a group they differ in lightness.

@@ -15,9 +15,8 @@ from taichi_dem.kit.units import without_unit
 from taichi_dem.kit.validation import FileName, choices, positive, unit_vector
 from taichi_dem.output.fragments import COLOURS, body_values, scale_end
 from taichi_dem.output.run_tables import RunTables
-from taichi_dem.plot.bodies import ALONG_Z, JOINT, draw_bodies, frame_block
 from taichi_dem.plot.series import ENERGY_TERMS
-from taichi_dem.plot.view import View
+from taichi_dem.plot.view import ALONG_Z, JOINT, View, draw_bodies, frame_block
 
 #: Fragments of a colour of their own; lighter ones are grey.
 _NAMED = 6

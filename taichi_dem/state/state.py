@@ -5,19 +5,38 @@ import taichi as ti
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.allocation import assign, values
-from taichi_dem.kit.types import real
+from taichi_dem.kit.types import mat3, real, vec3
 from taichi_dem.materials.body_materials import MOST
 from taichi_dem.mesh.topology import Topology
 from taichi_dem.physics.fracture import coulomb_limit
 from taichi_dem.physics.rotation_arrays import spins, turned_bodies
 from taichi_dem.state.activity import Activity
-from taichi_dem.state.body_motion import BodyMotion
 from taichi_dem.state.model import Model
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import NEVER
 
 #: Motion of a body that is given, by name.
 _GIVEN = ("position", "orientation", "velocity", "spin")
+
+
+@ti.dataclass
+class BodyMotion:
+    """A body at the beginning of its step, in world axes.
+
+    position: of the centre [m]. rotation: from the body frame to the world. velocity [m/s] and spin
+    [rad/s]: those of the leapfrog, half a step before. time [s]; step: length of the step [s].
+    since, until: times [s] from and up to which a load that varies acts by its mean; those of a
+    body's steps follow each other without a gap.
+    """
+
+    position: vec3
+    rotation: mat3
+    velocity: vec3
+    spin: vec3
+    time: real
+    step: real
+    since: real
+    until: real
 
 
 def unserved_limits(model: Model) -> np.ndarray:

@@ -14,11 +14,10 @@ from taichi_dem.kit.types import vec3
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned
 from taichi_dem.step.body_loads import BodyLoads
 from taichi_dem.step.bond import BondStep
-from taichi_dem.step.contact_force import ContactForce
+from taichi_dem.step.contact_force import ContactForce, TangentialSprings
 from taichi_dem.step.implicit.solver import Solver
 from taichi_dem.step.multirate.schedule import Schedule
 from taichi_dem.step.sleeping import ASLEEP
-from taichi_dem.step.tangential_springs import TangentialSprings
 
 
 @ti.data_oriented

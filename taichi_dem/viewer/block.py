@@ -13,8 +13,7 @@ from taichi_dem.kit.viewer import WebPage, pack, quantise, select_frames, show_p
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
 from taichi_dem.output.fragments import quaternions_of
 from taichi_dem.output.record import Frame
-from taichi_dem.plot.block import TITLES
-from taichi_dem.plot.film import speed_edges
+from taichi_dem.plot.block import TITLES, speed_edges
 from taichi_dem.plot.series import level_names, level_shades
 from taichi_dem.plot.view import first_breaks, skin
 from taichi_dem.state.model import Model

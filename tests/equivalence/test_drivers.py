@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import ImplicitDashpots, Simulation, runtime
-from taichi_dem.step.auto_driver import PARALLEL_FROM, RESIDENT_BELOW, AutoDriver, driver_name
-from taichi_dem.step.drivers import DRIVERS
+from taichi_dem.step.drivers import DRIVERS, PARALLEL_FROM, RESIDENT_BELOW, AutoDriver, driver_name
 from tests.bar_blast import UNTIL, bar_scene
 
 METHOD = ImplicitDashpots(4e-7, refresh=1e-5)
