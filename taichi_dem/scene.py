@@ -25,8 +25,7 @@ from taichi_dem.kit.validation import (
     word,
 )
 from taichi_dem.laws.base import PARTS_OF_BOND, Effect, check_one_material
-from taichi_dem.laws.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
-from taichi_dem.laws.roles import check_effect
+from taichi_dem.laws.roles import AUTO, LISTED, ChosenEffects, check_effect, chosen_effects
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials, body_materials
 from taichi_dem.materials.bond_rules import typical_of

@@ -1,6 +1,7 @@
 """Pressure on a group of outer faces, and its history."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,17 +11,62 @@ from numpy.typing import ArrayLike
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.elementary import sine_and_cosine, sine_shortfall
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.likely_units import BLAST_RISE, PRESSURE, in_unit
+from taichi_dem.kit.likely_units import ACCELERATION, BLAST_RISE, PRESSURE, in_unit
 from taichi_dem.kit.products import cross, matvec
 from taichi_dem.kit.types import vec3
-from taichi_dem.kit.validation import finite, positive, real_numbers, shown, word
-from taichi_dem.laws.base import Effect
+from taichi_dem.kit.validation import direction, finite, positive, real_numbers, shown, word
+from taichi_dem.laws.base import Effect, Travel
 from taichi_dem.loads.history import History, history_points, shortest_piece
 from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
 from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import Model
+
+
+@ti.data_oriented
+class Gravity(Effect):
+    """Uniform acceleration of all bodies.
+
+    Parameters
+    ----------
+    acceleration : sequence of float, default (0.0, -9.81, 0.0)
+        Acceleration along x, y and z [m/s^2].
+
+    Examples
+    --------
+    >>> Gravity((0.0, -1.62, 0.0)).name
+    'gravity'
+    """
+
+    role = "load"
+
+    def __init__(self, acceleration: Sequence[float] = (0.0, -9.81, 0.0)):
+        self._acceleration = direction("acceleration", acceleration)
+        in_unit("size of acceleration", math.hypot(*self._acceleration), ACCELERATION)
+
+    def numbers(self, material: Material) -> tuple[float, ...]:
+        """Acceleration [m/s^2], three components."""
+        return self._acceleration
+
+    def stress(self, material: Material, size: float) -> float:
+        """Weight of a column as high as the block."""
+        return material.density * size * sum(x * x for x in self._acceleration) ** 0.5
+
+    def travel(self) -> Travel:
+        """Without end along the acceleration."""
+        low = tuple(-math.inf if x < 0.0 else 0.0 for x in self._acceleration)
+        return low, tuple(math.inf if x > 0.0 else 0.0 for x in self._acceleration)
+
+    @ti.func
+    def acts_on(self, i):
+        """Every body has weight."""
+        return 1
+
+    @ti.func
+    def wrench(self, i, motion):
+        """Force [N] and torque about the centre [N m] on body i."""
+        return self.tables.mass[i] * vec3(self.law[0], self.law[1], self.law[2]), vec3(0.0)
 
 
 @ti.data_oriented

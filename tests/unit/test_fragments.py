@@ -7,8 +7,8 @@ import pytest
 
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.tetrahedra import signed_volumes
-from taichi_dem.output.fragments import fragment_of_body, quaternions_of, rigid_motion
-from tests.made_result import made_result, moved_rigidly, turned
+from taichi_dem.output.fragments import fragment_of_body, rigid_motion
+from tests.made_result import made_result, moved_rigidly
 
 SEED = 2
 
@@ -80,14 +80,3 @@ def test_bonds_that_break_later_still_join():
     result = made_result()
     counts = [result.fragments(k).row_count for k in range(len(result.frames))]
     assert counts[0] == 1 and counts == sorted(counts) and counts[-1] > 1
-
-
-def test_quaternions_are_those_of_their_rotations():
-    """Of any axis, and of half turns, where three of the four formulas divide by nothing."""
-    rng = np.random.default_rng(3)
-    axis = np.concatenate([rng.normal(size=(200, 3)), np.eye(3), [[1, 1, 0]], [[0, 0, 1]]])
-    angle = np.concatenate([rng.uniform(0.0, np.pi, 200), [np.pi] * 4, [0.0]])
-    unit = axis / np.linalg.norm(axis, axis=1)[:, None]
-    wanted = np.column_stack([np.sin(0.5 * angle)[:, None] * unit, np.cos(0.5 * angle)])
-    found = quaternions_of(turned(axis, angle))
-    assert np.abs((found * wanted).sum(axis=1)) == pytest.approx(1.0, abs=1e-12)
