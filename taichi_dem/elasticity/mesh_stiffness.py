@@ -20,6 +20,7 @@ from taichi_dem.mesh.topology import Topology, body_properties, face_vertices, t
 
 #: Residual of a solution, as a share of the largest load, and iterations at most.
 _TOLERANCE, _MOST_ITERATIONS = 1e-10, 20_000
+_TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,44 +205,55 @@ def motions_under(
     that are not balanced.
     Conjugate gradients, preconditioned by the block of each body.
     """
-    from scipy.sparse.linalg import LinearOperator, cg
-
-    stiffness, own = _stiffness(mesh, topology, springs)
+    own, rows, neighbour = _blocks(mesh, topology, springs)
+    solved, rest = np.zeros(forces.shape), forces.copy()
     alone = (own == 0.0).all(axis=(1, 2))
     # Forces on a body without bonds are balanced: what is left of them is rounding.
-    loads = np.where(alone[:, None, None], 0.0, forces).reshape(-1, forces.shape[2])
+    rest[alone] = 0.0
     inverse = np.linalg.inv(np.where(alone[:, None, None], np.eye(6), own))
-    blocks = LinearOperator(
-        stiffness.shape, lambda rest: (inverse @ rest.reshape(-1, 6, 1)).ravel()
-    )
     # Of the largest load: another may be zero but for rounding, as a pull along a face is.
-    bound = _TOLERANCE * np.linalg.norm(loads, axis=0).max()
-    options = {"rtol": 0.0, "atol": bound, "maxiter": _MOST_ITERATIONS, "M": blocks}
-    found = [cg(stiffness, load, **options) for load in loads.T]
-    if any(failed for _, failed in found):
-        raise InputError(
-            f"the springs of a mesh must be solved within {_MOST_ITERATIONS} iterations, and are "
-            f"not: is it made of bodies that hang on single bonds, or of very uneven size?"
-        )
-    return np.stack([motion for motion, _ in found], axis=1).reshape(forces.shape)
-
-
-def _stiffness(mesh, topology, springs):
-    """Forces on all bodies by their motions, sparse (6 n, 6 n), and its blocks, (n, 6, 6)."""
-    from scipy.sparse import csr_array
-
-    _, centre, _ = body_properties(mesh, 1.0)
-    links, size = np.stack([topology.master, topology.slave], axis=1), 6 * mesh.body_count
-    arms = mesh.points[topology.vertices][:, None] - centre[links][:, :, None]
-    maps = levers(arms) * np.array([-1.0, 1.0])[:, None, None, None]
-    area, law = face_laws(mesh.points, topology.vertices, springs)
-    pulled = (area[:, None, None] / 3.0 * law)[:, None, None] @ maps
-    own = np.zeros((mesh.body_count, 6, 6))
-    np.add.at(own, links, (maps.swapaxes(-1, -2) @ pulled).sum(axis=2))
-    rows = np.arange(9 * len(links)).reshape(-1, 1, 3, 3, 1)
-    places = np.broadcast_arrays(rows, 6 * links[:, :, None, None, None] + np.arange(6))
-    openings, forces = (
-        csr_array((part.ravel(), [one.ravel() for one in places]), shape=(rows.size, size))
-        for part in (maps, pulled)
+    bound = _TOLERANCE**2 * _products(rest, inverse @ rest).max()
+    way, size = np.zeros(forces.shape), np.ones(forces.shape[2])
+    for _ in range(_MOST_ITERATIONS):
+        scaled = inverse @ rest
+        now = _products(rest, scaled)
+        if np.all(now <= bound):
+            return solved
+        way = scaled + now / np.maximum(size, _TINY) * way
+        held = own @ way + rows @ way[neighbour].reshape(len(way), 24, -1)
+        size, step = now, now / np.maximum(_products(way, held), _TINY)
+        solved += step * way
+        rest -= step * held
+    raise InputError(
+        f"the springs of a mesh must be solved within {_MOST_ITERATIONS} iterations, and are "
+        f"not: is it made of bodies that hang on single bonds, or of very uneven size?"
     )
-    return openings.T @ forces, own
+
+
+def _blocks(mesh, topology, springs):
+    """Forces on each body by its own motion (bodies, 6, 6) and its neighbours' (bodies, 6, 24).
+
+    And the body behind each local face, its own number where there is none: its block is zero.
+    """
+    _, centre, _ = body_properties(mesh, 1.0)
+    corners = mesh.points[topology.vertices]
+    sides = topology.master, topology.slave
+    faces = topology.master_face, topology.slave_face
+    maps = [levers(corners - centre[side][:, None]) for side in sides]
+    area, law = face_laws(mesh.points, topology.vertices, springs)
+    law = (area[:, None, None] / 3.0 * law)[:, None]
+    count = mesh.body_count
+    neighbour = np.tile(np.arange(count)[:, None], (1, 4))
+    own, across = np.zeros((count, 6, 6)), np.zeros((count, 4, 6, 6))
+    for here, there in ((0, 1), (1, 0)):
+        body, face = sides[here], faces[here]
+        neighbour[body, face] = sides[there]
+        pulled = maps[here].swapaxes(2, 3) @ law
+        across[body, face] = -(pulled @ maps[there]).sum(axis=1)
+        np.add.at(own, body, (pulled @ maps[here]).sum(axis=1))
+    return own, np.moveaxis(across, 1, 2).reshape(count, 6, 24), neighbour
+
+
+def _products(one, other):
+    """Inner products of two fields, one for each load."""
+    return np.einsum("bkl,bkl->l", one, other)
