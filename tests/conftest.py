@@ -51,7 +51,7 @@ FIRST = ("verification", "unit", "ca", "activation")
 #: last of them gives all engines back.
 OF_THE_BLOCK = """equivalence/test_bits.py verification/test_conservation.py
     equivalence/test_digests.py equivalence/test_restart.py verification/test_wake_up.py
-    verification/test_convergence.py verification/test_implicit_scenes.py
+    verification/test_convergence.py verification/test_implicit.py
     material/test_two_materials.py equivalence/test_shared_engines.py""".split()
 
 
