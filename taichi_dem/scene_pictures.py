@@ -8,7 +8,7 @@ from taichi_dem.scene import Scene
 def picture_of(thing: Mesh | Scene) -> bytes:
     """The mesh coloured by group, of a scene with what acts on each group, as PNG."""
     # Imported here, so that matplotlib loads only where a picture is shown.
-    from taichi_dem.plot.groups import picture_of_groups
+    from taichi_dem.plot.view import picture_of_groups
 
     acting: dict[str, list[str]] = {}
     for effect in getattr(thing, "effects", ()):

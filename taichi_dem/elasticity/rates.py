@@ -113,7 +113,7 @@ def contact_eigenvalues(
 
     The first is for the worst of its spheres in contact, the second for all of the worst face. D is
     the identity with friction, n n^T without; contacts act where a sphere touches its face. The
-    step finds the same from the near contacts (``stability/contact_limits.py``).
+    step finds the same from the near contacts (``stability/body_limits.py``).
     """
     mass, centre, inertia = body_properties(mesh, density)
     spheres = spheres_of_faces(mesh, centre, divisions)

@@ -17,7 +17,7 @@ from taichi_dem.report.energy_balance import EnergyBalance
 from taichi_dem.report.estimates import AIR, BENDS, WEIGHT, Estimate, PartScales
 from taichi_dem.report.missing_effects import MissingEffect, bond_rounding
 from taichi_dem.report.readings import Run
-from taichi_dem.state.activity import LATER
+from taichi_dem.state.state import LATER
 from taichi_dem.state.timeline import MACRO_TICKS, NEVER
 
 _EPSILON = np.finfo(np.float64).eps
