@@ -144,11 +144,10 @@ class At:
 
     def __post_init__(self):
         plain_fields(self)
-        times = self.times_s
-        listed = hasattr(times, "__iter__") and getattr(times, "ndim", 1) == 1
-        if isinstance(times, (str, bytes, dict, set)) or not listed:
-            raise InputError(f"times_s must be a sequence of times in s, got {shown(times)}")
-        checked = tuple(positive("times_s", time, zero_allowed=True) for time in times)
+        listed = hasattr(self.times_s, "__iter__") and getattr(self.times_s, "ndim", 1) == 1
+        if isinstance(self.times_s, (str, bytes, dict, set)) or not listed:
+            raise InputError(f"times_s must be a sequence of times in s, got {shown(self.times_s)}")
+        checked = tuple(positive("times_s", time, zero_allowed=True) for time in self.times_s)
         object.__setattr__(self, "times_s", checked)
 
     def marks(self, last: int, dt: float, samples: int = 1) -> set:
@@ -271,7 +270,7 @@ class Collector:
 
 def _read(name, words) -> Any:
     """A member of the simulation of a view, as a property."""
-    return property(lambda view: getattr(view._parts[0], name), doc=words)
+    return property(lambda view: getattr(view._simulation, name), doc=words)
 
 
 class RunView(Uncopied):
@@ -285,23 +284,13 @@ class RunView(Uncopied):
         Simulation that runs.
     recorder : Recorder
         Recorder of its samples and frames.
-
-    Raises
-    ------
-    InputError
-        Something writes to the view.
     """
 
-    _parts: tuple
-
     def __init__(self, simulation: Simulation, recorder: Recorder):
-        object.__setattr__(self, "_parts", (simulation, recorder))
+        self._simulation, self._recorder = simulation, recorder
 
     def __repr__(self):
-        return in_brief(self, repr(self._parts[0]))
-
-    def __setattr__(self, name, value):
-        raise InputError(f"the view of a run must not be written to, got {name} = {shown(value)}")
+        return in_brief(self, repr(self._simulation))
 
     time_s: float = _read("time_s", "Present time [s].")
     step: int = _read("macro_step", "Number of largest steps done.")
@@ -313,12 +302,12 @@ class RunView(Uncopied):
     @property
     def broken(self) -> np.ndarray:
         """Whether each bond has been released, (bond_count,)."""
-        return locked(self._parts[0].state.broken())
+        return locked(self._simulation.state.broken())
 
     @property
     def evaluations(self) -> int:
         """Bonds and contact pairs evaluated so far."""
-        return self._parts[0].evaluations()
+        return self._simulation.evaluations()
 
     def motion(self) -> dict:
         """Motion of the bodies.
@@ -329,7 +318,7 @@ class RunView(Uncopied):
             Arrays by name, as in ``State.motion``: position [m], velocity [m/s], spin [rad/s] and
             more.
         """
-        return {name: locked(array) for name, array in self._parts[0].motion().items()}
+        return {name: locked(array) for name, array in self._simulation.motion().items()}
 
     def energy_balance(self) -> dict:
         """Terms of the energy balance.
@@ -339,7 +328,7 @@ class RunView(Uncopied):
         dict of float
             Energies by name [J].
         """
-        return self._parts[0].energy_balance.account()
+        return self._simulation.energy_balance.account()
 
     def frame(self) -> Frame:
         """Snapshot of the block.
@@ -349,7 +338,7 @@ class RunView(Uncopied):
         Frame
             Positions, displacements, velocities and damage.
         """
-        return self._parts[1].frame()
+        return self._recorder.frame()
 
     def report(self) -> Report:
         """Report of the run so far.
@@ -359,7 +348,7 @@ class RunView(Uncopied):
         Report
             Figures and cost.
         """
-        return self._parts[0].report()
+        return self._simulation.report()
 
     def history(self) -> dict:
         """Samples so far; one at this step is among them.
@@ -369,4 +358,4 @@ class RunView(Uncopied):
         dict of ndarray
             Columns by name, which ends in the unit.
         """
-        return {name: locked(array) for name, array in self._parts[1].history().items()}
+        return {name: locked(array) for name, array in self._recorder.history().items()}

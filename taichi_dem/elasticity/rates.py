@@ -106,19 +106,17 @@ def face_laws(
     return area, across * np.eye(3) + (normally - across) * along
 
 
-def contact_eigenvalues(
-    mesh: Mesh, density: Density, divisions: int, friction: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Largest eigenvalues of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], two arrays (n,).
+def contact_eigenvalues(mesh: Mesh, density: Density, divisions: int, friction: bool) -> np.ndarray:
+    """Largest eigenvalue of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], (n,).
 
-    The first is for the worst of its spheres in contact, the second for all of the worst face. D is
-    the identity with friction, n n^T without; contacts act where a sphere touches its face. The
-    step finds the same from the near contacts (``stability/body_limits.py``).
+    For all contacts of its worst face. D is the identity with friction, n n^T without; contacts act
+    where a sphere touches its face. The step finds the same from the near contacts
+    (``stability/body_limits.py``).
     """
     mass, centre, inertia = body_properties(mesh, density)
     spheres = spheres_of_faces(mesh, centre, divisions)
     root = inverse_root(mass, inertia)
-    one, whole_face = np.zeros(len(mass)), np.zeros(len(mass))
+    largest = np.zeros(len(mass))
     faces = geometry.all_faces(mesh.tetrahedra)
     normals = geometry.unit_normals(mesh.points, faces).reshape(-1, 4, 3)
     for face in range(4):
@@ -126,12 +124,8 @@ def contact_eigenvalues(
         arms = spheres.centre[:, face] + spheres.radius[:, face, :, None] * outward[:, None]
         along = outward[:, :, None] * outward[:, None, :]
         law = np.broadcast_to(np.eye(3), along.shape) if friction else along
-        found = scaled_eigenvalues(root, point_blocks(arms, law))
-        whole_face = np.maximum(whole_face, found)
-        for k in range(spheres.per_face):
-            found = scaled_eigenvalues(root, point_blocks(arms[:, k : k + 1], law))
-            one = np.maximum(one, found)
-    return one, whole_face
+        largest = np.maximum(largest, scaled_eigenvalues(root, point_blocks(arms, law)))
+    return largest
 
 
 def point_blocks(arms: np.ndarray, law: np.ndarray) -> np.ndarray:

@@ -6,7 +6,6 @@ arguments, and functions of the model. b is a bond, u one of its three contact u
 ``self.law[m, 0]`` and on.
 """
 
-import inspect
 from collections.abc import Iterable
 from typing import Any
 
@@ -202,28 +201,11 @@ def check_effect(effect: Any) -> None:
     further = [key for key in MEMBERS if key not in ROLES and getattr(effect, key, False)]
     wanted = [member for key in (effect.role, *further) for member in MEMBERS[key]]
     for member in wanted:
-        _check_member(effect, member, wanted)
-
-
-def _check_member(effect, member, wanted):
-    """Raise InputError where a member is missing, or takes another number of arguments."""
-    name, _, arguments = member.partition("(")
-    refused = f"effect {type(effect).__name__} must have a member {member}"
-    if not hasattr(type(effect), name):
-        raise InputError(f"{refused}, as its role {effect.role} asks for {', '.join(wanted)}")
-    given = _argument_names(getattr(type(effect), name))
-    if given is not None and len(given) != len(arguments.split(",")):
-        raise InputError(f"{refused}, got {name}({', '.join(given)})")
-
-
-def _argument_names(member):
-    """Names of the arguments of a function beside self; None where any number is taken."""
-    if not callable(member):
-        return None
-    found = list(inspect.signature(member).parameters.values())
-    if any(each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD) for each in found):
-        return None
-    return [each.name for each in found[1:] if each.default is each.empty]
+        if not hasattr(type(effect), member.partition("(")[0]):
+            raise InputError(
+                f"effect {type(effect).__name__} must have a member {member}, as its role "
+                f"{effect.role} asks for {', '.join(wanted)}"
+            )
 
 
 class ChosenEffects(tuple):

@@ -39,10 +39,6 @@ def checked_arrays(
         _refuse_coincident(places, pairs, extent)
     corners = _positive(places, corners, notes)
     _refuse_bad_sharing(corners)
-    if coincident and tolerance:
-        raise InputError(
-            f"weld_tolerance must be 0 with keep_coincident=True, got {shown(tolerance)}"
-        )
     if len(pairs):
         # Joined where they coincide, no body may lie in another.
         _refuse_bad_sharing(geometry.components(len(places), pairs)[corners])

@@ -192,7 +192,7 @@ def step_report(scene: Scene) -> StepReport:
         del limits["bond_dashpot"]
     if contact is not None:
         stiffness, damping = map(material.of_contacts, contact.constants)
-        _, whole_face = contact_eigenvalues(mesh, material.density, contact.divisions, friction)
+        whole_face = contact_eigenvalues(mesh, material.density, contact.divisions, friction)
         whole_face = whole_face * contact.areas(mesh)
         limits["contact_stiffness"] = spring_step(stiffness * whole_face)
         limits["contact_dashpot"] = dashpot_step(damping * whole_face)

@@ -5,7 +5,7 @@ every item writes its own slots, and every sum has a fixed order.
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import taichi as ti
@@ -204,13 +204,8 @@ class AutoDriver:
     returns seconds; replaced in tests. drivers: both, by name.
     """
 
-    def __init__(
-        self,
-        step: Step,
-        drivers: Mapping[str, Any],
-        clock: Callable[[], float] = time.perf_counter,
-    ):
-        self.step, self.clock = step, clock
+    def __init__(self, step: Step, drivers: Mapping[str, Any]):
+        self.step, self.clock = step, time.perf_counter
         self.drivers = {name: drivers[name] for name in (Parallel.name, Resident.name)}
         self.chosen = Resident.name
         self._begin()

@@ -41,7 +41,8 @@ def test_the_faster_driver_is_chosen_again_and_again_and_changes_no_bit():
     straight.advance_to(STEPS)
     changing, clock = Simulation(bar_scene(), METHOD, "resident"), Slow("resident")
     drivers = {name: kind(changing.step) for name, kind in DRIVERS.items()}
-    changing.driver = AutoDriver(changing.step, drivers, clock)
+    changing.driver = AutoDriver(changing.step, drivers)
+    changing.driver.clock = clock
     changing.start()
     clock.time_calls(changing.driver)
     names = [changing.driver.name]
