@@ -1,4 +1,7 @@
-"""Cell grid over the centres of bodies, and the counting sort that fills it."""
+"""Cell grid over the centres of bodies, and the counting sort that fills it.
+
+And the positions at which bodies were listed, with the distances that they may go from there.
+"""
 
 import taichi as ti
 

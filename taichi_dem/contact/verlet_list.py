@@ -1,6 +1,8 @@
 """Verlet list of the contact search: bodies that are near each other, within several skins.
 
 It contains all bodies, free or not, so one list serves many searches.
+
+Of its pairs those that are near are visited, in order.
 """
 
 import taichi as ti

@@ -1,4 +1,7 @@
-"""Rates of each body of a mesh: how fast its bonds or contacts answer, which limits its step."""
+"""Rates of each body of a mesh: how fast its bonds or contacts answer, which limits its step.
+
+And the stiffness of bonded bodies against waves, from their bonds and where these are (NumPy only).
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 """The paper's law of bonds: softening in tension, Coulomb slip, both together, and dashpots.
 
 Source: Konno et al., section 2.1, eq. 1 and 2, Fig. 2 to 4; Table 1.
+
+And Coulomb slip of bonds whose cohesion falls with the slip (linear slip weakening).
 """
 
 from typing import Any

@@ -4,6 +4,8 @@ All are ``ti.func`` methods of the bound effect, but for attributes, which are w
 arguments, and functions of the model. b is a bond, u one of its three contact units (3 b, 3 b + 1,
 3 b + 2), i a body, k a sphere pair, m a pair of materials, whose numbers a law reads as
 ``self.law[m, 0]`` and on.
+
+And the laws that a scene takes from its material where it names none: effects="auto" and "all".
 """
 
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""Pressure on a group of outer faces, and its history."""
+"""Weight, pressure on a group of outer faces, that of the blast gas (Konno et al., eq. 4)."""
 
 import math
 from collections.abc import Sequence

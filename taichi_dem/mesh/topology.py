@@ -1,6 +1,6 @@
 """Which faces are bonds or free, mass properties of bodies, parts that no bond joins (NumPy only).
 
-Local face f of a body is the face opposite its local vertex f.
+Local face f of a body is the face opposite its local vertex f. Bonds of one colour share no body.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""A run as a glTF scene (.glb) for browsers and Blender: every fragment moves as a rigid piece."""
+"""A run for other programs: glTF (browsers, Blender), extended XYZ (OVITO), VTKHDF (ParaView 5.12).
+
+In glTF every fragment moves as a rigid piece.
+"""
 
 import io
 import itertools

@@ -1,4 +1,7 @@
-"""Fragments: bodies that unbroken bonds still join, as one rigid piece each."""
+"""Fragments: bodies that unbroken bonds still join, as one rigid piece each.
+
+And values by which bodies are coloured, by name.
+"""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Monitoring of a block with a hole: the displacement of the bodies at its wall."""
+"""A block with a hole: displacement at its wall, peak velocities over the distance."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Pictures of the block: cracks (Konno et al., Fig 12), steps (Fig 13), where effects act."""
+"""Pictures of the block: cracks (Konno et al., Fig 12), steps (Fig 13), where effects act, film."""
 
 import contextlib
 import math

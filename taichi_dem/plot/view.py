@@ -1,6 +1,7 @@
-"""What a viewer sees of a block along an axis: facing faces from back to front, crack traces.
+"""What all pictures of a block are made of: a view along an axis, its faces from back to front.
 
-NumPy only. Corners are world positions (body_count, 4, 3) [m], as ``record.body_corners`` gives.
+Bodies are coloured by a value, lines by another, a mesh before a run by its groups. Corners are
+world positions (body_count, 4, 3) [m], as ``record.body_corners`` gives.
 """
 
 from collections.abc import Mapping, Sequence

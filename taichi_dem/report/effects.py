@@ -1,4 +1,7 @@
-"""Effects of a run: what acted, since when, and with what share of the energy."""
+"""Effects of a run: what acted, since when, and with what share of the energy.
+
+And the certificate of a run with effects="auto": what was left out.
+"""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,11 @@
-"""Effects that a scene left out and that would have acted in the run."""
+"""Effects that a scene left out and that would have acted in the run; bodies that creep.
+
+Friction without springs is a drag up to Coulomb's limit: below it, bodies slide as fast as the drag
+lets them, on a slope that is flatter than the friction angle too. Such a contact is told from a
+collision by its time, and by what the drag has given: what is pressed together parts within damping
+over stiffness, and two pieces stop once the drag gave the momentum that they slide with. Pieces
+that slide on as fast after many times as much are pushed by a load.
+"""
 
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""Rates of the springs and dashpots of each body, and the stable step that they allow.
+"""Stable steps: of springs and dashpots, of near contacts, and of each body.
 
 A body's rates change only where a bond breaks or a contact comes near or leaves. Such bodies are
 listed, and their rates found anew at the start of the next substep.

@@ -1,4 +1,4 @@
-"""Largest stable steps of the bodies of a scene, by criterion and by method, before any run."""
+"""What a scene's mesh makes of a material before a run: steps, elastic constants, cracks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Everything that changes in a run; checkpoints hold this and the effects' own state."""
+"""Everything that changes in a run; checkpoints hold this and the effects' own state.
+
+A unit whose bond never came near a limit has the traction stiffness times opening, to the bit, so
+the law and its memory are not touched. A law says by ``begins`` where a unit comes near.
+"""
 
 import numpy as np
 import taichi as ti

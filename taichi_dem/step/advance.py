@@ -1,10 +1,16 @@
 """Advance one bond, one contact pair, one body: the only class that composes the physics.
 
-Its bonds are in ``bond``, its pairs in ``contact_force``, its loads in ``body_loads``. Drivers
-choose the active members and call these functions; nothing else applies a force or moves a body. A
-bond or pair evaluated at a tick applies the impulse F * (smaller of their steps) to both bodies,
-with opposite signs; a body takes the sum at its own time (Konno et al., 3.1, eq. 3): v += S / m, L
-+= T, then x += dt v and q = exp(dt w) q, with the spin w in the middle of the turn.
+Its bonds are in ``bond``, its pairs in ``contact_force``. Drivers choose the active members and
+call these functions; nothing else applies a force or moves a body. A bond or pair evaluated at a
+tick applies the impulse F * (smaller of their steps) to both bodies, with opposite signs; a body
+takes the sum at its own time (Konno et al., 3.1, eq. 3): v += S / m, L += T, then x += dt v and
+q = exp(dt w) q, with the spin w in the middle of the turn.
+
+Times from and up to which each load acts on a body leave no gap, so that no pulse is lost: each
+begins where the last one of its body ended. A load that changes acts up to the middle of the step,
+where the leapfrog has the new velocity: of second order without dashpots. One that does not acts
+for the step itself, as springs do: it balances them also where steps change, and may be behind or
+ahead until it changes. The ground is solved in the body's own update.
 """
 
 import taichi as ti

@@ -1,4 +1,4 @@
-"""Contact forces of a pair of bodies: the part of ``Advance`` for spheres that may touch."""
+"""Contact forces of a pair of bodies, as a part of ``Advance``; springs of friction."""
 
 import taichi as ti
 

@@ -2,6 +2,9 @@
 
 Both read one tuple of phases, so that the order of a step is written once. They give the same bits:
 every item writes its own slots, and every sum has a fixed order.
+
+A third one is chosen by measurement: the choice depends on the work in a step and on free cores, as
+the parallel driver pays a launch for every phase, and more where others occupy a core.
 """
 
 import time

@@ -1,4 +1,8 @@
-"""The phases of a substep in their order, and those of the start of a run."""
+"""The phases of a substep in their order, those of the start of a run, and the audit of sleep.
+
+One in 1024 of the bonds is looked at in every substep, by a hash of the number of the substep: no
+result decides what is looked at, and nothing that the audit does remains.
+"""
 
 from collections.abc import Callable
 from typing import Any

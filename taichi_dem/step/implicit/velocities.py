@@ -1,4 +1,4 @@
-"""Velocities while a step is being solved, and their change per impulse."""
+"""Velocities while a step is being solved, their change per impulse, dashpots of the ground."""
 
 import taichi as ti
 

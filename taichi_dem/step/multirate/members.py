@@ -1,4 +1,7 @@
-"""Keys of bodies, bonds and pairs by which they are listed, and how listed members move."""
+"""Keys of bodies, bonds and pairs by which they are listed, and how listed members move.
+
+And what bodies that touch owe each other: how far levels differ, how far impulses reach.
+"""
 
 from typing import Any
 
