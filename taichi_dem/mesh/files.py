@@ -219,8 +219,8 @@ def _read_gmsh(path):
     copy = _NAMES.sub(lambda section: _NAME.sub(keyed, section[0]), content, count=1)
     with tempfile.TemporaryDirectory() as folder:
         place = os.path.join(folder, "keyed.msh")
-        with open(place, "wb") as file:
-            file.write(copy)
+        with open(place, "wb") as other:
+            other.write(copy)
         return _keyed_by_dimension(meshio.read(place), names)
 
 

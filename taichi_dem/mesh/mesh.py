@@ -451,4 +451,5 @@ def _with_group(mesh: Mesh, kind: str, name: str, members: np.ndarray) -> Mesh:
         raise InputError(f"name must be that of a new group, got {shown(name)}, which is there")
     if not len(members):
         raise InputError(f"group {name} must have at least one member, but none was chosen")
-    return replace(mesh, **{kind: {**groups, name: members}})
+    more: Any = {kind: {**groups, name: members}}
+    return replace(mesh, **more)
