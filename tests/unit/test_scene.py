@@ -26,7 +26,7 @@ from taichi_dem.simulate import run_simulation
 from tests.scenes import beside
 
 BAR = bar(0.2, 0.05, (4, 1, 1))
-FALL, HELD = effects.Gravity(), effects.Fixed("first left")
+FALL, HELD = effects.Gravity(), effects.Fixed("first_left")
 START = bar(0.2, 0.1, (2, 1, 1))
 CENTRE = START.points[START.tetrahedra].mean(axis=1)
 COUNT, METHOD, UNTIL = START.body_count, Uniform(1e-7), 2e-6
@@ -48,11 +48,11 @@ def told(shift, *listed):
     ("shift", "listed", "expected"),
     [
         # Driven along x past each other, and away.
-        ([3.0, 1.0, 0], [moved("first left", 50, 0, 0)], False),
-        ([3.0, 0, 0], [moved("first left", -50, 0, 0)], False),
+        ([3.0, 1.0, 0], [moved("first_left", 50, 0, 0)], False),
+        ([3.0, 0, 0], [moved("first_left", -50, 0, 0)], False),
         # A shaker moves as far as its velocity over 2 pi f: 8 mm and 8 m.
-        ([3.0, 0, 0], [moved("first left", 50, 0, 0, frequency=1000.0)], False),
-        ([3.0, 0, 0], [moved("first left", 50, 0, 0, frequency=1.0)], True),
+        ([3.0, 0, 0], [moved("first_left", 50, 0, 0, frequency=1000.0)], False),
+        ([3.0, 0, 0], [moved("first_left", 50, 0, 0, frequency=1.0)], True),
         # Side by side on one shaker: only what is near may touch.
         ([0, 0.06, 0], [moved("left", 50, 0, 0)], True),
         ([1.0, 0, 0], [moved("left", 50, 0, 0)], False),
@@ -60,7 +60,7 @@ def told(shift, *listed):
         ([0, 1.0, 0], [HELD, FALL], True),
         ([1.0, 0, 0], [HELD, FALL], False),
         ([0, 0.06, 0], [FALL], False),
-        ([3.0, 1.0, 0], [effects.GasPressure("first left")], True),
+        ([3.0, 1.0, 0], [effects.GasPressure("first_left")], True),
     ],
 )
 def test_parts_without_contact_are_told_where_they_may_come_to_meet(shift, listed, expected):
