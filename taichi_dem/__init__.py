@@ -39,8 +39,7 @@ from taichi_dem.mesh.mesh import Mesh, checked_mesh
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects
-from taichi_dem.observers import At, Collector, Every, Observer, RunView
-from taichi_dem.output.receivers import Received, Receivers
+from taichi_dem.observers import At, Collector, Every, Observer, Received, Receivers, RunView
 from taichi_dem.output.record import write_paraview
 from taichi_dem.report.estimates import estimated_effects
 from taichi_dem.scene import Scene

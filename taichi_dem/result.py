@@ -16,7 +16,7 @@ from taichi_dem.kit.files import output_folder, remove_files, write_csv, write_t
 from taichi_dem.kit.validation import FileName
 from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
-from taichi_dem.output.receivers import Received, write_receivers
+from taichi_dem.observers import Received, write_receivers
 from taichi_dem.output.record import (
     Frame,
     remove_series,
