@@ -24,7 +24,6 @@ from taichi_dem.goals import Goal
 from taichi_dem.kit.accuracy.answer import Answer
 from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
 from taichi_dem.kit.checkpoint import Checkpoint
-from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
@@ -76,7 +75,6 @@ __all__ = [
     "SimulationDiverged",
     "StepControl",
     "SweepTable",
-    "Table",
     "Uniform",
     "__version__",
     "checked_mesh",

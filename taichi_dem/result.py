@@ -4,12 +4,13 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MethodType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.data_table import data_frame
 from taichi_dem.kit.display import counted, embedded, in_brief, titled, verbatim
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, remove_files, write_csv, write_text
@@ -45,8 +46,8 @@ class Result(RunTables):
         Method that stepped.
     model : Model
         Arrays of the scene.
-    history : Table
-        Columns by name with their units, one row a sample.
+    series : dict of str to ndarray
+        Columns of ``history`` by name, whose ends are their units, one row a sample.
     frames : tuple of Frame
         Snapshots.
     broken_time : ndarray
@@ -70,7 +71,7 @@ class Result(RunTables):
     scene: Scene
     method: Any
     model: Model
-    history: Table
+    series: dict[str, np.ndarray]
     frames: tuple[Frame, ...]
     broken_time: np.ndarray
     peak_speed: np.ndarray
@@ -80,13 +81,8 @@ class Result(RunTables):
     acting_since: dict[str, np.ndarray] = field(default_factory=dict)
     receivers: Mapping[str, Received] = field(default_factory=dict)
 
-    def __post_init__(self):
-        # Whatever mapping it was made from, also by dataclasses.replace.
-        if not isinstance(self.history, Table):
-            object.__setattr__(self, "history", Table(self.history, index="time_s"))
-
     def __repr__(self):
-        samples = counted(len(self.history.get("time_s", ())), "sample")
+        samples = counted(len(self.series.get("time_s", ())), "sample")
         frames, early = counted(len(self.frames), "frame"), "diverged" if self.diverged else ""
         return in_brief(self, self.report.outcome, samples, frames, early)
 
@@ -104,9 +100,14 @@ class Result(RunTables):
         """What acted and what was left out, with effects="auto"; else None."""
         return self.report.certificate
 
-    @property
-    def effects(self) -> Table:
-        """One row for each effect: what it did, since when, what was left out, and advice."""
+    @cached_property
+    def history(self) -> Any:
+        """Time series as a pandas.DataFrame, a row a sample; units in ``attrs["units"]``."""
+        return data_frame(self.series)
+
+    @cached_property
+    def effects(self) -> Any:
+        """A DataFrame, a row an effect: what it did, since when, what was left out, advice."""
         return self.report.advice().table()
 
     @property
@@ -141,7 +142,7 @@ class Result(RunTables):
         folder = output_folder(folder)
         place, name = os.path.join(folder, "paraview"), series_name(folder)
         remove_series(place, name)
-        write_csv(os.path.join(folder, "history.csv"), self.history)
+        write_csv(os.path.join(folder, "history.csv"), self.series)
         write_bonds(os.path.join(folder, "bonds.csv"), self.model, self.broken_time)
         write_mesh(os.path.join(folder, "mesh.msh"), self.scene.mesh)
         text = json.dumps({**self.report.as_dict(), "diverged": self.diverged}, indent=1)

@@ -9,7 +9,7 @@ from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, output_folder
-from taichi_dem.kit.progress.progress import Listener, Pace, Worded, compiling
+from taichi_dem.kit.progress.progress import Listener, Pace, Progress, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.restart import NoCheckpointWriter
 from taichi_dem.kit.validation import AUTO, FileName, instance, progress_option, shown, whole, word
@@ -217,7 +217,8 @@ class _Plan:
             time_s, seconds = simulation.time_s, simulation.run_seconds
             rates = (time_s, "s/s"), (simulation.evaluations(), "evaluations/s")
             words = ", ".join(prefixed(done / max(seconds, 1e-9), unit) for done, unit in rates)
-            tell(Worded(min(1.0, time_s / (self.last * self.dt0)), seconds, words))
+            share = min(1.0, time_s / (self.last * self.dt0))
+            tell(Progress(share, seconds, "stepping", words))
 
         made = [Call(sample, self._evenly(self.samples))]
         if self.frames:
@@ -282,7 +283,7 @@ def _result(simulation, recorder, writer, plan, tell, brief=False, start=None):
         scene=simulation.scene,
         method=simulation.method,
         model=simulation.model,
-        history=recorder.history(),
+        series=recorder.history(),
         frames=tuple(recorder.frames),
         broken_time=recorder.broken_time(),
         peak_speed=recorder.peak_speed,

@@ -13,7 +13,6 @@ import numpy as np
 
 from taichi_dem.kit.extended_xyz import XyzFrame, write_extended_xyz
 from taichi_dem.kit.files import write_bytes
-from taichi_dem.kit.optional import optional
 from taichi_dem.kit.validation import FileName, choice, positive
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES, signed_volumes
 from taichi_dem.mesh.topology import skin
@@ -23,6 +22,7 @@ from taichi_dem.output.fragments import (
     rigid_motion,
     rotations_of,
     shares_of_scale,
+    vectors_of,
 )
 from taichi_dem.output.record import body_corners, cell_data, corners_of_bodies
 from taichi_dem.state.model import centres
@@ -251,9 +251,10 @@ def _bodies(result, frame):
 
 
 def _fragments(result, frame):
-    found = fragments_of(result.model, frame, result.broken_time)
-    centre, rotation = rigid_motion(result.model, frame, found.of_body)
-    radius, velocity = 0.5 * found["diameter_m"], found.vectors("velocity")
+    of_body = fragment_of_body(result.model, result.broken_time <= frame.time_s)
+    found = fragments_of(result.model, frame, of_body)
+    centre, rotation = rigid_motion(result.model, frame, of_body)
+    radius, velocity = 0.5 * found["diameter_m"], vectors_of(found, "velocity")
     return centre, radius, velocity, rotation, found["mass_kg"], found["fragment"]
 
 
@@ -276,7 +277,9 @@ def write_vtkhdf(path: FileName, result: Any) -> None:
     -----
     Format: VTK File Formats, section VTKHDF, unstructured grid over time, version 2.0.
     """
-    h5py, model, frames = optional("h5py"), result.model, result.frames
+    import h5py
+
+    model, frames = result.model, result.frames
     # In memory: HDF5 on a full disk fails when it closes the file, and then again at the end.
     content = io.BytesIO()
     with h5py.File(content, "w") as file:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.validation import choice
 from taichi_dem.mesh.tetrahedra import signed_volumes
 from taichi_dem.output.record import Frame
@@ -27,43 +26,10 @@ COLOURS = {
 }
 
 
-class Fragments(Table):
-    """Table of the fragments at one time, the heaviest first.
-
-    Attributes
-    ----------
-    of_body : ndarray of int, shape (body_count,)
-        Fragment of each body, a row of the table.
-    time_s : float
-        Time [s].
-
-    Notes
-    -----
-    ``diameter_m`` is that of the sphere of the same volume. ``sieve_m`` estimates the opening of
-    the square sieve that a fragment just passes: the middle edge of the cuboid with the same
-    volume density and principal moments of inertia, in the shape at rest. A fragment's velocity is
-    its momentum by its mass, its spin its angular momentum by its inertia. ``kinetic_J`` is that of
-    its bodies; the share in ``translation_J`` and ``rotation_J`` is that of a rigid piece, the
-    rest is vibration.
-    """
-
-    of_body: np.ndarray
-    time_s: float
-
-    def vectors(self, name: str) -> np.ndarray:
-        """Collect the three columns of a vector.
-
-        Parameters
-        ----------
-        name : str
-            "centre" [m], "velocity" [m/s] or "spin" [rad/s].
-
-        Returns
-        -------
-        ndarray, shape (fragments, 3)
-        """
-        endings = {"centre": "m", "velocity": "m_s", "spin": "rad_s"}
-        return np.stack([self[f"{name}_{axis}_{endings[name]}"] for axis in _AXES], axis=1)
+def vectors_of(fragments: Any, name: str) -> np.ndarray:
+    """Three columns of a table as vectors, (n, 3); name: "centre", "velocity" or "spin"."""
+    endings = {"centre": "m", "velocity": "m_s", "spin": "rad_s"}
+    return np.stack([fragments[f"{name}_{axis}_{endings[name]}"] for axis in _AXES], axis=1)
 
 
 def fragment_of_body(model: Model, broken: np.ndarray) -> np.ndarray:
@@ -86,24 +52,33 @@ def fragment_of_body(model: Model, broken: np.ndarray) -> np.ndarray:
     return rank[number.reshape(-1)]
 
 
-def fragments_of(model: Model, frame: Frame, broken_time: np.ndarray) -> Fragments:
-    """Tabulate the fragments in a frame.
+def fragments_of(model: Model, frame: Frame, of_body: np.ndarray) -> dict[str, np.ndarray]:
+    """Tabulate the fragments in a frame, the heaviest first.
 
     Parameters
     ----------
     model : Model
     frame : Frame
-    broken_time : ndarray, shape (bond_count,)
-        When each bond broke [s], NaN while it holds.
+    of_body : ndarray of int, shape (body_count,)
+        Fragment of each body.
 
     Returns
     -------
-    Fragments
+    dict of str to ndarray
+        Columns by name.
+
+    Notes
+    -----
+    ``diameter_m`` is that of the sphere of the same volume. ``sieve_m`` estimates the opening of
+    the square sieve that a fragment just passes: the middle edge of the cuboid with the same
+    volume density and principal moments of inertia, in the shape at rest. A fragment's velocity is
+    its momentum by its mass, its spin its angular momentum by its inertia. ``kinetic_J`` is that of
+    its bodies; the share in ``translation_J`` and ``rotation_J`` is that of a rigid piece, the
+    rest is vibration.
     """
-    of_body = fragment_of_body(model, broken_time <= frame.time_s)
     mass = sums(of_body, model.body_mass)
     volume = sums(of_body, signed_volumes(model.mesh.points, model.mesh.tetrahedra))
-    columns = {
+    return {
         "fragment": np.arange(len(mass)),
         "bodies": np.bincount(of_body),
         "mass_kg": mass,
@@ -112,9 +87,6 @@ def fragments_of(model: Model, frame: Frame, broken_time: np.ndarray) -> Fragmen
         "sieve_m": _middle_edges(model, of_body, mass),
         **_motion(model, frame, of_body, mass),
     }
-    made = Fragments(columns, index="fragment")
-    made.of_body, made.time_s = of_body, frame.time_s
-    return made
 
 
 def _motion(model, frame, of_body, mass):

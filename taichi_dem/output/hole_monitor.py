@@ -1,10 +1,11 @@
 """A block with a hole: displacement at its wall, peak velocities over the distance."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.data_table import data_frame
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.fixed_order import dot, length, weakest_direction
 from taichi_dem.kit.validation import flag, positive
@@ -107,15 +108,15 @@ class Attenuation:
     __repr__ = by_fields
 
     @property
-    def table(self) -> Table:
-        """A row a body: its distance in radii, peak speed, and whether it is an inner one."""
+    def table(self) -> Any:
+        """A DataFrame, a row a body: distance in radii, peak speed, whether it is an inner one."""
         columns = {
             "body": np.arange(len(self.speed)),
             "distance_by_radius": self.distance,
             "peak_speed_m_s": self.speed,
             "is_inner": self.inner,
         }
-        return Table(columns, {"distance_by_radius": "1", "is_inner": "1"}, index="body")
+        return data_frame(columns)
 
     def power_law(self, nearest: float, inner_only: bool = True) -> tuple[float, float]:
         """Fit a power of the distance by least squares.

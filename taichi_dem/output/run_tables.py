@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.data_table import arrays_of, data_frame
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, whole
-from taichi_dem.output.cracks import Rose, cracks_of, rose_of
+from taichi_dem.output.cracks import cracks_of, rose_of
 from taichi_dem.output.export import write_gltf, write_particles, write_vtkhdf
-from taichi_dem.output.fragments import Fragments, fragments_of
+from taichi_dem.output.fragments import fragment_of_body, fragments_of
 from taichi_dem.output.hole_monitor import Attenuation, attenuation_of, watched_groups
 from taichi_dem.output.record import Frame
 from taichi_dem.report.energy_balance import GIVEN, HELD, TERMS
@@ -22,7 +22,7 @@ class RunTables:
 
     scene: Scene
     model: Model
-    history: Table
+    series: dict[str, np.ndarray]
     frames: tuple[Frame, ...]
     broken_time: np.ndarray
     peak_speed: np.ndarray
@@ -52,7 +52,7 @@ class RunTables:
             )
         return self.frames[whole("frame", number, -count, count - 1)]
 
-    def fragments(self, frame: int = -1) -> Fragments:
+    def fragments(self, frame: int = -1) -> Any:
         """Tabulate the bodies that unbroken bonds still join.
 
         Parameters
@@ -62,8 +62,9 @@ class RunTables:
 
         Returns
         -------
-        Fragments
-            Masses, sizes, places, velocities, spins and energies, a row a fragment.
+        pandas.DataFrame
+            Masses, sizes, places, velocities, spins and energies, a row a fragment, the heaviest
+            first (``taichi_dem.output.fragments.fragments_of``).
 
         Raises
         ------
@@ -78,31 +79,46 @@ class RunTables:
             print(pieces)
             print(pieces["sieve_m"][pieces["mass_kg"] > 0.1])
         """
-        return fragments_of(self.model, self.frame(frame), self.broken_time)
+        of_body = self.fragment_of_body(frame)
+        return data_frame(fragments_of(self.model, self.frame(frame), of_body))
 
-    def cracks(self) -> Table:
+    def fragment_of_body(self, frame: int = -1) -> np.ndarray:
+        """Fragment of each body, a row of ``fragments(frame)``.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame, the last by default.
+
+        Returns
+        -------
+        ndarray of int, shape (body_count,)
+        """
+        return fragment_of_body(self.model, self.broken_time <= self.frame(frame).time_s)
+
+    def cracks(self) -> Any:
         """Tabulate broken faces in their order: time, area, place, normal, strike, dip.
 
         Returns
         -------
-        Table
+        pandas.DataFrame
         """
         return cracks_of(self.model, self.broken_time)
 
-    def crack_area(self) -> Table:
+    def crack_area(self) -> Any:
         """Tabulate the area of all cracks [m^2] at the times of the history.
 
         Returns
         -------
-        Table
+        pandas.DataFrame
             ``time_s`` and ``crack_area_m2``; one side of a crack counts.
         """
-        made, times_s = self.cracks(), self.history["time_s"]
+        made, times_s = arrays_of(self.cracks()), self.series["time_s"]
         area = np.concatenate([[0.0], made["crack_area_m2"]])
         upto = np.searchsorted(made["time_s"], times_s, side="right")
-        return Table({"time_s": times_s, "crack_area_m2": area[upto]}, index="time_s")
+        return data_frame({"time_s": times_s, "crack_area_m2": area[upto]})
 
-    def rose(self, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36) -> Rose:
+    def rose(self, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36) -> Any:
         """Tabulate crack area by the direction of the cracks in a plane.
 
         Parameters
@@ -114,29 +130,29 @@ class RunTables:
 
         Returns
         -------
-        Rose
-            Area and number of faces by sector.
+        pandas.DataFrame
+            Area and number of faces by sector (``taichi_dem.output.cracks.rose_of``).
         """
         return rose_of(self.model, np.isfinite(self.broken_time), axis, sectors)
 
-    def energy_shares(self) -> Table:
+    def energy_shares(self) -> Any:
         """Tabulate every term of the energy balance as a share of the energy given, over time.
 
         Returns
         -------
-        Table
+        pandas.DataFrame
             ``time_s``; ``given_J``: work of loads and supports, energy injected at releases and
             held at the start; and a column ``NAME_share`` of each other term, ``residual_share`` of
             what is unexplained. Shares add up to 1 by the balance; where nothing is given they are
             NaN.
         """
-        history, time_s = self.history, self.history["time_s"]
+        history, time_s = self.series, self.series["time_s"]
         held = sum(history[f"{name}_J"][:1].sum() for name in HELD)
         given = sum((history[f"{name}_J"] for name in GIVEN), np.full(len(time_s), held))
         safe = np.where(given > 0.0, given, np.nan)
         terms = [n for n in TERMS if n not in GIVEN and f"{n}_J" in history]
         shares = {f"{name}_share": history[f"{name}_J"] / safe for name in terms}
-        return Table({"time_s": time_s, "given_J": given, **shares}, index="time_s")
+        return data_frame({"time_s": time_s, "given_J": given, **shares})
 
     def attenuation(self, group: str | None = None, radius: float | None = None) -> Attenuation:
         """Peak velocity of every body over its distance from a hole.

@@ -39,7 +39,7 @@ def _span(axes, time):
 
 def plot_energy(result: RunTables, *, path: FileName | None = None) -> Figure:
     """Draw the terms of the energy balance over time, and what is unexplained."""
-    history = result.history
+    history = result.series
     time = 1e3 * history["time_s"]
     present = {key: look for key, look in ENERGY_TERMS.items() if key in history}
     terms = {key: look for key, look in present.items() if np.abs(history[key]).max() > 0.0}

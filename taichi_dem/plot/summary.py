@@ -50,7 +50,7 @@ def picture_of_run(result: RunTables) -> Any:
         panels = figure.subplot_mosaic(places, height_ratios=(1.0, 1.3) if long else (1.0, 1.0))
         drawn, label = _draw_block(panels["block"], view, result)
         figure.colorbar(drawn, ax=panels["block"], label=label, aspect=25)
-        _draw_curves(panels, result.history)
+        _draw_curves(panels, result.series)
         return png_of(figure)
 
 

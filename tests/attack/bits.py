@@ -47,7 +47,7 @@ def blast():
     )
     result = simulate(scene, method=ImplicitDashpots(2e-7), until=4e-5, frames=1, progress=None)
     last = result.frames[-1]
-    return digest(*result.history.values(), last.position, last.velocity, last.damage)
+    return digest(*result.series.values(), last.position, last.velocity, last.damage)
 
 
 def damper():

@@ -58,8 +58,8 @@ def test_dropping_effects_that_never_acted_changes_no_bit(gentle):
     assert "softening" in advice.inactive and advice.missing == ()
     assert "gravity" not in advice.droppable
     again = ran(*(make() for make in GENTLE if make.name not in advice.inactive))
-    for name, column in gentle.history.items():
-        np.testing.assert_array_equal(again.history[name], column, err_msg=name)
+    for name, column in gentle.series.items():
+        np.testing.assert_array_equal(again.series[name], column, err_msg=name)
 
 
 def test_weight_of_all_is_all_the_work(gentle):
@@ -161,8 +161,8 @@ def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(scene
     silent = result_of(pulled(*(law().silent() for law in LAWS)))
     assert len(ENGINES._engines) == before
     without = result_of(pulled())
-    for key, values in silent.history.items():
-        assert values.tobytes() == without.history[key].tobytes(), key
+    for key, values in silent.series.items():
+        assert values.tobytes() == without.series[key].tobytes(), key
     for frame, other in zip(silent.frames, without.frames):
         assert frame.position.tobytes() == other.position.tobytes()
     assert silent.report.effects == without.report.effects

@@ -99,8 +99,8 @@ def assert_same(result, other):
     for name in ("position", "velocity", "rotation"):
         first, second = (getattr(one.frames[-1], name) for one in (result, other))
         assert first.tobytes() == second.tobytes(), name
-    for name, column in result.history.items():
-        assert column.tobytes() == other.history[name].tobytes(), name
+    for name, column in result.series.items():
+        assert column.tobytes() == other.series[name].tobytes(), name
 
 
 def test_a_moving_scene_has_the_bits_of_a_motion_set_by_hand(by_hand):

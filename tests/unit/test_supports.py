@@ -189,7 +189,7 @@ def test_holes_fire_one_after_the_other_and_each_has_its_columns():
     # Two pulses in one hole are one hole.
     again = effects.GasPressure("left", 1e7, start=delay)
     alone = simulate(Scene(mesh, CONCRETE, [first, again]), **options)
-    left, right = (both.history[f"{side}_radial_displacement_mm"] for side in ("left", "right"))
-    early = both.history["time_s"] <= delay
-    assert left[early].tobytes() == alone.history["hole_radial_displacement_mm"][early].tobytes()
+    left, right = (both.series[f"{side}_radial_displacement_mm"] for side in ("left", "right"))
+    early = both.series["time_s"] <= delay
+    assert left[early].tobytes() == alone.series["hole_radial_displacement_mm"][early].tobytes()
     assert left[early][-1] and not right[early].any() and right[-1]
