@@ -17,8 +17,7 @@ A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
 # First, out of order: it prepares the environment for ``import taichi``.
 from taichi_dem.kit import runtime  # isort: skip
 
-# The second is imported for what it tells ``kit.pictures``.
-from taichi_dem import effects, goals, methods, scene_pictures, shapes  # noqa: F401
+from taichi_dem import effects, goals, methods, shapes
 from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.goals import Goal
 from taichi_dem.kit.accuracy.answer import Answer

@@ -14,7 +14,6 @@ from taichi_dem.kit.plot_style import STYLE, area_key, filming, picture, write_g
 from taichi_dem.kit.progress.progress import drawing
 from taichi_dem.kit.validation import FileName, positive, unit_vector
 from taichi_dem.output.record import Frame
-from taichi_dem.output.run_tables import RunTables
 from taichi_dem.plot.series import level_look, level_names
 from taichi_dem.plot.view import (
     ALONG_Z,
@@ -49,7 +48,7 @@ _STEPS = 7
 
 
 def plot_cracks(
-    result: RunTables,
+    result: Any,
     frame: int = -1,
     *,
     magnify: float = 5.0,
@@ -185,7 +184,7 @@ def plot_steps(
 
 
 def plot_acting(
-    result: RunTables, *, axis: Sequence[float] = ALONG_Z, path: FileName | None = None
+    result: Any, *, axis: Sequence[float] = ALONG_Z, path: FileName | None = None
 ) -> Figure:
     """Draw the bodies at rest, coloured by the time from which an effect acts; a panel each."""
     model, acting_since, until = result.model, result.acting_since, result.frames[-1].time_s
@@ -210,7 +209,7 @@ def plot_acting(
 
 
 def plot_film(
-    result: RunTables,
+    result: Any,
     path: FileName,
     *,
     magnify: float = 5.0,
