@@ -14,13 +14,12 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.report.certificate import Certificate
 from ca_damper.report.needed_effects import needed_effects
 from ca_damper.report.report import Report
-from ca_damper.runs.amplitude_response import AmplitudeResponse
 from ca_damper.runs.damper_map import DamperMap, damper_map
 from ca_damper.runs.film import film
 from ca_damper.runs.frequency_sweep import Sweep, sweep_up_and_down
-from ca_damper.runs.response import Response, frequency_response
-from ca_damper.runs.shake import TimeHistory, shake
-from ca_damper.runs.shake_structure import StructureHistory, shake_structure
+from ca_damper.runs.history import StructureHistory, TimeHistory
+from ca_damper.runs.response import AmplitudeResponse, Response, frequency_response
+from ca_damper.runs.shake import shake, shake_structure
 from ca_damper.scenes.table import SceneTable
 from ca_damper.solve_response import solve_response
 from ca_damper.spheres import Spheres

@@ -11,16 +11,14 @@ and Wanner, Solving Ordinary Differential Equations I, section II.4.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import taichi as ti
 from numpy.typing import ArrayLike
 
-from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.elementary import fifth_root
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import finite, positive, shown, whole
 
 #: Attempts after which an integration counts as stuck, unless the caller says otherwise.
 MOST_ATTEMPTS = 1_000_000
@@ -150,21 +148,12 @@ def stuck(t, t_end, h, attempts, most_attempts):
     return (attempts >= most_attempts) | (h <= _SMALLEST_SHARE * max(abs(t), abs(t_end)))
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """A solved initial value problem.
-
-    t: (n,) times of the accepted steps, first and last included. y: (n, k) states there.
-    rejected: attempts thrown away. evaluations: of the right-hand side.
-    """
+class Solution(NamedTuple):
+    """States y (n, k) at times t (n,), and evaluations of the right-hand side."""
 
     t: np.ndarray
     y: np.ndarray
-    rejected: int
     evaluations: int
-
-    def __repr__(self):
-        return by_fields(self)
 
 
 def solve(
@@ -175,97 +164,38 @@ def solve(
     rtol: float = 1e-6,
     atol: float = 1e-9,
     at: ArrayLike | None = None,
-    first: float | None = None,
-    most_attempts: int = MOST_ATTEMPTS,
 ) -> Solution:
-    """Solve dy/dt = rhs(t, y) from y(span[0]) = y0 to span[1] in Python.
+    """Solve dy/dt = rhs(t, y) from y(span[0]) = y0 to span[1] in Python, as kernels do.
 
-    y0: (k,) numbers. rtol, atol: local error allowed, |error| <= atol + rtol |y| in the Euclidean
-    mean. at: ascending times in the span at which y is wanted; the steps land on them, so they are
-    as exact as the rest. All accepted steps are given if None. first: first step to try, chosen by
-    itself if None.
-    Raises InputError for a bad argument or when the end is not reached within most_attempts.
+    rtol, atol: local error allowed, |error| <= atol + rtol |y| in the Euclidean mean. at: ascending
+    times in the span at which y is wanted; the steps land on them. All accepted steps are given if
+    None. Raises InputError where the end is not reached in MOST_ATTEMPTS.
     """
-    t, t_end = _checked_span(span)
-    y = _checked_numbers("y0", y0)
-    whole("most_attempts", most_attempts, 1, 2**31 - 1)
-    rtol = positive("rtol", rtol, zero_allowed=True)
-    atol = positive("atol", atol)
-    wanted = None if at is None else _checked_times(at, t, t_end)
+    t, t_end = map(float, span)
+    y, wanted = (
+        np.atleast_1d(np.asarray(y0, dtype=np.float64)),
+        np.atleast_1d([] if at is None else at),
+    )
 
     def derivative(_, time, state):
         """The user's right-hand side, in the shape that the stages call."""
         return np.asarray(rhs(time, state), dtype=np.float64)
 
     slope = derivative(None, t, y)
-    h = positive("first", first) if first is not None else None
-    extra = 1 if h is not None else 2
-    h = h or first_step(derivative, None, t, y, slope, rtol, atol)
-    inner = () if wanted is None else wanted[(wanted > t) & (wanted < t_end)]
-    path = _Path(derivative, t, y, slope, h, most_attempts)
-    for stop in (*inner, t_end):
-        path.go(stop, rtol, atol)
-    times, states = np.array(path.times), np.array(path.states)
-    rejected, evaluations = path.attempts - len(times) + 1, 6 * path.attempts + extra
-    if wanted is not None:
-        times, states = wanted, states[np.searchsorted(times, wanted)]
-    return Solution(times, states, rejected, evaluations)
-
-
-class _Path:
-    """Accepted times and states of an integration."""
-
-    def __init__(self, derivative, t, y, slope, h, most_attempts):
-        self.derivative, self.slope, self.h = derivative, slope, h
-        self.times, self.states = [t], [y]
-        self.attempts, self.most_attempts = 0, most_attempts
-
-    def go(self, stop, rtol, atol):
-        """Go on to a time and land on it."""
-        t, y = self.times[-1], self.states[-1]
+    h = first_step(derivative, None, t, y, slope, rtol, atol)
+    times, states, attempts = [t], [y], 0
+    for stop in (*wanted[(wanted > t) & (wanted < t_end)], t_end):
         while t < stop:
-            t, y, self.slope, size, error = attempt(
-                self.derivative, None, t, stop, y, self.slope, self.h, rtol, atol
-            )
-            self.attempts += 1
+            t, y, slope, size, error = attempt(derivative, None, t, stop, y, slope, h, rtol, atol)
+            attempts += 1
             if error <= 1.0:
-                self.times.append(t)
-                self.states.append(y)
+                times.append(t)
+                states.append(y)
             # A step cut short by the stop shortens no later one.
-            least = self.h if size < self.h and error <= 1.0 else 0.0
-            self.h = max(least, size * growth(error))
-            self._refuse_if_stuck(t, stop)
-
-    def _refuse_if_stuck(self, t, stop):
-        if t < stop and stuck(t, stop, self.h, self.attempts, self.most_attempts):
-            raise InputError(
-                f"rhs must be smooth up to t = {stop:g} for these tolerances: after "
-                f"{self.attempts} attempts the solver is stuck at t = {t:.6g} with steps of "
-                f"{self.h:.3g}"
-            )
-
-
-def _checked_times(at, t, t_end):
-    times = _checked_numbers("at", at)
-    inside = (times >= t).all() and (times <= t_end).all()
-    if not inside or (np.diff(times) < 0.0).any():
-        raise InputError(f"at must be ascending times in [{t:g}, {t_end:g}], got {shown(at)}")
-    return times
-
-
-def _checked_span(span):
-    two = isinstance(span, (tuple, list)) and len(span) == 2 and all(finite(time) for time in span)
-    if not two or span[0] > span[1]:
-        raise InputError(f"span must be two finite times in order, got {shown(span)}")
-    return float(span[0]), float(span[1])
-
-
-def _checked_numbers(name, values):
-    """Finite numbers as an array (n,)."""
-    try:
-        numbers = np.atleast_1d(values)
-        if numbers.dtype.kind not in "iuf" or numbers.ndim != 1 or not np.isfinite(numbers).all():
-            raise ValueError
-    except ValueError:
-        raise InputError(f"{name} must be finite numbers, got {shown(values)}") from None
-    return numbers.astype(np.float64)
+            h = max(h if size < h and error <= 1.0 else 0.0, size * growth(error))
+            if t < stop and stuck(t, stop, h, attempts, MOST_ATTEMPTS):
+                raise InputError(f"rhs must be smooth up to t = {stop:g}, got stuck at t = {t:.6g}")
+    found = Solution(np.array(times), np.array(states), 6 * attempts + 2)
+    if at is None:
+        return found
+    return found._replace(t=wanted, y=found.y[np.searchsorted(found.t, wanted)])

@@ -329,21 +329,6 @@ class Cycles:
         return (real_numbers("damping", damping, 0.0) + self.apparent_damping) / critical
 
 
-def history_dataset(
-    history: Any, places: tuple[str, ...], others: dict[str, tuple[str, ...]], axes: dict[str, Any]
-) -> Any:
-    """An xarray Dataset of a history: base, x, v and force over time, rms and peak of the run.
-
-    places: dimensions of x, v, rms and peak beside time. others: those of the rest, by name. axes:
-    of ``data_table.dataset``, but for time.
-    """
-    over_time = {"base": (), "x": places, "v": places, **others}
-    dims = {name: ("time", *own) for name, own in over_time.items()}
-    dims.update(rms=places, peak=places)
-    found = {name: (own, getattr(history, name), SAMPLE_UNITS[name]) for name, own in dims.items()}
-    return dataset(found, {"time": (history.time_s, "s"), **axes}, filling=history.label)
-
-
 def first_harmonic(phase: ArrayLike, values: ArrayLike) -> tuple[float, float]:
     """Amplitude of a quantity over a cycle, and its lag [degrees] behind sin(2 pi phase).
 

@@ -1,5 +1,6 @@
 """Maps of a driven damper: loss and apparent mass over amplitude, frequency, number, clearance."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,11 +12,12 @@ from ca_damper.batch import Batch
 from ca_damper.filling import Filling, check_filling
 from ca_damper.report.progress import Stages
 from ca_damper.report.report import Report
-from ca_damper.scenes.checks import MOST_CYCLES, MOST_SCENES, MOST_SEED
+from ca_damper.runs.result import Result, scenes_over
+from ca_damper.scenes.checks import MOST_CYCLES, MOST_SCENES, run_seeds
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.scenes.table import SceneTable
 from ca_damper.theory.collect_and_collide import CollectAndCollide, collect_and_collide
-from taichi_dem.kit.data_table import Table, Tabulated, dataset
+from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
@@ -29,12 +31,9 @@ from taichi_dem.kit.validation import (
     whole,
 )
 
-_AXES = ("clearances", "particles", "amplitudes", "frequencies", "seeds")
-_UNITS = ("m", "1", "m", "Hz", "1")
-
 
 @dataclass(frozen=True, eq=False)
-class DamperMap(Tabulated):
+class DamperMap(Result):
     """Measures of a container that is driven as A sin(2 pi f t), whatever its filling does.
 
     The axes of all measures are clearances, particles, amplitudes, frequencies, seeds, in this
@@ -129,29 +128,24 @@ class DamperMap(Tabulated):
         """Collect and collide without gravity, at every clearance, number and amplitude."""
         return collect_and_collide(np.array(self.amplitudes), self.gaps[:, :, None])
 
-    def to_xarray(self) -> Any:
-        """An xarray Dataset over clearance, particles, amplitude, frequency and seed.
-
-        Returns
-        -------
-        xarray.Dataset
-            ``apparent_damping``, ``apparent_mass``, ``loss``, ``mass_share``, ``energy``, and
-            ``gap``, the clearance of each box; units in attributes.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
-        """
-        dims = "clearance", "particles", "amplitude", "frequency", "seed"
-        units = {"apparent_damping": "N s/m", "apparent_mass": "kg", "loss": "1"}
-        units.update(mass_share="1", energy="1")
-        found: dict[str, Any] = {n: (dims, getattr(self, n), u) for n, u in units.items()}
-        found["gap"] = dims[:2], self.gaps, "m"
-        axes = {one: (getattr(self, name), unit) for one, name, unit in zip(dims, _AXES, _UNITS)}
+    def _axes(self) -> dict[str, Any]:
+        axes = {
+            "clearance": (self.clearances, "m"),
+            "particles": (self.particles, "1"),
+            "amplitude": (self.amplitudes, "m"),
+            "frequency": (self.frequencies, "Hz"),
+            "seed": (self.seeds, "1"),
+        }
         if self.clearances == (None,):
             del axes["clearance"]
-        return dataset(found, axes, filling=self.label)
+        return axes
+
+    def _variables(self) -> dict[str, Any]:
+        dims = "clearance", "particles", "amplitude", "frequency", "seed"
+        pure = dict.fromkeys(("loss", "mass_share", "energy"), "1")
+        units = {"apparent_damping": "N s/m", "apparent_mass": "kg", **pure}
+        found = {name: (dims, getattr(self, name), unit) for name, unit in units.items()}
+        return {**found, "gap": (dims[:2], self.gaps, "m")}
 
     def table(self) -> Table:
         """A row a scene: its place on the axes, measures, and the theory's loss and mass.
@@ -161,21 +155,26 @@ class DamperMap(Tabulated):
         Table
             Columns by name, units in ``units``.
         """
-        indices = np.indices(self.loss.shape).reshape(len(_AXES), -1)
-        clearance, number, amplitude = indices[:3]
-        columns: dict[str, Any] = {"filling": [self.label] * len(clearance)}
-        columns["clearance_m"] = self.gaps[clearance, number]
-        units = {"particles": "particles", "amplitudes": "amplitude_m"}
-        units.update(frequencies="frequency_Hz", seeds="seed")
-        for name, axis in zip(_AXES[1:], indices[1:]):
-            columns[units[name]] = np.array(getattr(self, name))[axis]
-        for name in ("loss", "mass_share", "energy"):
-            columns[name] = getattr(self, name).ravel()
-        made = self.theory
-        for name in ("loss", "mass"):
-            columns[f"{name}_theory"] = getattr(made, name)[clearance, number, amplitude]
-        pure = "filling", "loss", "mass_share", "energy", "loss_theory", "mass_theory"
-        return Table(columns, dict.fromkeys(pure, "1"))
+        columns: dict[str, Any] = {"filling": [self.label] * self.loss.size}
+        columns |= scenes_over(
+            clearance_m=range(len(self.clearances)),
+            particles=self.particles,
+            amplitude_m=self.amplitudes,
+            frequency_Hz=self.frequencies,
+            seed=self.seeds,
+        )
+        columns["clearance_m"] = self._of_scenes(self.gaps)
+        measures = "loss", "mass_share", "energy"
+        columns |= {name: getattr(self, name).ravel() for name in measures}
+        made = {"loss_theory": self.theory.loss, "mass_theory": self.theory.mass}
+        columns |= {name: self._of_scenes(values) for name, values in made.items()}
+        return Table(columns, dict.fromkeys(("filling", *measures, *made), "1"))
+
+    def _of_scenes(self, values: np.ndarray) -> np.ndarray:
+        """Values over the first axes as a number a scene, (scenes,)."""
+        shape = self.loss.shape
+        alike = np.reshape(values, (*values.shape, *[1] * (len(shape) - values.ndim)))
+        return np.broadcast_to(alike, shape).ravel()
 
 
 def damper_map(
@@ -236,80 +235,65 @@ def damper_map(
     ...     Spheres(), amplitudes=[5e-3, 1e-2], frequencies=10.0, particles=30
     ... )  # doctest: +SKIP
     """
-    check_filling(filling)
     progress_option("progress", progress)
-    plan = _Plan(filling, amplitudes, frequencies, particles, seeds)
-    plan.transient = whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
-    plan.measured = whole("measured_cycles", measured_cycles, 1, 100_000)
-    plan.dt = automatic_dt(filling.default_dt, max(plan.frequencies))
-    plan.dt = plan.dt if dt is None else positive("dt", dt)
-    jobs = plan.jobs(clearances)
+    axes = {
+        "particles": several("particles", particles, lambda n, x: whole(n, x, 1, 1_000_000)),
+        "amplitudes": several("amplitudes", amplitudes, positive),
+        "frequencies": several("frequencies", frequencies, positive),
+        "seeds": run_seeds(seeds),
+    }
+    scenes = math.prod(map(len, axes.values()))
+    if scenes > MOST_SCENES:
+        raise InputError(
+            f"amplitudes x frequencies x particles x seeds must make at most {MOST_SCENES} "
+            f"scenes, got {scenes}"
+        )
+    cycles = (
+        whole("transient_cycles", transient_cycles, 0, MOST_CYCLES),
+        whole("measured_cycles", measured_cycles, 1, 100_000),
+    )
+    longest = automatic_dt(check_filling(filling).default_dt, max(axes["frequencies"]))
+    step = longest if dt is None else positive("dt", dt)
+    ways = (None,) if clearances is None else several("clearances", clearances, positive)
+    jobs = _jobs(filling, axes["particles"], ways)
     with reporting(progress, "map") as report_progress:
         tell = Stages(report_progress, [(k + 1.0) / len(jobs) for k in range(len(jobs))])
-        runs = [plan.run(one, numbers, tell) for one, numbers in jobs]
-    return plan.map(clearances, jobs, runs)
-
-
-class _Plan:
-    """The checked axes of a map."""
-
-    transient: int
-    measured: int
-    dt: float
-
-    def __init__(self, filling, amplitudes, frequencies, particles, seeds):
-        self.filling = filling
-        self.amplitudes = several("amplitudes", amplitudes, positive)
-        self.frequencies = several("frequencies", frequencies, positive)
-        self.particles = several("particles", particles, lambda n, x: whole(n, x, 1, 1_000_000))
-        if not hasattr(seeds, "__iter__") or isinstance(seeds, (str, bytes, dict)):
-            seeds = range(1, whole("seeds", seeds, 1, 1_000_000) + 1)
-        self.seeds = several("seeds", seeds, lambda n, x: whole(n, x, 0, MOST_SEED))
-        self.scenes = len(self.amplitudes) * len(self.frequencies) * len(self.seeds)
-        if self.scenes * len(self.particles) > MOST_SCENES:
-            raise InputError(
-                f"amplitudes x frequencies x particles x seeds must make at most {MOST_SCENES} "
-                f"scenes, got {self.scenes * len(self.particles)}"
-            )
-
-    def jobs(self, clearances):
-        """(filling, particle numbers) of each batch."""
-        if clearances is None:
-            return [(self.filling, self.particles)]
-        ways = several("clearances", clearances, positive)
-        return [
-            (with_clearance(self.filling, number, way), (number,))
-            for way in ways
-            for number in self.particles
+        runs = [
+            _run(one, {**axes, "particles": numbers}, step, cycles, tell) for one, numbers in jobs
         ]
+    gaps = [clearance_of(one, number) for one, numbers in jobs for number in numbers]
+    shape = len(ways), *map(len, axes.values())
+    measures = {
+        name: np.concatenate([getattr(found, name) for found, _ in runs]).reshape(shape)
+        for name in ("apparent_damping", "apparent_mass")
+    }
+    return DamperMap(
+        label=filling.label,
+        particle_mass=filling.particle_mass,
+        clearances=ways,
+        gaps=np.array(gaps).reshape(shape[:2]),
+        reports=tuple(report for _, report in runs),
+        **axes,
+        **measures,
+    )
 
-    def run(self, filling, numbers, progress):
-        """Cycles of all scenes of a batch, and its report."""
-        axes = numbers, self.amplitudes, self.frequencies, self.seeds
-        number, size, frequency, seed = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
-        table = SceneTable(number, seed, self.dt, frequency, size)
-        batch = Batch(filling, table, mount="base", measured_cycles=self.measured)
-        batch.start()
-        return batch.run(self.transient, self.measured, progress), batch.report()
 
-    def map(self, clearances, jobs, runs):
-        """The map of all runs."""
-        ways = (None,) if clearances is None else several("clearances", clearances, positive)
-        shape = len(ways), len(self.particles), len(self.amplitudes), len(self.frequencies)
-        gaps = [clearance_of(one, number) for one, numbers in jobs for number in numbers]
+def _jobs(filling, particles, clearances):
+    """(filling, particle numbers) of each batch."""
+    if clearances == (None,):
+        return [(filling, particles)]
+    pairs = itertools.product(clearances, particles)
+    return [(with_clearance(filling, number, way), (number,)) for way, number in pairs]
 
-        def joined(name):
-            values = [getattr(cycles, name) for cycles, _ in runs]
-            return np.concatenate(values).reshape(*shape, len(self.seeds))
 
-        return DamperMap(
-            *(self.filling.label, self.filling.particle_mass, ways, self.particles),
-            *(self.amplitudes, self.frequencies, self.seeds),
-            gaps=np.array(gaps).reshape(shape[:2]),
-            apparent_damping=joined("apparent_damping"),
-            apparent_mass=joined("apparent_mass"),
-            reports=tuple(report for _, report in runs),
-        )
+def _run(filling, axes, dt, cycles, progress):
+    """Cycles of all scenes of a batch, and its report."""
+    scenes = scenes_over(**axes)
+    frequency, size = scenes["frequencies"], scenes["amplitudes"]
+    table = SceneTable(scenes["particles"], scenes["seeds"], dt, frequency, size)
+    batch = Batch(filling, table, mount="base", measured_cycles=cycles[1])
+    batch.start()
+    return batch.run(*cycles, progress), batch.report()
 
 
 def clearance_of(filling: Any, particles: int) -> float:

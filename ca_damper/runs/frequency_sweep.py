@@ -180,91 +180,54 @@ def sweep_up_and_down(
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
     check_run(transient_cycles, start, progress)
-    way = _Way(grid)
+    ways = _Ways(grid)
     with reporting(progress, "sweep") as report_progress:
         batch = grid.batch(grid.ratios[:1], measured_cycles)
         batch.start(start)
-        job = f"sweep, {grid.words()}, {transient_cycles} + {measured_cycles} cycles from {start}"
-        with batch.checkpointed(
-            checkpoint, resume, {"job": job}, way.checkpoint_owners()
-        ) as writer:
-            tell = Stages(report_progress, way.ends())
-            for k in way.pending():
+        job = f"sweep, {transient_cycles} + {measured_cycles} cycles from {start}"
+        identity = {"job": f"{job}, {grid.identity()}"}
+        with batch.checkpointed(checkpoint, resume, identity, {"ways": ways}) as writer:
+            pending = ways.order[ways.done :]
+            ends = (np.arange(len(pending)) + 1.0) / max(1, len(pending))
+            tell = Stages(report_progress, ends)
+            for _, k in pending:
                 if not batch.going_on:
                     batch.drive(grid.ratios[k] * grid.oscillator.natural_frequency)
-                cycles = batch.run(transient_cycles, measured_cycles, tell)
-                way.record(k, batch, cycles)
+                ways.record(batch, batch.run(transient_cycles, measured_cycles, tell))
             writer.save()
-    up, down = way.up, way.down
-    report, errors = batch.report(), (up.values[_ERROR], down.values[_ERROR])
-    return Sweep(up.response(), down.response(), report, *errors)
+    responses = ways.response(0), ways.response(1)
+    return Sweep(*responses, batch.report(), *ways.values[_ERROR])
 
 
-class _Way:
-    """The ratios of a sweep, up and down, and how many of them are done."""
+class _Ways:
+    """Measures of both directions, frequency by frequency; how many of them are done."""
 
     def __init__(self, grid):
-        self.up, self.down, self.done = _Collected(grid), _Collected(grid), 0
-        self.count = len(grid.ratios)
+        self.grid, self.done, count = grid, 0, len(grid.ratios)
+        self.order = [(0, k) for k in range(count)] + [(1, k) for k in reversed(range(count))]
+        self.steps = np.zeros((2, count), dtype=np.int32)
+        self.values = {name: np.empty((2, *grid.shape)) for name in (*MEASURE_UNITS, _ERROR)}
 
-    def checkpoint_owners(self):
-        """Data for a checkpoint, (name, owner) pairs."""
-        return ("way", self), ("up", self.up), ("down", self.down)
-
-    def ends(self):
-        """Shares of the remaining run at which each of the remaining ratios ends."""
-        ahead = 2 * self.count - self.done
-        return (np.arange(ahead) + 1.0) / max(1, ahead)
-
-    def pending(self):
-        """Numbers of the ratios that are not done, in order."""
-        return [*range(self.count), *reversed(range(self.count))][self.done :]
-
-    def record(self, k, batch, cycles):
-        """Record the measures at ratio number k."""
-        (self.up if self.done < self.count else self.down).record(k, batch, cycles)
+    def record(self, batch, cycles):
+        """Record the measures at the next frequency; half-widths hold at all of them together."""
+        way, k = self.order[self.done]
+        confidence = 1.0 - 0.05 / len(self.grid.ratios)
+        errors = np.array([half_width(row, confidence) for row in cycles.rms_by_cycle])
+        for name, value in {**self.grid.measures(cycles), _ERROR: errors}.items():
+            self.values[name][way, :, k] = value.reshape(-1, len(self.grid.seeds))
+        self.steps[way, k] = batch.steps_per_cycle[0]
         self.done += 1
 
     def saved(self):
         """Data for a checkpoint, arrays by name."""
-        return {"done": np.array(self.done)}
+        return {"done": np.array(self.done), "steps": self.steps, **self.values}
 
     def resume(self, saved):
         """Restore the data that ``saved`` returned."""
-        self.done = int(saved["done"])
-
-
-class _Collected:
-    """Measures of one direction, frequency by frequency."""
-
-    def __init__(self, grid):
-        self.grid = grid
-        self.steps = np.zeros(len(grid.ratios), dtype=np.int32)
-        self.values = {name: np.empty(grid.shape) for name in (*MEASURE_UNITS, _ERROR)}
-
-    def record(self, k, batch, cycles):
-        """Record the measures at ratio number k."""
-        particles, _, seeds = self.grid.shape
-        self.steps[k] = batch.steps_per_cycle[0]
-        found = {**self.grid.measures(cycles), _ERROR: self._errors(cycles)}
-        for name, value in found.items():
-            self.values[name][:, k] = value.reshape(particles, seeds)
-
-    def _errors(self, cycles):
-        """Half-widths of the RMS [m], at all frequencies together, (scenes,)."""
-        confidence = 1.0 - 0.05 / len(self.grid.ratios)
-        return np.array([half_width(row, confidence) for row in cycles.rms_by_cycle])
-
-    def saved(self):
-        """Data for a checkpoint, arrays by name."""
-        return {"steps": self.steps, **self.values}
-
-    def resume(self, saved):
-        """Restore the data that ``saved`` returned."""
-        self.steps = saved["steps"]
+        self.done, self.steps = int(saved["done"]), saved["steps"]
         self.values = {name: saved[name] for name in self.values}
 
-    def response(self):
-        """All of them."""
-        measures = {name: self.values[name] for name in MEASURE_UNITS}
-        return self.grid.response(self.steps, measures)
+    def response(self, way):
+        """All of one direction."""
+        measures = {name: self.values[name][way] for name in MEASURE_UNITS}
+        return self.grid.response(self.steps[way], measures)

@@ -1,7 +1,7 @@
 """Frequency response of the damped structure: every particle number, frequency and seed a scene."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,18 +13,19 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.report.measures import MEASURE_UNITS, Cycles, column_of, peak
 from ca_damper.report.report import Report
 from ca_damper.report.steady_state import LEAST_TESTED, change_of_halves, half_width
-from ca_damper.runs.amplitude_response import AmplitudeResponse
-from ca_damper.scenes.checks import MOST_SCENES, MOST_SEED, check_run
+from ca_damper.runs.result import Result, scenes_over
+from ca_damper.scenes.checks import MOST_SCENES, check_run, run_seeds
 from ca_damper.scenes.clock import automatic_dt, steps_per_cycle
 from ca_damper.scenes.table import SceneTable
-from taichi_dem.kit.checkpoint import Checkpoint
-from taichi_dem.kit.data_table import Table, Tabulated, dataset
+from taichi_dem.kit.checkpoint import Checkpoint, identity_of
+from taichi_dem.kit.data_table import Table, Tabulated
 from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.optional import optional
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.units import unit_of
-from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, whole
+from taichi_dem.kit.validation import AUTO, FileName, choice, instance, positive, several, whole
 
 #: Particle numbers that a notebook shows, evenly over those there are.
 _MOST_SHOWN = 8
@@ -43,7 +44,7 @@ _PEAK_COLUMNS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Response(Tabulated):
+class Response(Result):
     """Response curves of a filling; every measure is an array (particles, ratios, seeds).
 
     As the last line of a notebook's cell it shows its curves and a table of the peaks; a peak at an
@@ -181,27 +182,30 @@ class Response(Tabulated):
         """
         return Table(self.columns(), {"filling": "1"})
 
+    def _axes(self) -> dict[str, Any]:
+        frequency = self.ratios * self.oscillator.natural_frequency
+        axes = {"particles": (self.particles, "1"), "frequency": (frequency, "Hz")}
+        return {**axes, "seed": (self.seeds, "1")}
+
+    def _variables(self) -> dict[str, Any]:
+        dims = "particles", "frequency", "seed"
+        return {name: (dims, getattr(self, name), unit) for name, unit in self.units.items()}
+
     def to_xarray(self) -> Any:
-        """All measures as an xarray Dataset over particles, frequency and seed.
+        """As of ``Result``, over particles, frequency and seed; ``ratio`` is along frequency.
 
         Returns
         -------
         xarray.Dataset
-            Units in the attributes of each variable; ``ratio`` is a second coordinate along
-            frequency, the filling an attribute.
+            Units in the attributes of each variable, the filling in its own.
 
         Raises
         ------
         InputError
             Where xarray is not installed.
         """
-        dims = "particles", "frequency", "seed"
-        found = {name: (dims, getattr(self, name), unit) for name, unit in self.units.items()}
-        frequency = self.ratios * self.oscillator.natural_frequency
-        axes: dict[str, Any] = {"particles": (self.particles, "1"), "frequency": (frequency, "Hz")}
-        axes["seed"] = self.seeds, "1"
-        made = dataset(found, axes, filling=self.label)
-        return made.assign_coords(ratio=("frequency", self.ratios, {"units": "1"}))
+        ratio = "frequency", self.ratios, {"units": "1"}
+        return super().to_xarray().assign_coords(ratio=ratio)
 
     @property
     def plot(self) -> Any:
@@ -219,12 +223,101 @@ class Response(Tabulated):
         dict
             Columns by name, which ends in the unit.
         """
-        grids = np.meshgrid(self.particles, self.ratios, self.seeds, indexing="ij")
-        columns = dict(zip(("particles", "ratio", "seed"), (grid.ravel() for grid in grids)))
+        columns: dict[str, Any] = {"filling": [self.label] * self.rms.size}
+        columns |= scenes_over(particles=self.particles, ratio=self.ratios, seed=self.seeds)
         columns["frequency_Hz"] = columns["ratio"] * self.oscillator.natural_frequency
-        for name in MEASURE_UNITS:
-            columns[column_of(name)] = getattr(self, name).ravel()
-        return {"filling": [self.label] * grids[0].size, **columns}
+        return columns | {column_of(name): getattr(self, name).ravel() for name in MEASURE_UNITS}
+
+
+@dataclass(frozen=True, eq=False)
+class AmplitudeResponse(Tabulated):
+    """A Response for each amplitude of the base, from one batch.
+
+    Returned by ``frequency_response`` for several amplitudes of the base. It has a length, items by
+    number, and can be iterated over.
+
+    Parameters
+    ----------
+    amplitudes : tuple of float
+        Amplitudes of the base [m].
+    responses : tuple of Response
+        A Response for each amplitude; each has the report of the whole batch.
+    """
+
+    amplitudes: tuple[float, ...]
+    responses: tuple[Response, ...]
+
+    def __repr__(self) -> str:
+        amplitudes = f"base amplitudes {listed([1e3 * a for a in self.amplitudes])} mm"
+        return in_brief(self, amplitudes, self.responses[0].axes_in_words())
+
+    def __len__(self) -> int:
+        return len(self.responses)
+
+    def __getitem__(self, k: int) -> Response:
+        return self.responses[k]
+
+    def __iter__(self) -> Iterator[Response]:
+        return iter(self.responses)
+
+    def measure(self, name: str) -> np.ndarray:
+        """Measure of all responses by name, stacked by amplitude.
+
+        Parameters
+        ----------
+        name : str
+            Name of a measure of a Response, such as ``"rms"``.
+
+        Returns
+        -------
+        ndarray
+            Values, shape (amplitudes, particles, ratios, seeds), in the unit of the measure.
+        """
+        choice("name", name, MEASURE_UNITS)
+        return np.stack([getattr(one, name) for one in self.responses])
+
+    def peaks(self) -> tuple[np.ndarray, np.ndarray]:
+        """Locate the peak of each curve.
+
+        Returns
+        -------
+        tuple of (ndarray, ndarray)
+            Frequency ratio f/f0 [-] and RMS displacement [m] of the peaks, each of shape
+            (amplitudes, particles, seeds); NaN where a peak lies outside the ratios.
+        """
+        ratio, rms = zip(*(one.peaks() for one in self.responses))
+        return np.stack(ratio), np.stack(rms)
+
+    def table(self) -> Table:
+        """A row a scene, as of ``Response.table``, with its amplitude in front.
+
+        Returns
+        -------
+        Table
+            Columns by name, units in ``units``.
+        """
+        columns = [one.columns() for one in self.responses]
+        sizes = [len(one["filling"]) for one in columns]
+        joined = {name: np.concatenate([one[name] for one in columns]) for name in columns[0]}
+        amplitude = np.repeat(self.amplitudes, sizes)
+        return Table({"base_amplitude_m": amplitude, **joined}, {"filling": "1"})
+
+    def to_xarray(self) -> Any:
+        """As ``Response.to_xarray``, over base_amplitude [m] too.
+
+        Returns
+        -------
+        xarray.Dataset
+            Units in the attributes of each variable.
+
+        Raises
+        ------
+        InputError
+            Where xarray is not installed.
+        """
+        xarray = optional("xarray")
+        axis = xarray.Variable("base_amplitude", list(self.amplitudes), {"units": "m"})
+        return xarray.concat([one.to_xarray() for one in self.responses], axis)
 
 
 def frequency_response(
@@ -302,7 +395,7 @@ def frequency_response(
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt, base_amplitude)
     check_run(transient_cycles, start, progress)
-    job = f"response, {grid.words()}, {transient_cycles} + {measured_cycles} cycles from {start}"
+    job = f"response, {grid.identity()}, {transient_cycles} + {measured_cycles} cycles from {start}"
     with reporting(progress, "response") as report_progress:
         batch = grid.batch(grid.ratios, measured_cycles, effects)
         batch.start(start)
@@ -363,34 +456,28 @@ class Grid:
         base_amplitude: float | Sequence[float] | None = None,
     ):
         self.filling = check_filling(filling)
-        self.oscillator = Oscillator() if oscillator is None else oscillator
-        instance("oscillator", self.oscillator, Oscillator)
-        self._take_amplitudes(base_amplitude)
-        self.particles = several("particles", particles, self._particles)
+        own = instance("oscillator", Oscillator() if oscillator is None else oscillator, Oscillator)
+        given = own.base_amplitude if base_amplitude is None else base_amplitude
+        self.is_several = hasattr(base_amplitude, "__iter__")
+        self.amplitudes = several(
+            "base_amplitude", given, lambda name, x: positive(name, x, zero_allowed=True)
+        )
+        self.oscillator = replace(own, base_amplitude=self.amplitudes[0])
+        most = filling.capacity
+        self.particles = several("particles", particles, lambda name, n: whole(name, n, 0, most))
         self.ratios = np.array(several("ratios", ratios, positive))
         if (np.diff(self.ratios) <= 0.0).any():
             raise InputError(f"ratios must ascend, got {self.ratios.tolist()}")
-        if not hasattr(seeds, "__iter__") or isinstance(seeds, (str, bytes, dict)):
-            seeds = range(1, whole("seeds", seeds, 1, 1_000_000) + 1)
-        self.seeds = several("seeds", seeds, lambda name, x: whole(name, x, 0, MOST_SEED))
-        highest = float(self.ratios[-1]) * self.oscillator.natural_frequency
-        own = automatic_dt(filling.default_dt, highest)
-        self.dt = own if dt is None else positive("dt", dt)
+        self.seeds = run_seeds(seeds)
+        highest = float(self.ratios[-1]) * own.natural_frequency
+        longest = automatic_dt(filling.default_dt, highest)
+        self.dt = longest if dt is None else positive("dt", dt)
         scenes = len(self.amplitudes) * math.prod(self.shape)
         if scenes > MOST_SCENES:
             raise InputError(
                 f"particles x ratios x seeds must make at most {MOST_SCENES} scenes, got {scenes}"
             )
         self._check_steps()
-
-    def _take_amplitudes(self, given):
-        """Amplitudes of the base [m]; is_several: whether a sequence was asked for."""
-        self.is_several = hasattr(given, "__iter__")
-        own = self.oscillator.base_amplitude if given is None else given
-        self.amplitudes = several(
-            "base_amplitude", own, lambda name, x: positive(name, x, zero_allowed=True)
-        )
-        self.oscillator = replace(self.oscillator, base_amplitude=self.amplitudes[0])
 
     def _check_steps(self):
         """InputError for a step that fits no cycle, or that the filling refuses."""
@@ -399,17 +486,10 @@ class Grid:
             for particles in self.particles:
                 self.filling.check(particles, float(dt))
 
-    def _particles(self, name, value):
-        return whole(name, value, 0, self.filling.capacity)
-
-    def words(self) -> str:
-        """The run without the filling, in words."""
-        ratios = self.ratios.tolist()
-        amplitudes = f", base_amplitude {self.amplitudes}" if self.is_several else ""
-        return (
-            f"particles {self.particles}, ratios {ratios}, seeds {self.seeds}, dt {self.dt}, "
-            f"{self.oscillator}{amplitudes}"
-        )
+    def identity(self) -> str:
+        """Words that are the same for equal scenes, whatever the filling."""
+        axes = self.amplitudes, self.particles, self.ratios, self.seeds
+        return identity_of((*axes, self.dt, self.oscillator))
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -419,10 +499,11 @@ class Grid:
     def batch(self, ratios: np.ndarray, measured_cycles: int, effects: str = "listed") -> Batch:
         """Batch of all scenes at these ratios, amplitude by amplitude, seeds running fastest."""
         whole("measured_cycles", measured_cycles, 1, 100_000)
-        axes = self.amplitudes, self.particles, ratios, self.seeds
-        grids = np.meshgrid(*axes, indexing="ij")
-        amplitude, number, ratio, seed = (grid.ravel() for grid in grids)
-        o = self.oscillator
+        o, axes = (
+            self.oscillator,
+            {"particles": self.particles, "ratio": ratios, "seed": self.seeds},
+        )
+        amplitude, number, ratio, seed = scenes_over(amplitude=self.amplitudes, **axes).values()
         structure = (amplitude, o.mass, o.stiffness, o.damping)
         table = SceneTable(number, seed, self.dt, ratio * o.natural_frequency, *structure)
         return Batch(self.filling, table, measured_cycles=measured_cycles, effects=effects)

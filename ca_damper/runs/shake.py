@@ -1,152 +1,44 @@
-"""Time histories of the damped structure under a motion of its base or a force that is no sine."""
+"""Shake a structure, or one of several modes with boxes, by a motion or a force that is no sine."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ca_damper.batch import Batch
-from ca_damper.excitation.excitation import Excitation
+from ca_damper.engine.modal_mount import ModalMount
+from ca_damper.excitation.excitation import Excitation, excitation_of
 from ca_damper.excitation.signal import Signal
 from ca_damper.filling import Filling, check_filling
 from ca_damper.oscillator import Oscillator
-from ca_damper.report.measures import history_dataset
-from ca_damper.report.report import Report
-from ca_damper.runs.window import one_for_all, run_duration, run_seeds, window
-from ca_damper.scenes.checks import MOST_SCENES, STARTS, check_run
+from ca_damper.runs.history import StructureHistory, TimeHistory
+from ca_damper.runs.result import scenes_over
+from ca_damper.scenes.checks import MOST_SCENES, MOST_SEED, run_seeds
+from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE, MOST_STEPS_PER_CYCLE, automatic_dt
 from ca_damper.scenes.table import SceneTable
-from taichi_dem.kit.checkpoint import Checkpoint
-from taichi_dem.kit.data_table import Table, Tabulated
-from taichi_dem.kit.display import counted, in_brief, listed
+from ca_damper.structure import Box, ModalStructure
+from taichi_dem.kit.checkpoint import Checkpoint, identity_of
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, whole
+from taichi_dem.kit.validation import (
+    AUTO,
+    FileName,
+    instance,
+    positive,
+    progress_option,
+    real_numbers,
+    several,
+    shown,
+    told_apart,
+    whole,
+)
 
-
-@dataclass(frozen=True, eq=False)
-class TimeHistory(Tabulated):
-    """Motions of containers under one excitation.
-
-    Parameters
-    ----------
-    label : str
-        Short word for the filling.
-    oscillator : Oscillator
-        Primary structure.
-    excitation : Excitation
-        Motion of the base and force on the container.
-    particles : tuple of int
-        Numbers of particles.
-    seeds : tuple of int
-        Seeds.
-    time_s : ndarray
-        Times [s], shape (samples,).
-    base : ndarray
-        Displacement of the base [m], shape (samples,).
-    x : ndarray
-        Displacement of the container [m], shape (samples, particles, seeds).
-    v : ndarray
-        Velocity of the container [m/s], shape (samples, particles, seeds).
-    force : ndarray
-        Force of the filling on the container [N], mean since the sample before, shape (samples,
-        particles, seeds).
-    rms : ndarray
-        RMS of the displacement about its mean [m], of all steps, shape (particles, seeds).
-    peak : ndarray
-        Largest magnitude of the displacement [m], of all steps, shape (particles, seeds).
-    report : Report, optional
-        Figures and cost of the run.
-    """
-
-    label: str
-    oscillator: Oscillator
-    excitation: Excitation
-    particles: tuple
-    seeds: tuple
-    time_s: np.ndarray
-    base: np.ndarray
-    x: np.ndarray
-    v: np.ndarray
-    force: np.ndarray
-    rms: np.ndarray
-    peak: np.ndarray
-    report: Report | None = None
-
-    def __repr__(self) -> str:
-        axes = f"particles {listed(self.particles)}, {counted(len(self.seeds), 'seed')}"
-        size = f"{counted(len(self.time_s), 'sample')} in {self.time_s[-1]:.6g} s"
-        highest = f"largest RMS {1e3 * np.nanmax(self.rms):.4g} mm"
-        return in_brief(self, self.label, axes, size, highest)
-
-    @property
-    def relative(self) -> np.ndarray:
-        """Displacement of the container from the base [m], (samples, particles, seeds)."""
-        return self.x - self.base[:, None, None]
-
-    @property
-    def relative_rms(self) -> np.ndarray:
-        """RMS of the samples of ``relative`` about their mean [m], (particles, seeds)."""
-        return self.relative.std(axis=0)
-
-    @property
-    def relative_peak(self) -> np.ndarray:
-        """Largest magnitude of ``relative`` [m], of the samples, (particles, seeds)."""
-        return np.abs(self.relative).max(axis=0)
-
-    @property
-    def added_damping(self) -> np.ndarray:
-        """Coefficient of a dashpot on the base that takes the filling's work [N s/m].
-
-        -int F dx / int (x' - y')^2 dt over the run, (particles, seeds); NaN where the container
-        never moves on the base. Between samples the force counts by its mean and the speed as even,
-        so that they must be close together.
-        """
-        work = -(self.force[1:] * np.diff(self.x, axis=0)).sum(axis=0)
-        stretch = np.diff(self.relative, axis=0) ** 2
-        moved = (stretch / np.diff(self.time_s)[:, None, None]).sum(axis=0)
-        return np.divide(work, moved, out=np.full_like(work, np.nan), where=moved > 0.0)
-
-    @property
-    def damping_ratio(self) -> np.ndarray:
-        """Share of critical damping by the structure's own dashpot and ``added_damping``."""
-        o = self.oscillator
-        critical = 2.0 * math.sqrt(o.stiffness * o.mass)
-        return (o.damping + self.added_damping) / critical
-
-    def table(self) -> Table:
-        """A row a sample: time, base, and x and force of each particle number and seed.
-
-        Returns
-        -------
-        Table
-            Columns by name, units in ``units``.
-        """
-        columns, units = {"time_s": self.time_s, "base_m": self.base}, {}
-        for name, values, unit in (("x_m", self.x, "m"), ("force_N", self.force, "N")):
-            for k, number in enumerate(self.particles):
-                for j, seed in enumerate(self.seeds):
-                    columns[f"{name}_N{number}_seed{seed}"] = values[:, k, j]
-                    units[f"{name}_N{number}_seed{seed}"] = unit
-        return Table(columns, units, index="time_s")
-
-    def to_xarray(self) -> Any:
-        """An xarray Dataset over time, particles and seed, units in attributes.
-
-        Returns
-        -------
-        xarray.Dataset
-            ``base``, ``x``, ``v``, ``force`` over time; ``rms`` and ``peak`` of the run.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
-        """
-        axes = {"particles": (self.particles, "1"), "seed": (self.seeds, "1")}
-        return history_dataset(self, ("particles", "seed"), {"force": ("particles", "seed")}, axes)
+# Between the seeds of two boxes: larger than the seeds that users count, and prime.
+_BETWEEN_BOXES = 15_485_863
+# Share of a motion at the start that may lie outside the modes.
+_OUTSIDE_MODES = 1e-3
 
 
 def shake(
@@ -221,63 +113,248 @@ def shake(
     >>> ground = excitation.random_vibration([2.0, 20.0], [0.1, 0.1], duration=10.0)
     >>> shake(Spheres(), ground, particles=30).relative_rms  # doctest: +SKIP
     """
-    check_run(0, STARTS[0], progress)
-    plan = _Plan(filling, excitation, particles, seeds, oscillator, dt, duration, interval)
-    with reporting(progress, "shaking") as report_progress:
-        batch = plan.batch(mount, effects)
-        batch.start(displacement=displacement, velocity=velocity)
-        words = f"{plan.words(mount)}, from {displacement} m and {velocity} m/s"
-        with batch.checkpointed(checkpoint, resume, {"job": words}) as writer:
-            cycles = batch.run(0, 1, report_progress, record_every=plan.every)
+    progress_option("progress", progress)
+    check_filling(filling)
+    excitation, numbered = _one_for_all(excitation), run_seeds(seeds)
+    own = instance("oscillator", Oscillator() if oscillator is None else oscillator, Oscillator)
+    counts = several("particles", particles, lambda n, x: whole(n, x, 0, filling.capacity))
+    if len(counts) * len(numbered) > MOST_SCENES:
+        raise InputError(f"particles x seeds must make at most {MOST_SCENES} scenes")
+    most = filling.default_dt if dt is None else positive("dt", dt)
+    window = _window(excitation, duration, most, interval)
+    structure = 0.0, own.mass, own.stiffness, own.damping
+    scenes = scenes_over(particles=counts, seed=numbered).values()
+    table = SceneTable(*scenes, window.dt, 1.0 / window.duration, *structure)
+    start = {"displacement": displacement, "velocity": velocity}
+    job = f"shaken {identity_of((counts, numbered, window, own, mount, start))}"
+    options = {"excitation": excitation, "mount": mount, "effects": effects}
+    common, motion = _recorded(
+        (filling, table), options, window, start, progress, (job, checkpoint, resume)
+    )
+    shape = len(counts), len(numbered)
+    over_axes = {name: one.reshape(*one.shape[:-1], *shape) for name, one in motion.items()}
+    return TimeHistory(oscillator=own, particles=counts, seeds=numbered, **common, **over_axes)
+
+
+def shake_structure(
+    filling: Filling,
+    structure: ModalStructure,
+    boxes: Box | Sequence[Box],
+    excitation: Signal | Excitation,
+    *,
+    seeds: int | Sequence[int] = 5,
+    dt: float | None = None,
+    duration: float | None = None,
+    interval: float = 1e-3,
+    force_place: int | None = None,
+    displacement: Any = 0.0,
+    velocity: Any = 0.0,
+    effects: str = "listed",
+    progress: Listener | str | None = AUTO,
+    checkpoint: Checkpoint | None = None,
+    resume: FileName | None = None,
+) -> StructureHistory:
+    """Shake a structure with boxes and record its motion.
+
+    Parameters
+    ----------
+    filling : Filling
+        Filling of all boxes.
+    structure : ModalStructure
+        Places and modes.
+    boxes : Box or sequence of Box
+        Boxes, one or several; several may share a place.
+    excitation : Signal or Excitation
+        Motion of the base [m], or an Excitation, whose force acts at ``force_place``.
+    seeds : int or sequence of int, default 5
+        Number of seeds, counted from 1, or the seeds themselves.
+    dt : float, optional
+        Largest step [s]. None: that of the filling, or a fortieth of a cycle of the highest mode
+        where that is shorter.
+    duration : float, optional
+        Duration [s]; that of the excitation if None.
+    interval : float, default 0.001
+        Longest time between samples [s].
+    force_place : int, optional
+        Place where the force of the excitation acts.
+    displacement : float or array_like, default 0.0
+        Displacement of the places at the beginning [m], one number or (places,); a sum of the
+        modes.
+    velocity : float or array_like, default 0.0
+        Velocity of the places at the beginning [m/s], likewise.
+    effects : str, default "listed"
+        As in ``frequency_response``.
+    progress : callable or str or None, default "auto"
+        As in ``frequency_response``.
+    checkpoint : Checkpoint, optional
+        As in ``frequency_response``.
+    resume : path, optional
+        As in ``frequency_response``.
+
+    Returns
+    -------
+    StructureHistory
+        Motion of all places and force on all boxes over time.
+
+    Raises
+    ------
+    InputError
+        An argument is out of its range, or the step is too long for the highest mode.
+    SimulationDiverged
+        All scenes left the range in which their numbers mean anything. Where some did, a warning
+        tells which, and their results are nan.
+    """
+    progress_option("progress", progress)
+    check_filling(filling)
+    excitation, numbered = _one_for_all(excitation), run_seeds(seeds)
+    if (excitation.force is None) != (force_place is None):
+        wanted = "None without" if excitation.force is None else "a place for"
+        raise InputError(
+            f"force_place must be {wanted} a force in the excitation, got {shown(force_place)}"
+        )
+    boxed = _checked_boxes(boxes, filling.capacity)
+    modal = ModalMount(structure, [box.place for box in boxed], force_place)
+    if modal.group * len(numbered) > MOST_SCENES:
+        raise InputError(f"(boxes + empty places) x seeds must be at most {MOST_SCENES}")
+    window = _window(excitation, duration, _longest_step(filling, structure, dt), interval)
+    start = {
+        name: np.tile(_of_places(name, value, structure)[[*modal.scene_places]], len(numbered))
+        for name, value in (("displacement", displacement), ("velocity", velocity))
+    }
+    table = _table_of_groups(modal, boxed, numbered, window)
+    many = structure, boxed, numbered, window, force_place, start
+    job = f"shaken structure {identity_of(many)}"
+    options = {"excitation": excitation, "structure": modal, "effects": effects}
+    common, motion = _recorded(
+        (filling, table), options, window, start, progress, (job, checkpoint, resume)
+    )
+    # A place is that of the first scene there.
+    places = [modal.scene_places.index(i) for i in range(structure.place_count)]
+    taken = {**dict.fromkeys(motion, places), "force": slice(len(boxed))}
+    groups = len(numbered), modal.group
+    over_axes = {
+        name: np.swapaxes(one.reshape(*one.shape[:-1], *groups), -1, -2)[..., taken[name], :]
+        for name, one in motion.items()
+    }
+    return StructureHistory(structure=structure, boxes=boxed, seeds=numbered, **common, **over_axes)
+
+
+class Window(NamedTuple):
+    """A run of ``duration`` [s]: even samples, steps between two of them, and the step [s]."""
+
+    duration: float
+    samples: int
+    every: int
+    dt: float
+
+
+def _window(excitation: Excitation, asked: Any, dt: float, interval: Any) -> Window:
+    """Window with the largest step that makes a whole number of samples, none longer than dt [s].
+
+    asked: duration, that of the excitation if None. interval: between samples at most [s].
+    """
+    end = float(excitation.duration(1)[0])
+    if asked is None and math.isinf(end):
+        raise InputError("duration must be given for an excitation without an end, got None")
+    duration = end if asked is None else positive("duration", asked)
+    samples = math.ceil(duration / positive("interval", interval) * (1 - 1e-12))
+    every = math.ceil(duration / (samples * dt) * (1.0 - 1e-12))
+    every = max(every, math.ceil(LEAST_STEPS_PER_CYCLE / samples))
+    if samples * every > MOST_STEPS_PER_CYCLE:
+        got, most = told_apart(duration, MOST_STEPS_PER_CYCLE * dt)
+        raise InputError(f"duration must be at most {most} s in steps of {dt:.3g} s, got {got}")
+    return Window(duration, samples, every, duration / (samples * every))
+
+
+def _one_for_all(value: Any) -> Excitation:
+    """Excitation of one Signal or SineForce for all scenes; InputError for several or None."""
+    if value is None:
+        raise InputError("excitation must be a Signal or an Excitation, got None")
+    excitation = excitation_of(value)
+    if isinstance(excitation.base, tuple) or isinstance(excitation.force, tuple):
+        raise InputError(
+            f"excitation must be one for all scenes here, got several: {shown(excitation)}"
+        )
+    return excitation
+
+
+def _recorded(scenes, options, window, start, progress, saving):
+    """Run a batch over its window: fields that all scenes share, and those over scenes at the end.
+
+    scenes: filling and table. saving: words for the job, and both options of checkpoints.
+    """
+    job, checkpoint, resume = saving
+    with reporting(progress, "shaking") as tell:
+        batch = Batch(*scenes, measured_cycles=1, recorded_samples=window.samples, **options)
+        batch.start(**start)
+        with batch.checkpointed(checkpoint, resume, {"job": job}) as writer:
+            cycles = batch.run(0, 1, tell, record_every=window.every)
             writer.save()
-    return plan.history(batch, cycles)
+    series, sound = batch.time_series(), int(np.argmin(batch.diverged))
+    common = {"time_s": series["time_s"][:, sound], "base": series["y"][:, sound]}
+    common.update(label=scenes[0].label, excitation=batch.excitation, report=batch.report())
+    highest = np.maximum(cycles.mean_of("x_max"), -cycles.mean_of("x_min"))
+    motion = {name: series[name] for name in ("x", "v", "force")}
+    return common, {**motion, "rms": cycles.rms, "peak": highest}
 
 
-class _Plan:
-    """The checked arguments: one window that lasts as long as the run, in even samples."""
+def _checked_boxes(boxes, capacity):
+    """Boxes as a tuple; InputError."""
+    given = (boxes,) if isinstance(boxes, Box) else boxes
+    if not isinstance(given, (list, tuple)) or not given:
+        raise InputError(f"boxes must be a Box or a list of at least one, got {shown(boxes)}")
+    for box in given:
+        whole("particles", instance("boxes", box, Box).particles, 0, capacity)
+    return tuple(given)
 
-    def __init__(self, filling, excitation, particles, seeds, oscillator, dt, duration, interval):
-        self.filling = check_filling(filling)
-        self.excitation = one_for_all(excitation)
-        self.oscillator = Oscillator() if oscillator is None else oscillator
-        instance("oscillator", self.oscillator, Oscillator)
-        most = filling.capacity
-        self.particles = several("particles", particles, lambda n, x: whole(n, x, 0, most))
-        self.seeds = run_seeds(seeds)
-        if len(self.particles) * len(self.seeds) > MOST_SCENES:
-            raise InputError(f"particles x seeds must make at most {MOST_SCENES} scenes")
-        lasting = run_duration(self.excitation, duration)
-        dt = filling.default_dt if dt is None else positive("dt", dt)
-        self.duration, self.samples, self.every, self.dt = window(lasting, dt, interval)
 
-    def words(self, mount):
-        """The run without the filling, in words."""
-        axes = f"particles {self.particles}, seeds {self.seeds}, dt {self.dt}, every {self.every}"
-        return f"shaken for {self.duration} s on the {mount}, {axes}, {self.oscillator}"
-
-    def batch(self, mount, effects):
-        """Batch of all scenes, the last axis (seeds) running fastest."""
-        numbers, seeds = np.meshgrid(self.particles, self.seeds, indexing="ij")
-        o = self.oscillator
-        structure = (0.0, o.mass, o.stiffness, o.damping)
-        one = 1.0 / self.duration
-        table = SceneTable(numbers.ravel(), seeds.ravel(), self.dt, one, *structure)
-        options: dict[str, Any] = {"excitation": self.excitation, "recorded_samples": self.samples}
-        return Batch(
-            self.filling, table, mount=mount, measured_cycles=1, effects=effects, **options
+def _longest_step(filling, structure, dt):
+    """Step asked for [s], or that of the filling and of the highest mode; InputError."""
+    highest = float(structure.frequencies.max())
+    if dt is None:
+        return automatic_dt(filling.default_dt, highest)
+    most, longest = positive("dt", dt), 1.0 / (LEAST_STEPS_PER_CYCLE * highest)
+    if most > longest * (1.0 + 1e-12):
+        got, bound = told_apart(most, longest)
+        raise InputError(
+            f"dt must be at most {bound} s, {LEAST_STEPS_PER_CYCLE} steps to a cycle of the "
+            f"highest mode of {highest:.6g} Hz, got {got}: keep fewer modes, or shorter steps"
         )
+    return most
 
-    def history(self, batch, cycles):
-        """What the batch recorded."""
-        series, shape = batch.time_series(), (len(self.particles), len(self.seeds))
-        sound = int(np.argmin(batch.diverged))
-        highest = np.maximum(cycles.mean_of("x_max"), -cycles.mean_of("x_min"))
-        return TimeHistory(
-            *(self.filling.label, self.oscillator, self.excitation, self.particles, self.seeds),
-            time_s=series["time_s"][:, sound],
-            base=series["y"][:, sound],
-            rms=cycles.rms.reshape(shape),
-            peak=highest.reshape(shape),
-            report=batch.report(),
-            **{name: series[name].reshape(-1, *shape) for name in ("x", "v", "force")},
+
+def _table_of_groups(modal, boxes, seeds, window):
+    """Scenes of all groups, those of a group running fastest; box 0 has the seed of the run."""
+    empty = [0] * (modal.group - len(boxes))
+    numbers = [k if box.seed is None else box.seed for k, box in enumerate(boxes)]
+    started = [
+        [*((seed + number * _BETWEEN_BOXES) % (MOST_SEED + 1) for number in numbers), *empty]
+        for seed in seeds
+    ]
+    particles = [*(box.particles for box in boxes), *empty]
+    structure = modal.structure
+    mass = float(structure.masses.sum())
+    omega = 2.0 * np.pi * float(structure.frequencies.min())
+    damping = 2.0 * mass * omega * float(structure.damping_ratios[0])
+    return SceneTable(
+        *(np.tile(particles, len(seeds)), np.concatenate(started), window.dt),
+        *(1.0 / window.duration, 0.0, mass, mass * omega**2, damping),
+    )
+
+
+def _of_places(name, value, structure):
+    """Motion at the beginning, (places,); InputError unless it is a sum of the modes."""
+    places = structure.place_count
+    try:
+        motion = np.broadcast_to(real_numbers(name, value), places)
+    except ValueError:
+        raise InputError(
+            f"{name} must be a finite number or {places}, one for each place, got {shown(value)}"
+        ) from None
+    left = motion - structure.shapes @ structure.modal(motion)
+    if np.abs(left).max() > _OUTSIDE_MODES * np.abs(motion).max():
+        raise InputError(
+            f"{name} must be a sum of the modes of the structure, got {shown(value)}, of which "
+            f"{np.abs(left).max():.3g} is none: keep more modes"
         )
+    return motion

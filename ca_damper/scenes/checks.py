@@ -7,7 +7,15 @@ import numpy as np
 from ca_damper.excitation.excitation import Excitation, excitation_of
 from ca_damper.report import measures
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import LARGEST, choice, progress_option, shown, told_apart, whole
+from taichi_dem.kit.validation import (
+    LARGEST,
+    choice,
+    progress_option,
+    several,
+    shown,
+    told_apart,
+    whole,
+)
 
 #: Motion of the container at the beginning of a run.
 STARTS = ("rest", "empty", "rigid")
@@ -105,3 +113,10 @@ def check_within(excitation: Excitation, ends: np.ndarray) -> None:
             f"a run must end within its excitation of {most} s, got {got} s in scene {s}: run "
             "fewer cycles, or shorter windows"
         )
+
+
+def run_seeds(seeds: Any) -> tuple[int, ...]:
+    """Seeds given as their number or one by one; InputError."""
+    if not hasattr(seeds, "__iter__") or isinstance(seeds, (str, bytes, dict)):
+        seeds = range(1, whole("seeds", seeds, 1, 1_000_000) + 1)
+    return several("seeds", seeds, lambda name, x: whole(name, x, 0, MOST_SEED))
