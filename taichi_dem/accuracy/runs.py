@@ -19,7 +19,7 @@ from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import result_of, run_simulation
 from taichi_dem.simulation import Simulation
-from taichi_dem.stability.stable_step import spring_step
+from taichi_dem.stability.body_limits import spring_step
 from taichi_dem.stability.step_report import step_report
 
 #: Fewest steps of a run, and how many times shorter than springs bear they begin at most where the
