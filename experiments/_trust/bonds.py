@@ -11,8 +11,7 @@ from _trust.common import Number, dots
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY
 from taichi_dem.materials import Material
-from taichi_dem.mesh.face_groups import with_inner_group
-from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.mesh import checked_mesh, with_inner_group
 from taichi_dem.mesh.shapes import bar
 
 GRANITE = "Lac du Bonnet granite, Potyondy and Cundall, IJRMMS 41 (2004) 1329"

@@ -13,7 +13,7 @@ from _trust.common import Number, dots, material_of, plate, springs_step
 from taichi_dem import ImplicitDashpots, Scene, Simulation, effects, simulate
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED
-from taichi_dem.mesh.face_groups import with_cut
+from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.output.cracks import crack_areas
 
 #: E [Pa], nu and density [kg/m3] of both plates.

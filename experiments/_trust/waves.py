@@ -119,12 +119,13 @@ def spalled(edge, seed):
     last = weak.model.centre[:, 0] > ROD - edge
     fastest = max(frame.velocity[last, 0].mean() for frame in weak.frames)
     arrived = 0.5 * HEAVY * SPEED * fastest
-    fragments = pulsed(mesh, material, PEAK * PEAK / arrived, [effects.Softening()]).fragments()
-    mass, far = fragments["mass_kg"], np.full(fragments.row_count, -np.inf)
-    np.maximum.at(far, fragments.of_body, mesh.points[mesh.tetrahedra][..., 0].max(axis=1))
+    result = pulsed(mesh, material, PEAK * PEAK / arrived, [effects.Softening()])
+    fragments = result.fragments()
+    mass, far = fragments["mass_kg"].to_numpy(), np.full(len(fragments), -np.inf)
+    np.maximum.at(far, result.fragment_of_body(), mesh.points[mesh.tetrahedra][..., 0].max(axis=1))
     pieces = np.flatnonzero(mass > LEAST * mass.sum())
     first = pieces[far[pieces].argmax()]
-    speed = fragments["velocity_x_m_s"][first]
+    speed = fragments["velocity_x_m_s"].to_numpy()[first]
     return mass[first] / (HEAVY * THICK**2), speed, len(pieces) - 1, sorted(far[pieces].tolist())
 
 

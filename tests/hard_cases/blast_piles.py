@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 from _piles import GRAVITY, STEP, brick, hexahedron, loose, softened
 from taichi_dem import ImplicitDashpots
-from taichi_dem.mesh.face_groups import with_inner_group
+from taichi_dem.mesh.mesh import with_inner_group
 from taichi_dem.mesh.shapes import bar, placed_together
 from tests.hard_cases.blast_run import Run
 from tests.hard_cases.cases import Cases
