@@ -13,11 +13,9 @@ from typing import Any
 from taichi_dem.kit import children, runtime
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, write_csv, write_text
-from taichi_dem.kit.sweeps.job import Job, jobs_of
-from taichi_dem.kit.sweeps.journal import Journal
-from taichi_dem.kit.sweeps.rows import ADDED, Row, read_rows
+from taichi_dem.kit.sweeps.jobs import Job, Journal, jobs_of, table_of
 from taichi_dem.kit.sweeps.sweep import run_missing
-from taichi_dem.kit.sweeps.table import SweepTable
+from taichi_dem.kit.sweeps.table import ADDED, Row, read_rows
 from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.validation import shown
 
@@ -57,7 +55,7 @@ def run_sweep(
             if not os.path.exists(_summary_of(job)):
                 journal.forget(job)
         records = run_missing(run_row, jobs, journal, count=count)
-    return _show(table, SweepTable(jobs, records, seeded=False), options.out)
+    return _show(table, table_of(jobs, records, seeded=False), options.out)
 
 
 def run_row(row: Row) -> dict[str, Any]:
