@@ -9,14 +9,7 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_dem import (
-    CONCRETE,
-    Scene,
-    Simulation,
-    Uniform,
-    effects,
-    step_report,
-)
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, step_report
 from taichi_dem.effects import MixedMode, ShearSlip, SlipWeakening, Softening
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.laws.base import NEAR, Effect
