@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ca_damper.measures import MEASURE_UNITS
-from taichi_dem.kit.data_table import Table, Tabulated
+from taichi_dem.kit.data_table import Tabulated
 from taichi_dem.kit.display import in_brief, listed
-from taichi_dem.kit.optional import optional
 from taichi_dem.kit.validation import choice
 
 if TYPE_CHECKING:
@@ -75,19 +74,19 @@ class AmplitudeResponse(Tabulated):
         ratio, rms = zip(*(one.peaks() for one in self.responses))
         return np.stack(ratio), np.stack(rms)
 
-    def table(self) -> Table:
-        """A row a scene, as of ``Response.table``, with its amplitude in front.
+    def columns(self) -> dict[str, Any]:
+        """A row a scene, as of ``Response.columns``, with its amplitude in front.
 
         Returns
         -------
-        Table
-            Columns by name, units in ``units``.
+        dict
+            Columns by name, which ends in the unit.
         """
         columns = [one.columns() for one in self.responses]
         sizes = [len(one["filling"]) for one in columns]
         joined = {name: np.concatenate([one[name] for one in columns]) for name in columns[0]}
         amplitude = np.repeat(self.amplitudes, sizes)
-        return Table({"base_amplitude_m": amplitude, **joined}, {"filling": "1"})
+        return {"base_amplitude_m": amplitude, **joined}
 
     def to_xarray(self) -> Any:
         """As ``Response.to_xarray``, over base_amplitude [m] too.
@@ -96,12 +95,8 @@ class AmplitudeResponse(Tabulated):
         -------
         xarray.Dataset
             Units in the attributes of each variable.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
         """
-        xarray = optional("xarray")
+        import xarray
+
         axis = xarray.Variable("base_amplitude", list(self.amplitudes), {"units": "m"})
         return xarray.concat([one.to_xarray() for one in self.responses], axis)

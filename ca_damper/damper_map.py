@@ -15,7 +15,7 @@ from ca_damper.progress import Stages
 from ca_damper.report import Report
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.scenes.table import SceneTable
-from taichi_dem.kit.data_table import Table, Tabulated, dataset
+from taichi_dem.kit.data_table import Tabulated, dataset
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
@@ -137,11 +137,6 @@ class DamperMap(Tabulated):
         xarray.Dataset
             ``apparent_damping``, ``apparent_mass``, ``loss``, ``mass_share``, ``energy``, and
             ``gap``, the clearance of each box; units in attributes.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
         """
         dims = "clearance", "particles", "amplitude", "frequency", "seed"
         units = {"apparent_damping": "N s/m", "apparent_mass": "kg", "loss": "1"}
@@ -153,13 +148,13 @@ class DamperMap(Tabulated):
             del axes["clearance"]
         return dataset(found, axes, filling=self.label)
 
-    def table(self) -> Table:
+    def columns(self) -> dict[str, Any]:
         """A row a scene: its place on the axes, measures, and the theory's loss and mass.
 
         Returns
         -------
-        Table
-            Columns by name, units in ``units``.
+        dict
+            Columns by name, which ends in the unit.
         """
         indices = np.indices(self.loss.shape).reshape(len(_AXES), -1)
         clearance, number, amplitude = indices[:3]
@@ -174,8 +169,7 @@ class DamperMap(Tabulated):
         made = self.theory
         for name in ("loss", "mass"):
             columns[f"{name}_theory"] = getattr(made, name)[clearance, number, amplitude]
-        pure = "filling", "loss", "mass_share", "energy", "loss_theory", "mass_theory"
-        return Table(columns, dict.fromkeys(pure, "1"))
+        return columns
 
 
 def damper_map(

@@ -18,12 +18,11 @@ from ca_damper.scenes.clock import automatic_dt, steps_per_cycle
 from ca_damper.scenes.table import SceneTable
 from ca_damper.steady_state import LEAST_TESTED, change_of_halves, half_width
 from taichi_dem.kit.checkpoint import Checkpoint
-from taichi_dem.kit.data_table import Table, Tabulated, dataset
+from taichi_dem.kit.data_table import Tabulated, dataset, unit_of
 from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.units import unit_of
 from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, whole
 
 #: Particle numbers that a notebook shows, evenly over those there are.
@@ -171,16 +170,6 @@ class Response(Tabulated):
         """Unit of every measure, by name."""
         return {name: unit_of(column_of(name)) for name in MEASURE_UNITS}
 
-    def table(self) -> Table:
-        """A row a scene: filling, particles, ratio, frequency, seed and all measures.
-
-        Returns
-        -------
-        Table
-            Columns by name, units in ``units``.
-        """
-        return Table(self.columns(), {"filling": "1"})
-
     def to_xarray(self) -> Any:
         """All measures as an xarray Dataset over particles, frequency and seed.
 
@@ -189,11 +178,6 @@ class Response(Tabulated):
         xarray.Dataset
             Units in the attributes of each variable; ``ratio`` is a second coordinate along
             frequency, the filling an attribute.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
         """
         dims = "particles", "frequency", "seed"
         found = {name: (dims, getattr(self, name), unit) for name, unit in self.units.items()}
@@ -212,7 +196,7 @@ class Response(Tabulated):
         return ResponsePlots(self)
 
     def columns(self) -> dict[str, Any]:
-        """Columns of equal length with a row a scene, as they are written.
+        """A row a scene: filling, particles, ratio, frequency, seed and all measures.
 
         Returns
         -------

@@ -18,7 +18,7 @@ from ca_damper.report import Report
 from ca_damper.scenes.table import SceneTable
 from ca_damper.window import one_for_all, run_duration, run_seeds, window
 from taichi_dem.kit.checkpoint import Checkpoint
-from taichi_dem.kit.data_table import Table, Tabulated
+from taichi_dem.kit.data_table import Tabulated
 from taichi_dem.kit.display import counted, in_brief, listed
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
@@ -116,21 +116,20 @@ class TimeHistory(Tabulated):
         critical = 2.0 * math.sqrt(o.stiffness * o.mass)
         return (o.damping + self.added_damping) / critical
 
-    def table(self) -> Table:
+    def columns(self) -> dict[str, Any]:
         """A row a sample: time, base, and x and force of each particle number and seed.
 
         Returns
         -------
-        Table
-            Columns by name, units in ``units``.
+        dict
+            Columns by name, which ends in the unit.
         """
-        columns, units = {"time_s": self.time_s, "base_m": self.base}, {}
-        for name, values, unit in (("x_m", self.x, "m"), ("force_N", self.force, "N")):
+        columns = {"time_s": self.time_s, "base_m": self.base}
+        for name, values in (("x_m", self.x), ("force_N", self.force)):
             for k, number in enumerate(self.particles):
                 for j, seed in enumerate(self.seeds):
                     columns[f"{name}_N{number}_seed{seed}"] = values[:, k, j]
-                    units[f"{name}_N{number}_seed{seed}"] = unit
-        return Table(columns, units, index="time_s")
+        return columns
 
     def to_xarray(self) -> Any:
         """An xarray Dataset over time, particles and seed, units in attributes.
@@ -139,11 +138,6 @@ class TimeHistory(Tabulated):
         -------
         xarray.Dataset
             ``base``, ``x``, ``v``, ``force`` over time; ``rms`` and ``peak`` of the run.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
         """
         axes = {"particles": (self.particles, "1"), "seed": (self.seeds, "1")}
         return history_dataset(self, ("particles", "seed"), {"force": ("particles", "seed")}, axes)

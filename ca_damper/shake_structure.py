@@ -19,7 +19,7 @@ from ca_damper.scenes.table import SceneTable
 from ca_damper.structure import Box, ModalStructure
 from ca_damper.window import one_for_all, run_duration, run_seeds, window
 from taichi_dem.kit.checkpoint import Checkpoint, identity_of
-from taichi_dem.kit.data_table import Table, Tabulated
+from taichi_dem.kit.data_table import Tabulated
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
@@ -110,21 +110,20 @@ class StructureHistory(Tabulated):
         """
         return np.moveaxis(self.structure._modal(np.moveaxis(self.relative, 1, -1)), -1, 1)
 
-    def table(self) -> Table:
+    def columns(self) -> dict[str, Any]:
         """A row a sample: time, base, x of each place and force of each box, for each seed.
 
         Returns
         -------
-        Table
-            Columns by name, units in ``units``.
+        dict
+            Columns by name, which ends in the unit.
         """
-        columns, units = {"time_s": self.time_s, "base_m": self.base}, {}
-        for name, values, unit in (("x_m_place", self.x, "m"), ("force_N_box", self.force, "N")):
+        columns = {"time_s": self.time_s, "base_m": self.base}
+        for name, values in (("x_m_place", self.x), ("force_N_box", self.force)):
             for i in range(values.shape[1]):
                 for j, seed in enumerate(self.seeds):
                     columns[f"{name}{i}_seed{seed}"] = values[:, i, j]
-                    units[f"{name}{i}_seed{seed}"] = unit
-        return Table(columns, units, index="time_s")
+        return columns
 
     def to_xarray(self) -> Any:
         """An xarray Dataset over time, place, box and seed, units in attributes.
@@ -133,11 +132,6 @@ class StructureHistory(Tabulated):
         -------
         xarray.Dataset
             ``base``, ``x``, ``v``, ``force`` over time; ``rms`` and ``peak`` of the run.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
         """
         axes = {"seed": (self.seeds, "1")}
         return history_dataset(self, ("place", "seed"), {"force": ("box", "seed")}, axes)

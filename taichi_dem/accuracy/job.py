@@ -9,7 +9,7 @@ from taichi_dem.goals import Goal
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.methods import ImplicitDashpots, Method, Uniform
 from taichi_dem.scene import Scene
-from taichi_dem.stability.stable_step import spring_step
+from taichi_dem.stability.body_limits import spring_step
 from taichi_dem.stability.step_report import step_report
 
 #: Fewest steps of a run, and how many times shorter than springs bear they begin at most where the

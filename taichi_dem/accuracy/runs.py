@@ -7,7 +7,7 @@ import numpy as np
 
 from taichi_dem.accuracy.job import Job
 from taichi_dem.kit.display import counted
-from taichi_dem.kit.progress.progress import Listener, Worded
+from taichi_dem.kit.progress.progress import Listener, Progress
 from taichi_dem.kit.study.timing import clock
 from taichi_dem.output.record import Frame
 from taichi_dem.result import Result
@@ -104,7 +104,7 @@ class Runs:
         self.cost.setdefault(level, spent)
         if self._listen is not None:
             share = 1.0 - 1.0 / (1.0 + _GROWTH * self.count)
-            self._listen(Worded(share, self.seconds, counted(self.count, "run")))
+            self._listen(Progress(share, self.seconds, "stepping", counted(self.count, "run")))
         return result
 
     def _simulated(self, level, twin, tight, frames, brief):

@@ -5,7 +5,7 @@ import pytest
 from taichi_dem import BranchedAnswer, goals
 from taichi_dem.accuracy.job import Job
 from taichi_dem.kit.audit import Audit
-from taichi_dem.report.certificate import Certificate
+from taichi_dem.report.effects import Certificate
 from tests.accuracy.made_up_runs import scattered, searched
 from tests.accuracy.small_bar import UNTIL, struck_bar
 

@@ -7,15 +7,8 @@ import pytest
 
 from _closed_forms import _carried
 from _meshes import with_moved_nodes
-from taichi_dem import (
-    CONCRETE,
-    ImplicitDashpots,
-    Scene,
-    Simulation,
-    Uniform,
-    effects,
-)
-from taichi_dem.elasticity.wave_moduli import wave_moduli
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
+from taichi_dem.elasticity.rates import wave_moduli
 from taichi_dem.mesh.shapes import bar, single
 
 #: Concrete whose bonds have no dashpots, so that no wave fades.

@@ -1,14 +1,33 @@
-"""A run says where effects that were left out would have acted, and says nothing else."""
+"""A run says where effects that were left out would have acted, and says nothing else.
 
+A run tells energy that no load gave: from 1 % injected by overlaps, from half unexplained.
+Residual slip of bonds that hold: measured, reported, warned of.
+Estimates before a run judge each connected part by its own stress, motion and weight.
+"""
+
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
+from taichi_dem import (
+    CONCRETE,
+    Scene,
+    Simulation,
+    Uniform,
+    checked_mesh,
+    effects,
+    estimated_effects,
+    join,
+    shapes,
+)
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.report.energy_balance import TERMS, injected_words, open_account, unexplained_share
+from taichi_dem.report.estimates import NEEDED, NEGLIGIBLE, UNCLEAR
 from taichi_dem.report.missing_effects import unserved
+from taichi_dem.report.resolution import MOST_SLIP
 from taichi_dem.state.model import Model
 from tests.probe import BondProbe
 from tests.scenes import beside
@@ -18,6 +37,9 @@ TWO = beside(single(EDGE), single(EDGE), [1.0, 0.0, 0.0])
 LOSSLESS = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0, friction=0.0)
 BONDS = (effects.BondDamping(), effects.Softening(), effects.ShearSlip())
 BROKEN_ONLY = effects.SphereContact(3, outer_faces=False)
+EPS = np.finfo(float).eps
+BLOCK = shapes.block(0.1, element=0.1)
+HALVES = join(BLOCK, BLOCK.moved(by=(0.101, 0.0, 0.0)), names=["left", "right"])
 
 
 @pytest.mark.parametrize(
@@ -138,3 +160,139 @@ def test_damping_is_missed_only_where_bonds_strain_beyond_rounding(speed, missin
     away = checked_mesh(away.points + 100.0, away.tetrahedra, away.groups)
     found = pulled(away, speed).report().missing_effects
     assert tuple(m.effect for m in found) == missing
+
+
+@pytest.mark.parametrize(
+    "terms",
+    [
+        {"load_work": 150.0, "support_work": -50.0, "friction": 100.0},
+        # Bodies that had 200 J at the start and have half of it.
+        {"friction": 100.0, "kinetic": 100.0},
+        {"load_work": 120.0, "kinetic": 180.0, "residual": 20.0},
+    ],
+)
+def test_the_share_is_of_work_and_of_the_energy_at_the_start(terms):
+    def told(injected):
+        account = {**dict.fromkeys(TERMS, 0.0), "injected": injected, **terms}
+        return injected_words({**account, "kinetic": account["kinetic"] + injected})
+
+    assert "2.01 J by overlaps" in told(2.01)
+    assert told(1.99) == told(0.0) == ""
+
+
+def test_an_open_account_is_said():
+    account = {"kinetic": 1.0, "bond_dashpot": -3.0, "residual": 2.1}
+    assert unexplained_share(account) == pytest.approx(2.1 / 4.0)
+    assert "2.1 J unexplained" in open_account(account, 0.0)[0]
+    assert open_account({**account, "residual": 1.9}, 0.0) == ()
+    assert open_account({"kinetic": 1e-20, "residual": 1e-19}, 1e-20) == ()
+    assert open_account({**account, "residual": math.nan}, 0.0)
+
+
+def slid(share):
+    """Simulation of the pair, sampled with a residual slip of a share of an edge in a unit."""
+    simulation = Simulation(Scene(pair(EDGE), CONCRETE, [effects.ShearSlip()]), Uniform(1e-8))
+    simulation.start()
+    write_slip(simulation, share)
+    simulation.sample()
+    return simulation
+
+
+def write_slip(simulation, share):
+    """Let the second unit of the bond have slipped by a share of an edge, oblique to the axes."""
+    field = simulation.state.fields()["shear_slip_slip"]
+    slip = values(field)
+    slip[1, :2] = share * EDGE * np.array([0.6, -0.8])
+    assign(field, slip)
+
+
+def test_share_is_that_of_the_shortest_edge():
+    """To the rounding of a length over another."""
+    report = slid(0.03).report()
+    (found,) = report.bond_slip
+    assert found.share == pytest.approx(0.03, abs=16 * EPS)
+    assert found.where == 0 and found.count == 0
+
+
+def test_far_slip_is_warned_of_and_an_effect_that_weakens_is_missed():
+    report = slid(2.0 * MOST_SLIP).report()
+    assert any("bond 0 " in need and "by 10 %" in need for need in report.needs)
+    advice = report.advice()
+    assert [one.effect for one in advice.missing] == ["SlipWeakening"]
+    table = advice.table()
+    assert table["effect"].tolist() == ["shear_slip", "SlipWeakening"]
+    assert table["advice"].tolist() == ["keep", "list it"] and table["where"][1] == "bond 0"
+
+
+def test_largest_of_all_recordings_is_kept():
+    """Not that of the end: bonds that slipped far are often released later."""
+    simulation = slid(0.1)
+    write_slip(simulation, 0.02)
+    simulation.sample()
+    (found,) = simulation.report().bond_slip
+    assert found.share == pytest.approx(0.1, abs=16 * EPS) and found.count == 1
+
+
+def groups(mesh=HALVES, **motion):
+    found = estimated_effects(Scene(mesh, CONCRETE, "auto", **motion), 1e-3)
+    return {one.effect: one.group for one in found}, {one.effect: one.verdict for one in found}
+
+
+def test_a_blow_has_the_stress_of_its_wave():
+    """Two equal blocks that meet at v: the wave in each carries v / 2."""
+    speed = 2.0
+    found, verdicts = groups(velocity={"left": (speed, 0.0, 0.0)})
+    model = Model(HALVES, CONCRETE, ())
+    wave = np.sqrt(CONCRETE.normal_stiffness * 2.0 * model.body_radius.mean() / CONCRETE.density)
+    stress = CONCRETE.density * wave * 0.5 * speed
+    assert found["softening"] == pytest.approx(stress / CONCRETE.tensile_strength, 1e-9)
+    assert verdicts["contact"] == NEEDED
+
+
+def test_a_solid_that_turns_has_the_stress_of_its_rim():
+    rate = 100.0
+    found, _ = groups(BLOCK, spin=(0.0, 0.0, rate))
+    centre = BLOCK.points[BLOCK.tetrahedra].mean(axis=1) - 0.05
+    rim = rate * np.sqrt((centre[:, :2] ** 2).sum(axis=1).max())
+    stress = CONCRETE.density * rim**2
+    assert found["softening"] == pytest.approx(stress / CONCRETE.tensile_strength, 1e-6)
+
+
+#: A beam of 8 m that breaks by its own weight, a stub that does not, and what flies away from them.
+BEAM, STUB = bar(8.0, 0.25, (16, 1, 1)), bar(0.5, 0.25, (2, 1, 1))
+SHOT = bar(0.1, 0.1, (1, 1, 1)).moved(by=(0.0, 100.0, 0.0))
+AWAY = {"shot": (0.0, 300.0, 0.0)}
+
+
+@pytest.mark.parametrize(("held", "verdict"), [(BEAM, NEEDED), (STUB, NEGLIGIBLE)])
+def test_weight_is_judged_by_what_it_breaks_also_beside_a_projectile(held, verdict):
+    """One end is held; a body of 300 m/s falls by nothing beside its flight."""
+    mesh = join(held, SHOT, names=["held", "shot"])
+    scene = Scene(mesh, CONCRETE, "auto", loads=[effects.Fixed("held_left")], velocity=AWAY)
+    found = {one.effect: one for one in estimated_effects(scene, 0.05)}["gravity"]
+    assert found.verdict == verdict
+
+
+def test_a_part_at_rest_that_falls_needs_weight_beside_a_projectile():
+    """Nothing is known of what moves it: it may be hit; where it cannot be, weight is all."""
+    mesh = join(STUB, SHOT, names=["free", "shot"])
+    at_it = {"shot": (0.0, -300.0, 0.0)}
+    for velocity, verdict in ((at_it, UNCLEAR), (AWAY, NEEDED), (None, NEEDED)):
+        found = estimated_effects(Scene(mesh, CONCRETE, "auto", velocity=velocity), 0.05)
+        assert {one.effect: one.verdict for one in found}["gravity"] == verdict
+
+
+def test_a_part_keeps_its_estimates_beside_any_other():
+    """Of damping, too: a median over the bonds of all would hide the one bar that is damped."""
+    still = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0)
+    small, large = bar(2e-3, 5e-4, (4, 1, 1)), bar(4.0, 1.0, (8, 2, 2))
+    pulled = effects.Pressure("small_right", -1e5)
+    mesh = join(small, large.moved(by=(20.0, 0.0, 0.0)), names=["small", "large"])
+    beside = Scene(mesh, CONCRETE, "auto", loads=[pulled], materials={"large": still})
+    alone = Scene(small, CONCRETE, "auto", loads=[effects.Pressure("right", -1e5)])
+    found, own = (
+        {one.effect: one.group for one in estimated_effects(scene, 1e-3)}
+        for scene in (beside, alone)
+    )
+    for name in ("softening", "slip", "friction", "bond damping", "air drag"):
+        assert found[name] == pytest.approx(own[name], 1e-12), name

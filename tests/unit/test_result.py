@@ -1,4 +1,7 @@
-"""A result is shown whatever became of the run, and its files tell what it holds and no more."""
+"""A result is shown whatever became of the run, and its files tell what it holds and no more.
+
+The record of bodies' motion has the energy and momentum of a free flight in closed form.
+"""
 
 import csv
 import dataclasses
@@ -6,8 +9,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, Uniform, read_mesh, simulate
-from taichi_dem.mesh.shapes import bar
+from _motion_record import MotionRecord
+from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, Simulation, Uniform, read_mesh, simulate
+from taichi_dem.mesh.shapes import bar, placed_together, single
+from taichi_dem.simulate import run_simulation
 from tests.made_result import made_result
 from tests.notebook import shown
 
@@ -31,20 +36,20 @@ def test_a_notebook_shows_picture_and_figures(flown):
 
 
 def nothing_but_nan(result):
-    history = {name: np.full(len(column), NAN) for name, column in result.history.items()}
+    history = {name: np.full(len(column), NAN) for name, column in result.series.items()}
     ledger = dict.fromkeys(result.report.energy_balance, NAN)
     report = dataclasses.replace(result.report, energy_balance=ledger, run_seconds=NAN)
     frame = dataclasses.replace(
         result.frames[-1], displacement=NAN * result.frames[-1].displacement
     )
     speed = np.full(result.model.body_count, NAN)
-    more = {"history": history, "report": report, "frames": (frame,), "peak_speed": speed}
+    more = {"series": history, "report": report, "frames": (frame,), "peak_speed": speed}
     return dataclasses.replace(result, **more)
 
 
 def without_rows(result):
-    history = {name: column[:0] for name, column in result.history.items()}
-    return dataclasses.replace(result, history=history, frames=())
+    history = {name: column[:0] for name, column in result.series.items()}
+    return dataclasses.replace(result, series=history, frames=())
 
 
 @pytest.mark.parametrize("how", [nothing_but_nan, without_rows])
@@ -88,7 +93,7 @@ def test_a_folder_used_before_keeps_nothing_of_the_earlier_series(flown, tmp_pat
 
 def test_fragments_hold_the_kinetic_energy_of_the_account(flown):
     """Frames and samples are of one time; the share that bodies turn with is in both."""
-    energy = flown.history["kinetic_J"]
+    energy = flown.series["kinetic_J"]
     assert flown.fragments()["kinetic_J"].sum() == pytest.approx(energy[-1], rel=1e-12)
     assert flown.fragments(2)["kinetic_J"].sum() == pytest.approx(energy[2], rel=1e-12)
 
@@ -110,3 +115,22 @@ def test_attenuation_is_fitted_to_what_there_is():
     law = fall.attenuation().power_law(4.0, inner_only=False)
     assert law == pytest.approx((-1.5, 30.0), rel=1e-9)
     assert np.isnan(fall.attenuation().power_law(4.0)).all()
+
+
+def test_two_free_bodies_are_recorded_as_they_move_and_turn():
+    velocity = np.array([[3.0, 0.0, 0.0], [0.0, -1.0, 2.0]])
+    mesh = placed_together({"a": (single(), np.zeros(3)), "b": (single(), np.ones(3))})
+    spin = np.array([[0.0, 0.0, 50.0], [0.0, 0.0, 0.0]])
+    simulation = Simulation(Scene(mesh, CONCRETE, velocity=velocity, spin=spin), Uniform(1e-6))
+    both, second = made = MotionRecord(), MotionRecord(slice(1, 2))
+    run_simulation(simulation, until=1e-4, samples=5, progress=None, observers=made)
+    # A hundred steps round a place near 1 m.
+    assert both.moved == pytest.approx(np.multiply.outer(both.time_s, velocity), abs=2e-14)
+    assert second.kinetic_energy == pytest.approx(0.5 * second.mass[0] * 5.0, rel=1e-12)
+    # A regular tetrahedron turns about any axis as a ball does.
+    spun = 0.5 * both.inertia[0, 0, 0] * 50.0**2
+    assert both.rotational_energy == pytest.approx(spun, rel=1e-9)
+    assert both.momentum == pytest.approx(np.tile(both.mass @ velocity, (6, 1)), rel=1e-12)
+    orbit = np.cross([1.0, 1.0, 1.0], both.mass[1] * velocity[1])
+    whole = orbit + np.array([0.0, 0.0, 50.0 * both.inertia[0, 0, 0]])
+    assert both.angular_momentum == pytest.approx(np.tile(whole, (6, 1)), rel=1e-9)

@@ -19,12 +19,12 @@ from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
 from taichi_dem.kit.children import Terminated, ending_children
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, older_files, output_folder
-from taichi_dem.kit.progress.lasting_output import lasting_output
-from taichi_dem.kit.progress.progress_bar import no_bars, phase_lines
+from taichi_dem.kit.progress.progress_bar import showing
 from taichi_dem.kit.study.entries import Entry, entry_of
 from taichi_dem.kit.study.look import show_opening
 from taichi_dem.kit.study.settings import Settings, add_settings, take_settings
 from taichi_dem.kit.study.sweep_option import add_sweep, run_sweep
+from taichi_dem.kit.terminal import lasting_output
 from taichi_dem.kit.validation import shown
 
 #: Files of an earlier run that are named.
@@ -208,7 +208,7 @@ def main(
 
     def work(options):
         if options.sweep is not None:
-            return _sweep(run, made, options, given)
+            return run_sweep(run, made, options, given)
         if options.workers is not None:
             raise InputError(f"workers must be left out without --sweep, got {options.workers}")
         take_settings(options, made.settings)
@@ -223,13 +223,6 @@ def main(
         return 0
 
     return main_of_tool(work, made, arguments)
-
-
-def _sweep(run, made, options, given):
-    """Run the job for each row of a table; returns the exit code."""
-    if options.json:
-        raise InputError("json must be left out with --sweep, which writes sweep.csv")
-    return run_sweep(run, made, options, given)
 
 
 def main_of_tool(
@@ -261,10 +254,8 @@ def _loudness(options):
             nowhere = stack.enter_context(open(os.devnull, "w", encoding="utf-8"))
             stack.enter_context(contextlib.redirect_stdout(nowhere))
         if options.quiet:
-            stack.enter_context(no_bars())
             warnings.simplefilter("ignore")
-        else:
-            stack.enter_context(phase_lines())
+        stack.enter_context(showing("nothing" if options.quiet else "lines"))
         yield
 
 

@@ -1,32 +1,32 @@
 """Option --sweep of a study: the job once for each row of a CSV file, each in its own process."""
 
+import hashlib
 import json
 import os
 import subprocess
 import sys
-from argparse import Action, ArgumentParser, Namespace
+import time
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from inspect import getfile, unwrap
 from pathlib import Path
 from typing import Any
 
 from taichi_dem.kit import children, runtime
-from taichi_dem.kit.errors import InputError, SimulationDiverged
-from taichi_dem.kit.files import claiming, write_csv, write_text
-from taichi_dem.kit.sweeps.jobs import Job, Journal, jobs_of, table_of
-from taichi_dem.kit.sweeps.sweep import run_missing
-from taichi_dem.kit.sweeps.table import ADDED, Row, read_rows
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import claiming, output_folder, write_text
+from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study.cached_result import digest
 from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.validation import shown
 
-#: Options that are of the sweep, not of a row.
-_OWN = ("sweep", "workers", "out")
-#: Those without a value.
-_LOUDNESS = ("quiet", "json", "help")
+#: Options that are of the sweep, not of a row, and those without a value.
+_OWN, _LOUDNESS = ("sweep", "workers", "out"), ("quiet", "json", "help")
 #: Cells of a column that is an option without a value.
 _SWITCH = {"yes": True, "true": True, "1": True, "no": False, "false": False, "0": False}
-#: Columns of the row of a job.
-_OF_JOBS = ("script", "arguments", "out")
+#: Columns that sweep.csv has beside those of the table and the figures.
+_ADDED = ("error", "version", "commit", "machine", "seconds")
 
 
 def add_sweep(made: ArgumentParser, count: Callable[[str], int]) -> None:
@@ -39,56 +39,84 @@ def add_sweep(made: ArgumentParser, count: Callable[[str], int]) -> None:
 def run_sweep(
     run: Callable, made: ArgumentParser, options: Namespace, arguments: Sequence[str]
 ) -> int:
-    """Run all rows that are missing, gather their figures in sweep.csv; returns the exit code."""
-    table = read_rows(options.sweep, typed=False)
+    """Run all rows that are missing, gather their figures in sweep.csv; returns the exit code.
+
+    A row is done where an earlier sweep ran it with the same options, files and sources.
+    """
+    if options.json:
+        raise InputError("json must be left out with --sweep, which writes sweep.csv")
+    table = _rows(options.sweep)
     count = options.workers or runtime.usable_cores()
     lines = _lines(made, table, options, arguments, count)
-    name = os.path.basename(getfile(unwrap(run)))
     script = os.path.abspath(getfile(unwrap(run)))
     with claiming():
-        journal = Journal(options.out, f"experiments/{name}")
-        folders = [os.path.join(options.out, f"row_{k}") for k in range(len(table))]
-        cells = zip([script] * len(table), map(json.dumps, lines), folders)
-        rows: list[Row] = [dict(zip(_OF_JOBS, row)) for row in cells]
-        jobs = jobs_of(run_row, rows, 0, _files(script, lines))
-        for job in jobs:
-            if not os.path.exists(_summary_of(job)):
-                journal.forget(job)
-        records = run_missing(run_row, jobs, journal, count=count)
-    return _show(table, table_of(jobs, records, seeded=False), options.out)
+        folder = output_folder(options.out)
+        notes = _run_missing(script, lines, folder, count)
+    return _show(table, notes, folder)
 
 
-def run_row(row: Row) -> dict[str, Any]:
-    """Figures of the summary.json that a job leaves; run in a process of its own.
+def _rows(path):
+    """Rows of a CSV file, texts by column name."""
+    import pandas
 
-    Raises InputError and SimulationDiverged with the job's sentence, RuntimeError for another end.
-    """
-    script, arguments, out = (str(row[name]) for name in _OF_JOBS)
-    line = [sys.executable, script, *json.loads(arguments), f"--out={out}"]
+    try:
+        rows = pandas.read_csv(path, dtype=str, keep_default_na=False).to_dict("records")
+    except (OSError, ValueError) as error:
+        raise InputError(f"table {shown(path)} must be a CSV file: {error}") from None
+    if not rows:
+        raise InputError(f"table {shown(path)} must have at least one row, got none")
+    return rows
+
+
+def _run_missing(script, lines, folder, count):
+    """Notes on all rows: how each ended, and what it depends on."""
+    journal = Path(folder, "sweep.json")
+    notes: dict[str, dict] = json.loads(journal.read_text()) if journal.exists() else {}
+    scripts = [path.read_text() for path in sorted(Path(script).parent.glob("*.py"))]
+    sources = digest(scripts, ("taichi_dem", "ca_damper"))
+    stamps = {f"row_{k}": [sources, *line, *_digests(line)] for k, line in enumerate(lines)}
+    missing = [
+        name
+        for name in stamps
+        if notes.get(name, {}).get("stamp") != stamps[name]
+        or not Path(folder, name, "summary.json").exists()
+    ]
+    with ThreadPoolExecutor(count) as pool, ProgressBar("sweep") as bar:
+        jobs = {
+            pool.submit(_run_row, script, line, os.path.join(folder, name)): name
+            for name, line in zip(stamps, lines)
+            if name in missing
+        }
+        try:
+            for done, job in enumerate(as_completed(jobs)):
+                bar.count(done, len(jobs))
+                error, seconds = job.result()
+                stamp = [] if error else stamps[jobs[job]]
+                notes[jobs[job]] = {"stamp": stamp, "error": error, "seconds": seconds}
+                write_text(journal, json.dumps(notes))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    return [notes[name] for name in stamps]
+
+
+def _digests(line):
+    """Digests of the files that arguments name."""
+    words = [word for text in line for word in text.split("=")]
+    files = [Path(word).read_bytes() for word in words if os.path.isfile(word)]
+    return [hashlib.sha256(content).hexdigest() for content in files]
+
+
+def _run_row(script, line, folder):
+    """Run the job of a row; why it failed, or "", and its seconds."""
+    begun = time.perf_counter()
+    line = [sys.executable, script, *line, f"--out={folder}"]
     done = children.run(line, stdin=subprocess.DEVNULL)
+    seconds = time.perf_counter() - begun
     if done.returncode != 0:
-        kinds = {2: InputError, 3: SimulationDiverged}
-        words = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
-        raise kinds.get(done.returncode, RuntimeError)(words)
-    write_text(os.path.join(out, "output.txt"), done.stdout)
-    with open(os.path.join(out, "summary.json"), encoding="utf-8") as file:
-        figures = json.load(file)["figures"]
-    # No figure has the name of a column of the job or of the provenance.
-    return {
-        f"{name}_figure" if name in (*row, *ADDED) else name: one["value"]
-        for name, one in figures.items()
-        if one["value"] is not None
-    }
-
-
-def _files(script, lines):
-    """Files on which rows depend: scripts in the folder of the job's, and those in arguments."""
-    scripts = map(str, Path(script).parent.glob("*.py"))
-    return [*scripts, *(word for line in lines for text in line for word in text.split("="))]
-
-
-def _summary_of(job: Job) -> str:
-    return os.path.join(str(job.row["out"]), "summary.json")
+        return (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1], seconds
+    write_text(os.path.join(folder, "output.txt"), done.stdout)
+    return "", seconds
 
 
 def _lines(made, table, options, arguments, count):
@@ -99,19 +127,12 @@ def _lines(made, table, options, arguments, count):
     for name in _LOUDNESS:
         own.add_argument(f"--{name}", action="store_true")
     common = own.parse_known_args(arguments)[1]
-    known = _options_of(made)
-    for column in table[0]:
-        if column not in known:
-            raise InputError(
-                f"columns of table {options.sweep} must be out of {', '.join(known)}, "
-                f"got {shown(column)}"
-            )
     if "threads" not in table[0] and options.threads is None:
         common = [*common, f"--threads={max(1, runtime.usable_cores() // count)}"]
     lines = []
     for k, row in enumerate(table):
         try:
-            given = [_argument(known[name], name, str(cell)) for name, cell in row.items()]
+            given = [_argument(made, name, cell) for name, cell in row.items()]
             lines.append([*common, *filter(None, given)])
             made.parse_args(lines[-1])
         except InputError as error:
@@ -119,38 +140,49 @@ def _lines(made, table, options, arguments, count):
     return lines
 
 
-def _options_of(made: ArgumentParser) -> dict[str, Action]:
-    """Options that a column may name, by their long names without dashes."""
-    found = {
-        text[2:]: action
-        for action in made._actions
-        for text in action.option_strings
-        if text.startswith("--")
-    }
-    return {name: action for name, action in found.items() if name not in (*_OWN, *_LOUDNESS)}
-
-
-def _argument(action, name, cell):
+def _argument(made, name, cell):
     """The argument that a cell stands for, "" for a switch that is off."""
-    if action.nargs != 0:
+    known = {text[2:]: one for text, one in made._option_string_actions.items()}
+    known = {text: one for text, one in known.items() if text not in ("", *_OWN, *_LOUDNESS)}
+    if name not in known:
+        raise InputError(f"columns must be out of {', '.join(known)}, got {shown(name)}")
+    if known[name].nargs != 0:
         return f"--{name}={cell}"
     if cell.lower() not in _SWITCH:
         raise InputError(f"{name} must be one of {', '.join(_SWITCH)}, got {shown(cell)}")
     return f"--{name}" if _SWITCH[cell.lower()] else ""
 
 
-def _show(table, found, folder):
+def _show(table, notes, folder):
     """Write sweep.csv and print what became of each row; 1 where one has failed."""
-    given = {name: [row[name] for row in table] for name in table[0]}
-    figures = {name: column for name, column in found.items() if name not in _OF_JOBS}
-    named = {f"{name}_figure" if name in given else name: figures[name] for name in figures}
-    provenance = {name: found.provenance[name] for name in ADDED[1:]}
-    path = os.path.join(folder, "sweep.csv")
-    write_csv(path, {**given, **named, **provenance})
-    rows = [
-        [*row.values(), f"{seconds:.1f} s", error or "done"]
-        for row, seconds, error in zip(table, found.provenance["seconds"], found["error"])
+    import pandas
+
+    found = [
+        {**row, **note, **({} if note["error"] else _figures(folder, k, row))}
+        for k, (row, note) in enumerate(zip(table, notes))
     ]
-    print_table(rows, [*given, "time", "end"])
+    names = dict.fromkeys(name for row in found for name in row if name not in ("stamp", *_ADDED))
+    path = os.path.join(folder, "sweep.csv")
+    content = pandas.DataFrame(found, columns=[*names, *_ADDED])
+    write_text(path, content.to_csv(index=False, na_rep="nan"))
+    rows = [
+        [*row.values(), f"{note['seconds']:.1f} s", note["error"] or "done"]
+        for row, note in zip(table, notes)
+    ]
+    print_table(rows, [*table[0], "time", "end"])
     print(f"\nFigures of all rows are in {path}, their pictures and tables in row_0, row_1, ...")
-    return int(any(found["error"]))
+    return int(any(note["error"] for note in notes))
+
+
+def _figures(folder, number, row):
+    """Figures of the summary.json of a row, and what computed them."""
+    text = Path(folder, f"row_{number}", "summary.json").read_text(encoding="utf-8")
+    summary: Any = json.loads(text)
+    # No figure has the name of an option or of another column.
+    figures = {
+        f"{name}_figure" if name in (*row, *_ADDED) else name: one["value"]
+        for name, one in summary["figures"].items()
+    }
+    versions = summary["versions"]
+    place = versions["taichi-dem"], versions["commit"], summary["machine"]["processor"]
+    return {**figures, **dict(zip(_ADDED[1:4], place))}

@@ -67,24 +67,18 @@ def identity_of(work: Any) -> str:
     return f"{module}:{name}"
 
 
-def jobs_of(work: Any, rows: Sequence[Row], seed: int, files: Iterable[str] = ()) -> list[Job]:
-    """A job for each row; a row without a column seed gets one from the sweep's and its number.
-
-    files: on which all jobs depend, beside those that the function and a row name.
-    """
+def jobs_of(work: Any, rows: Sequence[Row], seed: int) -> list[Job]:
+    """A job for each row; a row without a column seed gets one from the sweep's and its number."""
     seen = Dependencies(work)
     depends = [identity_of(work), seen.digest, __version__]
-    common = dict(seen.files)
-    for path in files:
-        common.update(named_file(path, common))
-    known, jobs = dict(common), []
+    known, jobs = dict(seen.files), []
     for number, given in enumerate(rows):
         row = {**given, SEED: given.get(SEED, seed_of(seed, number))}
         own: dict[str, str] = {}
         for value in row.values():
             own.update(named_file(value, known) if isinstance(value, str) else {})
         known.update(own)
-        jobs.append(Job(row, _digest([*depends, row]), {**common, **own}))
+        jobs.append(Job(row, _digest([*depends, row]), {**seen.files, **own}))
     return jobs
 
 
@@ -207,11 +201,6 @@ class Journal:
             check = _digest([record._asdict(), job.files])
             kept = {"record": record._asdict(), "files": job.files, "check": check}
             write_text(self._path(job), json.dumps(kept))
-
-    def forget(self, job: Job) -> None:
-        """Remove the record of a job, if there is one."""
-        with contextlib.suppress(OSError):
-            os.remove(self._path(job))
 
     def _path(self, job):
         return os.path.join(self.folder, "jobs", f"{job.digest}.json")

@@ -13,7 +13,7 @@ from typing import Any
 from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import claiming
-from taichi_dem.kit.progress.progress import Counted, Listener
+from taichi_dem.kit.progress.progress import Listener, Progress
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.sweeps.dependencies import Dependencies
 from taichi_dem.kit.sweeps.jobs import (
@@ -110,21 +110,20 @@ def sweep(
     count = runtime.usable_cores() if workers is None else whole("workers", workers, 1, 1024)
     journal = Journal(out, identity_of(function))
     jobs = jobs_of(function, rows, whole("seed", seed, 0, 2**63))
-    records = run_missing(function, jobs, journal, count=count, client=client, progress=progress)
+    records = _run_missing(function, jobs, journal, count, client, progress)
     made = table_of(jobs, records, SEED in rows[0], Dependencies(function).unseen)
     if journal.folder:
         made.write_csv(os.path.join(journal.folder, RESULTS))
     return made
 
 
-def run_missing(
+def _run_missing(
     function: Work,
     jobs: Sequence[Job],
     journal: Journal,
-    *,
     count: int,
-    client: Any = None,
-    progress: Listener | str | None = AUTO,
+    client: Any,
+    progress: Listener | str | None,
 ) -> list[Record]:
     """Records of jobs, of which those that the journal lacks are run; count: of processes here."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):
@@ -142,8 +141,9 @@ def run_missing(
                 records[job.digest] = record
                 journal.write(job, record)
                 if listen is not None:
+                    words = f"{done + 1} of {len(missing)} runs"
                     share, seconds = (done + 1) / len(missing), time.perf_counter() - started
-                    listen(Counted(share, seconds, done + 1, len(missing)))
+                    listen(Progress(share, seconds, words=words))
     return [records[job.digest] for job in jobs]
 
 

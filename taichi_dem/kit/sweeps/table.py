@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.data_table import data_frame
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.validation import FileName, path_name, shown
@@ -76,11 +77,8 @@ def checked_rows(table: TableLike) -> list[Row]:
     ]
 
 
-def read_rows(path: FileName, typed: bool = True) -> list[Row]:
-    """Rows of a CSV file with a header; typed: cells that read as numbers become numbers.
-
-    Raises InputError for a file that cannot be read or is no such table.
-    """
+def _read_rows(path):
+    """Rows of a CSV file with a header; cells that read as numbers become numbers."""
     name = path_name("table", path)
     try:
         with open(name, encoding="utf-8-sig", newline="") as file:
@@ -93,10 +91,7 @@ def read_rows(path: FileName, typed: bool = True) -> list[Row]:
     for k, line in enumerate(cells):
         if len(line) != len(header) or "" in line:
             raise InputError(f"row {k} of table {name} must have {len(header)} cells, none empty")
-    return [
-        {column: _number_or_text(cell) if typed else cell for column, cell in zip(header, line)}
-        for line in cells
-    ]
+    return [{column: _number_or_text(cell) for column, cell in zip(header, line)} for line in cells]
 
 
 def plain_value(name: str, value: Any) -> Value:
@@ -111,7 +106,7 @@ def plain_value(name: str, value: Any) -> Value:
 
 def _rows(table):
     if isinstance(table, (str, os.PathLike)):
-        return read_rows(table)
+        return _read_rows(table)
     if hasattr(table, "to_dict"):
         return table.to_dict("records")
     if isinstance(table, Mapping):
@@ -212,9 +207,7 @@ class SweepTable(dict[str, np.ndarray]):
         -------
         pandas.DataFrame
         """
-        import pandas as pd
-
-        return pd.DataFrame(self._with(provenance))
+        return data_frame(self._with(provenance))
 
     def write_csv(self, path: FileName, provenance: bool = True) -> None:
         """Write the table as a CSV file.
