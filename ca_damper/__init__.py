@@ -32,9 +32,8 @@ from taichi_dem.kit.accuracy.answer import Answer
 from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.sweeps.rows import parameter_grid
 from taichi_dem.kit.sweeps.sweep import sweep
-from taichi_dem.kit.sweeps.table import SweepTable
+from taichi_dem.kit.sweeps.table import SweepTable, parameter_grid
 from taichi_dem.kit.version import __version__
 
 __all__ = [
