@@ -20,8 +20,7 @@ from taichi_dem.kit import runtime  # isort: skip
 from taichi_dem import effects, goals, methods, shapes
 from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.goals import Goal
-from taichi_dem.kit.accuracy.answer import Answer
-from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
+from taichi_dem.kit.bars.answer import Answer, Branch
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import Progress
@@ -52,7 +51,6 @@ __all__ = [
     "Answer",
     "At",
     "Branch",
-    "BranchedAnswer",
     "Checkpoint",
     "Collector",
     "Every",

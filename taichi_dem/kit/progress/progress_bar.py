@@ -6,6 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from taichi_dem.kit.progress.progress import Listener, Pace, Progress, listening
 from taichi_dem.kit.validation import fraction, instance, progress_option, shown, whole
@@ -177,7 +178,7 @@ def _terminal(title):
     columns = (spinner, name, words) if narrow else (spinner, name, BarColumn(None), words)
     # Prints go where they would go without the bar.
     redirect = sys.stdout is not None and sys.stdout.isatty()
-    options = {"transient": True, "expand": not narrow, "redirect_stdout": redirect}
+    options: Any = {"transient": True, "expand": not narrow, "redirect_stdout": redirect}
     with Bar(*columns, console=console, **options) as bar:
         task = bar.add_task(title, total=1.0, w="")
 
