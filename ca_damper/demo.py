@@ -29,7 +29,6 @@ import numpy as np
 
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
-from ca_damper.certificate import EFFECTS
 from ca_damper.demo_pictures import (
     LEVEL,
     Decay,
@@ -39,10 +38,11 @@ from ca_damper.demo_pictures import (
     sentences,
     write_decays,
 )
-from ca_damper.film import Film, film
 from ca_damper.fixed_mass import RigidMass
 from ca_damper.oscillator import Oscillator
-from ca_damper.progress import Stages
+from ca_damper.report.certificate import EFFECTS
+from ca_damper.report.progress import Stages
+from ca_damper.runs.film import Film, film
 from ca_damper.scenes.table import SceneTable
 from ca_damper.spheres import Spheres
 from taichi_dem.kit import study

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from ca_damper import Batch, ImpactDamper, Oscillator, SceneTable, film
-from ca_damper.measures import first_harmonic, peak
 from ca_damper.plot import Box, FilmMeasures
-from ca_damper.response import frequency_response
+from ca_damper.report.measures import first_harmonic, peak
+from ca_damper.runs.response import frequency_response
 
 #: Amplitude [m] and frequency [Hz] of the swinging grains.
 SWING = 24e-3, 6.0

@@ -9,7 +9,7 @@ from dataclasses import asdict
 import numpy as np
 
 from _effects_runs import damper_batch
-from ca_damper.lattice import DOWN, HELD, UP
+from ca_damper.automaton.lattice import DOWN, HELD, UP
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.field_memory import FieldMemory
@@ -62,7 +62,7 @@ class FrozenBatch:
         for state in states:
             arrays = {**own, **{name: state[name] for name in own.keys() & state.keys() - kept}}
             self.memory.write(arrays)
-            if "device.resting.held" in state.keys() - own.keys():
+            if "device.resting.held" in state and not self.batch.device.resting.rests:
                 release(self.batch.device)
             self._aim()
             self.states.append(self.memory.read())
@@ -105,3 +105,4 @@ def release(device):
     travelled[scene, cell] = np.where(rising, offset, -offset)
     for field, array in zip((cells.kind, cells.speed, cells.travelled), fields):
         assign(field, array)
+    device.resting.held.fill(0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ca_damper.measures import curve_distance
+from ca_damper.report.measures import curve_distance
 from taichi_dem.kit import study
 from taichi_dem.kit.study.paired_timing import median_interval
 

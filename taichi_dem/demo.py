@@ -28,7 +28,7 @@ from taichi_dem.mesh.files import read_mesh
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.output.record import write_bodies
-from taichi_dem.report.certificate import Certificate
+from taichi_dem.report.effects import Certificate
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate

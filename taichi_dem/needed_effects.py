@@ -10,8 +10,8 @@ import numpy as np
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.validation import fraction, instance
-from taichi_dem.laws.chosen import ChosenEffects
-from taichi_dem.mesh.parts import parts_of
+from taichi_dem.laws.roles import ChosenEffects
+from taichi_dem.mesh.topology import parts_of
 from taichi_dem.result import Result
 from taichi_dem.simulate import run_simulation
 from taichi_dem.simulation import Simulation

@@ -15,9 +15,8 @@ from taichi_dem.kit.restart import NoCheckpointWriter
 from taichi_dem.kit.validation import AUTO, FileName, instance, progress_option, shown, whole, word
 from taichi_dem.loads.history import unresolved_histories
 from taichi_dem.methods import Method
-from taichi_dem.observers import MOST_CALLS, At, Every, Observer, RunView, macro_steps
+from taichi_dem.observers import MOST_CALLS, At, Every, Observer, Receivers, RunView, macro_steps
 from taichi_dem.output.hole_monitor import watched_groups
-from taichi_dem.output.receivers import Receivers
 from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
 from taichi_dem.saving import arrays_of, writer_of

@@ -1,14 +1,29 @@
-"""Fragments: bodies that unbroken bonds still join, as one rigid piece each."""
+"""Fragments: bodies that unbroken bonds still join, as one rigid piece each.
+
+And values by which bodies are coloured, by name.
+"""
 
 from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.validation import choice
 from taichi_dem.mesh.tetrahedra import signed_volumes
 from taichi_dem.output.record import Frame
 from taichi_dem.state.model import Model, centres, sums
 
 _AXES = "xyz"
+#: Multiples of the golden ratio, less whole numbers, lie far apart.
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+#: Unit and words of what bodies can be coloured by.
+COLOURS = {
+    "speed": ("m/s", "speed"),
+    "peak_speed": ("m/s", "largest speed so far"),
+    "displacement": ("m", "displacement"),
+    "damage": ("1", "damage"),
+    "level": ("1", "level of the step"),
+    "fragment": ("1", "fragment, by falling mass"),
+}
 
 
 def vectors_of(fragments: Any, name: str) -> np.ndarray:
@@ -161,22 +176,37 @@ def rigid_motion(model: Model, frame: Frame, of_body: np.ndarray) -> tuple[np.nd
     return centre, left @ right
 
 
-def quaternions_of(rotation: np.ndarray) -> np.ndarray:
-    """Unit quaternions x, y, z, w of rotation matrices (n, 3, 3); (n, 4).
+def rotations_of(matrices: np.ndarray) -> Any:
+    """Rotation matrices (n, 3, 3) as a ``Rotation`` of SciPy."""
+    from scipy.spatial.transform import Rotation
 
-    Four formulas differ in the component that they divide by; the largest is taken (S. W. Shepperd,
-    J. Guidance and Control 1, 1978, 223-224).
+    return Rotation.from_matrix(matrices)
+
+
+def body_values(result: Any, frame: Frame, colour: str) -> np.ndarray:
+    """Value of every body of a ``Result`` in a frame, (body_count,); colour: one of COLOURS."""
+    if choice("colour", colour, COLOURS) == "fragment":
+        return fragment_of_body(result.model, result.broken_time <= frame.time_s)
+    if colour == "peak_speed":
+        return result.peak_speed
+    if colour == "displacement":
+        return np.linalg.norm(frame.displacement, axis=1)
+    return getattr(frame, colour)
+
+
+def scale_end(values: np.ndarray) -> float:
+    """Value that a fiftieth of the bodies exceed, or the largest where that is 0."""
+    return float(np.percentile(values, 98.0) or values.max())
+
+
+def shares_of_scale(result: Any, frame: Frame, colour: str) -> np.ndarray:
+    """Values of bodies as shares of a scale from 0 to 1, (body_count,).
+
+    1 is what a fiftieth of the bodies exceed. Fragments are spread over the scale, so that
+    neighbours differ.
     """
-    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(rotation, 0, -1)
-    x, y, z = h - f, c - g, d - b
-    candidates = np.array(
-        [
-            (1.0 + a + e + i, x, y, z),
-            (x, 1.0 + a - e - i, b + d, c + g),
-            (y, b + d, 1.0 - a + e - i, f + h),
-            (z, c + g, f + h, 1.0 - a - e + i),
-        ]
-    )
-    best = np.einsum("kkn->kn", candidates).argmax(axis=0)
-    found = candidates[best, :, np.arange(len(best))]
-    return np.roll(found / np.linalg.norm(found, axis=1)[:, None], -1, axis=1)
+    values = body_values(result, frame, colour)
+    if colour == "fragment":
+        return values * _GOLDEN % 1.0
+    top = scale_end(values)
+    return np.clip(values / top, 0.0, 1.0) if top > 0.0 else np.zeros(len(values))

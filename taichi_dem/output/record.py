@@ -12,7 +12,7 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.files import output_folder, remove_files, write_csv
 from taichi_dem.kit.validation import FileName, file_stem, instance, several
-from taichi_dem.loads.gas_pressure import GasPressure
+from taichi_dem.loads.pressure import GasPressure
 from taichi_dem.mesh.files import write_pvd, write_vtu
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.output.hole_monitor import HoleMonitor

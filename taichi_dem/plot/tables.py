@@ -12,11 +12,9 @@ from taichi_dem.kit.data_table import arrays_of, unit_of, without_unit
 from taichi_dem.kit.display import scale
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, SPARE_COLOURS, area_key, picture
 from taichi_dem.kit.validation import FileName, choices, positive, unit_vector
-from taichi_dem.output.body_values import COLOURS, body_values, scale_end
-from taichi_dem.output.run_tables import RunTables
-from taichi_dem.plot.bodies import ALONG_Z, JOINT, draw_bodies, frame_block
+from taichi_dem.output.fragments import COLOURS, body_values, scale_end
 from taichi_dem.plot.series import ENERGY_TERMS
-from taichi_dem.plot.view import View
+from taichi_dem.plot.view import ALONG_Z, JOINT, View, draw_bodies, frame_block
 
 #: Fragments of a colour of their own; lighter ones are grey.
 _NAMED = 6
@@ -27,7 +25,7 @@ _AT_HOLE = ("monitor_displacement_mm", "hole_radial_displacement_mm")
 
 
 def plot_history(
-    result: RunTables, names: Sequence[str] | None = None, *, path: FileName | None = None
+    result: Any, names: Sequence[str] | None = None, *, path: FileName | None = None
 ) -> Figure:
     """Draw columns of the history over time.
 
@@ -46,7 +44,7 @@ def plot_history(
     return plot_columns(path, history, names)
 
 
-def plot_crack_area(result: RunTables, *, path: FileName | None = None) -> Figure:
+def plot_crack_area(result: Any, *, path: FileName | None = None) -> Figure:
     """Draw the area of all cracks over time."""
     return plot_columns(path, arrays_of(result.crack_area()), ["crack_area_m2"])
 
@@ -85,7 +83,7 @@ def _draw(axes, time, table, names, unit):
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def plot_energy_shares(result: RunTables, *, path: FileName | None = None) -> Figure:
+def plot_energy_shares(result: Any, *, path: FileName | None = None) -> Figure:
     """Draw every term of the energy balance as a share of the energy given, over time.
 
     What is missing to 100 % is unexplained.
@@ -109,7 +107,7 @@ def plot_energy_shares(result: RunTables, *, path: FileName | None = None) -> Fi
     return figure
 
 
-def plot_fragments(result: RunTables, frame: int = -1, *, path: FileName | None = None) -> Figure:
+def plot_fragments(result: Any, frame: int = -1, *, path: FileName | None = None) -> Figure:
     """Draw the share of the mass that passes a sieve over its opening, in a frame.
 
     Shaded: the sizes of single bodies, below which the mesh and not the material decides.
@@ -134,7 +132,7 @@ def plot_fragments(result: RunTables, frame: int = -1, *, path: FileName | None 
 
 
 def plot_rose(
-    result: RunTables,
+    result: Any,
     axis: Sequence[float] = ALONG_Z,
     *,
     sectors: int = 36,
@@ -179,7 +177,7 @@ def _emptiest(rose):
 
 
 def plot_attenuation(
-    result: RunTables,
+    result: Any,
     group: str | None = None,
     *,
     nearest: float = 4.0,
@@ -230,7 +228,7 @@ def plot_attenuation(
 
 
 def plot_block(
-    result: RunTables,
+    result: Any,
     frame: int = -1,
     *,
     colour: str = "speed",
@@ -246,7 +244,7 @@ def plot_block(
     frame : int
         Number of the frame.
     colour : {"speed", "peak_speed", "displacement", "damage", "level", "fragment"}
-        ``taichi_dem.output.body_values.COLOURS``.
+        ``taichi_dem.output.fragments.COLOURS``.
     magnify : float
         Factor of the displacement.
     axis : sequence of 3 floats

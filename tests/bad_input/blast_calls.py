@@ -42,7 +42,7 @@ from taichi_dem import (
     step_report,
     write_paraview,
 )
-from taichi_dem.mesh.face_groups import with_inner_group
+from taichi_dem.mesh.mesh import with_inner_group
 from taichi_dem.mesh.shapes import bar, pair, single
 from tests.made_result import made_result
 

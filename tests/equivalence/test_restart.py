@@ -12,7 +12,7 @@ from taichi_dem import CONCRETE, Checkpoint, InputError, Scene, Simulation, effe
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.checkpoint import read_checkpoint
 from taichi_dem.kit.field_memory import FieldMemory, fields_of
-from taichi_dem.mesh.face_groups import with_cut
+from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.record import Recorder
 from taichi_dem.saving import saved_run

@@ -6,7 +6,7 @@ import pytest
 import _effects_costs
 from _effects_damper import FrozenBatch
 from _effects_frozen import WARM, FrozenScene, states_of_run
-from ca_damper.lattice import DIRECTIONS, HELD
+from ca_damper.automaton.lattice import DIRECTIONS, HELD
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
 from taichi_dem.mesh.shapes import bar
 

@@ -20,16 +20,16 @@ from _blast_ensemble import HOLE, hole_moves, moved, over_time, stronger
 from _hard_cases._statics import least_friction
 from _hard_cases.blast_piles import CARD, SPAN, TALL, house
 from _meshes import group_area, mirrored_copies
-from ca_damper.bouncing import Fall, RecordedFall
 from ca_damper.demo_pictures import Decay
-from ca_damper.measures import first_harmonic
+from ca_damper.report.measures import first_harmonic
+from ca_damper.theory.bouncing import Fall, RecordedFall
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, Uniform, read_mesh
 from taichi_dem.kit.study import Timing
 from taichi_dem.kit.study.work_precision import Point, answers, cheapest
 from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import topology_of
-from taichi_dem.output.attenuation import Attenuation, attenuation_of
+from taichi_dem.output.hole_monitor import Attenuation, attenuation_of
 from taichi_dem.state.model import Model
 
 # The package has functions of these names.

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit import runtime
-from taichi_dem.kit.accuracy.answer import Answer
+from taichi_dem.kit.bars.answer import Answer
 from taichi_dem.kit.files import older_files, write_csv, write_text
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.provenance import commit, processor
