@@ -429,11 +429,7 @@ class Receivers:
     {'far': (1.9, 1.0, 0.1)}
     """
 
-    def __init__(
-        self,
-        points: Mapping[str, Sequence[float]],
-        when: Every | At | None = None,
-    ):
+    def __init__(self, points: Mapping[str, Sequence[float]], when: Every | At | None = None):
         if not isinstance(points, Mapping) or not points:
             raise InputError(f"points must be a dict of name to (x, y, z), got {shown(points)}")
         self.points = {

@@ -57,10 +57,7 @@ def pair(edge: float = 0.05, height: float | None = None) -> Mesh:
     height = regular if height is None else positive("height", height)
     points = np.vstack([base, [-height, 0.0, 0.0], [height, 0.0, 0.0]])
     around = [(0, 1), (1, 2), (2, 0)]
-    groups = {
-        "left": [[3, a, b] for a, b in around],
-        "right": [[4, a, b] for a, b in around],
-    }
+    groups = {"left": [[3, a, b] for a, b in around], "right": [[4, a, b] for a, b in around]}
     return checked_mesh(points, [[3, 0, 1, 2], [4, 0, 2, 1]], groups)
 
 

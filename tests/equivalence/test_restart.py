@@ -91,8 +91,7 @@ CASES = {
 
 
 @pytest.fixture(
-    scope="module",
-    params=["controlled", "implicit", pytest.param("faces", marks=pytest.mark.slow)],
+    scope="module", params=["controlled", "implicit", pytest.param("faces", marks=pytest.mark.slow)]
 )
 def case(request):
     """Each of them in turn."""

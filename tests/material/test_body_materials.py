@@ -5,13 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_dem import (
-    CONCRETE,
-    InputError,
-    Scene,
-    effects,
-    step_report,
-)
+from taichi_dem import CONCRETE, InputError, Scene, effects, step_report
 from taichi_dem.materials.body_materials import joined
 from taichi_dem.materials.bond_rules import bond_geometry
 from taichi_dem.materials.material import bond_moduli

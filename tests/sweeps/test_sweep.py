@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import InputError, sweep
-from taichi_dem.kit.sweeps.journal import Journal
-from taichi_dem.kit.sweeps.rows import checked_rows
+from taichi_dem.kit.sweeps.jobs import Journal
+from taichi_dem.kit.sweeps.table import checked_rows
 from tests.processes import users_environment
 from tests.scenes import ROOT
 from tests.sweeps import jobs
