@@ -39,9 +39,6 @@ class DrawnRuns:
             more = np.array([draw() for _ in range(count)])
             self.records[key] = np.concatenate([before, more])
 
-    def series(self, key):
-        return np.stack([self.records[key]] * 2)
-
     def measures(self, key, begin, leave_out=0):
         kept = self.records[key][begin:]
         if not leave_out:

@@ -156,9 +156,10 @@ def test_scenes_go_on_from_where_they_are_each_as_far_as_asked():
     whole = batch.run(0, 70)
     for s, key in enumerate(keys):
         assert runs.cycles(key) == 70
-        assert np.array_equal(runs.series(key)[1][-1:], 0.5 * whole.record[s, -1:, 9:11] @ [1, -1])
+        found = runs.by_cycle(key)
+        assert np.array_equal(found["amplitude"][-1:], 0.5 * whole.record[s, -1:, 9:11] @ [1, -1])
         square, mean = (whole.record[s, :, k] / whole.steps[s] for k in (1, 0))
-        assert np.array_equal(runs.series(key)[0], np.sqrt(np.maximum(square - mean**2, 0.0)))
+        assert np.array_equal(found["rms"], np.sqrt(np.maximum(square - mean**2, 0.0)))
     assert runs.steps == int(70 * whole.steps.sum()) and runs.runs == 2
 
 
