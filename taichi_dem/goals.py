@@ -201,7 +201,7 @@ def kinetic_energy() -> Goal:
     Goal
         The energy [J].
     """
-    return Goal("kinetic energy", "J", lambda result: result.history["kinetic_J"][-1])
+    return Goal("kinetic energy", "J", lambda result: result.series["kinetic_J"][-1])
 
 
 def peak_speed(body: int) -> Goal:

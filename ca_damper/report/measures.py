@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_dem.kit.data_table import dataset
+from taichi_dem.kit.data_table import dataset, unit_of
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.types import FloatOrArray
-from taichi_dem.kit.units import unit_of
 from taichi_dem.kit.validation import choice, real_numbers
 
 #: Summed over the steps of a cycle; _cos and _sin: times cos(w t) and sin(w t).
@@ -89,11 +88,6 @@ class Cycles:
         -------
         xarray.Dataset
             Units in the attributes of each variable.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
         """
         names = [n for n in MEASURE_UNITS if n not in ("loss_factor", "damping_ratio")]
         found: dict[str, Any] = {

@@ -10,7 +10,7 @@ import numpy as np
 from taichi_dem.elasticity.rates import bond_rates, springs_of
 from taichi_dem.goals import Goal
 from taichi_dem.kit.display import counted
-from taichi_dem.kit.progress.progress import Listener, Worded
+from taichi_dem.kit.progress.progress import Listener, Progress
 from taichi_dem.kit.study.timing import clock
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.methods import ImplicitDashpots, Method, Uniform
@@ -19,7 +19,7 @@ from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import result_of, run_simulation
 from taichi_dem.simulation import Simulation
-from taichi_dem.stability.stable_step import spring_step
+from taichi_dem.stability.body_limits import spring_step
 from taichi_dem.stability.step_report import step_report
 
 #: Fewest steps of a run, and how many times shorter than springs bear they begin at most where the
@@ -185,7 +185,7 @@ class Runs:
         self.cost.setdefault(level, spent)
         if self._listen is not None:
             share = 1.0 - 1.0 / (1.0 + _GROWTH * self.count)
-            self._listen(Worded(share, self.seconds, counted(self.count, "run")))
+            self._listen(Progress(share, self.seconds, "stepping", counted(self.count, "run")))
         return result
 
     def _simulated(self, level, twin, tight, frames, brief):

@@ -8,7 +8,7 @@ from taichi_dem.kit.bars.answer import known_partings
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.methods import order_of
-from taichi_dem.report.certificate import Certificate
+from taichi_dem.report.effects import Certificate
 from taichi_dem.report.energy_balance import injected_words
 from taichi_dem.report.shared_volume import Interpenetration
 from taichi_dem.scene import Scene, kind_of

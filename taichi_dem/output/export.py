@@ -1,5 +1,9 @@
-"""A run as a glTF scene (.glb) for browsers and Blender: every fragment moves as a rigid piece."""
+"""A run for other programs: glTF (browsers, Blender), extended XYZ (OVITO), VTKHDF (ParaView 5.12).
 
+In glTF every fragment moves as a rigid piece.
+"""
+
+import io
 import itertools
 import json
 import struct
@@ -7,12 +11,20 @@ from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.extended_xyz import XyzFrame, write_extended_xyz
 from taichi_dem.kit.files import write_bytes
-from taichi_dem.kit.validation import FileName, positive
-from taichi_dem.mesh.tetrahedra import LOCAL_FACES
+from taichi_dem.kit.validation import FileName, choice, positive
+from taichi_dem.mesh.tetrahedra import LOCAL_FACES, signed_volumes
 from taichi_dem.mesh.topology import skin
-from taichi_dem.output.body_values import shares_of_scale
-from taichi_dem.output.fragments import fragment_of_body, quaternions_of, rigid_motion
+from taichi_dem.output.fragments import (
+    fragment_of_body,
+    fragments_of,
+    rigid_motion,
+    rotations_of,
+    shares_of_scale,
+    vectors_of,
+)
+from taichi_dem.output.record import body_corners, cell_data, corners_of_bodies
 from taichi_dem.state.model import centres
 
 #: Colours from low to high, viridis in nine steps, and that of crack faces; sRGB.
@@ -25,6 +37,11 @@ _SCALE = np.array(
 _INSIDE = np.array((181, 173, 156))
 _FLOAT, _BYTE, _VERTICES = 5126, 5121, 34962
 _TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+_TETRAHEDRON = 10
+#: The format's version that brought series, the lowest that has all that is used here.
+_VERSION = (2, 0)
+#: Rows of a compressed piece of a column.
+_CHUNK = 65536
 
 
 def write_gltf(path: FileName, result: Any, colour: str, seconds: float) -> None:
@@ -87,7 +104,7 @@ def _colours(values):
 def _motions(model, frames, of_body):
     """Translations (frames, fragments, 3) and quaternions x, y, z, w (frames, fragments, 4)."""
     places, rotations = zip(*(rigid_motion(model, frame, of_body) for frame in frames))
-    turns = np.array(list(map(quaternions_of, rotations)))
+    turns = np.array([rotations_of(one).as_quat() for one in rotations])
     # q and -q are one rotation; between two frames the shorter way is meant.
     for before, turn in itertools.pairwise(turns):
         turn *= np.where((turn * before).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
@@ -185,3 +202,128 @@ def _chunk(kind, data, filler):
     """A chunk of the container, filled up to a multiple of four bytes."""
     data = data + filler * (-len(data) % 4)
     return struct.pack("<I4s", len(data), kind) + data
+
+
+def write_particles(path: FileName, result: Any, of: str) -> None:
+    """Write the frames of a ``Result`` as an extended XYZ file.
+
+    Parameters
+    ----------
+    path : str or path
+        Name of the file, such as ``"run.xyz"``.
+    result : Result
+        With a frame at least.
+    of : {"bodies", "fragments"}
+        What a particle is. Fragments are those of each frame, so that their number grows.
+
+    Raises
+    ------
+    InputError
+        For another word, or where the file cannot be written.
+
+    Notes
+    -----
+    Columns: pos [m], radius of the sphere of the same volume [m], velo [m/s], orientation (unit
+    quaternion x, y, z, w, from the shape at rest), mass [kg], fragment (by falling mass).
+    """
+    kinds = {"bodies": _bodies, "fragments": _fragments}
+    particles_of = kinds[choice("of", of, kinds)]
+    tables = [_table(*particles_of(result, frame)) for frame in result.frames]
+    margin = max(table["radius"].max() for table in tables)
+    low = np.min([table["pos"].min(axis=0) for table in tables], axis=0) - margin
+    high = np.max([table["pos"].max(axis=0) for table in tables], axis=0) + margin
+    shots = [XyzFrame(f.time_s, table, low, high - low) for f, table in zip(result.frames, tables)]
+    write_extended_xyz(path, shots)
+
+
+def _table(place, radius, velocity, rotation, mass, fragment):
+    """Columns of the particles in a frame, by name."""
+    turns = {"orientation": rotations_of(rotation).as_quat(), "mass": mass, "fragment": fragment}
+    return {"pos": place, "radius": radius, "velo": velocity, **turns}
+
+
+def _bodies(result, frame):
+    model = result.model
+    volume = signed_volumes(model.mesh.points, model.mesh.tetrahedra)
+    of_body = fragment_of_body(model, result.broken_time <= frame.time_s)
+    radius = np.cbrt(0.75 * volume / np.pi)
+    return frame.position, radius, frame.velocity, frame.rotation, model.body_mass, of_body
+
+
+def _fragments(result, frame):
+    of_body = fragment_of_body(result.model, result.broken_time <= frame.time_s)
+    found = fragments_of(result.model, frame, of_body)
+    centre, rotation = rigid_motion(result.model, frame, of_body)
+    radius, velocity = 0.5 * found["diameter_m"], vectors_of(found, "velocity")
+    return centre, radius, velocity, rotation, found["mass_kg"], found["fragment"]
+
+
+def write_vtkhdf(path: FileName, result: Any) -> None:
+    """Write the frames of a ``Result`` as one VTKHDF file: moving points, cell data of the series.
+
+    Parameters
+    ----------
+    path : str or path
+        Name of the file, such as ``"run.vtkhdf"``.
+    result : Result
+        With a frame at least.
+
+    Raises
+    ------
+    InputError
+        Where h5py is not installed, or the file cannot be written.
+
+    Notes
+    -----
+    Format: VTK File Formats, section VTKHDF, unstructured grid over time, version 2.0.
+    """
+    import h5py
+
+    model, frames = result.model, result.frames
+    # In memory: HDF5 on a full disk fails when it closes the file, and then again at the end.
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"] = _VERSION
+        kind = h5py.string_dtype("ascii", len("UnstructuredGrid"))
+        root.attrs.create("Type", b"UnstructuredGrid", dtype=kind)
+        _write_cells(root, model)
+        points = [body_corners(model, frame).reshape(-1, 3) for frame in frames]
+        _column(root, "Points", points)
+        columns = [cell_data(model, frame, result.acting_since) for frame in frames]
+        for name in columns[0]:
+            _column(root, f"CellData/{name}", [column[name] for column in columns])
+        _write_steps(root, [frame.time_s for frame in frames], model.body_count, list(columns[0]))
+    write_bytes(path, content.getvalue())
+
+
+def _write_cells(root, model):
+    """Bodies as cells, each with four points of its own, the same in all frames."""
+    cells = corners_of_bodies(model)
+    count = len(cells)
+    root["Connectivity"] = cells.astype(np.int64).ravel()
+    root["Offsets"] = 4 * np.arange(count + 1, dtype=np.int64)
+    root["Types"] = np.full(count, _TETRAHEDRON, np.uint8)
+    for name, number in (("Points", cells.size), ("Cells", count), ("ConnectivityIds", cells.size)):
+        root[f"NumberOf{name}"] = np.array([number], dtype=np.int64)
+
+
+def _write_steps(root, times_s, count, names):
+    """Where the data of each frame begin; the cells are those of the first for all."""
+    steps = root.create_group("Steps")
+    steps.attrs["NSteps"] = len(times_s)
+    steps["Values"] = np.array(times_s)
+    every, none = np.arange(len(times_s)), np.zeros(len(times_s), dtype=np.int64)
+    steps["NumberOfParts"] = none + 1
+    steps["PartOffsets"], steps["PointOffsets"] = none, 4 * count * every
+    steps["CellOffsets"] = steps["ConnectivityIdOffsets"] = none[:, None]
+    for name in names:
+        steps[f"CellDataOffsets/{name}"] = count * every
+
+
+def _column(root, name, parts):
+    """Write the values of all frames, one after the other."""
+    values = np.concatenate(parts)
+    packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+    chunk = (min(len(values), _CHUNK), *values.shape[1:])
+    root.create_dataset(name, data=values, chunks=chunk, **packed)

@@ -10,7 +10,8 @@ import sys
 import time
 import warnings
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NoReturn
 
@@ -19,20 +20,19 @@ from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
 from taichi_dem.kit.children import Terminated, ending_children
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, older_files, output_folder
-from taichi_dem.kit.progress.lasting_output import lasting_output
-from taichi_dem.kit.progress.progress_bar import no_bars, phase_lines
-from taichi_dem.kit.study.entries import Entry, entry_of
-from taichi_dem.kit.study.look import show_opening
-from taichi_dem.kit.study.settings import Settings, add_settings, take_settings
+from taichi_dem.kit.progress.progress_bar import showing
+from taichi_dem.kit.study.entries import Entry, entry_of, show_opening
 from taichi_dem.kit.study.sweep_option import add_sweep, run_sweep
+from taichi_dem.kit.terminal import lasting_output
 from taichi_dem.kit.validation import shown
 
-#: Files of an earlier run that are named.
-_MOST_NAMED = 10
+#: Name -> (full, quick), or (full, quick, type, help) for a setting that is an option too: value
+#: of the full job, of the quick job.
+Settings = Mapping[str, tuple]
 _INTERVALS = {None: "every_wall_s", "s": "every_wall_s", "steps": "every_steps", "sim": "every_s"}
 
 
-class Parser(argparse.ArgumentParser):
+class Parser(ArgumentParser):
     """An argument parser whose complaints are one sentence.
 
     settings: of the study, for ``main``. entry: its texts, where no script has an entry for them.
@@ -62,45 +62,37 @@ def one_of(names: Collection[str]) -> Callable[[str], str]:
     return _checked(str, f"one of {', '.join(names)}", lambda x: x in names)
 
 
-def _checked(kind, words, allowed):
-    def parse(text):
-        try:
-            value = kind(text)
-        except ValueError:
-            value = None
-        if value is None or not allowed(value):
-            raise argparse.ArgumentTypeError(f"must be {words}, got {shown(text)}")
-        return value
-
-    return parse
-
-
 def tolerance(text: str) -> float:
     """Type of an option that is a share in (0, 1], such as 1% or 0.01."""
-    number_part, percent = (text[:-1], 0.01) if text.endswith("%") else (text, 1.0)
-    try:
-        value = percent * float(number_part)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value <= 1.0:
-        raise argparse.ArgumentTypeError(
-            f"must be a share above 0 and up to 100%, such as 1% or 0.01, got {shown(text)}"
-        )
-    return value
+    words = "a share above 0 and up to 100%, such as 1% or 0.01"
+    return _checked(_share, words, lambda x: 0.0 < x <= 1.0)(text)
+
+
+def _share(text):
+    return 0.01 * float(text[:-1]) if text.endswith("%") else float(text)
 
 
 def interval(text: str) -> dict:
     """Type of an option that says how often: 600s on the wall, 5000steps, or 1e-5sim seconds."""
+    words = "like 600s (on the wall), 5000steps or 1e-5sim"
+    return _checked(_interval, words, lambda given: Checkpoint("any", **given))(text)
+
+
+def _interval(text):
     found: Any = re.fullmatch(r"([0-9.]+(?:[eE][-+]?[0-9]+)?)(s|steps|sim)?", text)
-    try:
-        unit = _INTERVALS[found[2]]
-        value: Any = int(found[1]) if unit == "every_steps" else float(found[1])
-        Checkpoint("any", **{unit: value})
-    except (TypeError, ValueError, InputError):
-        raise argparse.ArgumentTypeError(
-            f"must be like 600s (on the wall), 5000steps or 1e-5sim, got {shown(text)}"
-        ) from None
-    return {unit: value}
+    unit = _INTERVALS[found[2]]
+    return {unit: int(found[1]) if unit == "every_steps" else float(found[1])}
+
+
+def _checked(kind, words, allowed):
+    def parse(text):
+        with contextlib.suppress(ValueError, TypeError, InputError):
+            value = kind(text)
+            if allowed(value):
+                return value
+        raise argparse.ArgumentTypeError(f"must be {words}, got {shown(text)}")
+
+    return parse
 
 
 def several(kind: Callable[[str], Any]) -> Callable[[str], list]:
@@ -154,11 +146,35 @@ def bare_parser(name: str, description: str | None) -> Parser:
     return made
 
 
-def output_paths(folder: str) -> Callable[[str], str]:
-    """Make the folder of the output; returns a function: path of a file in it, by its name.
+def add_settings(made: ArgumentParser, settings: Settings, **defaults: Any) -> ArgumentParser:
+    """Add an option for each setting that has a type; returns the parser.
 
-    Raises InputError when it cannot be made or written to.
+    defaults: of options that the parser already has.
     """
+    for name, (_, _, *option) in settings.items():
+        if option:
+            kind, words = option
+            words = words.replace("%", "%%")
+            made.add_argument(f"--{name.replace('_', '-')}", type=kind, help=words)
+    made.set_defaults(**defaults)
+    return made
+
+
+def take_settings(options: Namespace, settings: Settings) -> None:
+    """Give each setting that no option has set its value in the full or in the quick job."""
+    for name, (full, quick, *_) in settings.items():
+        if getattr(options, name, None) is None:
+            setattr(options, name, quick if options.quick else full)
+
+
+def begin(options: Namespace, settings: Settings = MappingProxyType({})) -> Path:
+    """Take settings that ``main`` does not know; make the folder for the output."""
+    take_settings(options, settings)
+    return Path(output_folder(options.out))
+
+
+def output_paths(folder: str) -> Callable[[str], str]:
+    """Make the folder of the output; returns a function: path of a file in it, by its name."""
     return functools.partial(os.path.join, output_folder(folder))
 
 
@@ -192,6 +208,23 @@ def checkpoint_of(
     return {"checkpoint": checkpoint, "resume": path if goes_on else None}
 
 
+def add_accuracy(made: ArgumentParser, what: str) -> None:
+    """Add the option --accuracy; what: is found to that share of its value, in words."""
+    words = f"find {what} to this share of their value, such as 1%%, and nothing else"
+    made.add_argument("--accuracy", type=tolerance, default=None, help=words)
+
+
+def check_accuracy(options: Namespace, others: Iterable[str] = ()) -> None:
+    """Raise InputError where --accuracy was given with what leaves it no choice.
+
+    others: options beside those of checkpoints, by name.
+    """
+    given = [name for name in ("resume", "checkpoint_every", *others) if getattr(options, name)]
+    if given:
+        names = " and ".join(name.replace("_", "-") for name in given)
+        raise InputError(f"accuracy must be left out with {names}: it chooses runs of its own")
+
+
 def main(
     run: Callable[[Namespace], None],
     made: Parser,
@@ -208,7 +241,7 @@ def main(
 
     def work(options):
         if options.sweep is not None:
-            return _sweep(run, made, options, given)
+            return run_sweep(run, made, options, given)
         if options.workers is not None:
             raise InputError(f"workers must be left out without --sweep, got {options.workers}")
         take_settings(options, made.settings)
@@ -219,17 +252,12 @@ def main(
         show_opening(made.description, options.entry, options.quick)
         with claiming():
             run(options)
-        _name_older_files(options.out, options.began)
+        older = older_files(options.out, options.began)
+        if older:
+            print(f"Not of this run, in {options.out}: {', '.join(older)}")
         return 0
 
     return main_of_tool(work, made, arguments)
-
-
-def _sweep(run, made, options, given):
-    """Run the job for each row of a table; returns the exit code."""
-    if options.json:
-        raise InputError("json must be left out with --sweep, which writes sweep.csv")
-    return run_sweep(run, made, options, given)
 
 
 def main_of_tool(
@@ -261,10 +289,8 @@ def _loudness(options):
             nowhere = stack.enter_context(open(os.devnull, "w", encoding="utf-8"))
             stack.enter_context(contextlib.redirect_stdout(nowhere))
         if options.quiet:
-            stack.enter_context(no_bars())
             warnings.simplefilter("ignore")
-        else:
-            stack.enter_context(phase_lines())
+        stack.enter_context(showing("nothing" if options.quiet else "lines"))
         yield
 
 
@@ -277,28 +303,11 @@ def _show_warning(usual, message, category, *place, **more):
 
 
 def _summary(options):
-    """Text of the JSON file that sums up a run, without the newline at its end."""
-    name = getattr(options, "summary", "summary.json")
-    path = os.path.join(options.out, name)
-    if not os.path.isfile(path) or name in older_files(options.out, options.began):
-        raise InputError(f"json needs a run that writes {name}, and this one wrote none")
-    with open(path, encoding="utf-8") as file:
-        return file.read().rstrip()
-
-
-def _name_older_files(folder, began):
-    """Say which files in the folder of the output this run has not written."""
-    older = older_files(folder, began)
-    if older:
-        listed = ", ".join(older[:_MOST_NAMED])
-        more = f" and {len(older) - _MOST_NAMED} more" if len(older) > _MOST_NAMED else ""
-        print(f"Not of this run, in {folder}: {listed}{more}")
-
-
-def say(words: str) -> None:
-    """Say a sentence on stderr, as one line, where that can be written to."""
-    with contextlib.suppress(OSError):
-        print(" ".join(words.split()), file=sys.stderr, flush=True)
+    """Text of summary.json, without the newline at its end."""
+    path = Path(options.out, "summary.json")
+    if not path.is_file() or path.name in older_files(options.out, options.began):
+        raise InputError(f"json needs a run that writes {path.name}, and this one wrote none")
+    return path.read_text(encoding="utf-8").rstrip()
 
 
 def exit_code(work: Callable[[], int | None]) -> int:
@@ -320,5 +329,5 @@ def exit_code(work: Callable[[], int | None]) -> int:
             code, words = 130, "interrupted"
         except Terminated as error:
             code, words = 128 + error.number, f"ended by {signal.Signals(error.number).name}"
-        say(words)
+        print(" ".join(words.split()), file=sys.stderr, flush=True)
         return code
