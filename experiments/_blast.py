@@ -1,8 +1,17 @@
-"""The paper's blast, and the methods by which its experiments run it."""
+"""The paper's blast, the methods by which its experiments run it, and what a run has cost."""
 
 from functools import partial
 
-from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, read_mesh, step_report
+from taichi_dem import (
+    CONCRETE,
+    PAPER_BLOCK,
+    Collector,
+    Every,
+    Scene,
+    effects,
+    read_mesh,
+    step_report,
+)
 from taichi_dem.kit.study import add_checkpoints, checkpoint_of, parser
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.step_control import StepControl
@@ -61,6 +70,16 @@ def paper_effects():
 def paper_scene(mesh=PAPER_BLOCK):
     """The paper's scene with all of its effects; mesh: a file."""
     return Scene(read_mesh(mesh), CONCRETE, paper_effects())
+
+
+def run_costs():
+    """Collector of what a run has cost at every sample, and of the levels of its bodies."""
+    return Collector(
+        Every(samples=1),
+        cpu_s=lambda view: view.cpu_seconds,
+        evaluations=lambda view: view.evaluations,
+        level=lambda view: view.motion()["level"],
+    )
 
 
 def print_quality(scene):

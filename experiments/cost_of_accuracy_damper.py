@@ -88,6 +88,8 @@ def run(options):
     study.write_rows(folder / "curves.csv", rows, "method ratio step_s seed rms_m reference")
     shared = {"titles": titles, "floors": floors, "work_name": "particle steps [1]"}
     draw_all(folder, options, made, own, toward, empty, shared)
+    curves = {name: (options.ratios, sweep.rms) for name, sweep in made.items()}
+    picture_compared(folder / "curves.png", curves, OSCILLATOR)
     study.finish(options, NAME, figures_of(made, own, toward, empty, floors), compiling)
 
 
@@ -112,35 +114,26 @@ def sweep_of(name, options, bar):
 
 def rk45_points(frequency, repeats, quick):
     """(Points of all ways, seconds of compiling) at frequencies [Hz]; quick: every other point."""
-    every = 2 if quick else 1
-    jobs = [
-        ("rk45_tolerance", rtol, power(rtol), RK45_STEPS[0], rtol) for rtol in TOLERANCES[::every]
-    ]
-    jobs += [("rk45_step", dt, f"{1e3 * dt:g} ms", dt, 1e-2) for dt in RK45_STEPS[::every]]
-    points, compiling = [], 0.0
-    for method, swept, label, dt, rtol in jobs:
-        found, seconds = rk45_in_kernel(frequency, repeats, dt, rtol)
+    every, points, compiling = 2 if quick else 1, [], 0.0
+    jobs = [("rk45_tolerance", rtol, RK45_STEPS[0], rtol) for rtol in TOLERANCES[::every]]
+    jobs += [("rk45_step", dt, dt, 1e-2) for dt in RK45_STEPS[::every]]
+    for method, swept, dt, rtol in jobs:
+        table = SceneTable(0, 1, dt, frequency, OSCILLATOR.base_amplitude)
+        batch, spent = Batch(Empty(), table, measured_cycles=1, rtol=rtol, atol=1e-3 * rtol), []
+        # The first run compiles.
+        for _ in range(1 + repeats):
+            started = time.perf_counter()
+            batch.start("empty")
+            rms = batch.run(RK45_CYCLES - 1, 1).rms
+            spent.append(time.perf_counter() - started)
+        error = curve_distance(rms, OSCILLATOR.rms(frequency))
+        found = 6 * int(batch.attempts().sum()), error, study.Timing.of(spent[1:])
+        label = power(swept) if swept == rtol else f"{1e3 * dt:g} ms"
         points.append(Point(method, swept, label, *found))
-        compiling += seconds
+        compiling += batch.compile_seconds
     for rtol in PYTHON_TOLERANCES[::every]:
         points.append(Point("rk45_python", rtol, power(rtol), *rk45_in_python(frequency, rtol)))
     return points, compiling
-
-
-def rk45_in_kernel(frequency, repeats, dt, rtol):
-    """(Evaluations, error, timing) of a Batch, and its seconds of compiling."""
-    table = SceneTable(0, 1, dt, frequency, OSCILLATOR.base_amplitude)
-    batch = Batch(Empty(), table, measured_cycles=1, rtol=rtol, atol=1e-3 * rtol)
-    seconds = []
-    # The first run compiles.
-    for _ in range(1 + repeats):
-        started = time.perf_counter()
-        batch.start("empty")
-        rms = batch.run(RK45_CYCLES - 1, 1).rms
-        seconds.append(time.perf_counter() - started)
-    evaluations = 6 * int(batch.attempts().sum())
-    error = curve_distance(rms, OSCILLATOR.rms(frequency))
-    return (evaluations, error, study.Timing.of(seconds[1:])), batch.compile_seconds
 
 
 def rk45_in_python(frequency, rtol):
@@ -152,9 +145,8 @@ def rk45_in_python(frequency, rtol):
         solution = rk45.solve(*job, rtol=rtol, atol=1e-3 * rtol, at=at)
         x.append(solution.y[:SAMPLES, 0])
         evaluations += solution.evaluations
-    rms = np.sqrt(np.square(x).mean(axis=1) - np.mean(x, axis=1) ** 2)
     spent = study.Timing.of([time.perf_counter() - started])
-    return evaluations, curve_distance(rms, OSCILLATOR.rms(frequency)), spent
+    return evaluations, curve_distance(np.std(x, axis=1), OSCILLATOR.rms(frequency)), spent
 
 
 def draw_all(folder, options, made, own, toward, empty, shared):
@@ -197,8 +189,6 @@ def draw_all(folder, options, made, own, toward, empty, shared):
         "function), as a share of the peak. Steps are at most 3.9 ms; rtol 0.01 where the longest "
         "step is swept, free steps in Python.",
     )
-    curves = {name: (ratios, sweep.rms) for name, sweep in made.items()}
-    picture_compared(folder / "curves.png", curves, OSCILLATOR)
 
 
 def figures_of(made, own, toward, empty, floors):

@@ -1,0 +1,399 @@
+"""Questions with a tolerance, drawn at random by seeds, and how their answers are judged.
+
+To the blast they ask about bars under gas pressure; to the damper about small scenes with short
+transients, so that a reference at a quarter of the step is affordable.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ca_damper import (
+    Automaton,
+    Empty,
+    Oscillator,
+    RigidMass,
+    Spheres,
+    frequency_response,
+    solve_response,
+)
+from ca_damper import goals as damper_goals
+from taichi_dem import (
+    CONCRETE,
+    PAPER_BLOCK,
+    InputError,
+    Scene,
+    Uniform,
+    effects,
+    goals,
+    read_mesh,
+    simulate,
+    solve,
+    step_report,
+)
+from taichi_dem.accuracy.job import Job
+from taichi_dem.accuracy.runs import Runs
+from taichi_dem.kit import study
+from taichi_dem.kit.accuracy.branches import BranchedAnswer
+from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.display import counted
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar, placed_together, single
+from taichi_dem.simulate import result_of
+
+#: Fewest and most boxes along x, y and z, and bodies of a bar.
+BOXES, BODIES = ((2, 12), (1, 5), (1, 5)), (12, 1500)
+#: Powers of ten between which are drawn: edge of a box [m], stiffness and damping over those of
+#: concrete, peak of the pressure [Pa]; end of the run and rise of the pressure over the time of a
+#: wave along the bar; tolerances.
+EDGE, STIFFNESS, DAMPING, PEAK = (-2, -1), (-0.3, 0.5), (-1.5, 0.3), (6.5, 8.7)
+LASTS, RISES, TOLERANCE = (0.0, 1.3), (-1.0, 0.5), (-2.5, -1.0)
+#: Shares of the bars that have dashpots, that may break, and that are fixed at one end.
+DAMPED, BREAKING, FIXED = 0.85, 0.6, 0.4
+#: Room in the lists of contacts: a bar that is crushed needs more than a block that is blasted.
+LISTS = {"pairs_per_body": 200, "neighbours_per_body": 500}
+PAPER = Automaton(rules="paper")
+#: Fillings by how often they are drawn, in tenths.
+FILLINGS = (
+    *((Empty(), 1), (RigidMass(), 1), (Spheres(), 2), (PAPER, 3)),
+    *((replace(PAPER, accounting=word), 1.5) for word in ("landing", "landing+ejection")),
+)
+#: CPU seconds that an answer may take, and a peak of spheres, which are dearer.
+BUDGET_S, PEAK_OF_SPHERES_S = 4.0, 12.0
+#: A reference: first seed, cycles; its step is so much shorter, less so at a peak of spheres.
+FIRST_SEED, TRANSIENT, MEASURED, QUARTER, PEAK_OF_SPHERES = 1001, 120, 80, 4, 2
+#: Seeds of a round of it, as many as come to so many steps, between these; rounds at most, and
+#: standard error by half the bar at which they end.
+STEPS, FEWEST, MOST, ROUNDS, SHARP = 8_000_000, 3, 12, 3, 0.3
+#: The reference has a step so many halvings below that of the answer: 16 times finer.
+FINER = 4
+#: Steps of the scan: the longest stable one, over 2^k; a method whose steps are longer than that by
+#: more than this has no chance.
+SCANNED, HOPELESS = range(6), 100
+
+
+@dataclass(frozen=True)
+class BlastQuestion:
+    """A question about a scene: the value of a goal at a time [s], to a tolerance."""
+
+    seed: int
+    scene: Scene
+    until: float
+    goal: goals.Goal
+    tolerance: float
+
+    def __str__(self):
+        bodies = counted(self.scene.mesh.body_count, "body")
+        names = " ".join(effect.name for effect in self.scene.effects if effect.name)
+        return f"bar of {bodies} to {self.until:.3g} s: {self.goal.name}; {names}"
+
+
+def blast_question(seed):
+    """The question to the blast with a number."""
+    random = np.random.default_rng(seed)
+    mesh, edge = _bar(random)
+    stiffer, damped = _power(random, STIFFNESS), _power(random, DAMPING)
+    springs, dashpots = (
+        [f"{k}_{end}" for k in ("normal", "shear")] for end in ("stiffness", "damping")
+    )
+    constants = {name: stiffer * getattr(CONCRETE, name) for name in springs}
+    constants.update({name: damped * getattr(CONCRETE, name) for name in dashpots})
+    material = replace(CONCRETE, **constants)
+    wave = np.sqrt(material.normal_stiffness * edge / material.density)
+    travel = float(np.ptp(mesh.points[:, 0]) / wave)
+    until = travel * _power(random, LASTS)
+    scene = Scene(mesh, material, _effects(random, travel))
+    goal = _goal(random, scene)
+    return BlastQuestion(seed, scene, until, goal, _power(random, TOLERANCE))
+
+
+def paper_question(until, tolerance):
+    """How far the hole of the paper's block opens until a time [s]."""
+    scene = Scene(read_mesh(PAPER_BLOCK), CONCRETE, "auto", loads=[effects.GasPressure()])
+    return BlastQuestion(0, scene, until, goals.hole_displacement(), tolerance)
+
+
+def dropped_question(until):
+    """How far three stiff tetrahedra go that fall on a slab: each bounce magnifies what differs.
+
+    Under 3,000 times the weight of the earth, without friction and bonds of their own.
+    """
+    random = np.random.default_rng(1)
+    parts = {"floor": (bar(0.05, 0.6, (1, 4, 4)), (0.0, 0.0, 0.0))}
+    for k in range(3):
+        body = single(0.05)
+        turn, _ = np.linalg.qr(random.standard_normal((3, 3)))
+        turn *= np.sign(np.linalg.det(turn))
+        turned = (body.points - body.points.mean(axis=0)) @ turn
+        place = 0.12 + 0.04 * k, 0.3, 0.3
+        parts[f"body{k}"] = checked_mesh(turned, body.tetrahedra, body.groups), place
+    chosen = [effects.Gravity((-3e4, 0, 0)), effects.BodyContact(), effects.Fixed("floor_left")]
+    scene = Scene(placed_together(parts), CONCRETE, chosen)
+    return BlastQuestion(0, scene, until, goals.displacement("base"), 0.01)
+
+
+def _power(random, between):
+    return float(10.0 ** random.uniform(*between))
+
+
+def _bar(random):
+    """A bar whose inner points are moved at random, and the edge of its boxes [m]."""
+    bodies, boxes = 0, np.ones(3, dtype=int)
+    while not BODIES[0] <= bodies <= BODIES[1]:
+        boxes = np.array([round(_power(random, np.log10(ends))) for ends in BOXES])
+        bodies = 6 * int(boxes.prod())
+    edge = _power(random, EDGE)
+    mesh = bar(edge * boxes[0], edge * boxes[1:].max(), boxes.tolist())
+    size = mesh.points.max(axis=0)
+    inner = (mesh.points > 1e-9) & (mesh.points < size - 1e-9)
+    moved = random.uniform(-1.0, 1.0, mesh.points.shape) * 0.15 * random.random() * size / boxes
+    return checked_mesh(mesh.points + inner * moved, mesh.tetrahedra, mesh.groups), edge
+
+
+def _effects(random, travel):
+    """Gas pressure on the left end, and what else was drawn; travel: time of a wave [s]."""
+    rise, decay = travel * _power(random, RISES), random.uniform(1.5, 4.0)
+    gas = effects.GasPressure("left", peak=_power(random, PEAK), rise=rise, decay_ratio=decay)
+    found = [gas]
+    if random.random() < DAMPED:
+        found.append(effects.BondDamping())
+    if random.random() < BREAKING:
+        found += [effects.Softening(), effects.ShearSlip()]
+        found += [effects.BodyContact(**LISTS), effects.StickingFriction()]
+    if random.random() < FIXED:
+        found.append(effects.Fixed("right"))
+    return found
+
+
+def _goal(random, scene):
+    """One of the goals that the scene has."""
+    body = int(random.integers(scene.mesh.body_count))
+    choices = [goals.displacement("left"), goals.body_displacement(body), goals.kinetic_energy()]
+    choices += [goals.peak_speed(body), goals.largest_fragment()]
+    if scene.effect("dashpot") is not None:
+        choices.append(goals.energy_share("bond_dashpot"))
+    if scene.effect("contact") is not None:
+        choices.append(goals.broken_faces())
+    return choices[random.integers(len(choices))]
+
+
+@dataclass(frozen=True)
+class DamperQuestion:
+    """A question to ``solve_response``: goal at a tolerance, of a filling on an oscillator."""
+
+    seed: int
+    filling: Any
+    particles: int
+    oscillator: Oscillator
+    goal: damper_goals.Goal
+    tolerance: float
+
+    def arguments(self):
+        """Arguments of ``solve_response``."""
+        given = {name: value for name, value in vars(self).items() if name != "seed"}
+        dear = isinstance(self.filling, Spheres) and self.goal.kind == "extreme"
+        return {**given, "budget_s": PEAK_OF_SPHERES_S if dear else BUDGET_S, "progress": None}
+
+    def __str__(self):
+        o, share = self.oscillator, 100.0 * self.tolerance
+        places = f"{o.natural_frequency:.1f} Hz, damping {o.damping_ratio:.3f}"
+        return (
+            f"{self.seed}: {self.filling.label} x {self.particles}, {self.goal.name} to "
+            f"{share:.2g} %, {places}, mass {o.mass:.3f} kg, y0 {1e3 * o.base_amplitude:.2f} mm"
+        )
+
+
+def damper_question(seed):
+    """The question to the damper with a number."""
+    rng = np.random.default_rng([2604, seed])
+    weights = np.array([weight for _, weight in FILLINGS], dtype=float)
+    filling = FILLINGS[rng.choice(len(FILLINGS), p=weights / weights.sum())][0]
+    most = 20 if isinstance(filling, Spheres) else 40
+    particles = 0 if isinstance(filling, Empty) else int(rng.integers(3, most + 1))
+    mass = 0.086 * 2.0 ** rng.uniform(-1.0, 1.0)
+    omega = 2.0 * math.pi * rng.uniform(7.0, 12.0)
+    damping = 2.0 * rng.uniform(0.02, 0.06) * mass * omega
+    # Of the paper's acceleration of the base, 0.7 to 6 times, as there is more damping.
+    base = 0.6e-3 * (37.9 / omega) ** 2 * 2.0 ** rng.uniform(-0.5, 2.5)
+    oscillator = Oscillator(mass, mass * omega**2, damping, base)
+    tolerance = float(10.0 ** rng.uniform(math.log10(0.003), -1.0))
+    ratio = round(float(rng.uniform(0.88, 1.06)), 3)
+    asked = [damper_goals.peak_rms(), damper_goals.peak_ratio(), damper_goals.rms_at(ratio)]
+    if not isinstance(filling, (Empty, RigidMass)):
+        asked += [damper_goals.loss_factor_at(ratio), damper_goals.apparent_mass_at(ratio)]
+    goal = asked[int(rng.integers(len(asked)))]
+    return DamperQuestion(seed, filling, particles, oscillator, goal, tolerance)
+
+
+def reference_values(question, answer):
+    """Independent values whose mean is what the bar should hold, one a seed.
+
+    Exact for a filling that is a mass and nothing else. Else at a finer step, with other seeds, an
+    automaton's peak at half the spacing; of several motions those nearest to the answer.
+    """
+    filling, o, goal = question.filling, question.oscillator, question.goal
+    if isinstance(filling, (Empty, RigidMass)):
+        mass = question.particles * filling.particle_mass
+        if goal.kind == "extreme":
+            return np.array([o.peak(mass)[goal.unit == "m"]])
+        return np.array([float(o.rms(goal.ratios[0] * o.natural_frequency, mass))])
+    ratios, finer = answer.result.ratios, QUARTER
+    if goal.kind == "extreme" and isinstance(filling, Spheres):
+        finer = PEAK_OF_SPHERES
+    elif goal.kind == "extreme":
+        step = np.diff(ratios).min() / 2.0
+        ratios = np.arange(ratios[0], ratios[-1] + 0.5 * step, step)
+    job = {"particles": question.particles, "ratios": ratios, "oscillator": o, "progress": None}
+    job.update(dt=float(answer.result.dt.max()) / finer)
+    job.update(transient_cycles=TRANSIENT, measured_cycles=MEASURED)
+    steps = len(ratios) * (TRANSIENT + MEASURED) * finer
+    steps *= float(answer.result.steps_per_cycle.max())
+    count, values = min(MOST, max(FEWEST, round(STEPS / steps))), np.empty(0)
+    for first in range(FIRST_SEED, FIRST_SEED + ROUNDS * count, count):
+        found = frequency_response(filling, seeds=range(first, first + count), **job)
+        values = np.concatenate([values, _values_of(found, goal, answer)])
+        if values.std() <= SHARP * answer.error * math.sqrt(len(values)):
+            break
+    return values
+
+
+def _values_of(found, goal, answer):
+    """Values of a goal, one a seed; of several motions those of the answer's, if there are any."""
+    branches = getattr(answer, "branches", ())
+    if goal.kind == "extreme" and not branches:
+        # Jackknife of the peak of the mean curve.
+        curves = found.rms[0].T
+        count, whole = len(curves), _top(found.ratios, curves.mean(axis=0), goal)
+        less = [
+            _top(found.ratios, np.delete(curves, k, 0).mean(axis=0), goal) for k in range(count)
+        ]
+        return count * whole - (count - 1) * np.array(less)
+    values = goal.values(found)[:, 0]
+    values = values[np.isfinite(values)]
+    centres = [branch.value for branch in branches] or [answer.value]
+    own = np.abs(values[:, None] - centres).argmin(axis=1) == 0
+    return values[own] if own.any() else values
+
+
+def _top(ratios, curve, goal):
+    """Place or height of the peak of a curve, smoothed by a polynomial of 1 / RMS^2."""
+    square = ratios**2
+    x = (square - square.mean()) / np.ptp(square)
+    fit = np.polynomial.Polynomial.fit(x, curve**-2.0, min(4, len(x) // 2 + 1))
+    place = np.linspace(x[0], x[-1], 4001)
+    low = fit(place)
+    k = int(low.argmin())
+    at_peak = math.sqrt(square.mean() + np.ptp(square) * place[k]), low[k] ** -0.5
+    return at_peak[goal.unit == "m"]
+
+
+def job_of(question):
+    """The question as ``solve`` has it."""
+    return Job(question.scene, question.until, question.goal, question.tolerance, 0.95)
+
+
+def answered(question, repeats=2):
+    """Answer to a question to the blast, and its least CPU time [s]: the first may compile."""
+    spent = []
+    for _ in range(repeats):
+        begun = study.clock()
+        given = {"until": question.until, "goal": question.goal, "progress": None}
+        answer = solve(question.scene, tolerance=question.tolerance, **given)
+        spent.append(study.clock() - begun)
+    return answer, min(spent)
+
+
+def judged_blast(question):
+    """A question to the blast answered, beside the value at a step 16 times finer.
+
+    None where one of them is refused: a bar that is crushed to rubble fills its lists.
+    """
+    try:
+        answer, seconds = answered(question)
+        true = Runs(job_of(question), None).value(answer.plan.begin + 1 + FINER)
+    except InputError as refused:
+        return print(f"left out: {question}: {refused}")
+    return judged("blast", question, answer, seconds, math.nan if true is None else true)
+
+
+def judged_damper(question):
+    """A question to the damper answered, beside the mean of finer runs with other seeds.
+
+    None where its budget ends before there is anything to tell.
+    """
+    try:
+        answer = solve_response(**question.arguments())
+    except InputError:
+        return None
+    true, doubt = reference_values(question, answer), 0.0
+    if len(true) > 1:
+        doubt = t_quantile(0.95, len(true) - 1) * float(true.std(ddof=1)) / math.sqrt(len(true))
+    return judged("damper", question, answer, answer.plan.seconds, float(true.mean()), doubt)
+
+
+def judged(kind, question, answer, seconds, true, doubt=0.0):
+    """An answer beside the true value; doubt: half-width at 95 % of the bar of that.
+
+    deviation: how far it is off, in half-widths of its bar. single: whether it is one number.
+    """
+    off, width = float(answer.value) - true, math.hypot(answer.error, doubt)
+    far = off / width if width else (math.copysign(math.inf, off) if off else 0.0)
+    return SimpleNamespace(
+        **{"kind": kind, "seed": question.seed, "question": str(question), "cpu_s": seconds},
+        **{"value": float(answer.value), "error": float(answer.error), "true": true},
+        **{"holds": int(abs(off) <= width), "reached": int(answer.reached), "deviation": far},
+        **{"tolerance_percent": 100.0 * question.tolerance, "answer": answer},
+        single=not isinstance(answer, BranchedAnswer),
+    )
+
+
+def fixed_runs(question, others):
+    """All runs of the scan that end well: words, value of the goal and CPU seconds of each.
+
+    others: methods beside the answer's.
+    """
+    job = job_of(question)
+    make, longest = type(job.method(0)), job.method(0).dt0
+    methods = [(job.in_words(k), make(longest / 2**k)) for k in SCANNED]
+    if others and job.solves:
+        report = step_report(question.scene)
+        full, limited = (float(report.borne(kind).min()) for kind in ("full", "limited"))
+        methods += [(f"explicit, {dt:.2g} s", Uniform(dt)) for dt in (full, 0.5 * full)]
+        methods.append((f"limited dashpots, {limited:.2g} s", Uniform(limited, dashpot="limited")))
+    rows = 100 if question.goal.kind == "extreme" else 1
+    looks = {"until": question.until, "samples": rows, "frames": 1, "progress": None}
+    found = []
+    for words, method in methods:
+        if HOPELESS * method.dt0 <= longest:
+            continue
+        spent = []
+        try:
+            for _ in range(2):
+                begun = study.clock()
+                result = result_of(simulate, question.scene, method=method, **looks)
+                spent.append(study.clock() - begun)
+        except InputError:
+            continue
+        if not result.diverged:
+            found.append((words, question.goal.value(result), min(spent)))
+    return found
+
+
+def twins_of(question, count):
+    """Runs that differ by one rounding: times [ms], mean ways [mm], and how far they are apart.
+
+    (frames,), (count, frames) and (count - 1, frames), the last as a share of a usual way.
+    """
+    runs = Runs(job_of(question), None)
+    level = next(k for k in SCANNED if runs.value(k) is not None)
+    frames = [runs.frames(level, twin) for twin in range(count)]
+    moved = np.array([[frame.displacement for frame in some] for some in frames])
+    far = np.linalg.norm(moved[0, -1], axis=1)
+    moved = moved[:, :, far > np.median(far)]
+    ways = np.linalg.norm(moved, axis=3)
+    apart = np.linalg.norm(moved[1:] - moved[0], axis=3).mean(axis=2)
+    time_ms = 1e3 * np.array([frame.time_s for frame in frames[0]])
+    return time_ms, 1e3 * ways.mean(axis=2), apart / np.maximum(ways[0].mean(axis=1), 1e-300)
