@@ -8,6 +8,7 @@ that run in kernels are left out, as their contracts are those of the roles.
 import dataclasses
 import importlib
 import inspect
+import re
 import sys
 import typing
 from functools import cached_property
@@ -192,3 +193,10 @@ def _keeps(kind, contract):
     fields = {field.name for field in _fields(kind)}
     wanted = [name for name in vars(contract) if not name.startswith("_")]
     return all(hasattr(kind, name) or name in fields for name in wanted)
+
+
+def parameters(text):
+    """Types of the parameters of a docstring in NumPy style, by name."""
+    pattern = r"^Parameters\n-{3,}\n(.*?)(?=^\S[^\n]*\n-{3,}$|\Z)"
+    section = re.search(pattern, inspect.cleandoc(text), re.DOTALL | re.MULTILINE)
+    return dict(re.findall(r"^(\S.*?) : (.*)$", section[1] if section else "", re.MULTILINE))
