@@ -11,29 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper import (
-    Automaton,
-    Empty,
-    Oscillator,
-    RigidMass,
-    Spheres,
-    frequency_response,
-    solve_response,
-)
+import ca_damper as ca
+import taichi_dem as dem
 from ca_damper import goals as damper_goals
-from taichi_dem import (
-    CONCRETE,
-    PAPER_BLOCK,
-    InputError,
-    Scene,
-    Uniform,
-    effects,
-    goals,
-    read_mesh,
-    simulate,
-    solve,
-    step_report,
-)
+from taichi_dem import effects, goals
 from taichi_dem.accuracy.job import Job
 from taichi_dem.accuracy.runs import Runs
 from taichi_dem.kit import study
@@ -55,10 +36,10 @@ LASTS, RISES, TOLERANCE = (0.0, 1.3), (-1.0, 0.5), (-2.5, -1.0)
 DAMPED, BREAKING, FIXED = 0.85, 0.6, 0.4
 #: Room in the lists of contacts: a bar that is crushed needs more than a block that is blasted.
 LISTS = {"pairs_per_body": 200, "neighbours_per_body": 500}
-PAPER = Automaton(rules="paper")
+PAPER = ca.Automaton(rules="paper")
 #: Fillings by how often they are drawn, in tenths.
 FILLINGS = (
-    *((Empty(), 1), (RigidMass(), 1), (Spheres(), 2), (PAPER, 3)),
+    *((ca.Empty(), 1), (ca.RigidMass(), 1), (ca.Spheres(), 2), (PAPER, 3)),
     *((replace(PAPER, accounting=word), 1.5) for word in ("landing", "landing+ejection")),
 )
 #: CPU seconds that an answer may take, and a peak of spheres, which are dearer.
@@ -80,7 +61,7 @@ class BlastQuestion:
     """A question about a scene: the value of a goal at a time [s], to a tolerance."""
 
     seed: int
-    scene: Scene
+    scene: dem.Scene
     until: float
     goal: goals.Goal
     tolerance: float
@@ -99,20 +80,22 @@ def blast_question(seed):
     springs, dashpots = (
         [f"{k}_{end}" for k in ("normal", "shear")] for end in ("stiffness", "damping")
     )
-    constants = {name: stiffer * getattr(CONCRETE, name) for name in springs}
-    constants.update({name: damped * getattr(CONCRETE, name) for name in dashpots})
-    material = replace(CONCRETE, **constants)
+    constants = {name: stiffer * getattr(dem.CONCRETE, name) for name in springs}
+    constants.update({name: damped * getattr(dem.CONCRETE, name) for name in dashpots})
+    material = replace(dem.CONCRETE, **constants)
     wave = np.sqrt(material.normal_stiffness * edge / material.density)
     travel = float(np.ptp(mesh.points[:, 0]) / wave)
     until = travel * _power(random, LASTS)
-    scene = Scene(mesh, material, _effects(random, travel))
+    scene = dem.Scene(mesh, material, _effects(random, travel))
     goal = _goal(random, scene)
     return BlastQuestion(seed, scene, until, goal, _power(random, TOLERANCE))
 
 
 def paper_question(until, tolerance):
     """How far the hole of the paper's block opens until a time [s]."""
-    scene = Scene(read_mesh(PAPER_BLOCK), CONCRETE, "auto", loads=[effects.GasPressure()])
+    scene = dem.Scene(
+        dem.read_mesh(dem.PAPER_BLOCK), dem.CONCRETE, "auto", loads=[effects.GasPressure()]
+    )
     return BlastQuestion(0, scene, until, goals.hole_displacement(), tolerance)
 
 
@@ -130,8 +113,12 @@ def dropped_question(until):
         turned = (body.points - body.points.mean(axis=0)) @ turn
         place = 0.12 + 0.04 * k, 0.3, 0.3
         parts[f"body{k}"] = checked_mesh(turned, body.tetrahedra, body.groups), place
-    chosen = [effects.Gravity((-3e4, 0, 0)), effects.BodyContact(), effects.Fixed("floor_left")]
-    scene = Scene(placed_together(parts), CONCRETE, chosen)
+    chosen = [
+        effects.Gravity((-3e4, 0, 0)),
+        effects.BodyContact(),
+        effects.Fixed("floor_left"),
+    ]
+    scene = dem.Scene(placed_together(parts), dem.CONCRETE, chosen)
     return BlastQuestion(0, scene, until, goals.displacement("base"), 0.01)
 
 
@@ -171,7 +158,11 @@ def _effects(random, travel):
 def _goal(random, scene):
     """One of the goals that the scene has."""
     body = int(random.integers(scene.mesh.body_count))
-    choices = [goals.displacement("left"), goals.body_displacement(body), goals.kinetic_energy()]
+    choices = [
+        goals.displacement("left"),
+        goals.body_displacement(body),
+        goals.kinetic_energy(),
+    ]
     choices += [goals.peak_speed(body), goals.largest_fragment()]
     if scene.effect("dashpot") is not None:
         choices.append(goals.energy_share("bond_dashpot"))
@@ -187,14 +178,14 @@ class DamperQuestion:
     seed: int
     filling: Any
     particles: int
-    oscillator: Oscillator
+    oscillator: ca.Oscillator
     goal: damper_goals.Goal
     tolerance: float
 
     def arguments(self):
         """Arguments of ``solve_response``."""
         given = {name: value for name, value in vars(self).items() if name != "seed"}
-        dear = isinstance(self.filling, Spheres) and self.goal.kind == "extreme"
+        dear = isinstance(self.filling, ca.Spheres) and self.goal.kind == "extreme"
         return {**given, "budget_s": PEAK_OF_SPHERES_S if dear else BUDGET_S, "progress": None}
 
     def __str__(self):
@@ -211,18 +202,18 @@ def damper_question(seed):
     rng = np.random.default_rng([2604, seed])
     weights = np.array([weight for _, weight in FILLINGS], dtype=float)
     filling = FILLINGS[rng.choice(len(FILLINGS), p=weights / weights.sum())][0]
-    most = 20 if isinstance(filling, Spheres) else 40
-    particles = 0 if isinstance(filling, Empty) else int(rng.integers(3, most + 1))
+    most = 20 if isinstance(filling, ca.Spheres) else 40
+    particles = 0 if isinstance(filling, ca.Empty) else int(rng.integers(3, most + 1))
     mass = 0.086 * 2.0 ** rng.uniform(-1.0, 1.0)
     omega = 2.0 * math.pi * rng.uniform(7.0, 12.0)
     damping = 2.0 * rng.uniform(0.02, 0.06) * mass * omega
     # Of the paper's acceleration of the base, 0.7 to 6 times, as there is more damping.
     base = 0.6e-3 * (37.9 / omega) ** 2 * 2.0 ** rng.uniform(-0.5, 2.5)
-    oscillator = Oscillator(mass, mass * omega**2, damping, base)
+    oscillator = ca.Oscillator(mass, mass * omega**2, damping, base)
     tolerance = float(10.0 ** rng.uniform(math.log10(0.003), -1.0))
     ratio = round(float(rng.uniform(0.88, 1.06)), 3)
     asked = [damper_goals.peak_rms(), damper_goals.peak_ratio(), damper_goals.rms_at(ratio)]
-    if not isinstance(filling, (Empty, RigidMass)):
+    if not isinstance(filling, (ca.Empty, ca.RigidMass)):
         asked += [damper_goals.loss_factor_at(ratio), damper_goals.apparent_mass_at(ratio)]
     goal = asked[int(rng.integers(len(asked)))]
     return DamperQuestion(seed, filling, particles, oscillator, goal, tolerance)
@@ -235,13 +226,13 @@ def reference_values(question, answer):
     automaton's peak at half the spacing; of several motions those nearest to the answer.
     """
     filling, o, goal = question.filling, question.oscillator, question.goal
-    if isinstance(filling, (Empty, RigidMass)):
+    if isinstance(filling, (ca.Empty, ca.RigidMass)):
         mass = question.particles * filling.particle_mass
         if goal.kind == "extreme":
             return np.array([o.peak(mass)[goal.unit == "m"]])
         return np.array([float(o.rms(goal.ratios[0] * o.natural_frequency, mass))])
     ratios, finer = answer.result.ratios, QUARTER
-    if goal.kind == "extreme" and isinstance(filling, Spheres):
+    if goal.kind == "extreme" and isinstance(filling, ca.Spheres):
         finer = PEAK_OF_SPHERES
     elif goal.kind == "extreme":
         step = np.diff(ratios).min() / 2.0
@@ -253,7 +244,7 @@ def reference_values(question, answer):
     steps *= float(answer.result.steps_per_cycle.max())
     count, values = min(MOST, max(FEWEST, round(STEPS / steps))), np.empty(0)
     for first in range(FIRST_SEED, FIRST_SEED + ROUNDS * count, count):
-        found = frequency_response(filling, seeds=range(first, first + count), **job)
+        found = ca.frequency_response(filling, seeds=range(first, first + count), **job)
         values = np.concatenate([values, _values_of(found, goal, answer)])
         if values.std() <= SHARP * answer.error * math.sqrt(len(values)):
             break
@@ -301,7 +292,7 @@ def answered(question, repeats=2):
     for _ in range(repeats):
         begun = study.clock()
         given = {"until": question.until, "goal": question.goal, "progress": None}
-        answer = solve(question.scene, tolerance=question.tolerance, **given)
+        answer = dem.solve(question.scene, tolerance=question.tolerance, **given)
         spent.append(study.clock() - begun)
     return answer, min(spent)
 
@@ -314,7 +305,7 @@ def judged_blast(question):
     try:
         answer, seconds = answered(question)
         true = Runs(job_of(question), None).value(answer.plan.begin + 1 + FINER)
-    except InputError as refused:
+    except dem.InputError as refused:
         return print(f"left out: {question}: {refused}")
     return judged("blast", question, answer, seconds, math.nan if true is None else true)
 
@@ -325,8 +316,8 @@ def judged_damper(question):
     None where its budget ends before there is anything to tell.
     """
     try:
-        answer = solve_response(**question.arguments())
-    except InputError:
+        answer = ca.solve_response(**question.arguments())
+    except dem.InputError:
         return None
     true, doubt = reference_values(question, answer), 0.0
     if len(true) > 1:
@@ -359,10 +350,12 @@ def fixed_runs(question, others):
     make, longest = type(job.method(0)), job.method(0).dt0
     methods = [(job.in_words(k), make(longest / 2**k)) for k in SCANNED]
     if others and job.solves:
-        report = step_report(question.scene)
+        report = dem.step_report(question.scene)
         full, limited = (float(report.borne(kind).min()) for kind in ("full", "limited"))
-        methods += [(f"explicit, {dt:.2g} s", Uniform(dt)) for dt in (full, 0.5 * full)]
-        methods.append((f"limited dashpots, {limited:.2g} s", Uniform(limited, dashpot="limited")))
+        methods += [(f"explicit, {dt:.2g} s", dem.Uniform(dt)) for dt in (full, 0.5 * full)]
+        methods.append(
+            (f"limited dashpots, {limited:.2g} s", dem.Uniform(limited, dashpot="limited"))
+        )
     rows = 100 if question.goal.kind == "extreme" else 1
     looks = {"until": question.until, "samples": rows, "frames": 1, "progress": None}
     found = []
@@ -373,9 +366,9 @@ def fixed_runs(question, others):
         try:
             for _ in range(2):
                 begun = study.clock()
-                result = result_of(simulate, question.scene, method=method, **looks)
+                result = result_of(dem.simulate, question.scene, method=method, **looks)
                 spent.append(study.clock() - begun)
-        except InputError:
+        except dem.InputError:
             continue
         if not result.diverged:
             found.append((words, question.goal.value(result), min(spent)))

@@ -12,20 +12,10 @@ from functools import partial
 import numpy as np
 import taichi as ti
 
+import taichi_dem as dem
 from _blast import EFFECTS
 from ca_damper import Automaton, Batch, Oscillator, SceneTable, Spheres
 from ca_damper.lattice import DOWN, HELD, UP
-from taichi_dem import (
-    CONCRETE,
-    PAPER_BLOCK,
-    ImplicitDashpots,
-    Scene,
-    Simulation,
-    SimulationDiverged,
-    Uniform,
-    read_mesh,
-    simulate,
-)
 from taichi_dem.demo import figures_of_certificate
 from taichi_dem.kit.allocation import assign, field_bytes, values
 from taichi_dem.kit.field_memory import FieldMemory
@@ -45,24 +35,24 @@ PEAK, WEAK = 575e6, 5.75e6
 ORDER = ("bond_damping", "softening", "shear_slip", "body_contact", "sticking_friction")
 #: Contacts in place of that of bodies: their states are those of an own run.
 REPLACING = ("sphere_contact", "surface_contact")
-_UNDAMPED = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0)
+_UNDAMPED = replace(dem.CONCRETE, normal_damping=0.0, shear_damping=0.0)
 #: Scenes whose shortest list of effects that serves is known: material, peak [Pa], the list.
 KNOWN_LISTS = {
-    "blast": (CONCRETE, PEAK, ORDER),
-    "weak pulse": (CONCRETE, WEAK, ("bond_damping",)),
+    "blast": (dem.CONCRETE, PEAK, ORDER),
+    "weak pulse": (dem.CONCRETE, WEAK, ("bond_damping",)),
     "weak pulse, no damping": (_UNDAMPED, WEAK, ()),
-    "blast, no friction": (replace(CONCRETE, friction=0.0), PEAK, ORDER[:-1]),
+    "blast, no friction": (replace(dem.CONCRETE, friction=0.0), PEAK, ORDER[:-1]),
 }
 #: Substeps after a state is restored that are not timed: its data come to the cache.
 WARM = 2
 
 
-def scene_of(names, material=CONCRETE, peak=PEAK):
+def scene_of(names, material=dem.CONCRETE, peak=PEAK):
     """The paper's block under gas of some peak pressure [Pa], with effects by name, or "auto"."""
-    mesh, gas = read_mesh(PAPER_BLOCK), EFFECTS["gas_pressure"](peak=peak)
+    mesh, gas = dem.read_mesh(dem.PAPER_BLOCK), EFFECTS["gas_pressure"](peak=peak)
     if names == "auto":
-        return Scene(mesh, material, "auto", loads=[gas])
-    return Scene(mesh, material, [gas, *(EFFECTS[name]() for name in names)])
+        return dem.Scene(mesh, material, "auto", loads=[gas])
+    return dem.Scene(mesh, material, [gas, *(EFFECTS[name]() for name in names)])
 
 
 def blast(names, until, step, ulps):
@@ -72,8 +62,8 @@ def blast(names, until, step, ulps):
     """
     scene, started = scene_of(names, peak=PEAK + ulps * np.spacing(PEAK)), time.process_time()
     try:
-        result = simulate(scene, method=ImplicitDashpots(step), until=until, samples=25)
-    except SimulationDiverged as error:
+        result = dem.simulate(scene, method=dem.ImplicitDashpots(step), until=until, samples=25)
+    except dem.SimulationDiverged as error:
         return {"failed": str(error)}
     report = result.report
     return {
@@ -105,7 +95,7 @@ def damper(filling, options, table, transient):
     ready = time.process_time()
     try:
         measured = batch.run(transient, table["measured_cycles"])
-    except SimulationDiverged as error:
+    except dem.SimulationDiverged as error:
         return {"failed": str(error)}
     return {
         "before_first_step_s": ready - started,
@@ -128,7 +118,7 @@ class FrozenScene:
 
     def __init__(self, scene, method, states=(), substeps=12):
         driver = "parallel" if on_device() else "resident"
-        self.simulation, self.substeps = Simulation(scene, method, driver), substeps
+        self.simulation, self.substeps = dem.Simulation(scene, method, driver), substeps
         self.simulation.driver.prepare()
         self.memory = FieldMemory(self.simulation.engine)
         own = self.memory.read()
@@ -222,7 +212,7 @@ def costs_of_blast(scenes, lists, certified, until, step, states, substeps, **ti
 
     certified: end [s] of the run with effects="auto" whose certificate is a third entry.
     """
-    method, times = ImplicitDashpots(step), [until * (k + 0.5) / states for k in range(states)]
+    method, times = dem.ImplicitDashpots(step), [until * (k + 0.5) / states for k in range(states)]
 
     def from_runs(candidates, alike):
         """Costs of scenes; alike: of each the one from whose states it begins."""
@@ -244,7 +234,7 @@ def costs_of_blast(scenes, lists, certified, until, step, states, substeps, **ti
         listed = {"best list": best, "auto": "auto", "all effects": ORDER}
         candidates = {name: scene_of(names, material, peak) for name, names in listed.items()}
         costs[scene] = from_runs(candidates, {name: name for name in listed})
-    run = simulate(scene_of("auto"), until=certified, method=method, samples=1)
+    run = dem.simulate(scene_of("auto"), until=certified, method=method, samples=1)
     told = figures_of_certificate(run.certificate)
     return {"blast": blasts, "lists": costs, "certificate": told}
 
@@ -271,8 +261,8 @@ def absent(substeps, repeats):
 
 def _elastic(stripped):
     """A function that takes an elastic block, its bodies shaken, some substeps on."""
-    scene = Scene(read_mesh(PAPER_BLOCK), CONCRETE, [])
-    simulation = Simulation(scene, Uniform(1e-8), "resident")
+    scene = dem.Scene(dem.read_mesh(dem.PAPER_BLOCK), dem.CONCRETE, [])
+    simulation = dem.Simulation(scene, dem.Uniform(1e-8), "resident")
     centre = simulation.model.centre
     velocity = np.random.default_rng(1).normal(size=centre.shape)
     simulation.state.set_motion(centre, velocity=velocity)

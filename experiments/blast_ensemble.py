@@ -24,19 +24,10 @@ import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 
+import taichi_dem as dem
 from _blast import BLOCK_STEP, blast_parser
 from _drawing import crossings
-from taichi_dem import (
-    CONCRETE,
-    Every,
-    ImplicitDashpots,
-    InputError,
-    Scene,
-    effects,
-    read_mesh,
-    simulate,
-    sweep,
-)
+from taichi_dem import effects
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, BLUE, ORANGE, picture
@@ -68,11 +59,11 @@ def blast(row):
     bond, as a text of ones and zeros, whether it broke.
     """
     random = np.random.default_rng(row["seed"])
-    mesh = moved(read_mesh(row["mesh"]), row["jitter"], random)
-    material = stronger(CONCRETE, 1.0 + row["scatter"] * random.standard_normal())
-    scene = Scene(mesh, material, "auto", loads=[effects.GasPressure()])
+    mesh = moved(dem.read_mesh(row["mesh"]), row["jitter"], random)
+    material = stronger(dem.CONCRETE, 1.0 + row["scatter"] * random.standard_normal())
+    scene = dem.Scene(mesh, material, "auto", loads=[effects.GasPressure()])
     given = {"until": row["until"], "samples": row["samples"], "progress": None}
-    result = simulate(scene, method=ImplicitDashpots(BLOCK_STEP), **given)
+    result = dem.simulate(scene, method=dem.ImplicitDashpots(BLOCK_STEP), **given)
     hole = result.history["hole_radial_displacement_mm"].tolist()
     broken = "".join("01"[one] for one in (~np.isnan(result.broken_time)).astype(int))
     moves = {HOLE.format(k): value for k, value in enumerate(hole)}
@@ -101,7 +92,7 @@ def stronger(material, factor):
 
 def over_time(moves, until, samples):
     """Mean, standard deviation and band of the hole's displacement [mm], (samples, blasts)."""
-    steps = Every(samples=1).marks(macro_steps(until, BLOCK_STEP), BLOCK_STEP, samples)
+    steps = dem.Every(samples=1).marks(macro_steps(until, BLOCK_STEP), BLOCK_STEP, samples)
     low, high = np.quantile(moves, [0.5 - 0.5 * BAND, 0.5 + 0.5 * BAND], axis=1)
     return {
         "time_ms": 1e3 * BLOCK_STEP * np.array(sorted({0, *steps})),
@@ -163,23 +154,23 @@ def draw_faces(axes, segments, probability):
 
 def run(options):
     """Blast, count, draw, print."""
-    mesh, at = read_mesh(options.mesh), study.output_paths(options.out)
+    mesh, at = dem.read_mesh(options.mesh), study.output_paths(options.out)
     mesh.group_faces("hole")
     names = ("mesh", "jitter", "scatter", "until", "samples")
     rows = [{name: getattr(options, name) for name in names} for _ in range(options.members)]
     # A second process would compile as well, which takes longer than four blasts.
     workers = 1 if options.quick else options.threads
-    table = sweep(blast, rows, out=at("members"), workers=workers, seed=options.seed)
+    table = dem.sweep(blast, rows, out=at("members"), workers=workers, seed=options.seed)
     table.write_csv(at("members.csv"))
     ended = table["error"] == ""
     if ended.sum() < 2:
-        raise InputError(f"two blasts must end well, got: {table['error'][~ended][0]}")
+        raise dem.InputError(f"two blasts must end well, got: {table['error'][~ended][0]}")
     broken = np.array([[*text] for text in table["broken"][ended]]) == "1"
     moves = np.array([table[name][ended] for name in table if name.startswith(HOLE[:8])])
     columns, last = over_time(moves, options.until, options.samples), moves[-1]
     write_csv(at("displacement.csv"), columns)
     draw_displacement(at("displacement.png"), columns, last)
-    model, counts, shares = Model(mesh, CONCRETE, ()), broken.sum(axis=1), broken.mean(axis=0)
+    model, counts, shares = Model(mesh, dem.CONCRETE, ()), broken.sum(axis=1), broken.mean(axis=0)
     top, middle = model.topology, mesh.points[model.topology.vertices].mean(axis=1)
     places = {f"{axis}_m": middle[:, k] for k, axis in enumerate("xyz")}
     faces = {"body": top.master, "other_body": top.slave, **places, "probability": shares}

@@ -24,16 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ca_damper import (
-    Automaton,
-    InputError,
-    ProgressBar,
-    Spheres,
-    frequency_response,
-    goals,
-    solve_response,
-    sweep_up_and_down,
-)
+import ca_damper as ca
 from ca_damper.plot import picture_hysteresis, picture_measures, picture_responses
 from ca_damper.response import OUTSIDE, Grid
 from taichi_dem.kit import study
@@ -44,12 +35,12 @@ NAME = "damper_response"
 COARSE = ([0.80, 0.84, 0.87, 0.89], [1.04, 1.06, 1.09, 1.12])
 RATIOS = np.round(np.concatenate([COARSE[0], np.arange(0.90, 1.0201, 0.005), COARSE[1]]), 4)
 #: Of both fillings [kg].
-PARTICLE_MASS = Spheres().particle_mass
+PARTICLE_MASS = ca.Spheres().particle_mass
 #: Those of the paper.
 ACCOUNTINGS = ("landing", "landing+ejection", "all")
-AUTOMATA = [Automaton(rules="paper", accounting=word) for word in ACCOUNTINGS]
+AUTOMATA = [ca.Automaton(rules="paper", accounting=word) for word in ACCOUNTINGS]
 #: The fillings compared, by label.
-FILLINGS = {filling.label: filling for filling in (Spheres(), *AUTOMATA)}
+FILLINGS = {filling.label: filling for filling in (ca.Spheres(), *AUTOMATA)}
 NUMBERS = several(whole(0, 160))
 SETTINGS = {
     "fillings": (list(FILLINGS), ["dem", "ca_static"], several(str), ", ".join(FILLINGS)),
@@ -78,17 +69,17 @@ def run(options):
     """Measure all fillings, write tables and pictures."""
     for label in options.fillings:
         if label not in FILLINGS:
-            raise InputError(f"fillings must be some of {', '.join(FILLINGS)}, got {label!r}")
+            raise ca.InputError(f"fillings must be some of {', '.join(FILLINGS)}, got {label!r}")
     if options.accuracy is not None:
         return run_to_accuracy(options)
     if options.resume and not any(Path(options.out).glob("checkpoint_*.npz")):
-        raise InputError(f"resume must be left out: there is no checkpoint in {options.out}")
+        raise ca.InputError(f"resume must be left out: there is no checkpoint in {options.out}")
     jobs = {label: jobs_of(FILLINGS[label], options) for label in options.fillings}
     folder = study.begin(options)
     responses, sweeps = {}, {}
     for label, (response, sweep) in jobs.items():
-        responses[label] = made(frequency_response, response, f"{label}_response", options)
-        sweeps[label] = made(sweep_up_and_down, sweep, f"{label}_sweep", options)
+        responses[label] = made(ca.frequency_response, response, f"{label}_response", options)
+        sweeps[label] = made(ca.sweep_up_and_down, sweep, f"{label}_sweep", options)
     write_tables(responses, sweeps, folder)
     picture_responses(folder / "response.png", responses, PARTICLE_MASS)
     picture_measures(folder / "measures.png", responses, PARTICLE_MASS)
@@ -102,12 +93,12 @@ def run_to_accuracy(options):
     """Find the peaks to an accuracy; print and write the answers."""
     study.check_accuracy(options)
     folder, rows, figures = study.begin(options), [], {}
-    asked = [goals.peak_ratio(), goals.peak_rms()]
+    asked = [ca.goals.peak_ratio(), ca.goals.peak_rms()]
     for label in options.fillings:
         for n in options.particles:
             job = {"particles": n, "goal": asked, "tolerance": options.accuracy}
-            with ProgressBar(f"{label}, {n} particles") as bar:
-                answers = solve_response(FILLINGS[label], **job, progress=bar)
+            with ca.ProgressBar(f"{label}, {n} particles") as bar:
+                answers = ca.solve_response(FILLINGS[label], **job, progress=bar)
             for answer in answers:
                 study.show_answer(f"{label}, {n} particles", answer)
                 rows.append(((label, n), answer))
@@ -144,7 +135,7 @@ def jobs_of(filling, options):
 def made(work, arguments, name, options):
     """What work(**arguments) gives, under a progress bar, with a checkpoint of its own."""
     kept = study.checkpoint_of(options, f"checkpoint_{name}", may_be_new=True)
-    with ProgressBar(name.replace("_", " ")) as bar:
+    with ca.ProgressBar(name.replace("_", " ")) as bar:
         return work(**arguments, **kept, progress=bar)
 
 

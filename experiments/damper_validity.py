@@ -23,16 +23,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from ca_damper import (
-    Automaton,
-    Batch,
-    ImpactDamper,
-    Oscillator,
-    SceneTable,
-    Spheres,
-    film,
-    frequency_response,
-)
+import ca_damper as ca
 from ca_damper.measures import first_harmonic, peak
 from ca_damper.plot import Box, FilmMeasures
 from taichi_dem.kit import study
@@ -60,9 +51,9 @@ SETTINGS = {
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 #: Fillings by column of the table: spheres, rules of the first edition, of place; steps [s].
 FILLINGS = {
-    "dem": (Spheres(), 2e-5),
-    "paper": (Automaton(rules="paper"), 1e-4),
-    "place": (Automaton(), 1e-4),
+    "dem": (ca.Spheres(), 2e-5),
+    "paper": (ca.Automaton(rules="paper"), 1e-4),
+    "place": (ca.Automaton(), 1e-4),
 }
 #: Swinging grains: amplitude [m], frequency [Hz], frames a cycle.
 SWING, FRAMES = (24e-3, 6.0), 32
@@ -82,7 +73,7 @@ PLUG_GRAINS, PLUG_FREQUENCY, BEYOND = 40, 6.0, (16e-3, 20e-3, 24e-3, 30e-3)
 RATIOS = np.arange(0.93, 1.0001, 0.005)
 #: Shares at which the colours of the picture change.
 SHADES = (0.0, 0.05, 0.1, 0.2, 0.4, 1.0)
-OWN, HEADER = Oscillator(), ("case", "spheres or exact", "paper", "place", "wanted", "met")
+OWN, HEADER = ca.Oscillator(), ("case", "spheres or exact", "paper", "place", "wanted", "met")
 
 
 class Effort(NamedTuple):
@@ -98,7 +89,7 @@ class Effort(NamedTuple):
         scenes = np.broadcast_arrays(np.atleast_1d(particles), frequency, amplitude)
         count, frequency, amplitude = (np.repeat(one, self.seeds) for one in scenes)
         seed = np.tile(np.arange(self.seeds) + 1, len(scenes[0]))
-        batch = Batch(filling, SceneTable(count, seed, dt, frequency, amplitude), **options)
+        batch = ca.Batch(filling, ca.SceneTable(count, seed, dt, frequency, amplitude), **options)
         self.made.append(batch)
         batch.start()
         return batch
@@ -137,7 +128,7 @@ def swing_rows(options, effort):
         phase = np.arange(FRAMES) * (steps // FRAMES) / steps
         every = {"sample_every": steps, "frame_every": steps // FRAMES, "progress": None}
         for _ in range(options.filmed):
-            shots += [cycle[:FRAMES] for cycle in film(batch, steps, **every).frames]
+            shots += [cycle[:FRAMES] for cycle in ca.film(batch, steps, **every).frames]
         return phase, FilmMeasures.of(Box.of(filling), shots, phase).mean_height_mm
 
     for count in options.swings:
@@ -168,7 +159,7 @@ def impact_rows(options, effort):
         return 1e3 * batch.run(400, 50).rms[0]
 
     own = FILLINGS["place"][0]
-    case = ImpactDamper(OWN, mass, own.wall_restitution, IMPACT_CELLS * own.width, where[0])
+    case = ca.ImpactDamper(OWN, mass, own.wall_restitution, IMPACT_CELLS * own.width, where[0])
     values = 1e3 * case.rms(max(case.speeds)), *by_filling(impact, "paper", "place")
     title = "impact damper, 0.1 M, clearance 12 mm, no gravity, at f0: RMS"
     yield row_of("impact_rms_mm", title, "mm", values, 1.04, 1.10)
@@ -237,7 +228,7 @@ def peak_rows(options, effort):
         seeds = 1 if filling.label == "dem" else max(1, effort.seeds // 4)
         cycles = {"transient_cycles": effort.transient, "measured_cycles": effort.cycles}
         job = {"particles": [count], "ratios": RATIOS, "seeds": seeds, "dt": dt, "progress": None}
-        response = frequency_response(filling, **job, **cycles)
+        response = ca.frequency_response(filling, **job, **cycles)
         effort.made.append(response.report)
         ratio, rms = peak(RATIOS, np.median(response.rms[0], axis=1))
         return ratio, 1e3 * rms
