@@ -25,21 +25,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from _accuracy import (
-    answered,
-    blast_question,
-    damper_question,
-    dropped_question,
-    fixed_runs,
-    judged_blast,
-    judged_damper,
-    paper_question,
-    twins_of,
-)
+import _accuracy as ask
 from ca_damper import Spheres, frequency_response, solve_response
 from ca_damper import goals as damper_goals
 from taichi_dem.kit import study
-from taichi_dem.kit.plot_style import BLUE, GREY, ORANGE, RED, line_key, picture
+from taichi_dem.kit.plot_style import BLUE, GREY, ORANGE, RED, picture
 
 NAME = "accuracy_on_request"
 QUESTIONS = Path(__file__).with_name("accuracy_questions.csv")
@@ -71,8 +61,8 @@ COLUMNS = "kind seed question tolerance_percent value error true holds reached c
 
 def price_row(seed, others):
     """Row of the table of prices; None where no single run, or no answer, is good enough."""
-    question = blast_question(seed)
-    found, runs = judged_blast(question), fixed_runs(question, others)
+    question = ask.blast_question(seed)
+    found, runs = ask.judged_blast(question), ask.fixed_runs(question, others)
     if found is None or not found.reached:
         return None
     most = question.tolerance * abs(found.true)
@@ -87,10 +77,10 @@ def price_row(seed, others):
 
 def cost_of_blast(options):
     """Panel of the paper's block, and what 1 % costs there [s]."""
-    asked = [paper_question(options.until, share) for share in options.tolerances]
-    found = [judged_blast(question) for question in asked]
+    asked = [ask.paper_question(options.until, share) for share in options.tolerances]
+    found = [ask.judged_blast(question) for question in asked]
     true, fixed = found[-1].true, {}
-    for words, value, spent in fixed_runs(asked[-1], options.others):
+    for words, value, spent in ask.fixed_runs(asked[-1], options.others):
         fixed.setdefault(words.split(",")[0], []).append((abs(value / true - 1.0), spent))
     return panel_of(true, [one.answer for one in found], [one.cpu_s for one in found], fixed)
 
@@ -105,11 +95,8 @@ def cost_of_damper(options):
     # Compiles.
     frequency_response(Spheres(), **job, transient_cycles=0, measured_cycles=1)
     begun, cycles = study.clock(), zip(("transient_cycles", "measured_cycles"), options.cycles)
-    peak, true = (
-        float(frequency_response(Spheres(), **job, **dict(cycles)).rms[0].max()),
-        found[-1].value,
-    )
-    spent = study.clock() - begun
+    peak = float(frequency_response(Spheres(), **job, **dict(cycles)).rms[0].max())
+    spent, true = study.clock() - begun, found[-1].value
     fixed = {"fixed cycles and frequencies": [(abs(peak / true - 1.0), spent)]}
     return *panel_of(true, found, [one.plan.seconds for one in found], fixed), spent
 
@@ -135,16 +122,10 @@ def draw_cost(path, panels):
                 tried = np.maximum(np.array(runs).T, [[1e-6], [0.0]])
                 look = {"color": colour, "label": name, "markersize": 4}
                 one.plot(100.0 * tried[0], tried[1], mark, **look)
-            bars, off, seconds = np.array(answers).T
+            bars, off, seconds = np.maximum(np.array(answers).T, 1e-6)
             look = {"color": BLUE, "zorder": 3}
             one.plot(100.0 * bars, seconds, "-o", label="answer, by its bar", **look)
-            one.plot(
-                100.0 * np.maximum(off, 1e-6),
-                seconds,
-                "x",
-                label="the same, by its true error",
-                **look,
-            )
+            one.plot(100.0 * off, seconds, "x", label="the same, by its true error", **look)
             one.set(xscale="log", yscale="log", title=title, xlabel="error / value [%]")
             one.set_ylabel("CPU time, all runs of an answer [s]")
             one.invert_xaxis()
@@ -177,13 +158,13 @@ def draw_parting(path, time_ms, ways, apart, answer):
         left.set(xlabel="time [ms]", ylabel="mean way of the bodies [mm]")
         left.set_title(f"{len(ways)} runs whose starts differ by one rounding")
         right.semilogy(time_ms[1:], np.maximum(apart[:, 1:].T, 1e-16), color=BLUE, linewidth=0.8)
-        right.axhline(answer.tolerance, color=ORANGE)
-        right.axvline(1e3 * answer.plan.parting_s, color=RED, linestyle="--")
+        words = f"tolerance, {100 * answer.tolerance:g} %"
+        right.axhline(answer.tolerance, color=ORANGE, label=words)
+        look = {"color": RED, "linestyle": "--", "label": "from here on solve sees them part"}
+        right.axvline(1e3 * answer.plan.parting_s, **look)
         right.set(xlabel="time [ms]", ylabel="distance from the first run / way [1]")
         right.set_title("how far they are apart")
-        keys = [line_key(f"tolerance, {100 * answer.tolerance:g} %", color=ORANGE)]
-        keys.append(line_key("from here on solve sees them part", color=RED, linestyle="--"))
-        right.legend(handles=keys, loc="lower right")
+        right.legend(loc="lower right")
 
 
 def run(options):
@@ -197,22 +178,22 @@ def run(options):
     prices = [price_row(seed, options.others) for seed in seeds("price")]
     prices = pd.DataFrame([row for row in prices if row])
     prices.to_csv(folder / "prices.csv", index=False)
-    found = [judged_blast(blast_question(seed)) for seed in seeds("blast")]
-    found += [judged_damper(damper_question(seed)) for seed in seeds("damper")]
+    found = [ask.judged_blast(ask.blast_question(seed)) for seed in seeds("blast")]
+    found += [ask.judged_damper(ask.damper_question(seed)) for seed in seeds("damper")]
     answers = pd.DataFrame([vars(one) for one in found if one is not None])
     answers.to_csv(folder / "bars.csv", index=False, columns=COLUMNS)
     singles = answers[answers.single]
     held = 100.0 * singles.groupby("kind", sort=False).holds.mean()
     (block, block_s), (damper, damper_s, fixed_s) = cost_of_blast(options), cost_of_damper(options)
-    late, late_s = answered(paper_question(options.later, 0.01))
+    late, late_s = ask.answered(ask.paper_question(options.later, 0.01))
     panels = {"paper's block, hole displacement": block, "paper's damper, peak RMS": damper}
     draw_cost(folder / "cost.png", panels)
     deviations = {kind: some.to_numpy() for kind, some in singles.groupby("kind").deviation}
     draw_calibration(folder / "calibration.png", deviations, 100.0 * singles.holds.mean())
-    dropped = dropped_question(options.dropped)
-    answer, _ = answered(dropped, repeats=1)
+    dropped = ask.dropped_question(options.dropped)
+    answer, _ = ask.answered(dropped, repeats=1)
     print(f"dropped bodies: {answer}")
-    draw_parting(folder / "twins.png", *twins_of(dropped, options.twins), answer)
+    draw_parting(folder / "twins.png", *ask.twins_of(dropped, options.twins), answer)
     figures = {
         "price_ratio_median": (float(prices.ratio.median()), "1"),
         "price_ratio_worst": (float(prices.ratio.max()), "1"),

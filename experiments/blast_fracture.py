@@ -41,6 +41,8 @@ bonds.csv (when each bond broke), bodies.csv, the mesh used, summary.json and a 
 import sys
 from functools import partial
 
+import pandas as pd
+
 import taichi_dem as dem
 from _blast import EFFECTS, blast_parser, print_quality, run_options
 from _blast import METHODS as BLAST_METHODS
@@ -68,13 +70,6 @@ METHODS = {
 PAPER_DT0, PAPER_L = 1e-8, 1e-7
 #: Contact of the paper, as of --with.
 SPHERES = "sphere_contact,friction"
-#: What is printed of runs with both contacts: header, figure and format.
-SHOWN = {
-    "contact": ("contact", ""),
-    "hole [mm]": ("hole_radial_displacement_mm", ".2f"),
-    "injected at breaks [kJ]": ("injected_kJ", ".1f"),
-    "CPU [s]": ("cpu_s", ".2f"),
-}
 SETTINGS = {
     "dt0": (None, None, study.number(0, 1), "largest step [s], by method"),
     "l": (None, None, study.number(0, 1), "the paper's way of a body in a step [m], 1e-7"),
@@ -123,9 +118,8 @@ def chosen_method(name, dt0, distance):
         return PAPER_METHODS[name](dt0 or PAPER_DT0, distance or PAPER_L)
     if distance is not None:
         paper = ", ".join(PAPER_METHODS)
-        raise dem.InputError(
-            f"l must be left out unless method is one of {paper}, got {distance:g}"
-        )
+        words = f"must be left out unless method is one of {paper}, got {distance:g}"
+        raise dem.InputError(f"l {words}")
     make, step = METHODS[name]
     return make(dt0 or step)
 
@@ -134,9 +128,8 @@ def run(options):
     """Run, picture, print."""
     method = chosen_method(options.method, options.dt0, options.l)
     if options.compare and (options.added or options.without):
-        raise dem.InputError(
-            "compare must be left out with --with and --without: it runs two lists"
-        )
+        words = "must be left out with --with and --without: it runs two lists"
+        raise dem.InputError(f"compare {words}")
     scene = chosen_scene(options, options.added)
     if options.accuracy is not None:
         return run_to_accuracy(scene, options)
@@ -169,16 +162,14 @@ def run_with_spheres(options, method):
 def show_both(bodies, spheres):
     """Print what the contacts of two runs differ in."""
     runs = {"whole bodies": bodies, "the paper's spheres": spheres}
-    rows = [
-        {
-            "contact": f"{name}, diverged" if run.diverged else name,
-            "cpu_s": run.report.run_cpu_seconds,
+    table = {
+        f"{name}, diverged" if run.diverged else name: {
             **{key: one[0] for key, one in figures_of(run).items()},
+            "cpu_s": run.report.run_cpu_seconds,
         }
         for name, run in runs.items()
-    ]
-    # A mesh without a hole has no displacement of it.
-    study.show_rows(rows, {header: one for header, one in SHOWN.items() if one[0] in rows[0]})
+    }
+    print(pd.DataFrame(table).to_string(float_format="{:.4g}".format), "\n")
 
 
 def run_to_accuracy(scene, options):

@@ -3,8 +3,8 @@
     python experiments/cost_of_effects.py          # about four minutes on two cores
     python experiments/cost_of_effects.py --quick
 
-The paper's block is blasted with its effects added one by one, and left out one by one; so is a
-response curve of the damper, by spheres and by the automaton.
+The paper's block is blasted with its effects left out one by one; so is a response curve of the
+damper computed, by spheres and by the automaton.
 
 - What an effect costs: CPU seconds of a step with and without it from the same states. States of
   the run with all effects are put into every other scene; all scenes take turns in one process, in
@@ -20,7 +20,8 @@ An effect that is left out of a scene must cost nothing: an elastic block is tim
 stripped by hand. And of some scenes the shortest list of effects that serves is known: what all
 effects cost there is listed too.
 
-Writes effects.png, blast.csv, damper.csv, lists.csv and summary.json to results/cost_of_effects/.
+Writes effects.png, blast.csv, spheres.csv, automaton.csv, lists.csv and summary.json to
+results/cost_of_effects/.
 """
 
 import sys

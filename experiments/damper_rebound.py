@@ -76,7 +76,6 @@ def run(options):
     errors = {title: 1e3 * np.array(made.errors(COUNTED)) for title, made in runs.items()}
     picture_rebound(folder / "rebound.png", runs, errors)
     write_tables(folder, runs)
-    print_errors(errors)
     study.finish(options, NAME, figures_of(errors), [batch for batch, _ in jobs.values()])
 
 
@@ -165,16 +164,6 @@ def plot_errors(axes, errors):
     axes.invert_yaxis()
     axes.grid(False, axis="y")
     axes.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=2, columnspacing=1.2)
-
-
-def print_errors(errors):
-    """Print the errors of every impact."""
-    print("Error of impact [ms] and of the apex after it [mm], by impact")
-    rows = []
-    for title, own in errors.items():
-        cells = [f"{late:+.3f} / {high:+.3f}" for late, high in own.T]
-        rows.append((title, *cells, *["at rest"] * (COUNTED - len(cells))))
-    study.print_table(rows, ["filling", *(str(k + 1) for k in range(COUNTED))])
 
 
 if __name__ == "__main__":
