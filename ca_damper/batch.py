@@ -11,11 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper import measures
-from ca_damper.activation import activated, certificate_of, periods_of
-from ca_damper.certificate import EFFECTS, Certificate, Periods
-from ca_damper.checked_range import checked_range, warn_outside
-from ca_damper.checks import (
+from ca_damper.engine.activation import activated, certificate_of, periods_of
+from ca_damper.engine.launches import Launches
+from ca_damper.engine.loaded_scenes import LoadedScenes
+from ca_damper.engine.modal_mount import ModalMount
+from ca_damper.engine.recorder import ROOM
+from ca_damper.excitation.excitation import Excitation
+from ca_damper.filling import Filling
+from ca_damper.report import measures
+from ca_damper.report.certificate import EFFECTS, Certificate, Periods
+from ca_damper.report.checked_range import checked_range, warn_outside
+from ca_damper.report.progress import BatchProgress
+from ca_damper.report.report import RK45_STAGES, Report
+from ca_damper.scenes.checks import (
     MOST_CYCLES,
     check_finite_start,
     check_single_sine,
@@ -23,14 +31,6 @@ from ca_damper.checks import (
     for_all,
     starts_of,
 )
-from ca_damper.engine.launches import Launches
-from ca_damper.engine.loaded_scenes import LoadedScenes
-from ca_damper.engine.modal_mount import ModalMount
-from ca_damper.engine.recorder import ROOM
-from ca_damper.excitation.excitation import Excitation
-from ca_damper.filling import Filling
-from ca_damper.progress import BatchProgress
-from ca_damper.report import RK45_STAGES, Report
 from ca_damper.scenes.table import SceneTable, dealt
 from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import identity_of, version_text
@@ -551,7 +551,7 @@ class Batch(LoadedScenes):
                 launches.count(self._steps_taken(), self.table.column("particles"))
             if progress is not None:
                 scene_steps = round(launches.done * total)
-                progress(BatchProgress(launches.done, launches.seconds, scene_steps))
+                progress(BatchProgress(launches.done, launches.seconds, steps=scene_steps))
             self.writer.save_if_needed()
             done = launches.done
 

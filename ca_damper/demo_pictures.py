@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.decay import logarithmic_decrement
-from ca_damper.film import Film
 from ca_damper.oscillator import Oscillator
+from ca_damper.runs.film import Film
+from ca_damper.theory.decay import logarithmic_decrement
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.files import write_csv
 
@@ -104,7 +104,7 @@ def draw_films(path: str, page: str | None, films: tuple[Film, Film], options: N
     """
     # Imported here, so that matplotlib loads only where a picture is drawn.
     from ca_damper.plot import Box, Hanging, film_hanging
-    from ca_damper.viewer import show_containers
+    from ca_damper.plot.containers import show_containers
     from taichi_dem.kit.plot_style import GREY, styles_of
 
     filling = films[1].filling

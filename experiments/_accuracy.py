@@ -15,11 +15,9 @@ import ca_damper as ca
 import taichi_dem as dem
 from ca_damper import goals as damper_goals
 from taichi_dem import effects, goals
-from taichi_dem.accuracy.job import Job
-from taichi_dem.accuracy.runs import Runs
+from taichi_dem.accuracy.runs import Job, Runs
 from taichi_dem.kit import study
-from taichi_dem.kit.accuracy.branches import BranchedAnswer
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.display import counted
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, placed_together, single
@@ -253,7 +251,7 @@ def reference_values(question, answer):
 
 def _values_of(found, goal, answer):
     """Values of a goal, one a seed; of several motions those of the answer's, if there are any."""
-    branches = getattr(answer, "branches", ())
+    branches = answer.branches
     if goal.kind == "extreme" and not branches:
         # Jackknife of the peak of the mean curve.
         curves = found.rms[0].T
@@ -337,7 +335,7 @@ def judged(kind, question, answer, seconds, true, doubt=0.0):
         **{"value": float(answer.value), "error": float(answer.error), "true": true},
         **{"holds": int(abs(off) <= width), "reached": int(answer.reached), "deviation": far},
         **{"tolerance_percent": 100.0 * question.tolerance, "answer": answer},
-        single=not isinstance(answer, BranchedAnswer),
+        single=not answer.branches,
     )
 
 

@@ -15,7 +15,7 @@ import taichi as ti
 import taichi_dem as dem
 from _blast import EFFECTS
 from ca_damper import Automaton, Batch, Oscillator, SceneTable, Spheres
-from ca_damper.lattice import DOWN, HELD, UP
+from ca_damper.automaton.lattice import DOWN, HELD, UP
 from taichi_dem.demo import figures_of_certificate
 from taichi_dem.kit.allocation import assign, field_bytes, values
 from taichi_dem.kit.field_memory import FieldMemory
@@ -71,7 +71,7 @@ def blast(names, until, step, ulps):
         "run_s": report.run_cpu_seconds,
         "steps": report.substeps,
         "memory_MB": 1e-6 * field_bytes(),
-        "hole_mm": float(result.history["hole_radial_displacement_mm"][-1]),
+        "hole_mm": float(result.series["hole_radial_displacement_mm"][-1]),
         "broken_faces": report.broken_faces,
     }
 
@@ -170,7 +170,7 @@ class FrozenBatch:
         taken = {name for name in own if not name.startswith(self.OWN)}
         for state in states:
             self.memory.write({**own, **{name: state[name] for name in taken & state.keys()}})
-            if "device.resting.held" in state.keys() - own.keys():
+            if "device.resting.held" in state and not self.batch.device.resting.rests:
                 release(self.batch.device)
             coupling = self.batch.engine.coupling
             begin = coupling.read_status()[0]
@@ -198,6 +198,7 @@ def release(device):
     travelled[scene, cell] = np.where(rising, offset, -offset)
     for field, array in zip(fields, arrays):
         assign(field, array)
+    device.resting.held.fill(0)
 
 
 def paired_costs(frozen, states, **timing):

@@ -50,7 +50,7 @@ from taichi_dem.kit.plot_style import GREY, picture
 from taichi_dem.kit.process_memory import peak_memory_mb
 from taichi_dem.mesh.joined import in_space_order
 from taichi_dem.output.hole_monitor import HoleMonitor
-from taichi_dem.plot.bodies import draw_lines, shades
+from taichi_dem.plot.view import draw_lines, shades
 
 NAME = "blast_block"
 SETTINGS = {
@@ -153,7 +153,7 @@ def run(options):
     peaks = {"distance_radii": fall.distance, "peak_speed_m_s": fall.speed}
     write_csv(at("peaks.csv"), {**peaks, "nearer_to_hole": fall.inner.astype(int)})
     drawing, step_ms = time.perf_counter() - started, 1e3 * report.run_cpu_seconds / report.substeps
-    moved = float(result.history["hole_radial_displacement_mm"][-1])
+    moved = float(result.series["hole_radial_displacement_mm"][-1])
     print(f"\n{report}\n")
     figures = {
         "tetrahedra": (report.body_count, "1"),

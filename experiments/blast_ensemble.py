@@ -32,8 +32,16 @@ from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, BLUE, ORANGE, picture
 from taichi_dem.observers import macro_steps
-from taichi_dem.plot.bodies import JOINT, STONE, draw_lines, draw_stone, frame_block, shades
-from taichi_dem.plot.view import View, traces
+from taichi_dem.plot.view import (
+    JOINT,
+    STONE,
+    View,
+    draw_lines,
+    draw_stone,
+    frame_block,
+    shades,
+    traces,
+)
 from taichi_dem.state.model import Model
 
 NAME = "blast_ensemble"
@@ -64,7 +72,7 @@ def blast(row):
     scene = dem.Scene(mesh, material, "auto", loads=[effects.GasPressure()])
     given = {"until": row["until"], "samples": row["samples"], "progress": None}
     result = dem.simulate(scene, method=dem.ImplicitDashpots(BLOCK_STEP), **given)
-    hole = result.history["hole_radial_displacement_mm"].tolist()
+    hole = result.series["hole_radial_displacement_mm"].tolist()
     broken = "".join("01"[one] for one in (~np.isnan(result.broken_time)).astype(int))
     moves = {HOLE.format(k): value for k, value in enumerate(hole)}
     return {"broken_faces": result.report.broken_faces, **moves, "broken": broken}

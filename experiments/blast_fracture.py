@@ -49,7 +49,7 @@ from _blast import METHODS as BLAST_METHODS
 from taichi_dem.demo import SETTINGS as DEMO_SETTINGS
 from taichi_dem.demo import figures_of, picture
 from taichi_dem.kit import study
-from taichi_dem.laws.chosen import WORDS
+from taichi_dem.laws.roles import WORDS
 from taichi_dem.methods import Multirate, Uniform
 from taichi_dem.simulate import result_of
 

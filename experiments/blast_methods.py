@@ -65,7 +65,7 @@ def follow(scene, name, make, step, options):
     """One run of a method with a step [s]; writes its time series."""
     costs, method = run_costs(), make(step)
     result = simulate(scene, method=method, title=name, observers=[costs], **run_options(options))
-    series = {**result.history, "cpu_s": costs["cpu_s"], "evaluations": costs["evaluations"]}
+    series = {**result.series, "cpu_s": costs["cpu_s"], "evaluations": costs["evaluations"]}
     write_csv(f"{options.out}/history_{name}.csv", series)
     if not method.uniform:
         shares, path = level_shares(costs.rows["level"]), f"{options.out}/levels_{name}.png"
@@ -78,7 +78,7 @@ def serves(scene, method, exact, options):
     """Whether a method reaches the time for stability, undiverged and near the reference."""
     short = {**run_options(options), "until": options.stable_until, "samples": 1}
     try:
-        found = simulate(scene, method=method, progress=None, **short).history
+        found = simulate(scene, method=method, progress=None, **short).series
     except SimulationDiverged:
         return False
     wanted = np.interp(found["time_s"][-1], exact["time_s"], exact[MOVED])

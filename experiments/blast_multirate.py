@@ -94,7 +94,7 @@ def follow(name, options, scene):
     instants = [Instant(name, words, time_s) for words, time_s in times.items()]
     looks = {"title": styles_of([name])[name].label, "observers": [costs, *instants]}
     result = simulate(scene, method=method, **looks, **run_options(options))
-    series = {**result.history, "cpu_s": costs["cpu_s"], "evaluations": costs["evaluations"]}
+    series = {**result.series, "cpu_s": costs["cpu_s"], "evaluations": costs["evaluations"]}
     shares = level_shares(costs.rows["level"])
     write_csv(f"{options.out}/{name}.csv", {**series, **level_columns(shares)})
     if not method.uniform:

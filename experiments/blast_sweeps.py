@@ -27,7 +27,7 @@ from taichi_dem.kit import study
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.lanes import by_lane
 from taichi_dem.kit.plot_style import BROWN, GREY, STYLES, VIOLET, picture
-from taichi_dem.mesh.colouring import edge_colours
+from taichi_dem.mesh.topology import edge_colours
 from taichi_dem.simulate import run_simulation
 
 NAME = "blast_sweeps"

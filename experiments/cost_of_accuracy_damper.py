@@ -19,10 +19,11 @@ from functools import partial
 
 import numpy as np
 
-from ca_damper import Automaton, Batch, Empty, Oscillator, ProgressBar, SceneTable, Spheres, rk45
-from ca_damper.measures import curve_distance
+from ca_damper import Automaton, Batch, Empty, Oscillator, ProgressBar, SceneTable, Spheres
+from ca_damper.accuracy.step_study import StepStudy
+from ca_damper.engine import rk45
 from ca_damper.plot import picture_compared
-from ca_damper.step_study import StepStudy
+from ca_damper.report.measures import curve_distance
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import power, seconds, styles_of
 from taichi_dem.kit.study.work_precision import Point, answers

@@ -31,7 +31,7 @@ import numpy as np
 import pandas as pd
 
 from _effects import KNOWN_LISTS, ORDER, absent, blast, costs_of_blast, costs_of_damper, damper
-from ca_damper.measures import curve_distance
+from ca_damper.report.measures import curve_distance
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, SKY, area_key, line_key, picture
 from taichi_dem.kit.progress.progress_bar import ProgressBar

@@ -22,8 +22,8 @@ from functools import partial
 import numpy as np
 
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film
-from ca_damper.automaton.accumulator import READINGS
-from ca_damper.bouncing import Fall, RecordedFall
+from ca_damper.automaton.transport import READINGS
+from ca_damper.theory.bouncing import Fall, RecordedFall
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, VIOLET, picture, styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar

@@ -24,8 +24,8 @@ import numpy as np
 import pandas as pd
 
 import ca_damper as ca
-from ca_damper.measures import first_harmonic, peak
 from ca_damper.plot import Box, FilmMeasures
+from ca_damper.report.measures import first_harmonic, peak
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.plot_style import BLACK, picture, styles_of

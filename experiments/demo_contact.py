@@ -74,7 +74,7 @@ def blasts(law, points, contact, options):
         scene = Scene(read_mesh(options.mesh), CONCRETE, [*listed, contact, gas])
         job = {"method": ImplicitDashpots(options.step), "title": contact.name}
         results.append(simulate(scene, **job, **run_options(options)))
-    holes = [float(one.history["hole_radial_displacement_mm"][-1]) for one in results]
+    holes = [float(one.series["hole_radial_displacement_mm"][-1]) for one in results]
     reports = [one.report for one in results]
     told = {"first": reports[0], "energy": reports[0].energy_balance, "reports": reports}
     return SimpleNamespace(law=law, points=points, holes=holes, **told)

@@ -147,7 +147,7 @@ def run(options):
         raise dem.InputError(f"speed must be at least {words}, got {options.speed:.4g}")
     at = study.output_paths(options.out)
     impacts = [hit(name, options) for name in options.methods]
-    base, time_s, columns = impacts[0], impacts[0].result.history["time_s"], {}
+    base, time_s, columns = impacts[0], impacts[0].result.series["time_s"], {}
     for one in impacts:
         one.fewer = float(base.evaluations[-1] / one.evaluations[-1])
         one.difference = float(np.abs(one.struck - base.struck).max() / np.abs(base.struck).max())

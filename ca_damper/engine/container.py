@@ -9,7 +9,7 @@ are in ``excited_container.py``.
 
 import taichi as ti
 
-from ca_damper import rk45
+from ca_damper.engine import rk45
 from ca_damper.filling import Action, Motion
 from ca_damper.oscillator import Forcing, sine_and_cosine, slope, slope_at_phase
 from ca_damper.scenes.clock import Clock

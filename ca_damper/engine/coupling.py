@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from ca_damper import measures
 from ca_damper.engine.account import MomentumAccount
+from ca_damper.report import measures
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit import runtime

@@ -16,8 +16,8 @@ from ca_damper.engine.modal_mount import ModalKind
 from ca_damper.engine.recorder import ROOM, Recorder
 from ca_damper.excitation.excitation import Excitation, ExcitationKind
 from ca_damper.filling import LEAST_PLACES, check_device, check_places, structure_of
-from ca_damper.gravity import gravity_along
 from ca_damper.scenes.clock import Clock
+from ca_damper.scenes.gravity import gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.engine_pool import Engine, EnginePool

@@ -8,7 +8,7 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper import rk45
+from ca_damper.engine import rk45
 from ca_damper.engine.container import MOST_ATTEMPTS, PrescribedContainer, SpringContainer
 from ca_damper.engine.signals import BASES, FORCES
 from ca_damper.excitation.excitation import Excitation, ExcitationKind

@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper import measures
-from ca_damper.checks import (
-    check_record_fits,
-    checked_excitation,
-    checked_samples,
-)
 from ca_damper.engine.damper_engine import DamperEngine, borrow
 from ca_damper.engine.divergence import divergence
 from ca_damper.engine.modal_mount import ModalMount, checked_mount
 from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import Filling, check_filling, structure_of
+from ca_damper.report import measures
+from ca_damper.scenes.checks import (
+    check_record_fits,
+    checked_excitation,
+    checked_samples,
+)
 from ca_damper.scenes.scene_memory import SceneMemory
 from ca_damper.scenes.scene_numbers import SceneNumbers
 from ca_damper.scenes.table import SceneTable

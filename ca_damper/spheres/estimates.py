@@ -12,7 +12,7 @@ numbers of some hundreds its drag coefficient is below 1.
 import math
 from typing import TYPE_CHECKING
 
-from ca_damper.certificate import Estimate
+from ca_damper.report.certificate import Estimate
 
 if TYPE_CHECKING:
     from ca_damper.spheres.options import Spheres

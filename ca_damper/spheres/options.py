@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from operator import mul
 from typing import ClassVar
 
-from ca_damper.certificate import NEGLIGIBLE, Estimate
 from ca_damper.filling import LEAST_PLACES, DeviceFilling, Structure
-from ca_damper.gravity import checked_gravity, gravity_along
+from ca_damper.report.certificate import NEGLIGIBLE, Estimate
+from ca_damper.scenes.gravity import checked_gravity, gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.contact_law import FRICTION_LAWS, POWERS, contact_duration, pair_numbers
 from ca_damper.spheres.divergence_codes import DIVERGENCES

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from ca_damper import Automaton, Batch, Empty, Oscillator, SceneTable, Spheres, film
-from ca_damper.measures import COLUMNS
 from ca_damper.plot import Box
+from ca_damper.report.measures import COLUMNS
 
 FILLINGS = {
     "automaton": Automaton(rules="paper"),

@@ -7,7 +7,7 @@ import pytest
 import taichi as ti
 from scipy.integrate import solve_ivp
 
-from ca_damper import rk45
+from ca_damper.engine import rk45
 
 
 def bell(_, t, y):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from _effects import KNOWN_LISTS, WARM, FrozenBatch, FrozenScene, scene_of
-from ca_damper.lattice import DIRECTIONS, HELD
+from ca_damper.automaton.lattice import DIRECTIONS, HELD
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
 from taichi_dem.mesh.shapes import bar
 

@@ -10,9 +10,9 @@ from _hard_cases._statics import least_friction
 from _hard_cases.blast_piles import CARD, SPAN, TALL, house
 from _meshes import group_area, mirrored_copies
 from blast_ensemble import moved, over_time, stronger
-from ca_damper.bouncing import Fall, RecordedFall
 from ca_damper.demo_pictures import Decay
-from ca_damper.measures import first_harmonic
+from ca_damper.report.measures import first_harmonic
+from ca_damper.theory.bouncing import Fall, RecordedFall
 from cost_of_accuracy_blast import (
     SPLIT,
     displacement_error,
@@ -27,7 +27,7 @@ from taichi_dem.kit.study.work_precision import Point, answers, cheapest
 from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import topology_of
-from taichi_dem.output.attenuation import Attenuation, attenuation_of
+from taichi_dem.output.hole_monitor import Attenuation, attenuation_of
 from taichi_dem.state.model import Model
 
 # The package has functions of these names.
