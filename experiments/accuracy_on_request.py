@@ -25,7 +25,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-import _accuracy as ask
+import _accuracy as judge
+from _questions import blast_question, damper_question, dropped_question, paper_question
 from ca_damper import Spheres, frequency_response, solve_response
 from ca_damper import goals as damper_goals
 from taichi_dem.kit import study
@@ -61,8 +62,8 @@ COLUMNS = "kind seed question tolerance_percent value error true holds reached c
 
 def price_row(seed, others):
     """Row of the table of prices; None where no single run, or no answer, is good enough."""
-    question = ask.blast_question(seed)
-    found, runs = ask.judged_blast(question), ask.fixed_runs(question, others)
+    question = blast_question(seed)
+    found, runs = judge.judged_blast(question), judge.fixed_runs(question, others)
     if found is None or not found.reached:
         return None
     most = question.tolerance * abs(found.true)
@@ -77,10 +78,10 @@ def price_row(seed, others):
 
 def cost_of_blast(options):
     """Panel of the paper's block, and what 1 % costs there [s]."""
-    asked = [ask.paper_question(options.until, share) for share in options.tolerances]
-    found = [ask.judged_blast(question) for question in asked]
+    asked = [paper_question(options.until, share) for share in options.tolerances]
+    found = [judge.judged_blast(question) for question in asked]
     true, fixed = found[-1].true, {}
-    for words, value, spent in ask.fixed_runs(asked[-1], options.others):
+    for words, value, spent in judge.fixed_runs(asked[-1], options.others):
         fixed.setdefault(words.split(",")[0], []).append((abs(value / true - 1.0), spent))
     return panel_of(true, [one.answer for one in found], [one.cpu_s for one in found], fixed)
 
@@ -178,22 +179,22 @@ def run(options):
     prices = [price_row(seed, options.others) for seed in seeds("price")]
     prices = pd.DataFrame([row for row in prices if row])
     prices.to_csv(folder / "prices.csv", index=False)
-    found = [ask.judged_blast(ask.blast_question(seed)) for seed in seeds("blast")]
-    found += [ask.judged_damper(ask.damper_question(seed)) for seed in seeds("damper")]
+    found = [judge.judged_blast(blast_question(seed)) for seed in seeds("blast")]
+    found += [judge.judged_damper(damper_question(seed)) for seed in seeds("damper")]
     answers = pd.DataFrame([vars(one) for one in found if one is not None])
     answers.to_csv(folder / "bars.csv", index=False, columns=COLUMNS)
     singles = answers[answers.single]
     held = 100.0 * singles.groupby("kind", sort=False).holds.mean()
     (block, block_s), (damper, damper_s, fixed_s) = cost_of_blast(options), cost_of_damper(options)
-    late, late_s = ask.answered(ask.paper_question(options.later, 0.01))
+    late, late_s = judge.answered(paper_question(options.later, 0.01))
     panels = {"paper's block, hole displacement": block, "paper's damper, peak RMS": damper}
     draw_cost(folder / "cost.png", panels)
     deviations = {kind: some.to_numpy() for kind, some in singles.groupby("kind").deviation}
     draw_calibration(folder / "calibration.png", deviations, 100.0 * singles.holds.mean())
-    dropped = ask.dropped_question(options.dropped)
-    answer, _ = ask.answered(dropped, repeats=1)
+    dropped = dropped_question(options.dropped)
+    answer, _ = judge.answered(dropped, repeats=1)
     print(f"dropped bodies: {answer}")
-    draw_parting(folder / "twins.png", *ask.twins_of(dropped, options.twins), answer)
+    draw_parting(folder / "twins.png", *judge.twins_of(dropped, options.twins), answer)
     figures = {
         "price_ratio_median": (float(prices.ratio.median()), "1"),
         "price_ratio_worst": (float(prices.ratio.max()), "1"),
