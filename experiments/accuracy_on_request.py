@@ -71,9 +71,9 @@ def price_row(seed, others):
     if not good:
         return None
     least, method = min(good)
-    row = {name: getattr(found, name) for name in ("seed", "question", "tolerance_percent")}
-    row.update(solve_s=found.cpu_s, cheapest_s=least, cheapest_method=method)
-    return {**row, "half_step_s": runs[1][2], "ratio": found.cpu_s / least}
+    names = {"solve_s": found.cpu_s, "cheapest_s": least, "cheapest_method": method}
+    ratio = {"half_step_s": runs[1][2], "ratio": found.cpu_s / least}
+    return {"seed": seed, "question": found.question, **names, **ratio}
 
 
 def cost_of_blast(options):

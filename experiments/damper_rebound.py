@@ -20,6 +20,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import pandas as pd
 
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film
 from ca_damper.automaton.transport import READINGS
@@ -151,16 +152,12 @@ def picture_rebound(path, runs, errors):
 
 def plot_errors(axes, errors):
     """Bars by impact; errors: of the times of impact [ms], by filling."""
-    values = list(errors.values())
-    for k in range(max(map(len, values))):
-        rows = [row for row, own in enumerate(values) if k < len(own)]
-        places = [row + 0.19 * (k - 0.5 * (COUNTED - 1)) for row in rows]
-        widths = [max(SHORTEST, values[row][k]) for row in rows]
-        axes.barh(places, widths, 0.17, color=SHADES[k], label=f"impact {k + 1}")
+    rows = [pd.Series(own, [f"impact {k + 1}" for k in range(len(own))]) for own in errors.values()]
+    table = pd.DataFrame(rows, [TITLES[title] for title in errors]).clip(lower=SHORTEST)
     words = f"most that passes, {ALLOWED_MS:g} ms"
     axes.axvline(ALLOWED_MS, color=VIOLET, linewidth=1.0, linestyle="--", label=words)
-    axes.set_yticks(range(len(errors)), [TITLES[title] for title in errors])
-    axes.set(xscale="log", xlabel="error of the time of impact [ms]", xlim=(SHORTEST, None))
+    table.plot.barh(ax=axes, width=0.76, color=SHADES, logx=True)
+    axes.set(xlabel="error of the time of impact [ms]", xlim=(SHORTEST, None))
     axes.invert_yaxis()
     axes.grid(False, axis="y")
     axes.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=2, columnspacing=1.2)
