@@ -1,14 +1,11 @@
 """What experiments read from runs and answers, on made-up ones whose result is known."""
 
-import sys
-
 import numpy as np
 import pytest
 
-import _trust
-from _hard_cases._statics import least_friction
-from _hard_cases.blast_piles import CARD, SPAN, TALL, house
 from _meshes import group_area, mirrored_copies
+from _trust.blast import laws
+from _trust.cracks import forked, speed
 from blast_ensemble import moved, over_time, stronger
 from ca_damper.demo_pictures import Decay
 from ca_damper.report.measures import first_harmonic
@@ -29,9 +26,8 @@ from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.output.hole_monitor import Attenuation, attenuation_of
 from taichi_dem.state.model import Model
+from tests.hard_cases.blast_piles import CARD, SPAN, TALL, house, least_friction
 
-# The package has functions of these names.
-BLAST, BRANCHING = (sys.modules[f"{_trust.__name__}.{name}"] for name in ("blast", "branching"))
 EDGE, BAR = 2e-3, bar(0.2, 0.1, (2, 1, 1))
 
 
@@ -161,14 +157,14 @@ def branches(angle, speed):
 def test_a_crack_has_branched_once_its_branches_are_apart():
     """2 a tan(angle) > 3 edges, within the slice of two edges in which that becomes so."""
     true = (0.02 + 1.5 * EDGE / np.tan(0.5)) / 1000.0
-    found = BRANCHING.forked(*branches(0.5, 1000.0), EDGE)
+    found = forked(*branches(0.5, 1000.0), EDGE)
     assert abs(found - true) <= 2.5 * EDGE / 1000.0
-    assert np.isnan(BRANCHING.forked(*branches(0.0, 1000.0), EDGE))
+    assert np.isnan(forked(*branches(0.0, 1000.0), EDGE))
 
 
 def test_the_speed_of_a_tip_is_right_to_a_face_in_its_window():
     place, when = branches(0.5, 500.0)
-    found = BRANCHING.speed(place[:, 0], when, 10.0 * EDGE / 500.0)
+    found = speed(place[:, 0], when, 10.0 * EDGE / 500.0)
     assert found == pytest.approx(500.0, rel=0.05 + 1e-9)
 
 
@@ -176,8 +172,8 @@ def test_laws_of_sizes_are_found_in_curves_that_follow_them():
     x = np.geomspace(0.01, 2.0, 48)
     rosin = np.append(-np.expm1(-((x[:-1] / 0.7) ** 1.5)), 1.0)
     swebrec = 1.0 / (1.0 + (np.log(x[-1] / x) / np.log(2.0 / 0.4)) ** 2.5)
-    assert BLAST.laws(x, rosin, 0.1)[0][0] == pytest.approx(1.5, rel=1e-9)
-    assert BLAST.laws(x, swebrec, 0.1)[1][0] == pytest.approx(2.5, rel=1e-9)
+    assert laws(x, rosin, 0.1)[0][0] == pytest.approx(1.5, rel=1e-9)
+    assert laws(x, swebrec, 0.1)[1][0] == pytest.approx(2.5, rel=1e-9)
 
 
 def test_the_least_friction_of_a_house_of_cards_is_that_of_moments():

@@ -2,13 +2,23 @@
 
 import numpy as np
 
-from _hard_cases import _damper_run as scenes
-from _hard_cases._damper_run import AUTOMATA, EXACT, SPHERES, drive, fall, filling, spring
 from ca_damper import Batch, SceneTable, SimulationDiverged
-from taichi_dem.kit.study.cases import Cases
+from ca_damper.plot import Box
+from tests.hard_cases.cases import Cases
+from tests.hard_cases.damper_run import (
+    ALL,
+    AUTOMATA,
+    EXACT,
+    OSCILLATOR,
+    SPHERES,
+    Run,
+    drive,
+    fall,
+    filling,
+    spring,
+)
 
 case = CASES = Cases("damper")
-ALL = (*AUTOMATA, *SPHERES)
 #: An amplitude [m] at which spheres are shaken at 2.2 g.
 MILD = 0.015
 #: Options of particles whose blows give back a share of the speed.
@@ -80,22 +90,13 @@ def no_gravity(trial):
     drive(trial, filling(trial, gravity=0.0), 30, 10 if trial.quick else 100)
 
 
+@case(AUTOMATA, wall_near_a_cell_a_step=(0.5, 50))
+@case((), (AUTOMATA, "faster than one cell a step"), wall_above_a_cell_a_step=(1.5, 5))
 def push(trial, cells, cycles):
-    """The wall takes some cells a step."""
+    """The wall takes {0:g} cells a step and throws back (1 + e) V: more than one skips cells."""
     amplitude = cells * filling(trial).width / 1e-3 / (2.0 * np.pi * 6.0)
-    drive(trial, filling(trial), 30, cycles, amplitude, dt=1e-3)
-
-
-@case(AUTOMATA)
-def wall_near_a_cell_a_step(trial):
-    """The wall takes half a cell a step: what it throws back, (1 + e) V, just fits in one."""
-    push(trial, 0.5, 5 if trial.quick else 50)
-
-
-@case((), (AUTOMATA, "faster than one cell a step"))
-def wall_above_a_cell_a_step(trial):
-    """The wall takes 1.5 cells a step: particles that it pushes skip cells."""
-    push(trial, 1.5, 5)
+    cycles = 5 if trial.quick else cycles
+    drive(trial, filling(trial), 30, cycles, base_amplitude=amplitude, dt=1e-3)
 
 
 @case(AUTOMATA)
@@ -110,10 +111,13 @@ def step_above_limit(trial):
     drive(trial, filling(trial), 50, 1, dt=2e-3)
 
 
-def mild(trial, cycles=3, **options):
+def mild(trial, cycles=3, what=None, particles=30, **options):
     """Spheres shaken at 2.2 g."""
-    what = options.pop("what", filling(trial))
-    drive(trial, what, options.pop("particles", 30), cycles, MILD, **options).flight_energy()
+    what = what or filling(trial)
+    run = drive(trial, what, particles, cycles, base_amplitude=MILD, **options)
+    # All fly at twice the wall's speed, as high as the box.
+    most = run.mass * (2.0 * (run.omega * MILD) ** 2 + what.gravity * Box.of(what).height)
+    trial.limit("energy [J]", run.column("energy"), most, "N m ((2 V)^2 / 2 + g H)")
 
 
 @case(SPHERES)
@@ -165,27 +169,26 @@ def resonance_for_long(trial):
     run.draw_swings()
 
 
-def below_lift_off(trial, bound, formula, particles, cycles, *, what=None, **options):
+def below_lift_off(trial, particles, cycles, *limit, what=None, **options):
     """Particles that never lift answer as a mass glued to the container."""
     run = spring(trial, what or filling(trial), particles, cycles, **options)
     run.sound()
-    run.rigid_response(bound, formula)
+    run.rigid_response(*limit or (2e-3, "the specification"))
     run.draw_swings()
 
 
 @case(EXACT)
 def rigid_limit(trial):
     """Fifty particles that never lift: those of a structure heavier by N m, to 2e-3."""
-    options = {"ratio": 0.8, "base": 0.1e-3, "transient": 100 if trial.quick else 250}
-    below_lift_off(trial, 2e-3, "the specification", 50, 20, **options)
+    transient = 100 if trial.quick else 250
+    below_lift_off(trial, 50, 20, ratio=0.8, base=0.1e-3, transient=transient)
 
 
 @case(EXACT)
 def heavy_particles(trial):
     """Particles ten times as heavy as the container (1 g), never lifting: no added-mass blow-up."""
     # The peak of 51 particles' worth of mass lies at 2.7 f0; 0.8 f0 is far below it.
-    options = {"ratio": 0.8, "base": 0.5e-3, "mass": 1e-3, "transient": 100}
-    below_lift_off(trial, 2e-3, "the specification", 50, 20, **options)
+    below_lift_off(trial, 50, 20, ratio=0.8, base=0.5e-3, mass=1e-3, transient=100)
 
 
 @case(ALL)
@@ -194,9 +197,9 @@ def light_particles(trial):
     what = filling(trial, particle_mass=1e-7)
     # Contacts of light spheres are as much briefer.
     dt = what.safe_step() if trial.method in SPHERES else what.default_dt
-    quality, share = 0.5 / scenes.OSCILLATOR.damping_ratio, 30.0 * 1e-7 / scenes.OSCILLATOR.mass
+    quality, share = 0.5 / OSCILLATOR.damping_ratio, 30.0 * 1e-7 / OSCILLATOR.mass
     limit, cycles = (4.0 * quality * share + 1e-8, "4 Q N m / M"), 4 if trial.quick else 40
-    below_lift_off(trial, *limit, 30, cycles, what=what, dt=dt)
+    below_lift_off(trial, 30, cycles, *limit, what=what, dt=dt)
 
 
 @case(ALL)
@@ -212,8 +215,8 @@ def odd_step(trial):
 @case(EXACT)
 def still_heap(trial):
     """A hundred particles in a container at rest come to rest, and weigh what they weigh."""
-    still = {"frequency": 10.0, "base_amplitude": 0.0, "transient": 30}
-    run = scenes.Run(trial, filling(trial), 100, 10 if trial.quick else 100, **still)
+    options = {"frequency": 10.0, "base_amplitude": 0.0, "transient": 30}
+    run = Run(trial, filling(trial), 100, 10 if trial.quick else 100, **options)
     run.kept_inside()
     run.weight_carried(1e-3, "the specification")
     energy = run.column("energy")
@@ -238,10 +241,9 @@ def single_cell(trial):
     if trial.method in AUTOMATA:
         # In free flight it is known to half a cell only, and a square wave of that height has a
         # first harmonic 4 / pi as high.
-        bound = 2.0 * what.width / (np.pi * 24e-3)
-        bounds[1] = bound, "4 / pi x half a cell / amplitude"
+        bounds[1] = 2.0 * what.width / (np.pi * 24e-3), "4 / pi x half a cell / amplitude"
     for when, amplitude, limit in zip(("below g", "at 3.5 g"), (5e-3, 24e-3), bounds):
-        run = scenes.Run(trial, what, 1, 20, base_amplitude=amplitude)
+        run = Run(trial, what, 1, 20, base_amplitude=amplitude)
         mass = run.cycles.apparent_mass[0] / what.particle_mass
         trial.limit(f"apparent mass error {when}", abs(mass - 1.0), *limit)
     run.sound()
@@ -251,7 +253,7 @@ def single_cell(trial):
 def hard_spheres(trial):
     """Spheres of steel's modulus run at the step advised for them, a tenth of the soft ones'."""
     what = filling(trial, **STEEL)
-    mild(trial, 1 if trial.quick else 3, what=what, dt=what.safe_step())
+    mild(trial, 1 if trial.quick else 3, what, dt=what.safe_step())
 
 
 @case((), (SPHERES, "dt must be at most"))

@@ -17,6 +17,7 @@ FILLINGS = {
     "empty": Empty(),
 }
 AUTOMATA, SPHERES = tuple(FILLINGS)[:3], tuple(FILLINGS)[3:5]
+ALL = (*AUTOMATA, *SPHERES)
 #: Those whose account of forces keeps momentum.
 EXACT = ("automaton", *SPHERES)
 OSCILLATOR = Oscillator()
@@ -50,7 +51,7 @@ class Run:
         self.row, self.steps = self.batch.table.row(0), int(self.batch.steps_per_cycle[0])
         self.time = cycles / self.row["frequency"]
         self.omega = 2.0 * np.pi * self.row["frequency"]
-        self.weight = particles * what.particle_mass * what.gravity
+        self.mass = particles * what.particle_mass
 
     def column(self, name):
         """A column of ``measures.COLUMNS`` over the measured cycles, (cycles,)."""
@@ -61,15 +62,15 @@ class Run:
         self.kept_inside()
         if self.trial.method in EXACT:
             self.momentum_kept()
-        self.draw("energy of the particles [mJ]", 1e3 * self.column("energy"))
-
-    def draw(self, ylabel, *lines):
-        """Draw quantities over the cycles."""
-        self.trial.draw("cycle [1]", np.arange(1, len(lines[0]) + 1), ylabel, *lines)
+        energy = 1e3 * self.column("energy")
+        cycle = np.arange(1, len(energy) + 1)
+        self.trial.draw("cycle [1]", cycle, "energy of the particles [mJ]", energy)
 
     def draw_swings(self):
         """Draw the highest and the lowest displacement of every cycle."""
-        self.draw("highest and lowest x [mm]", *(1e3 * self.column(n) for n in ("x_max", "x_min")))
+        ends = [1e3 * self.column(name) for name in ("x_max", "x_min")]
+        cycle = np.arange(1, len(ends[0]) + 1)
+        self.trial.draw("cycle [1]", cycle, "highest and lowest x [mm]", *ends)
 
     def draw_places(self):
         """Draw where the particles are."""
@@ -96,27 +97,26 @@ class Run:
         with the container's velocity of a step ago: off by a dt / v = w dt. Otherwise round-off of
         a step and quanta of 2^-40 m/s.
         """
-        given = -(self.cycles.mean_force[0] + self.weight) * self.time
+        given = -(self.cycles.mean_force[0] + self.mass * self.what.gravity) * self.time
         swing = 0.5 * (self.column("x_max").max() - self.column("x_min").min())
-        scale = self.particles * self.what.particle_mass * self.omega * swing
         steps = self.steps * len(self.column("x"))
         bound, formula = 10.0 * steps * EPS, "10 steps x 2^-52"
         if self.trial.method in AUTOMATA:
             bound = 2.0 * self.omega * self.row["dt"]
             formula = "2 w dt: held particles count a step late"
-        error = abs(self.momentum_gained - given) / scale
+        error = abs(self.momentum_gained - given) / (self.mass * self.omega * swing)
         self.trial.limit("momentum error / N m v", error, bound, formula)
 
     def weight_carried(self, bound, formula):
         """Mean force on the container against -N m g, as a share of it."""
-        error = abs(self.cycles.mean_force[0] + self.weight) / self.weight
+        weight = self.mass * self.what.gravity
+        error = abs(self.cycles.mean_force[0] + weight) / weight
         self.trial.limit("mean force error", error, bound, formula)
 
     def rigid_response(self, bound, formula):
         """RMS displacement against that of a structure with the particles glued in."""
         o = Oscillator(*(self.row[n] for n in ("mass", "stiffness", "damping", "base_amplitude")))
-        added = self.particles * self.what.particle_mass
-        wanted = o.base_amplitude * abs(o.transfer(self.row["frequency"], added)) / np.sqrt(2.0)
+        wanted = o.rms(self.row["frequency"], self.mass)
         error = abs(self.cycles.rms[0] / wanted - 1.0)
         self.trial.limit("response error", error, bound, formula)
 
@@ -135,18 +135,10 @@ class Run:
         fastest = np.linalg.norm(self.batch.snapshot(0)["velocity"], axis=1).max(initial=0.0)
         self.trial.limit("fastest [m/s]", fastest, bound, "V (1 + e) / (1 - e) + sqrt(2 g H)")
 
-    def flight_energy(self):
-        """Energy of particles that all fly at twice the wall's speed, as high as the box."""
-        wall = self.omega * self.row["base_amplitude"]
-        height = Box.of(self.what).height
-        most = 2.0 * wall**2 + self.what.gravity * height
-        most *= self.particles * self.what.particle_mass
-        self.trial.limit("energy [J]", self.column("energy"), most, "N m ((2 V)^2 / 2 + g H)")
 
-
-def drive(trial, what, particles, cycles, amplitude=0.024, **options):
+def drive(trial, what, particles, cycles, **options):
     """A container that moves as told, x = amplitude sin(2 pi f t); returns a sound Run."""
-    run = Run(trial, what, particles, cycles, base_amplitude=amplitude, **options)
+    run = Run(trial, what, particles, cycles, **options)
     run.sound()
     return run
 
@@ -160,14 +152,20 @@ def spring(trial, what, particles, cycles, *, ratio=1.0, base=0.6e-3, **options)
     return Run(trial, what, particles, cycles, spring=True, **options)
 
 
+def still(trial, what, particles, dt=None, **options):
+    """Batch of particles that start in a container at rest."""
+    dt = dt or min(what.default_dt, what.safe_step())
+    batch = Batch(what, SceneTable(particles, 1, dt, 10.0, 0.0), mount="base", **options)
+    batch.start()
+    trial.compile_s += batch.compile_seconds
+    return batch
+
+
 def fall(trial, what, seconds, particles=1, samples=400):
     """Energy of particles in a container at rest over that at the start; it is drawn."""
-    batch = Batch(what, SceneTable(particles, 1, what.default_dt, 10.0, 0.0), mount="base")
-    batch.start()
+    batch = still(trial, what, particles, what.default_dt)
     every = max(1, round(seconds / samples / batch.table.row(0)["dt"]))
     history = film(batch, every * samples, sample_every=every).history
-    trial.compile_s += batch.compile_seconds
-    energy = history["energy"][:, 0]
-    share = energy / energy[0]
+    share = history["energy"][:, 0] / history["energy"][0, 0]
     trial.draw("time [s]", history["time_s"][:, 0], "energy / energy at the start [1]", share)
-    return energy
+    return history["energy"][:, 0]

@@ -2,10 +2,9 @@
 
 import numpy as np
 
+from _closed_forms import damped_opening
 from _motion_record import MotionRecord
 from taichi_dem import CONCRETE, Scene, Simulation, StepControl, effects
-from taichi_dem.mesh.mesh import checked_mesh
-from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.simulate import run_simulation
 
@@ -17,6 +16,7 @@ ACCURACY = 0.01
 EDGE = 0.05
 AREA = 0.25 * 3.0**0.5 * EDGE**2
 MASS = CONCRETE.density * EDGE**3 / (6.0 * 2.0**0.5)
+X = np.array([1.0, 0.0, 0.0])
 #: Methods of bodies that nothing touches.
 FREE = {
     "uniform": Uniform(1e-7),
@@ -39,22 +39,12 @@ TOUCHING = {
 }
 
 
-def contact_effects():
-    """All effects but loads; bodies touch at all free faces."""
-    bonds = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
-    return [*bonds, effects.BodyContact(), effects.StickingFriction()]
-
-
-def soon(trial):
-    """Time of cases with contact [s]."""
-    return 2e-5 if trial.quick else 1e-4
-
-
 class Run(MotionRecord):
     """The bodies of a mesh by the method of a trial, and limits on what they did.
 
     velocity [m/s], shift [m] and spin [rad/s] at the start are broadcast to all bodies. bodies:
-    which are judged. scene: options of ``Scene``, by default concrete with ``contact_effects``.
+    which are judged. until: [s], by default that of cases with contact. scene: options of
+    ``Scene``, by default concrete with all effects but loads, whose bodies touch at all free faces.
     dt: largest step [s]; steps: how many of them. result: of the run.
     """
 
@@ -64,12 +54,15 @@ class Run(MotionRecord):
     ):  # fmt: skip
         super().__init__(bodies)
         method = methods[trial.method]
-        scene = Scene(mesh, **{"material": CONCRETE, "effects": contact_effects(), **scene})
+        bonds = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
+        usual = [*bonds, effects.BodyContact(), effects.StickingFriction()]
+        scene = Scene(mesh, **{"material": CONCRETE, "effects": usual, **scene})
         simulation = Simulation(scene, method)
         place = simulation.model.centre + shift
         simulation.state.set_motion(place, velocity=velocity, spin=spin)
         looks = {"samples": SAMPLES, "progress": None, "observers": [self]}
-        self.result = run_simulation(simulation, until=until or soon(trial), **looks)
+        soon = 2e-5 if trial.quick else 1e-4
+        self.result = run_simulation(simulation, until=until or soon, **looks)
         trial.compile_s += simulation.compile_seconds
         trial.warnings += simulation.step_resolution.findings()
         self.trial, self.dt, self.steps = trial, method.dt0, self.time_s[-1] / method.dt0
@@ -84,8 +77,9 @@ class Run(MotionRecord):
         self.draw("kinetic energy / given [1]", share)
         return share
 
-    def no_energy_made(self):
-        """Kinetic energy never exceeds what there was at the start."""
+    def nothing_made(self):
+        """Momentum is kept, and kinetic energy never exceeds what there was at the start."""
+        self.momentum_kept()
         rise, formula = self.energy().max() - 1.0, "kinetic <= kinetic at the start"
         self.trial.limit("kinetic energy above what was there", rise, 1e-3, formula)
 
@@ -95,6 +89,19 @@ class Run(MotionRecord):
         bound = EPS * (100.0 * self.steps**0.5 + self.steps * place)
         formula = "100 eps sqrt(n) + n eps place / size"
         self.trial.limit("momentum error", self.momentum_error(EDGE), bound, formula)
+
+    def flies_straight(self, share=0.5, formula="n steps x eps / 2 x place"):
+        """Every addition rounds a place by a share of its last digit at most."""
+        off = abs(self.moved - self["velocity"][0] * self.time_s[:, None, None])
+        steps = self.steps * 2.0 ** self["level"].max()
+        bound = share * steps * EPS * abs(self["position"]).max()
+        self.trial.limit("off its path [m]", off, bound, formula)
+
+    def stays(self):
+        """Nothing moves, to the bit."""
+        moved = abs(self.moved).max(axis=(1, 2))
+        self.trial.limit("displacement [m]", moved, 0.0, "nothing acts")
+        self.draw("displacement [m]", moved)
 
     def converged(
         self, name, found, true, scale, bound=ACCURACY, formula="1 % of the exact solution"
@@ -108,19 +115,17 @@ class Run(MotionRecord):
         self.draw("opening [µm]", 1e6 * gap)
         return gap
 
+    def exact_gap(self, opening, speed=0.0, area=AREA):
+        """Opening [m] of a bonded pair over time; opening [m], speed [m/s]: at the start."""
+        laws = area * CONCRETE.normal_stiffness, area * CONCRETE.normal_damping
+        return damped_opening(0.5 * self.mass[0], *laws, opening, speed, self.time_s)
 
-def right_half():
-    """The second body of a pair, alone."""
-    return checked_mesh(pair().points[[0, 1, 2, 4]], [[3, 0, 2, 1]], {})
+    def eases(self, opening, area=AREA):
+        """A pair pulled by an opening [m] eases as the damped oscillator that it is."""
+        true = self.exact_gap(opening, area=area)
+        self.converged("error of the opening / first", self.gap(opening), true, opening)
 
 
-def beside(mesh, shift, other):
-    """Two solids in one mesh, the first shifted [m]."""
-    return placed_together({"first": (mesh, shift), "other": (other, np.zeros(3))})
-
-
-def shot_at_block():
-    """A fragment of 100 m/s, 10 µm before a cube of six bodies at rest: mesh and velocities."""
-    block = bar(0.1, 0.1, (1, 1, 1))
-    velocity = np.outer(np.arange(7) == 0, (100.0, 0.0, 0.0))
-    return beside(single(), (-1e-5, 0.05, 0.05), block), velocity
+def apart(opening, others=0):
+    """Displacements of a pair that is opened [m], and of others behind it."""
+    return [[0.0, 0.0, 0.0], [opening, 0.0, 0.0], *[[0.0, 0.0, 0.0]] * others]

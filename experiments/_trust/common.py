@@ -1,9 +1,15 @@
-"""Random meshes of plates and bars: triangles about jittered points, three tetrahedra a prism."""
+"""What cases of others share: numbers beside ours, random meshes of plates, and dots of meshes.
+
+A case is a function of an ``Effort``; it returns its Numbers, and a function that draws them.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from taichi_dem import step_report
 from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
+from taichi_dem.kit.plot_style import RED
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import checked_mesh
 
@@ -11,6 +17,59 @@ from taichi_dem.mesh.mesh import checked_mesh
 JITTER = 0.25
 #: Least distance of points without rows, in edges: one of them on the square of an edge.
 DISTANCE = 0.78
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What is spent: seeds of random meshes of a size, and sizes of element."""
+
+    seeds: range
+    sizes: int
+
+
+@dataclass
+class Number:
+    """A number that others have published or derived, and ours beside it.
+
+    key, words, unit: what it is. source: where the published number comes from. values: ours, one
+    for each mesh or draw. low, high: what counts as agreement, published within a share ``allowed``
+    where not given. note: what a reader should know of a miss. mean, spread: of the meshes, which
+    is half of their range.
+    """
+
+    key: str
+    words: str
+    published: float
+    values: np.ndarray
+    low: float | None = None
+    high: float | None = None
+    unit: str = "1"
+    source: str = ""
+    note: str = ""
+    allowed: float = 0.01
+
+    def __post_init__(self):
+        reach = self.allowed * abs(self.published)
+        self.low = self.published - reach if self.low is None else self.low
+        self.high = self.published + reach if self.high is None else self.high
+        self.mean, self.spread = float(np.mean(self.values)), 0.5 * float(np.ptp(self.values))
+
+    @property
+    def error_percent(self):
+        """Of the mean, in percent of the published number; absolute where that is zero."""
+        gap = self.mean - self.published
+        return 100.0 * (gap / abs(self.published) if self.published else gap)
+
+    @property
+    def holds(self):
+        """Whether the mean of the meshes lies within what counts as agreement."""
+        return bool(self.low <= self.mean <= self.high)
+
+
+def dots(axes, x, values, words="a random mesh", colour=RED):
+    """A dot a mesh: values (meshes, n) over x (n,)."""
+    axes.plot(x, np.transpose(values), "o", color=colour, ms=4)
+    axes.plot([], [], "o", color=colour, label=words)
 
 
 def plate(length, height, edge, seed, layers=1, in_rows=True):
@@ -25,20 +84,17 @@ def plate(length, height, edge, seed, layers=1, in_rows=True):
     points = (_points if in_rows else _scattered)(length, height, edge, draw)
     flat = draw.permutation(points)
     triangles = _triangles(flat)
-    grid = np.vstack(
-        [np.column_stack([flat, np.full(len(flat), k * edge)]) for k in range(layers + 1)]
-    )
+    layer = [np.column_stack([flat, np.full(len(flat), k * edge)]) for k in range(layers + 1)]
+    grid = np.vstack(layer)
     bodies = np.vstack([_prisms(triangles, len(flat), k) for k in range(layers)])
     faces = np.sort(bodies[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
     outer, count = np.unique(faces, axis=0, return_counts=True)
     outer = outer[count == 1]
-    ends = ("left", "right"), ("bottom", "top"), ("back", "front")
+    sides = [(axis, end) for axis in range(3) for end in (0.0, 1.0)]
     sizes, groups = (length, height, layers * edge), {}
-    for axis, names in enumerate(ends):
-        for name, place in zip(names, (0.0, sizes[axis])):
-            groups[name] = outer[
-                np.isclose(grid[outer, axis], place, atol=1e-9 * length).all(axis=1)
-            ]
+    for name, (axis, end) in zip(("left", "right", "bottom", "top", "back", "front"), sides):
+        on = np.isclose(grid[outer, axis], end * sizes[axis], atol=1e-9 * length)
+        groups[name] = outer[on.all(axis=1)]
     return checked_mesh(grid, bodies, groups)
 
 
@@ -96,13 +152,13 @@ def _prisms(triangles, points, layer):
 
 
 def material_of(mesh, young, poisson, axes=(0, 1), **options):
-    """A material of which a mesh shows this Young's modulus [Pa] along axes, and what it showed."""
+    """A material of which a mesh shows this Young's modulus [Pa] along axes."""
     made = Material.from_elastic(young=young, poisson=poisson, **options)
-    shown = mesh_stiffness(mesh, made)
-    scale = young / float(np.mean(shown.young_along[list(axes)]))
-    return Material.from_elastic(young=scale * young, poisson=poisson, **options), shown
+    shown = mesh_stiffness(mesh, made).young_along[list(axes)]
+    scale = young / float(np.mean(shown))
+    return Material.from_elastic(young=scale * young, poisson=poisson, **options)
 
 
-def springs_step(scene, share=0.5):
-    """A share of the largest step that the springs of all bonds allow [s]."""
-    return share * float(step_report(scene).borne("solved").min())
+def springs_step(scene):
+    """Half of the largest step that the springs of all bonds allow [s]."""
+    return 0.5 * float(step_report(scene).borne("solved").min())
