@@ -84,7 +84,7 @@ class Film:
         >>> film(batch, 2000, frame_every=20).show("damper.html")  # doctest: +SKIP
         """
         # Imported here, so that matplotlib loads only where something is shown.
-        from ca_damper.viewer import MOST_SCENES, show_film
+        from ca_damper.plot.containers import MOST_SCENES, show_film
 
         if not self.frames:
             raise InputError("frames must be recorded to show a film: film(..., frame_every=20)")

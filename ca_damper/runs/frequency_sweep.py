@@ -116,7 +116,7 @@ class Sweep:
     def plot(self) -> Any:
         """Pictures of the sweep: ``sweep.plot.hysteresis(path="hysteresis.png")``."""
         # Imported here, so that matplotlib loads only where a picture is drawn.
-        from ca_damper.plot.response_plots import SweepPlots
+        from ca_damper.plot.curves import SweepPlots
 
         return SweepPlots(self)
 

@@ -127,11 +127,12 @@ class Response(Result):
 
     def _repr_html_(self):
         # Imported here, so that matplotlib loads only where a picture is shown.
-        from ca_damper.plot.response import picture_of_response
+        from ca_damper.plot.curves import picture_rms
+        from taichi_dem.kit.plot_style import png_of
 
         count = len(self.particles)
         rows = np.unique(np.linspace(0, count - 1, _MOST_SHOWN).round().astype(int))
-        png = picture_of_response(self, rows)
+        png = png_of(picture_rms(None, self, rows))
         some = f" ({len(rows)} of {count} particle numbers)" if len(rows) < count else ""
         return titled(
             f"Response: {self.axes_in_words()}{some}",
@@ -211,7 +212,7 @@ class Response(Result):
     def plot(self) -> Any:
         """Pictures of the response, one function each: ``response.plot.curves("loss_factor")``."""
         # Imported here, so that matplotlib loads only where a picture is drawn.
-        from ca_damper.plot.response_plots import ResponsePlots
+        from ca_damper.plot.curves import ResponsePlots
 
         return ResponsePlots(self)
 

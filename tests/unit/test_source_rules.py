@@ -15,7 +15,7 @@ LAYERS = {
         | accuracy | solve | demo | __init__ | __main__""",
     "ca_damper": """
         errors report | oscillator structure excitation | theory | scenes | filling
-        | engine | fixed_mass automaton spheres | combined | batch | plot | viewer
+        | engine | fixed_mass automaton spheres | combined | batch | plot
         | runs | goals | accuracy | solve_response
         | demo_pictures | demo | __init__ | __main__""",
 }

@@ -1,7 +1,7 @@
 """Self-contained HTML pages that play recorded frames: page, player and packed data.
 
 A page holds its styles, scripts and data, and its Content-Security-Policy forbids any request. The
-3-D view is in ``taichi_dem.viewer``, the 2-D view in ``ca_damper.viewer``.
+3-D view is in ``taichi_dem.viewer``, the 2-D view in ``ca_damper.plot``.
 """
 
 from taichi_dem.kit.viewer.packing import pack, quantise, time_unit

@@ -9,8 +9,8 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from ca_damper.oscillator import Oscillator
-from taichi_dem.kit.plot_style import GREY, STYLES, area_key, picture, png_of, styled, styles_of
-from taichi_dem.kit.validation import FileName
+from taichi_dem.kit.plot_style import GREY, STYLES, area_key, picture, styles_of
+from taichi_dem.kit.validation import FileName, choice
 
 _SHADES = colormaps["viridis"]
 _FINE = 400
@@ -37,26 +37,15 @@ def picture_responses(path: FileName, responses: Mapping[str, Any], particle_mas
             axis.set_axis_off()
 
 
-def picture_of_response(response: Any, rows: Any) -> Any:
-    """PNG, in bytes: RMS over frequency; rows: which of the particle numbers are drawn."""
-    with styled(size=(7.2, 4.0)) as (figure, axis):
-        _draw_rms(axis, response, rows)
-        return png_of(figure)
-
-
-def picture_rms(path: FileName | None, response: Any) -> Figure:
-    """RMS over frequency for every particle number, and of the empty container."""
+def picture_rms(path: FileName | None, response: Any, rows: Any = None) -> Figure:
+    """RMS over frequency, and of the empty container; rows: which particle numbers, all if None."""
     with picture(path, size=(7.2, 4.0)) as (figure, axis):
-        _draw_rms(axis, response)
+        # Without damping the empty container has no end at its natural frequency.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            _draw_curves(axis, response, rows)
+        axis.set_ylim(0.0, None)
+        _explain_curves(axis, response)
     return figure
-
-
-def _draw_rms(axis, response, rows=None):
-    # Without damping the empty container has no end at its natural frequency.
-    with np.errstate(divide="ignore", invalid="ignore"):
-        _draw_curves(axis, response, rows)
-    axis.set_ylim(0.0, None)
-    _explain_curves(axis, response)
 
 
 def _explain_curves(axis, response):
@@ -252,3 +241,49 @@ def _draw_ways(axis, sweep, k):
         for way, words, colour, mark in ways:
             look = {"color": colour, "marker": mark, "ms": 3, "label": words if seed == 0 else None}
             axis.plot(sweep.up.ratios, 1e3 * way.rms[k, :, seed], **look)
+
+
+class ResponsePlots:
+    """Pictures of a response.
+
+    Each function returns a matplotlib figure, which a notebook shows, and writes it as PNG where a
+    ``path`` is given (InputError where it cannot).
+
+    Examples
+    --------
+    ::
+
+        response.plot.curves(path="rms.png")
+        response.plot.curves("loss_factor")
+    """
+
+    def __init__(self, response: Any):
+        self._response = response
+
+    def curves(self, measure: str = "rms", *, path: FileName | None = None) -> Figure:
+        """Draw a measure over frequency: median over seeds, shaded from lowest to highest.
+
+        Parameters
+        ----------
+        measure : str
+            Name of a measure of the response; the RMS beside that of the empty container.
+        path : str or path, optional
+        """
+        if choice("measure", measure, self._response.units) == "rms":
+            return picture_rms(path, self._response)
+        return picture_measure(path, self._response, measure)
+
+    def peaks(self, *, path: FileName | None = None) -> Figure:
+        """Draw place and height of the peaks over the particle number."""
+        return picture_peaks(path, self._response)
+
+
+class SweepPlots:
+    """Pictures of a sweep; functions as those of ``ResponsePlots``."""
+
+    def __init__(self, sweep: Any):
+        self._sweep = sweep
+
+    def hysteresis(self, *, path: FileName | None = None) -> Figure:
+        """Draw the RMS over frequency, up and down, each seed a line."""
+        return picture_hysteresis(path, {self._sweep.up.label: self._sweep})

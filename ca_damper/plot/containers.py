@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.plot.box import SPEEDS, Box
-from ca_damper.plot.hanging import Hanging
+from ca_damper.plot.boxes import SPEEDS, Box, Hanging
 from ca_damper.report.record import Frame
 from ca_damper.spheres import Spheres
 from taichi_dem.kit.display import counted, listed
