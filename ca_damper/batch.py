@@ -590,6 +590,6 @@ class Batch(LoadedScenes):
                 launches.count((end - begin).astype(np.int64), self.table.column("particles"))
             if progress is not None:
                 scene_steps = round(launches.done * total)
-                progress(BatchProgress(launches.done, launches.seconds, scene_steps))
+                progress(BatchProgress(launches.done, launches.seconds, steps=scene_steps))
             self.writer.save_if_needed()
             done = launches.done

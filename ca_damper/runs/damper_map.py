@@ -17,7 +17,6 @@ from ca_damper.scenes.checks import MOST_CYCLES, MOST_SCENES, run_seeds
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.scenes.table import SceneTable
 from ca_damper.theory.collect_and_collide import CollectAndCollide, collect_and_collide
-from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
@@ -147,13 +146,13 @@ class DamperMap(Result):
         found = {name: (dims, getattr(self, name), unit) for name, unit in units.items()}
         return {**found, "gap": (dims[:2], self.gaps, "m")}
 
-    def table(self) -> Table:
+    def columns(self) -> dict[str, Any]:
         """A row a scene: its place on the axes, measures, and the theory's loss and mass.
 
         Returns
         -------
-        Table
-            Columns by name, units in ``units``.
+        dict
+            Columns by name, which ends in the unit.
         """
         columns: dict[str, Any] = {"filling": [self.label] * self.loss.size}
         columns |= scenes_over(
@@ -168,7 +167,7 @@ class DamperMap(Result):
         columns |= {name: getattr(self, name).ravel() for name in measures}
         made = {"loss_theory": self.theory.loss, "mass_theory": self.theory.mass}
         columns |= {name: self._of_scenes(values) for name, values in made.items()}
-        return Table(columns, dict.fromkeys(("filling", *measures, *made), "1"))
+        return columns
 
     def _of_scenes(self, values: np.ndarray) -> np.ndarray:
         """Values over the first axes as a number a scene, (scenes,)."""

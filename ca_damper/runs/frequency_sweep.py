@@ -19,10 +19,9 @@ from ca_damper.report.report import Report
 from ca_damper.report.steady_state import ROUNDING, half_width
 from ca_damper.runs.response import Grid, Response
 from ca_damper.scenes.checks import check_run
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import in_brief
-from taichi_dem.kit.optional import optional
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, FileName
@@ -102,13 +101,9 @@ class Sweep:
         -------
         xarray.Dataset
             Units in the attributes of each variable.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
         """
-        xarray = optional("xarray")
+        import xarray
+
         axis = xarray.Variable("direction", ["up", "down"])
         return xarray.concat([self.up.to_xarray(), self.down.to_xarray()], axis)
 

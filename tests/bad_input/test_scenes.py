@@ -28,7 +28,7 @@ from taichi_dem import (
     checked_mesh,
     effects,
 )
-from taichi_dem.mesh.face_groups import with_inner_group
+from taichi_dem.mesh.mesh import with_inner_group
 from taichi_dem.mesh.shapes import pair, single
 from tests.bad_input.refusals import assert_refused
 
