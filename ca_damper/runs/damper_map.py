@@ -31,6 +31,17 @@ from taichi_dem.kit.validation import (
     whole,
 )
 
+#: Axes of a map: attribute and unit by dimension; units of its measures.
+_AXES = {
+    "clearance": ("clearances", "m"),
+    "particles": ("particles", "1"),
+    "amplitude": ("amplitudes", "m"),
+    "frequency": ("frequencies", "Hz"),
+    "seed": ("seeds", "1"),
+}
+_UNITS = {"apparent_damping": "N s/m", "apparent_mass": "kg"}
+_UNITS |= dict.fromkeys(("loss", "mass_share", "energy"), "1")
+
 
 @dataclass(frozen=True, eq=False)
 class DamperMap(Result):
@@ -107,45 +118,18 @@ class DamperMap(Result):
         """Energy taken in a cycle by N m A^2 w^2."""
         return np.pi * self.loss
 
-    def loss_factor(self, container_mass: float) -> np.ndarray:
-        """Energy lost in a radian over the energy in motion, c / (w (M + m)).
-
-        Parameters
-        ----------
-        container_mass : float
-            Mass M of the container [kg].
-
-        Returns
-        -------
-        ndarray
-            Loss factor [-], shape of all axes.
-        """
-        moving = positive("container_mass", container_mass) + self.apparent_mass
-        return self.apparent_damping / (self.omega * moving)
-
     @property
     def theory(self) -> CollectAndCollide:
         """Collect and collide without gravity, at every clearance, number and amplitude."""
         return collect_and_collide(np.array(self.amplitudes), self.gaps[:, :, None])
 
     def _axes(self) -> dict[str, Any]:
-        axes = {
-            "clearance": (self.clearances, "m"),
-            "particles": (self.particles, "1"),
-            "amplitude": (self.amplitudes, "m"),
-            "frequency": (self.frequencies, "Hz"),
-            "seed": (self.seeds, "1"),
-        }
-        if self.clearances == (None,):
-            del axes["clearance"]
-        return axes
+        axes = {one: (getattr(self, name), unit) for one, (name, unit) in _AXES.items()}
+        return {one: axis for one, axis in axes.items() if axis[0] != (None,)}
 
     def _variables(self) -> dict[str, Any]:
-        dims = "clearance", "particles", "amplitude", "frequency", "seed"
-        pure = dict.fromkeys(("loss", "mass_share", "energy"), "1")
-        units = {"apparent_damping": "N s/m", "apparent_mass": "kg", **pure}
-        found = {name: (dims, getattr(self, name), unit) for name, unit in units.items()}
-        return {**found, "gap": (dims[:2], self.gaps, "m")}
+        found = {name: (tuple(_AXES), getattr(self, name), unit) for name, unit in _UNITS.items()}
+        return {**found, "gap": (("clearance", "particles"), self.gaps, "m")}
 
     def table(self) -> Table:
         """A row a scene: its place on the axes, measures, and the theory's loss and mass.
@@ -155,15 +139,11 @@ class DamperMap(Result):
         Table
             Columns by name, units in ``units``.
         """
+        places = scenes_over(**{one: getattr(self, name) for one, (name, _) in _AXES.items()})
         columns: dict[str, Any] = {"filling": [self.label] * self.loss.size}
-        columns |= scenes_over(
-            clearance_m=range(len(self.clearances)),
-            particles=self.particles,
-            amplitude_m=self.amplitudes,
-            frequency_Hz=self.frequencies,
-            seed=self.seeds,
-        )
         columns["clearance_m"] = self._of_scenes(self.gaps)
+        columns["particles"], columns["amplitude_m"] = places["particles"], places["amplitude"]
+        columns["frequency_Hz"], columns["seed"] = places["frequency"], places["seed"]
         measures = "loss", "mass_share", "energy"
         columns |= {name: getattr(self, name).ravel() for name in measures}
         made = {"loss_theory": self.theory.loss, "mass_theory": self.theory.mass}
@@ -267,15 +247,9 @@ def damper_map(
         name: np.concatenate([getattr(found, name) for found, _ in runs]).reshape(shape)
         for name in ("apparent_damping", "apparent_mass")
     }
-    return DamperMap(
-        label=filling.label,
-        particle_mass=filling.particle_mass,
-        clearances=ways,
-        gaps=np.array(gaps).reshape(shape[:2]),
-        reports=tuple(report for _, report in runs),
-        **axes,
-        **measures,
-    )
+    own = {"label": filling.label, "particle_mass": filling.particle_mass, "clearances": ways}
+    own |= {"gaps": np.array(gaps).reshape(shape[:2]), "reports": tuple(told for _, told in runs)}
+    return DamperMap(**own, **axes, **measures)
 
 
 def _jobs(filling, particles, clearances):

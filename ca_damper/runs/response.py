@@ -25,7 +25,7 @@ from taichi_dem.kit.optional import optional
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.units import unit_of
-from taichi_dem.kit.validation import AUTO, FileName, choice, instance, positive, several, whole
+from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, whole
 
 #: Particle numbers that a notebook shows, evenly over those there are.
 _MOST_SHOWN = 8
@@ -261,22 +261,6 @@ class AmplitudeResponse(Tabulated):
     def __iter__(self) -> Iterator[Response]:
         return iter(self.responses)
 
-    def measure(self, name: str) -> np.ndarray:
-        """Measure of all responses by name, stacked by amplitude.
-
-        Parameters
-        ----------
-        name : str
-            Name of a measure of a Response, such as ``"rms"``.
-
-        Returns
-        -------
-        ndarray
-            Values, shape (amplitudes, particles, ratios, seeds), in the unit of the measure.
-        """
-        choice("name", name, MEASURE_UNITS)
-        return np.stack([getattr(one, name) for one in self.responses])
-
     def peaks(self) -> tuple[np.ndarray, np.ndarray]:
         """Locate the peak of each curve.
 
@@ -404,20 +388,8 @@ def frequency_response(
             cycles = batch.run(transient_cycles, measured_cycles, report_progress)
             writer.save()
     report = replace(batch.report(), **_sampling(cycles))
-    return _by_amplitude(grid, batch.steps_per_cycle, grid.measures(cycles), report)
-
-
-def _by_amplitude(grid, steps, values, report):
-    """A Response for each amplitude, or the one there is; steps, values: of all scenes."""
-    shape = (len(grid.amplitudes), *grid.shape)
-    steps = steps.reshape(shape)[0, 0, :, 0]
-    values = {name: value.reshape(shape) for name, value in values.items()}
-    made = []
-    for k, amplitude in enumerate(grid.amplitudes):
-        one = grid.response(steps, {name: value[k] for name, value in values.items()})
-        oscillator = replace(grid.oscillator, base_amplitude=amplitude)
-        made.append(replace(one, oscillator=oscillator, report=report))
-    return AmplitudeResponse(grid.amplitudes, tuple(made)) if grid.is_several else made[0]
+    made = tuple(replace(one, report=report) for one in grid.responses(batch, cycles))
+    return AmplitudeResponse(grid.amplitudes, made) if grid.is_several else made[0]
 
 
 def _sampling(cycles):
@@ -518,6 +490,15 @@ class Grid:
         dt = 1.0 / (self.ratios * self.oscillator.natural_frequency * steps)
         axes = (self.particles, self.ratios, self.seeds)
         return Response(self.filling.label, self.oscillator, *axes, steps, dt, **values)
+
+    def responses(self, batch: Batch, cycles: Cycles) -> Iterator[Response]:
+        """The Response of a batch that has run, one for each amplitude."""
+        shape = (len(self.amplitudes), *self.shape)
+        steps = batch.steps_per_cycle.reshape(shape)[0, 0, :, 0]
+        values = {name: one.reshape(shape) for name, one in self.measures(cycles).items()}
+        for k, amplitude in enumerate(self.amplitudes):
+            made = self.response(steps, {name: one[k] for name, one in values.items()})
+            yield replace(made, oscillator=replace(self.oscillator, base_amplitude=amplitude))
 
 
 def measures_of(oscillator: Oscillator, cycles: Cycles) -> dict[str, np.ndarray]:

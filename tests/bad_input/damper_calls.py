@@ -192,7 +192,6 @@ def _excitations():
 
 def _answers():
     found, many = response(), AmplitudeResponse([1e-3], [response()])
-    yield "AmplitudeResponse.measure", many.measure, {"name": "rms"}
     yield "AmplitudeResponse.write_csv", many.write_csv, {"path": path("x.csv")}
     yield "Response.write_csv", found.write_csv, {"path": path("x.csv")}
     goal = {"name": "x", "unit": "m", "kind": "value", "function": len, "ratios": (1.0,)}

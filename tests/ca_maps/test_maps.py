@@ -55,5 +55,4 @@ def test_a_rigid_mass_is_mass_and_no_loss_on_all_axes():
     assert made.loss.shape == (1, 3, 2, 1, 1)
     assert made.mass_share == pytest.approx(1.0, rel=1e-6)
     assert made.loss == pytest.approx(0.0, abs=1e-6)
-    assert made.loss_factor(0.1) == pytest.approx(0.0, abs=1e-6)
     assert np.isnan(made.gaps).all()
