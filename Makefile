@@ -96,7 +96,8 @@ lessons: $(LESSONS_STAMP) ## serve four interactive lessons to this machine's br
 	$(BIN)/python -m marimo run $(LESSONS) --host 127.0.0.1 $(LESSONS_OPTIONS)
 
 docs: $(DOCS_STAMP) ## build these pages with API, gallery and search as a site, in results/docs
-	$(BIN)/python -m docs.site results/docs
+	$(BIN)/python -m sphinx -q -W --keep-going -c docs/site . results/docs
+	@echo "The first page is results/docs/index.html"
 
 mesh: $(MESH_STAMP) ## make the meshes again (installs gmsh; the others do not need it)
 	$(BIN)/python experiments/make_meshes.py $(MESH_OPTIONS)

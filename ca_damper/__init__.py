@@ -27,8 +27,7 @@ from ca_damper.structure import Box, ModalStructure
 from ca_damper.theory.collect_and_collide import CollectAndCollide, collect_and_collide
 from ca_damper.theory.decay import logarithmic_decrement
 from ca_damper.theory.impact_damper import ImpactDamper
-from taichi_dem.kit.accuracy.answer import Answer
-from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
+from taichi_dem.kit.bars.answer import Answer, Branch
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.sweeps.rows import parameter_grid
@@ -43,7 +42,6 @@ __all__ = [
     "Batch",
     "Box",
     "Branch",
-    "BranchedAnswer",
     "Certificate",
     "CollectAndCollide",
     "Combined",

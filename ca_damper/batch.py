@@ -551,7 +551,7 @@ class Batch(LoadedScenes):
                 launches.count(self._steps_taken(), self.table.column("particles"))
             if progress is not None:
                 scene_steps = round(launches.done * total)
-                progress(BatchProgress(launches.done, launches.seconds, scene_steps))
+                progress(BatchProgress(launches.done, launches.seconds, steps=scene_steps))
             self.writer.save_if_needed()
             done = launches.done
 

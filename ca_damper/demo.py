@@ -49,7 +49,6 @@ from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.study.entries import Entry
-from taichi_dem.kit.study.summary_entries import add_to_summary
 from taichi_dem.kit.terminal import show_paragraph
 
 NAME = "damper_demo"
@@ -131,7 +130,7 @@ def let_go(options: Namespace, name: str) -> None:
     draw = partial(picture, decays, (rigid, shown), options)
     study.finish(options, name, figures_of(decays, options), reports.values(), draw=draw)
     if report.certificate is not None:
-        add_to_summary(options.out, certificate=report.certificate.as_dict())
+        study.add_to_summary(options.out, certificate=report.certificate.as_dict())
 
 
 def picture(decays: Mapping[str, Decay], fillings: Sequence[Any], options: Namespace) -> None:

@@ -9,10 +9,8 @@ import numpy as np
 from _damper_reference import reference_values
 from ca_damper import solve_response
 from taichi_dem import Answer, InputError, Uniform, simulate, solve, step_report
-from taichi_dem.accuracy.job import Job
-from taichi_dem.accuracy.runs import Runs
-from taichi_dem.kit.accuracy.branches import BranchedAnswer
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.accuracy.runs import Job, Runs
+from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.study.timing import clock
 from taichi_dem.simulate import result_of
 
@@ -63,7 +61,7 @@ class Judged:
     @property
     def single(self) -> bool:
         """Whether a single number answers the question."""
-        return not isinstance(self.answer, BranchedAnswer)
+        return not self.answer.branches
 
     def row(self, kind: str) -> tuple:
         """Cells of a table: the question, the answer, the truth."""

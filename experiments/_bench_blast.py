@@ -111,7 +111,7 @@ def hole_at(until, step, **sweeping):
     """Displacement of the hole at a time [mm], with solved dashpots."""
     method = ImplicitDashpots(step, **sweeping)
     result = simulate(paper_scene(), method=method, until=until, progress=None)
-    return float(result.history["hole_radial_displacement_mm"][-1])
+    return float(result.series["hole_radial_displacement_mm"][-1])
 
 
 def whole_runs():

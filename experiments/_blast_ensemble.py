@@ -27,7 +27,7 @@ def blast(row):
     scene = Scene(mesh, material, "auto", loads=[effects.GasPressure()])
     given = {"until": row["until"], "samples": row["samples"], "progress": None}
     result = simulate(scene, method=ImplicitDashpots(BLOCK_STEP), **given)
-    hole = result.history["hole_radial_displacement_mm"].tolist()
+    hole = result.series["hole_radial_displacement_mm"].tolist()
     broken = "".join("01"[one] for one in (~np.isnan(result.broken_time)).astype(int))
     moves = {HOLE.format(k): value for k, value in enumerate(hole)}
     return {"broken_faces": result.report.broken_faces, **moves, "broken": broken}

@@ -28,7 +28,7 @@ class Blasts:
     def __init__(self, law, parts, results):
         self.law, self.results, self.first = law, results, results[0].report
         self.points = parts**2 if law == "bodies" else (parts - 1) * (parts - 2) // 2
-        self.holes = [float(one.history["hole_radial_displacement_mm"][-1]) for one in results]
+        self.holes = [float(one.series["hole_radial_displacement_mm"][-1]) for one in results]
 
     def energy(self, name):
         """A term of the energy balance of the first [kJ]."""

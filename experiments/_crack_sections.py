@@ -8,8 +8,16 @@ from matplotlib.colors import Normalize
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from taichi_dem.kit.plot_style import GREY, picture
-from taichi_dem.plot.bodies import JOINT, STONE, draw_lines, draw_stone, frame_block, shades
-from taichi_dem.plot.view import View, traces
+from taichi_dem.plot.view import (
+    JOINT,
+    STONE,
+    View,
+    draw_lines,
+    draw_stone,
+    frame_block,
+    shades,
+    traces,
+)
 
 _AXES = "xyz"
 

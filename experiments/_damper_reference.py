@@ -43,7 +43,7 @@ def _places(question, answer):
 
 def _values_of(found, goal, answer):
     """Values of a goal, one a seed; of several motions those of the answer's, if there are any."""
-    branches = getattr(answer, "branches", ())
+    branches = answer.branches
     if goal.kind == "extreme" and not branches:
         return _without_one(found, goal)
     values = goal.values(found)[:, 0]

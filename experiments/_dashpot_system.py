@@ -12,7 +12,7 @@ import numpy as np
 
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.lanes import by_lane
-from taichi_dem.mesh.colouring import edge_colours
+from taichi_dem.mesh.topology import edge_colours
 
 #: All bonds.
 ALL = slice(None)

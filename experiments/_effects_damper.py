@@ -62,7 +62,7 @@ class FrozenBatch:
         for state in states:
             arrays = {**own, **{name: state[name] for name in own.keys() & state.keys() - kept}}
             self.memory.write(arrays)
-            if "device.resting.held" in state.keys() - own.keys():
+            if "device.resting.held" in state and not self.batch.device.resting.rests:
                 release(self.batch.device)
             self._aim()
             self.states.append(self.memory.read())
@@ -105,3 +105,4 @@ def release(device):
     travelled[scene, cell] = np.where(rising, offset, -offset)
     for field, array in zip((cells.kind, cells.speed, cells.travelled), fields):
         assign(field, array)
+    device.resting.held.fill(0)

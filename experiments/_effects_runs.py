@@ -35,7 +35,7 @@ def blast(names, until, step, ulps):
         "run_s": report.run_cpu_seconds,
         "steps": report.substeps,
         "memory_MB": 1e-6 * field_bytes(),
-        "hole_mm": float(result.history["hole_radial_displacement_mm"][-1]),
+        "hole_mm": float(result.series["hole_radial_displacement_mm"][-1]),
         "broken_faces": report.broken_faces,
         "shares": {use.effect: use.share for use in report.effect_activity},
     }

@@ -8,8 +8,7 @@ import numpy as np
 
 from taichi_dem.kit.plot_style import STYLE, filming, write_gif
 from taichi_dem.kit.progress.progress import drawing
-from taichi_dem.plot.bodies import ALONG_Z, draw_bodies, frame_block, move_bodies
-from taichi_dem.plot.view import View
+from taichi_dem.plot.view import ALONG_Z, View, draw_bodies, frame_block, move_bodies
 
 #: Pixels an inch that are drawn; the GIF has half as many each way.
 _DPI = 200

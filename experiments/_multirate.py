@@ -37,7 +37,7 @@ class Impact:
 
     def __init__(self, name, result, evaluations):
         self.name, self.style, self.evaluations = name, styles_of([name])[name], evaluations
-        self.result, self.model, self.time = result, result.model, result.history["time_s"]
+        self.result, self.model, self.time = result, result.model, result.series["time_s"]
         self.levels = np.array([frame.level for frame in result.frames])
         self.struck, self.far = (self._moved(group) for group in ("bar_right", "bar_left"))
 

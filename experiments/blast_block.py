@@ -103,7 +103,7 @@ def scale_for(tetrahedra):
 
 def figures_of(result, exponent):
     """Figures for summary.json."""
-    report, history = result.report, result.history
+    report, history = result.report, result.series
     step_ms = 1e3 * report.run_cpu_seconds / report.substeps
     return {
         "tetrahedra": (report.body_count, "1"),

@@ -57,7 +57,7 @@ from taichi_dem import (
 from taichi_dem.demo import SETTINGS as DEMO_SETTINGS
 from taichi_dem.demo import figures_of, picture
 from taichi_dem.kit import study
-from taichi_dem.laws.chosen import WORDS
+from taichi_dem.laws.roles import WORDS
 from taichi_dem.methods import Multirate, Uniform
 from taichi_dem.simulate import result_of
 

@@ -67,7 +67,7 @@ def follow(scene, name, make, step, options):
     """One run of a method with a step [s]; writes its time series."""
     costs, method = RunCosts(), make(step)
     result = simulate(scene, method=method, title=name, observers=[costs], **run_options(options))
-    series = {**result.history, **costs.columns}
+    series = {**result.series, **costs.columns}
     write_csv(f"{options.out}/history_{name}.csv", series)
     made = {"report": result.report, "series": series, "moved": float(series[MOVED][-1])}
     if not method.uniform:
@@ -80,7 +80,7 @@ def serves(scene, method, exact, options):
     """Whether a method reaches the time for stability, undiverged and near the reference."""
     short = {**run_options(options), "until": options.stable_until, "samples": 1}
     try:
-        found = simulate(scene, method=method, progress=None, **short).history
+        found = simulate(scene, method=method, progress=None, **short).series
     except SimulationDiverged:
         return False
     wanted = np.interp(found["time_s"][-1], exact["time_s"], exact[MOVED])

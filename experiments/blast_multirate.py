@@ -97,7 +97,7 @@ def follow(name, options, scene):
         if costs.view is not None:
             history = costs.view.history()
             write_csv(f"{options.out}/history_{name}.csv", history)
-    return SimpleNamespace(**made, series={**result.history, **costs.columns}, levels=costs.levels)
+    return SimpleNamespace(**made, series={**result.series, **costs.columns}, levels=costs.levels)
 
 
 def run(options):

@@ -22,7 +22,7 @@ from functools import partial
 import numpy as np
 
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film
-from ca_damper.automaton.accumulator import READINGS
+from ca_damper.automaton.transport import READINGS
 from ca_damper.theory.bouncing import Fall, RecordedFall
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, VIOLET, picture, styles_of

@@ -17,14 +17,11 @@ A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
 # First, out of order: it prepares the environment for ``import taichi``.
 from taichi_dem.kit import runtime  # isort: skip
 
-# The second is imported for what it tells ``kit.pictures``.
-from taichi_dem import effects, goals, methods, scene_pictures, shapes  # noqa: F401
+from taichi_dem import effects, goals, methods, shapes
 from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.goals import Goal
-from taichi_dem.kit.accuracy.answer import Answer
-from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
+from taichi_dem.kit.bars.answer import Answer, Branch
 from taichi_dem.kit.checkpoint import Checkpoint
-from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
@@ -39,16 +36,14 @@ from taichi_dem.mesh.mesh import Mesh, checked_mesh
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects
-from taichi_dem.observers import At, Collector, Every, Observer, RunView
-from taichi_dem.output.receivers import Received, Receivers
+from taichi_dem.observers import At, Collector, Every, Observer, Received, Receivers, RunView
 from taichi_dem.output.record import write_paraview
 from taichi_dem.report.estimates import estimated_effects
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate
 from taichi_dem.simulation import Simulation
 from taichi_dem.solve import solve
-from taichi_dem.stability.elastic_report import elastic_report
-from taichi_dem.stability.step_report import step_report
+from taichi_dem.stability.step_report import elastic_report, step_report
 from taichi_dem.step_control import StepControl
 
 __all__ = [
@@ -57,7 +52,6 @@ __all__ = [
     "Answer",
     "At",
     "Branch",
-    "BranchedAnswer",
     "Checkpoint",
     "Collector",
     "Every",
@@ -78,7 +72,6 @@ __all__ = [
     "SimulationDiverged",
     "StepControl",
     "SweepTable",
-    "Table",
     "Uniform",
     "__version__",
     "checked_mesh",

@@ -21,7 +21,6 @@ import numpy as np
 
 from taichi_dem.effects import GasPressure
 from taichi_dem.kit import study
-from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.study.entries import Entry
 from taichi_dem.materials import CONCRETE
@@ -29,7 +28,7 @@ from taichi_dem.mesh.files import read_mesh
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.output.record import write_bodies
-from taichi_dem.report.certificate import Certificate
+from taichi_dem.report.effects import Certificate
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate
@@ -85,7 +84,7 @@ def figures_of(result: Result) -> dict[str, tuple]:
     dict
         Arguments of ``study.figure`` by name: value, unit, and the paper's value or nothing.
     """
-    history, report = result.history, result.report
+    history, report = result.series, result.report
     paper_mm = 1.93 if abs(report.until_s - 5e-4) < 1e-9 else None
     per_ms = report.run_cpu_seconds / (1e3 * report.until_s)
     moved = {
@@ -165,8 +164,8 @@ def _picture_more(result, at):
     for gas in (load for load in result.model.loads if isinstance(load, GasPressure)):
         time_s = np.linspace(0.0, 1.1 * gas.duration, 400)
         pressure = gas.pressure_at(time_s)
-        curve = Table({"time_s": time_s, "pressure": pressure}, {"pressure": "Pa"})
-        plot_columns(at("pressure.png"), curve, ["pressure"])
+        curve = {"time_s": time_s, "pressure_Pa": pressure}
+        plot_columns(at("pressure.png"), curve, ["pressure_Pa"])
         write_csv(at("pressure.csv"), {"time_s": time_s, "pressure_pa": pressure})
     drawn.history(path=at("history.png"))
     drawn.energy(path=at("energy.png"))

@@ -1,14 +1,11 @@
 """Effects that a scene may list; all others are not computed, allocated or compiled."""
 
 from taichi_dem.laws.body_contact import BodyContact
-from taichi_dem.laws.bond import BondDamping, ShearSlip, Softening
+from taichi_dem.laws.bond import BondDamping, ShearSlip, SlipWeakening, Softening
 from taichi_dem.laws.friction import Friction, StickingFriction
 from taichi_dem.laws.mixed_mode import MixedMode
-from taichi_dem.laws.slip_weakening import SlipWeakening
 from taichi_dem.laws.sphere_contact import SphereContact
-from taichi_dem.loads.gas_pressure import GasPressure
-from taichi_dem.loads.gravity import Gravity
-from taichi_dem.loads.pressure import Pressure
+from taichi_dem.loads.pressure import GasPressure, Gravity, Pressure
 from taichi_dem.loads.quiet_boundary import QuietBoundary
 from taichi_dem.loads.supports import Fixed, PrescribedMotion, Roller
 

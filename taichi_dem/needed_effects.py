@@ -10,8 +10,8 @@ import numpy as np
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.validation import fraction, instance
-from taichi_dem.laws.chosen import ChosenEffects
-from taichi_dem.mesh.parts import parts_of
+from taichi_dem.laws.roles import ChosenEffects
+from taichi_dem.mesh.topology import parts_of
 from taichi_dem.result import Result
 from taichi_dem.simulate import run_simulation
 from taichi_dem.simulation import Simulation
@@ -86,7 +86,7 @@ def _difference(result, names):
         simulation = Simulation(scene, result.method, result.report.driver.split("+")[0])
         if result.start is not None:
             simulation.state.set_motion(**result.start)
-        until, samples = result.report.until_s, len(result.history["time_s"]) - 1
+        until, samples = result.report.until_s, len(result.series["time_s"]) - 1
         again = run_simulation(simulation, until=until, samples=samples, progress=None)
     except (InputError, SimulationDiverged):
         return np.inf
@@ -117,7 +117,7 @@ def recorded_difference(first: Result, second: Result) -> float:
     the largest in the connected part to which a body belongs; zero where rounding explains it.
     Infinite where columns have other lengths, or other bonds broke.
     """
-    history, broken, part = first.history, first.broken_time, parts_of(first.model.mesh)
+    history, broken, part = first.series, first.broken_time, parts_of(first.model.mesh)
     joules = [name for name in history if name.endswith("_J") and name != "residual_J"]
     energy = max((np.abs(history[name]).max(initial=0.0) for name in joules), default=0.0)
     # The energy that rounding may have put into the bonds moves the lightest body at most so fast,
@@ -137,7 +137,7 @@ def recorded_difference(first: Result, second: Result) -> float:
         if name != "residual_J":
             unexplained = next((rounding[unit] for unit in rounding if name.endswith(unit)), 0.0)
             scale = energy if name in joules else None
-            found.append(_apart(history[name], second.history.get(name), unexplained, scale))
+            found.append(_apart(history[name], second.series.get(name), unexplained, scale))
     return float(max(found, default=0.0))
 
 

@@ -1,20 +1,33 @@
-"""Observers of a run: objects that ``simulate`` calls with a read-only view of it."""
+"""Observers of a run, called with a view of it; receivers of motion at points of the solid."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from taichi_dem.kit.data_table import locked
-from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.display import by_fields, in_brief
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.uncopied import Uncopied
-from taichi_dem.kit.validation import instance, plain_fields, positive, shown, told_apart, whole
+from taichi_dem.kit.validation import (
+    FileName,
+    direction,
+    instance,
+    plain_fields,
+    positive,
+    shown,
+    told_apart,
+    whole,
+    word,
+)
+from taichi_dem.mesh.topology import body_at
 from taichi_dem.methods import Method
 from taichi_dem.output.record import Frame, Recorder
 from taichi_dem.report.report import Report
+from taichi_dem.scene import Scene
 from taichi_dem.simulation import MOST_STEPS, Simulation
 from taichi_dem.state.model import Model
 
@@ -144,11 +157,10 @@ class At:
 
     def __post_init__(self):
         plain_fields(self)
-        times = self.times_s
-        listed = hasattr(times, "__iter__") and getattr(times, "ndim", 1) == 1
-        if isinstance(times, (str, bytes, dict, set)) or not listed:
-            raise InputError(f"times_s must be a sequence of times in s, got {shown(times)}")
-        checked = tuple(positive("times_s", time, zero_allowed=True) for time in times)
+        listed = hasattr(self.times_s, "__iter__") and getattr(self.times_s, "ndim", 1) == 1
+        if isinstance(self.times_s, (str, bytes, dict, set)) or not listed:
+            raise InputError(f"times_s must be a sequence of times in s, got {shown(self.times_s)}")
+        checked = tuple(positive("times_s", time, zero_allowed=True) for time in self.times_s)
         object.__setattr__(self, "times_s", checked)
 
     def marks(self, last: int, dt: float, samples: int = 1) -> set:
@@ -271,7 +283,7 @@ class Collector:
 
 def _read(name, words) -> Any:
     """A member of the simulation of a view, as a property."""
-    return property(lambda view: getattr(view._parts[0], name), doc=words)
+    return property(lambda view: getattr(view._simulation, name), doc=words)
 
 
 class RunView(Uncopied):
@@ -285,23 +297,13 @@ class RunView(Uncopied):
         Simulation that runs.
     recorder : Recorder
         Recorder of its samples and frames.
-
-    Raises
-    ------
-    InputError
-        Something writes to the view.
     """
 
-    _parts: tuple
-
     def __init__(self, simulation: Simulation, recorder: Recorder):
-        object.__setattr__(self, "_parts", (simulation, recorder))
+        self._simulation, self._recorder = simulation, recorder
 
     def __repr__(self):
-        return in_brief(self, repr(self._parts[0]))
-
-    def __setattr__(self, name, value):
-        raise InputError(f"the view of a run must not be written to, got {name} = {shown(value)}")
+        return in_brief(self, repr(self._simulation))
 
     time_s: float = _read("time_s", "Present time [s].")
     step: int = _read("macro_step", "Number of largest steps done.")
@@ -313,12 +315,12 @@ class RunView(Uncopied):
     @property
     def broken(self) -> np.ndarray:
         """Whether each bond has been released, (bond_count,)."""
-        return locked(self._parts[0].state.broken())
+        return locked(self._simulation.state.broken())
 
     @property
     def evaluations(self) -> int:
         """Bonds and contact pairs evaluated so far."""
-        return self._parts[0].evaluations()
+        return self._simulation.evaluations()
 
     def motion(self) -> dict:
         """Motion of the bodies.
@@ -329,7 +331,7 @@ class RunView(Uncopied):
             Arrays by name, as in ``State.motion``: position [m], velocity [m/s], spin [rad/s] and
             more.
         """
-        return {name: locked(array) for name, array in self._parts[0].motion().items()}
+        return {name: locked(array) for name, array in self._simulation.motion().items()}
 
     def energy_balance(self) -> dict:
         """Terms of the energy balance.
@@ -339,7 +341,7 @@ class RunView(Uncopied):
         dict of float
             Energies by name [J].
         """
-        return self._parts[0].energy_balance.account()
+        return self._simulation.energy_balance.account()
 
     def frame(self) -> Frame:
         """Snapshot of the block.
@@ -349,7 +351,7 @@ class RunView(Uncopied):
         Frame
             Positions, displacements, velocities and damage.
         """
-        return self._parts[1].frame()
+        return self._recorder.frame()
 
     def report(self) -> Report:
         """Report of the run so far.
@@ -359,7 +361,7 @@ class RunView(Uncopied):
         Report
             Figures and cost.
         """
-        return self._parts[0].report()
+        return self._simulation.report()
 
     def history(self) -> dict:
         """Samples so far; one at this step is among them.
@@ -369,4 +371,137 @@ class RunView(Uncopied):
         dict of ndarray
             Columns by name, which ends in the unit.
         """
-        return {name: locked(array) for name, array in self._parts[1].history().items()}
+        return {name: locked(array) for name, array in self._recorder.history().items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Received:
+    """Motion of a point over time.
+
+    Parameters
+    ----------
+    point : tuple of float
+        Place at the start [m], (3,).
+    body : int
+        Number of the body that holds it.
+    time_s : ndarray
+        Times [s], (k,).
+    displacement : ndarray
+        Displacements [m], (k, 3).
+    velocity : ndarray
+        Velocities [m/s], (k, 3).
+    """
+
+    point: tuple[float, ...]
+    body: int
+    time_s: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+
+    __repr__ = by_fields
+
+
+class Receivers:
+    """Observer that keeps the motion of points of the solid.
+
+    A point moves with the body that holds it at the start, as a point of that rigid body.
+
+    Parameters
+    ----------
+    points : mapping
+        Place (x, y, z) of each receiver at the start [m], by its name.
+    when : Every or At, optional
+        Times of the readings; those of the time series by default.
+
+    Raises
+    ------
+    InputError
+        A name or place is none.
+
+    Notes
+    -----
+    ``result.receivers[name]`` holds what a run gave, a ``Received``, and ``result.write`` leaves
+    receivers.csv. A resumed run gives what followed.
+
+    Examples
+    --------
+    >>> Receivers({"far": (1.9, 1.0, 0.1)}, when=Every(time_s=1e-6)).points
+    {'far': (1.9, 1.0, 0.1)}
+    """
+
+    def __init__(
+        self,
+        points: Mapping[str, Sequence[float]],
+        when: Every | At | None = None,
+    ):
+        if not isinstance(points, Mapping) or not points:
+            raise InputError(f"points must be a dict of name to (x, y, z), got {shown(points)}")
+        self.points = {
+            word("name of a receiver", name): direction(f"receiver {name}", point)
+            for name, point in points.items()
+        }
+        self.when = Every(samples=1) if when is None else instance("when", when, (Every, At))
+        self._bodies = np.zeros(0, dtype=np.int64)
+        self._rows: list[tuple[float, np.ndarray]] = []
+
+    def __repr__(self) -> str:
+        return in_brief(self, ", ".join(self.points), repr(self.when))
+
+    def check_scene(self, scene: Scene) -> None:
+        """Find the bodies that hold the points, and forget an earlier run.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the run.
+
+        Raises
+        ------
+        InputError
+            A point is in no body of the mesh.
+        """
+        places = self.points.items()
+        found = [body_at(scene.mesh, f"receiver {name}", np.array(at)) for name, at in places]
+        self._bodies, self._rows = np.array(found), []
+
+    def observe(self, view: RunView) -> None:
+        """Keep displacements and velocities of the points.
+
+        Parameters
+        ----------
+        view : RunView
+            View of the run.
+        """
+        motion, bodies = view.motion(), self._bodies
+        centre = view.model.centre[bodies]
+        arm = np.array(list(self.points.values())) - centre
+        turned = (motion["rotation"][bodies] * arm[:, None, :]).sum(axis=2)
+        moved = (motion["position"][bodies] - centre) + (turned - arm)
+        velocity = motion["velocity"][bodies] + np.cross(motion["spin"][bodies], turned)
+        self._rows.append((view.time_s, np.stack([moved, velocity])))
+
+    def received(self) -> dict[str, Received]:
+        """Return what was kept so far.
+
+        Returns
+        -------
+        dict
+            A ``Received`` by the name of its receiver.
+        """
+        times = np.array([time_s for time_s, _ in self._rows])
+        motion = np.array([motion for _, motion in self._rows]).reshape(-1, 2, len(self.points), 3)
+        return {
+            name: Received(at, int(self._bodies[k]), times, motion[:, 0, k], motion[:, 1, k])
+            for k, (name, at) in enumerate(self.points.items())
+        }
+
+
+def write_receivers(path: FileName, receivers: Mapping[str, Received]) -> None:
+    """Write a CSV row for each receiver and time; InputError when it cannot be written."""
+    names = [np.full(len(one.time_s), name) for name, one in receivers.items()]
+    times = [one.time_s for one in receivers.values()]
+    columns = {"receiver": np.concatenate(names), "time_s": np.concatenate(times)}
+    for letter, unit, kind in (("u", "m", "displacement"), ("v", "m_s", "velocity")):
+        rows = np.vstack([getattr(one, kind) for one in receivers.values()])
+        columns.update({f"{letter}{axis}_{unit}": rows[:, k] for k, axis in enumerate("xyz")})
+    write_csv(path, columns)

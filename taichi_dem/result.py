@@ -1,22 +1,29 @@
-"""Result of ``simulate``: its display in a notebook, and the files that it writes."""
+"""Result of ``simulate``: tables, display in a notebook, files; pictures of meshes and scenes."""
 
 import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MethodType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.data_table import arrays_of, data_frame
 from taichi_dem.kit.display import counted, embedded, in_brief, titled, verbatim
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, remove_files, write_csv, write_text
-from taichi_dem.kit.validation import FileName
+from taichi_dem.kit.pictures import drawn_by
+from taichi_dem.kit.validation import FileName, whole
 from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
-from taichi_dem.output.receivers import Received, write_receivers
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.observers import Received, write_receivers
+from taichi_dem.output.cracks import cracks_of, rose_of
+from taichi_dem.output.export import write_gltf, write_particles, write_vtkhdf
+from taichi_dem.output.fragments import fragment_of_body, fragments_of
+from taichi_dem.output.hole_monitor import Attenuation, attenuation_of, watched_groups
 from taichi_dem.output.record import (
     Frame,
     remove_series,
@@ -24,15 +31,15 @@ from taichi_dem.output.record import (
     write_bonds,
     write_paraview,
 )
-from taichi_dem.output.run_tables import RunTables
-from taichi_dem.report.certificate import Certificate
+from taichi_dem.report.effects import Certificate
+from taichi_dem.report.energy_balance import GIVEN, HELD, TERMS
 from taichi_dem.report.report import Report
 from taichi_dem.scene import Scene
 from taichi_dem.state.model import Model
 
 
 @dataclass(frozen=True, eq=False)
-class Result(RunTables):
+class Result:
     """Result of a run.
 
     As the last line of a notebook's cell it shows a picture and the report.
@@ -45,8 +52,8 @@ class Result(RunTables):
         Method that stepped.
     model : Model
         Arrays of the scene.
-    history : Table
-        Columns by name with their units, one row a sample.
+    series : dict of str to ndarray
+        Columns of ``history`` by name, whose ends are their units, one row a sample.
     frames : tuple of Frame
         Snapshots.
     broken_time : ndarray
@@ -70,7 +77,7 @@ class Result(RunTables):
     scene: Scene
     method: Any
     model: Model
-    history: Table
+    series: dict[str, np.ndarray]
     frames: tuple[Frame, ...]
     broken_time: np.ndarray
     peak_speed: np.ndarray
@@ -80,13 +87,8 @@ class Result(RunTables):
     acting_since: dict[str, np.ndarray] = field(default_factory=dict)
     receivers: Mapping[str, Received] = field(default_factory=dict)
 
-    def __post_init__(self):
-        # Whatever mapping it was made from, also by dataclasses.replace.
-        if not isinstance(self.history, Table):
-            object.__setattr__(self, "history", Table(self.history, index="time_s"))
-
     def __repr__(self):
-        samples = counted(len(self.history.get("time_s", ())), "sample")
+        samples = counted(len(self.series.get("time_s", ())), "sample")
         frames, early = counted(len(self.frames), "frame"), "diverged" if self.diverged else ""
         return in_brief(self, self.report.outcome, samples, frames, early)
 
@@ -104,9 +106,14 @@ class Result(RunTables):
         """What acted and what was left out, with effects="auto"; else None."""
         return self.report.certificate
 
-    @property
-    def effects(self) -> Table:
-        """One row for each effect: what it did, since when, what was left out, and advice."""
+    @cached_property
+    def history(self) -> Any:
+        """Time series as a pandas.DataFrame, a row a sample; units in ``attrs["units"]``."""
+        return data_frame(self.series)
+
+    @cached_property
+    def effects(self) -> Any:
+        """A DataFrame, a row an effect: what it did, since when, what was left out, advice."""
         return self.report.advice().table()
 
     @property
@@ -120,6 +127,214 @@ class Result(RunTables):
 
         drawn = {name.removeprefix("plot_"): getattr(plot, name) for name in plot.__all__}
         return SimpleNamespace(**{name: MethodType(one, self) for name, one in drawn.items()})
+
+    def frame(self, number: int = -1) -> Frame:
+        """Choose a frame.
+
+        Parameters
+        ----------
+        number : int
+            From 0 on, or from -1, the last, backwards.
+
+        Returns
+        -------
+        Frame
+
+        Raises
+        ------
+        InputError
+            Where there is none of this number.
+        """
+        count = len(self.frames)
+        if not count:
+            raise InputError(
+                "a result must have frames for this: simulate(..., frames=1) keeps two"
+            )
+        return self.frames[whole("frame", number, -count, count - 1)]
+
+    def fragments(self, frame: int = -1) -> Any:
+        """Tabulate the bodies that unbroken bonds still join.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame, the last by default.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Masses, sizes, places, velocities, spins and energies, a row a fragment, the heaviest
+            first (``taichi_dem.output.fragments.fragments_of``).
+
+        Raises
+        ------
+        InputError
+            Where there is no such frame.
+
+        Examples
+        --------
+        ::
+
+            pieces = result.fragments()
+            print(pieces)
+            print(pieces["sieve_m"][pieces["mass_kg"] > 0.1])
+        """
+        of_body = self.fragment_of_body(frame)
+        return data_frame(fragments_of(self.model, self.frame(frame), of_body))
+
+    def fragment_of_body(self, frame: int = -1) -> np.ndarray:
+        """Fragment of each body, a row of ``fragments(frame)``.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame, the last by default.
+
+        Returns
+        -------
+        ndarray of int, shape (body_count,)
+        """
+        return fragment_of_body(self.model, self.broken_time <= self.frame(frame).time_s)
+
+    def cracks(self) -> Any:
+        """Tabulate broken faces in their order: time, area, place, normal, strike, dip.
+
+        Returns
+        -------
+        pandas.DataFrame
+        """
+        return cracks_of(self.model, self.broken_time)
+
+    def crack_area(self) -> Any:
+        """Tabulate the area of all cracks [m^2] at the times of the history.
+
+        Returns
+        -------
+        pandas.DataFrame
+            ``time_s`` and ``crack_area_m2``; one side of a crack counts.
+        """
+        made, times_s = arrays_of(self.cracks()), self.series["time_s"]
+        area = np.concatenate([[0.0], made["crack_area_m2"]])
+        upto = np.searchsorted(made["time_s"], times_s, side="right")
+        return data_frame({"time_s": times_s, "crack_area_m2": area[upto]})
+
+    def rose(self, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36) -> Any:
+        """Tabulate crack area by the direction of the cracks in a plane.
+
+        Parameters
+        ----------
+        axis : sequence of 3 floats
+            Normal of the plane, towards the viewer.
+        sectors : int
+            Of a half turn, 2 to 360.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Area and number of faces by sector (``taichi_dem.output.cracks.rose_of``).
+        """
+        return rose_of(self.model, np.isfinite(self.broken_time), axis, sectors)
+
+    def energy_shares(self) -> Any:
+        """Tabulate every term of the energy balance as a share of the energy given, over time.
+
+        Returns
+        -------
+        pandas.DataFrame
+            ``time_s``; ``given_J``: work of loads and supports, energy injected at releases and
+            held at the start; and a column ``NAME_share`` of each other term, ``residual_share`` of
+            what is unexplained. Shares add up to 1 by the balance; where nothing is given they are
+            NaN.
+        """
+        history, time_s = self.series, self.series["time_s"]
+        held = sum(history[f"{name}_J"][:1].sum() for name in HELD)
+        given = sum((history[f"{name}_J"] for name in GIVEN), np.full(len(time_s), held))
+        safe = np.where(given > 0.0, given, np.nan)
+        terms = [n for n in TERMS if n not in GIVEN and f"{n}_J" in history]
+        shares = {f"{name}_share": history[f"{name}_J"] / safe for name in terms}
+        return data_frame({"time_s": time_s, "given_J": given, **shares})
+
+    def attenuation(self, group: str | None = None, radius: float | None = None) -> Attenuation:
+        """Peak velocity of every body over its distance from a hole.
+
+        Parameters
+        ----------
+        group : str, optional
+            Face group of the hole's wall; that under gas pressure, or "hole", by default.
+        radius : float, optional
+            Of the hole [m]; that of the points of its wall by default.
+
+        Returns
+        -------
+        Attenuation
+            ``.table``, and ``.power_law(nearest)`` for the fit.
+
+        Raises
+        ------
+        InputError
+            Where the mesh has no such group.
+        """
+        group = next(iter(watched_groups(self.scene)), None) if group is None else group
+        if group is None:
+            raise InputError(
+                "group must name the wall of a hole, as this scene has no gas pressure"
+            )
+        return attenuation_of(self.model, self.peak_speed, group, radius)
+
+    def write_vtkhdf(self, path: FileName) -> None:
+        """Write all frames as one VTKHDF file for ParaView, with the data of the PVD series.
+
+        Parameters
+        ----------
+        path : str or path
+            Such as ``"run.vtkhdf"``.
+
+        Raises
+        ------
+        InputError
+            Where there are no frames, h5py is not installed, or the file cannot be written.
+        """
+        self.frame()
+        write_vtkhdf(path, self)
+
+    def write_xyz(self, path: FileName, of: str = "bodies") -> None:
+        """Write all frames as an extended XYZ file for OVITO.
+
+        Parameters
+        ----------
+        path : str or path
+            Such as ``"run.xyz"``.
+        of : {"bodies", "fragments"}
+            What a particle is (``taichi_dem.output.export``).
+
+        Raises
+        ------
+        InputError
+            Where there are no frames, or the file cannot be written.
+        """
+        self.frame()
+        write_particles(path, self, of)
+
+    def write_gltf(self, path: FileName, colour: str = "peak_speed", seconds: float = 10.0) -> None:
+        """Write an animation for browsers and Blender; every fragment moves as a rigid piece.
+
+        Parameters
+        ----------
+        path : str or path
+            Such as ``"run.glb"``.
+        colour : str
+            One of ``taichi_dem.output.fragments.COLOURS``, in the last frame: violet is 0, yellow
+            the value that 2 % of the bodies exceed.
+        seconds : float
+            How long the animation lasts [s].
+
+        Raises
+        ------
+        InputError
+            Where there are no frames, or the file cannot be written.
+        """
+        self.frame()
+        write_gltf(path, self, colour, seconds)
 
     def write(self, folder: FileName) -> None:
         """Write history.csv, bonds.csv, mesh.msh, report.json and a ParaView series to a folder.
@@ -141,7 +356,7 @@ class Result(RunTables):
         folder = output_folder(folder)
         place, name = os.path.join(folder, "paraview"), series_name(folder)
         remove_series(place, name)
-        write_csv(os.path.join(folder, "history.csv"), self.history)
+        write_csv(os.path.join(folder, "history.csv"), self.series)
         write_bonds(os.path.join(folder, "bonds.csv"), self.model, self.broken_time)
         write_mesh(os.path.join(folder, "mesh.msh"), self.scene.mesh)
         text = json.dumps({**self.report.as_dict(), "diverged": self.diverged}, indent=1)
@@ -189,6 +404,21 @@ class Result(RunTables):
         # Imported here, so that matplotlib loads only where something is shown.
         from taichi_dem.viewer.block import show_block
 
-        if not self.frames:
-            raise InputError("frames must be at least 1 to show a run: simulate(..., frames=20)")
+        self.frame()
         return show_block(self, path, open_browser)
+
+
+def picture_of(thing: Mesh | Scene) -> bytes:
+    """The mesh coloured by group, of a scene with what acts on each group, as PNG."""
+    # Imported here, so that matplotlib loads only where a picture is shown.
+    from taichi_dem.plot.view import picture_of_groups
+
+    acting: dict[str, list[str]] = {}
+    for effect in getattr(thing, "effects", ()):
+        if hasattr(effect, "group"):
+            acting.setdefault(effect.group, []).append(effect.name.replace("_", " "))
+    return picture_of_groups(thing.mesh if isinstance(thing, Scene) else thing, acting)
+
+
+drawn_by(Mesh, picture_of)
+drawn_by(Scene, picture_of)

@@ -17,9 +17,9 @@ import numpy as np
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import EDGE, in_unit
 from taichi_dem.kit.validation import FileName, direction, finite, positive, shown, told_apart
-from taichi_dem.mesh.drawn_out import circle, divided, drawn_out
 from taichi_dem.mesh.gmsh import filled_surface, refuse_too_many
 from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.shapes import circle, divided, drawn_out
 
 #: Distance from a line within which a point lies on it, in elements.
 _ON = 1e-6

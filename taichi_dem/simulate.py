@@ -9,15 +9,14 @@ from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, output_folder
-from taichi_dem.kit.progress.progress import Listener, Pace, Worded, compiling
+from taichi_dem.kit.progress.progress import Listener, Pace, Progress, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.restart import NoCheckpointWriter
 from taichi_dem.kit.validation import AUTO, FileName, instance, progress_option, shown, whole, word
 from taichi_dem.loads.history import unresolved_histories
 from taichi_dem.methods import Method
-from taichi_dem.observers import MOST_CALLS, At, Every, Observer, RunView, macro_steps
+from taichi_dem.observers import MOST_CALLS, At, Every, Observer, Receivers, RunView, macro_steps
 from taichi_dem.output.hole_monitor import watched_groups
-from taichi_dem.output.receivers import Receivers
 from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
 from taichi_dem.saving import arrays_of, writer_of
@@ -218,7 +217,8 @@ class _Plan:
             time_s, seconds = simulation.time_s, simulation.run_seconds
             rates = (time_s, "s/s"), (simulation.evaluations(), "evaluations/s")
             words = ", ".join(prefixed(done / max(seconds, 1e-9), unit) for done, unit in rates)
-            tell(Worded(min(1.0, time_s / (self.last * self.dt0)), seconds, words))
+            share = min(1.0, time_s / (self.last * self.dt0))
+            tell(Progress(share, seconds, "stepping", words))
 
         made = [Call(sample, self._evenly(self.samples))]
         if self.frames:
@@ -283,7 +283,7 @@ def _result(simulation, recorder, writer, plan, tell, brief=False, start=None):
         scene=simulation.scene,
         method=simulation.method,
         model=simulation.model,
-        history=recorder.history(),
+        series=recorder.history(),
         frames=tuple(recorder.frames),
         broken_time=recorder.broken_time(),
         peak_speed=recorder.peak_speed,

@@ -19,9 +19,8 @@ from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, instance, shown, whole
 from taichi_dem.methods import Method
-from taichi_dem.report.certificate import certificate_of
 from taichi_dem.report.divergence import DivergenceCheck
-from taichi_dem.report.effects import effect_uses, on_demand
+from taichi_dem.report.effects import certificate_of, effect_uses, on_demand
 from taichi_dem.report.energy_balance import EnergyBalance, open_account
 from taichi_dem.report.missing_effects import MissingEffects
 from taichi_dem.report.readings import Kept, Readings, Run
@@ -35,8 +34,7 @@ from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.auto_driver import MEASURED, AutoDriver, driver_name
-from taichi_dem.step.drivers import DRIVERS
+from taichi_dem.step.drivers import DRIVERS, MEASURED, AutoDriver, driver_name
 from taichi_dem.step.multirate.schedule import Schedule
 from taichi_dem.step.phases import Step
 from taichi_dem.step_control import CRITERIA

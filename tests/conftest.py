@@ -18,7 +18,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 from taichi_dem import InputError, runtime
 from taichi_dem.kit.allocation import field_bytes, tree_count
-from taichi_dem.step.auto_driver import CPU_ONLY
+from taichi_dem.step.drivers import CPU_ONLY
 from tests import arch
 
 pytest_plugins = ("tests.attacks", "tests.compiler", "tests.own_engines")
@@ -51,7 +51,7 @@ FIRST = ("verification", "unit", "ca", "activation")
 #: last of them gives all engines back.
 OF_THE_BLOCK = """equivalence/test_bits.py verification/test_conservation.py
     equivalence/test_digests.py equivalence/test_restart.py verification/test_wake_up.py
-    verification/test_convergence.py verification/test_implicit_scenes.py
+    verification/test_convergence.py verification/test_implicit.py
     material/test_two_materials.py equivalence/test_shared_engines.py""".split()
 
 

@@ -5,7 +5,7 @@ import os
 import numpy as np
 
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, checked_mesh, effects, read_mesh
-from taichi_dem.mesh.shapes import single
+from taichi_dem.mesh.shapes import placed_together, single
 from tests.turns import matrix
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -40,22 +40,13 @@ def brisk_scene(**contact):
 
 def beside(mesh, other, shift):
     """Two meshes in one, the second moved by a shift [m]."""
-    points = np.vstack([mesh.points, other.points + shift])
-    bodies = np.vstack([mesh.tetrahedra, other.tetrahedra + mesh.point_count])
-    groups = {f"first {name}": faces for name, faces in mesh.groups.items()}
-    groups.update({f"second {name}": f + mesh.point_count for name, f in other.groups.items()})
-    for name in set(mesh.groups) & set(other.groups):
-        groups[name] = np.vstack([groups[f"first {name}"], groups[f"second {name}"]])
-    return checked_mesh(points, bodies, groups)
+    return placed_together({"first": (mesh, [0.0, 0.0, 0.0]), "second": (other, shift)})
 
 
 def apart(count, edge=0.05):
     """Single regular bodies in a row, no two of which share a corner."""
     alone = checked_mesh(single(edge).points, single(edge).tetrahedra, {})
-    mesh = alone
-    for k in range(1, count):
-        mesh = beside(mesh, alone, [20.0 * k * edge, 0.0, 0.0])
-    return mesh
+    return placed_together({f"body_{k}": (alone, [20.0 * k * edge, 0, 0]) for k in range(count)})
 
 
 def quaternions(random, count):

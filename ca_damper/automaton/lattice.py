@@ -146,40 +146,10 @@ class Lattice:
         return Geometry(int(size.columns), int(size.rows))
 
     @ti.func
-    def cell_count(self):
-        """Number of cells, walls included; that of the cell beyond the lattice."""
-        return self.size[None].cells
-
-    @ti.func
-    def column_count(self):
-        """Number of columns inside the walls."""
-        return self.size[None].columns
-
-    @ti.func
-    def row_count(self):
-        """Number of rows inside the walls."""
-        return self.size[None].rows
-
-    @ti.func
-    def column_height(self):
-        """Number of cells of a column, walls included."""
-        return self.size[None].height
-
-    @ti.func
     def nearest_row(self, base, height):
         """Row nearest to a height [cells] in the column whose lowest cell, a wall, is ``base``."""
-        row = ti.cast(ti.floor(height - self.height_of(base + 1) + 0.5), ti.i32)
+        row = ti.cast(ti.floor(height - self.level[base + 1] + 0.5), ti.i32)
         return ti.math.clamp(row, 0, self.size[None].rows - 1)
-
-    @ti.func
-    def first(self):
-        """First cell that a particle can take."""
-        return self.size[None].first
-
-    @ti.func
-    def end(self):
-        """One past the last cell that a particle can take."""
-        return self.size[None].end
 
     @ti.func
     def cell_ahead(self, cell, kind):
@@ -195,6 +165,11 @@ class Lattice:
     def cell_of(self, column, row):
         """Number of the cell in a column and row, both counted inside the walls."""
         return (column + 1) * self.size[None].height + row + 1
+
+    @ti.func
+    def cell_from(self, column, k, way):
+        """The k-th cell of a column, counted upwards (way 1) or downwards (-1)."""
+        return self.cell_of(column, k if way > 0 else self.size[None].rows - 1 - k)
 
     @ti.func
     def height_of(self, cell):

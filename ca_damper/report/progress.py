@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.progress.progress import Listener, Pace, Progress
@@ -17,13 +16,13 @@ _GROWTH = 0.1
 class BatchProgress(Progress):
     """Progress of a batch. steps: scene-steps done."""
 
-    phase: ClassVar[str] = "stepping"
-    steps: int
+    phase: str = "stepping"
+    steps: int = 0
 
-    @property
-    def speed(self) -> str:
-        """Scene-steps a second."""
-        return prefixed(self.steps / max(self.seconds, 1e-9), "scene steps/s")
+    def __post_init__(self):
+        """Say the scene-steps a second."""
+        words = prefixed(self.steps / max(self.seconds, 1e-9), "scene steps/s")
+        object.__setattr__(self, "words", words)
 
 
 class Stages:
@@ -35,7 +34,7 @@ class Stages:
 
     def __init__(self, progress: Listener | None, ends: Sequence[float]):
         self.progress, self.ends, self.stage = progress, ends, 0
-        self.before = BatchProgress(0.0, 0.0, 0)
+        self.before = BatchProgress(0.0, 0.0)
         self.pace = Pace(_LEAST_SECONDS)
 
     def __call__(self, progress: Progress) -> None:
@@ -49,7 +48,7 @@ class Stages:
         share = end if progress.share == 1.0 else begin + (end - begin) * progress.share
         seconds = self.before.seconds + progress.seconds
         steps = self.before.steps + progress.steps
-        whole = BatchProgress(float(share), seconds, steps)
+        whole = BatchProgress(float(share), seconds, steps=steps)
         if progress.share == 1.0:
             self.stage, self.before = self.stage + 1, whole
         if self.pace.should_report(share == 1.0):
@@ -75,4 +74,4 @@ class OpenEnded(Stages):
 
     def end(self) -> None:
         """Report that all is done."""
-        self._pass_on(BatchProgress(1.0, self.before.seconds, self.before.steps))
+        self._pass_on(BatchProgress(1.0, self.before.seconds, steps=self.before.steps))

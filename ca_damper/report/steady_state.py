@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from taichi_dem.kit.accuracy.branches import LEAST_SEEDS
-from taichi_dem.kit.accuracy.student import f_outside, t_outside, t_quantile
+from taichi_dem.kit.bars.chance import LEAST_SEEDS, f_outside, t_outside, t_quantile
 
 #: Fewer cycles are never called steady.
 LEAST_CYCLES = 32

@@ -17,7 +17,6 @@ from ca_damper.scenes.checks import MOST_CYCLES, MOST_SCENES, run_seeds
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.scenes.table import SceneTable
 from ca_damper.theory.collect_and_collide import CollectAndCollide, collect_and_collide
-from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
@@ -131,13 +130,13 @@ class DamperMap(Result):
         found = {name: (tuple(_AXES), getattr(self, name), unit) for name, unit in _UNITS.items()}
         return {**found, "gap": (("clearance", "particles"), self.gaps, "m")}
 
-    def table(self) -> Table:
+    def columns(self) -> dict[str, Any]:
         """A row a scene: its place on the axes, measures, and the theory's loss and mass.
 
         Returns
         -------
-        Table
-            Columns by name, units in ``units``.
+        dict
+            Columns by name, which ends in the unit.
         """
         places = scenes_over(**{one: getattr(self, name) for one, (name, _) in _AXES.items()})
         columns: dict[str, Any] = {"filling": [self.label] * self.loss.size}
@@ -148,7 +147,7 @@ class DamperMap(Result):
         columns |= {name: getattr(self, name).ravel() for name in measures}
         made = {"loss_theory": self.theory.loss, "mass_theory": self.theory.mass}
         columns |= {name: self._of_scenes(values) for name, values in made.items()}
-        return Table(columns, dict.fromkeys(("filling", *measures, *made), "1"))
+        return columns
 
     def _of_scenes(self, values: np.ndarray) -> np.ndarray:
         """Values over the first axes as a number a scene, (scenes,)."""
@@ -216,7 +215,7 @@ def damper_map(
     ... )  # doctest: +SKIP
     """
     progress_option("progress", progress)
-    axes = {
+    axes: dict[str, Any] = {
         "particles": several("particles", particles, lambda n, x: whole(n, x, 1, 1_000_000)),
         "amplitudes": several("amplitudes", amplitudes, positive),
         "frequencies": several("frequencies", frequencies, positive),
@@ -243,11 +242,15 @@ def damper_map(
         ]
     gaps = [clearance_of(one, number) for one, numbers in jobs for number in numbers]
     shape = len(ways), *map(len, axes.values())
-    measures = {
+    measures: dict[str, Any] = {
         name: np.concatenate([getattr(found, name) for found, _ in runs]).reshape(shape)
         for name in ("apparent_damping", "apparent_mass")
     }
-    own = {"label": filling.label, "particle_mass": filling.particle_mass, "clearances": ways}
+    own: dict[str, Any] = {
+        "label": filling.label,
+        "particle_mass": filling.particle_mass,
+        "clearances": ways,
+    }
     own |= {"gaps": np.array(gaps).reshape(shape[:2]), "reports": tuple(told for _, told in runs)}
     return DamperMap(**own, **axes, **measures)
 
@@ -262,12 +265,12 @@ def _jobs(filling, particles, clearances):
 
 def _run(filling, axes, dt, cycles, progress):
     """Cycles of all scenes of a batch, and its report."""
-    scenes = scenes_over(**axes)
+    (transient, measured), scenes = cycles, scenes_over(**axes)
     frequency, size = scenes["frequencies"], scenes["amplitudes"]
     table = SceneTable(scenes["particles"], scenes["seeds"], dt, frequency, size)
-    batch = Batch(filling, table, mount="base", measured_cycles=cycles[1])
+    batch = Batch(filling, table, mount="base", measured_cycles=measured)
     batch.start()
-    return batch.run(*cycles, progress), batch.report()
+    return batch.run(transient, measured, progress), batch.report()
 
 
 def clearance_of(filling: Any, particles: int) -> float:

@@ -102,11 +102,6 @@ class Film:
         -------
         xarray.Dataset
             Units in the attributes of each variable.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
         """
         dims = "sample", "scene"
         found = {name: (dims, array, SAMPLE_UNITS[name]) for name, array in self.history.items()}

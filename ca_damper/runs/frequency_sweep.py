@@ -19,10 +19,9 @@ from ca_damper.report.report import Report
 from ca_damper.report.steady_state import ROUNDING, half_width
 from ca_damper.runs.response import Grid, Response
 from ca_damper.scenes.checks import check_run
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import in_brief
-from taichi_dem.kit.optional import optional
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, FileName
@@ -102,13 +101,9 @@ class Sweep:
         -------
         xarray.Dataset
             Units in the attributes of each variable.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
         """
-        xarray = optional("xarray")
+        import xarray
+
         axis = xarray.Variable("direction", ["up", "down"])
         return xarray.concat([self.up.to_xarray(), self.down.to_xarray()], axis)
 
@@ -188,7 +183,7 @@ def sweep_up_and_down(
         identity = {"job": f"{job}, {grid.identity()}"}
         with batch.checkpointed(checkpoint, resume, identity, {"ways": ways}) as writer:
             pending = ways.order[ways.done :]
-            ends = (np.arange(len(pending)) + 1.0) / max(1, len(pending))
+            ends = [(k + 1.0) / len(pending) for k in range(len(pending))]
             tell = Stages(report_progress, ends)
             for _, k in pending:
                 if not batch.going_on:

@@ -12,7 +12,6 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.report.report import Report
 from ca_damper.runs.result import Result
 from ca_damper.structure import ModalStructure
-from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import counted, in_brief, listed
 
 
@@ -81,20 +80,19 @@ class History(Result):
         """Displacement from the base [m], (samples, places, seeds)."""
         return self.x - self.base[:, None, None]
 
-    def table(self) -> Table:
+    def columns(self) -> dict[str, Any]:
         """A row a sample: time, base, x of each place and force on each container, by seed.
 
         Returns
         -------
-        Table
-            Columns by name, units in ``units``.
+        dict
+            Columns by name, which ends in the unit.
         """
-        columns, units = {"time_s": self.time_s, "base_m": self.base}, {}
-        for values, unit, (head, names) in zip((self.x, self.force), "mN", self._names().items()):
+        columns = {"time_s": self.time_s, "base_m": self.base}
+        for values, (head, names) in zip((self.x, self.force), self._names().items()):
             for (i, one), (j, seed) in itertools.product(enumerate(names), enumerate(self.seeds)):
                 columns[f"{head}{one}_seed{seed}"] = values[:, i, j]
-                units[f"{head}{one}_seed{seed}"] = unit
-        return Table(columns, units, index="time_s")
+        return columns
 
     def _axes(self) -> dict[str, Any]:
         return {"time": (self.time_s, "s"), "seed": (self.seeds, "1")}

@@ -18,13 +18,11 @@ from ca_damper.scenes.checks import MOST_SCENES, check_run, run_seeds
 from ca_damper.scenes.clock import automatic_dt, steps_per_cycle
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.checkpoint import Checkpoint, identity_of
-from taichi_dem.kit.data_table import Table, Tabulated
+from taichi_dem.kit.data_table import Tabulated, unit_of
 from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.optional import optional
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.units import unit_of
 from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, whole
 
 #: Particle numbers that a notebook shows, evenly over those there are.
@@ -173,16 +171,6 @@ class Response(Result):
         """Unit of every measure, by name."""
         return {name: unit_of(column_of(name)) for name in MEASURE_UNITS}
 
-    def table(self) -> Table:
-        """A row a scene: filling, particles, ratio, frequency, seed and all measures.
-
-        Returns
-        -------
-        Table
-            Columns by name, units in ``units``.
-        """
-        return Table(self.columns(), {"filling": "1"})
-
     def _axes(self) -> dict[str, Any]:
         frequency = self.ratios * self.oscillator.natural_frequency
         axes = {"particles": (self.particles, "1"), "frequency": (frequency, "Hz")}
@@ -273,19 +261,19 @@ class AmplitudeResponse(Tabulated):
         ratio, rms = zip(*(one.peaks() for one in self.responses))
         return np.stack(ratio), np.stack(rms)
 
-    def table(self) -> Table:
-        """A row a scene, as of ``Response.table``, with its amplitude in front.
+    def columns(self) -> dict[str, Any]:
+        """A row a scene, as of ``Response.columns``, with its amplitude in front.
 
         Returns
         -------
-        Table
-            Columns by name, units in ``units``.
+        dict
+            Columns by name, which ends in the unit.
         """
         columns = [one.columns() for one in self.responses]
         sizes = [len(one["filling"]) for one in columns]
         joined = {name: np.concatenate([one[name] for one in columns]) for name in columns[0]}
         amplitude = np.repeat(self.amplitudes, sizes)
-        return Table({"base_amplitude_m": amplitude, **joined}, {"filling": "1"})
+        return {"base_amplitude_m": amplitude, **joined}
 
     def to_xarray(self) -> Any:
         """As ``Response.to_xarray``, over base_amplitude [m] too.
@@ -294,13 +282,9 @@ class AmplitudeResponse(Tabulated):
         -------
         xarray.Dataset
             Units in the attributes of each variable.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
         """
-        xarray = optional("xarray")
+        import xarray
+
         axis = xarray.Variable("base_amplitude", list(self.amplitudes), {"units": "m"})
         return xarray.concat([one.to_xarray() for one in self.responses], axis)
 

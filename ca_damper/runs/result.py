@@ -27,11 +27,6 @@ class Result(Tabulated):
         -------
         xarray.Dataset
             Units in the attributes of each variable, the filling in its own.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
         """
         return dataset(self._variables(), self._axes(), filling=self.label)
 

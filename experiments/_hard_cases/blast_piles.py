@@ -9,7 +9,7 @@ from _hard_cases._statics import least_friction
 from _piles import GRAVITY, STEP, brick, hexahedron, loose, softened
 from taichi_dem import ImplicitDashpots
 from taichi_dem.kit.study.cases import Cases
-from taichi_dem.mesh.face_groups import with_inner_group
+from taichi_dem.mesh.mesh import with_inner_group
 from taichi_dem.mesh.shapes import bar, placed_together
 
 case = CASES = Cases("blast")

@@ -73,7 +73,7 @@ def sieving(result):
     The size of a fragment is the edge of a cube of its volume; the largest ends the sieves.
     """
     density = result.model.material.density
-    mass = result.fragments()["mass_kg"]
+    mass = result.fragments()["mass_kg"].to_numpy()
     size = np.cbrt(mass / density)
     limit = OF_THE_MESH * np.cbrt(result.model.body_mass.mean() / density)
     sieves = np.geomspace(0.1 * limit, size.max(), SIEVES)

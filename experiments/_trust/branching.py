@@ -10,7 +10,7 @@ from _trust.meshes import material_of, plate, springs_step
 from _trust.number import Number
 from taichi_dem import ImplicitDashpots, Scene, effects, simulate
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED
-from taichi_dem.mesh.face_groups import with_cut
+from taichi_dem.mesh.mesh import with_cut
 
 SOURCE = "Borden et al., CMAME 217 (2012) 77"
 #: Plate: length, height, notch [m]; E [Pa], nu, density [kg/m3], and pull on both long edges [Pa].

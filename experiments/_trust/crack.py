@@ -9,7 +9,7 @@ from _trust.number import Number
 from taichi_dem import ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.plot_style import BLACK, RED
-from taichi_dem.mesh.face_groups import with_cut
+from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.output.cracks import crack_areas
 
 #: Plate and depth of its notch [m], edges of elements [m].

@@ -7,8 +7,7 @@ import numpy as np
 from _trust.number import Number
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.kit.plot_style import BLACK, BLUE
-from taichi_dem.mesh.face_groups import with_inner_group
-from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.mesh import checked_mesh, with_inner_group
 from taichi_dem.mesh.shapes import bar
 
 SOURCE = "Benzeggagh and Kenane, Compos. Sci. Technol. 56 (1996) 439"

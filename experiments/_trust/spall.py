@@ -63,11 +63,11 @@ def spalled(edge, seed):
     arrived = 0.5 * DENSITY * SPEED * fastest
     result = run(mesh, material, PEAK * PEAK / arrived, [effects.Softening()])
     fragments = result.fragments()
-    mass, far = fragments["mass_kg"], np.full(fragments.row_count, -np.inf)
-    np.maximum.at(far, fragments.of_body, mesh.points[mesh.tetrahedra][..., 0].max(axis=1))
+    mass, far = fragments["mass_kg"].to_numpy(), np.full(len(fragments), -np.inf)
+    np.maximum.at(far, result.fragment_of_body(), mesh.points[mesh.tetrahedra][..., 0].max(axis=1))
     pieces = np.flatnonzero(mass > LEAST * mass.sum())
     first = pieces[far[pieces].argmax()]
-    speed = fragments["velocity_x_m_s"][first]
+    speed = fragments["velocity_x_m_s"].to_numpy()[first]
     return mass[first] / (DENSITY * WIDTH**2), speed, len(pieces) - 1, sorted(far[pieces].tolist())
 
 

@@ -14,7 +14,7 @@ from _page import percent, png_like_the_first
 from taichi_dem.kit.plot_style import BLUE, GREY, RED, styled
 from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.plot.bodies import draw_bodies
+from taichi_dem.plot.view import draw_bodies
 from taichi_dem.simulate import result_of, simulate
 
 LENGTH = 0.3

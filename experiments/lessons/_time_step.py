@@ -17,7 +17,7 @@ from taichi_dem.kit.plot_style import BLACK, GREY, RED, seconds, styled, styles_
 from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.observers import macro_steps
-from taichi_dem.plot.bodies import draw_bodies
+from taichi_dem.plot.view import draw_bodies
 from taichi_dem.simulate import result_of, run_simulation
 
 LENGTH, WIDTH, CELLS = 0.4, 0.05, (12, 1, 1)

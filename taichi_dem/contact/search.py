@@ -20,8 +20,7 @@ import taichi as ti
 
 from taichi_dem.contact.breaks import Breaks
 from taichi_dem.contact.contacts import Contacts
-from taichi_dem.contact.near_pairs import NearPairs
-from taichi_dem.contact.verlet_list import VerletList
+from taichi_dem.contact.verlet_list import NearPairs, VerletList
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.products import norm

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import inf, nan
 from typing import Any
 
-from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.data_table import data_frame
 from taichi_dem.kit.display import in_brief
 
 #: Columns of ``Advice.table`` with what stands in a row that has nothing to say there.
@@ -14,7 +14,6 @@ _COLUMNS = {
     **{"energy_J": nan, "energy_share": nan, "evaluations": 0, "skipped": 0},
     **{"left_out": nan, "advice": "", "reason": ""},
 }
-_PURE = ("events", "energy_share", "evaluations", "skipped", "left_out")
 
 
 @dataclass(frozen=True)
@@ -193,12 +192,12 @@ class Advice:
                 return f"{finding.what}: {finding.count}", "list it"
         return "left out", "not missed"
 
-    def table(self) -> Table:
+    def table(self) -> Any:
         """Give all that is known of the effects, a row for each.
 
         Returns
         -------
-        Table
+        pandas.DataFrame
             Name, whether listed, number and first time and place of its events, energy [J] and its
             share, evaluations made and skipped, estimated size of what was left out, as a share of
             what it acts beside; advice and its reason.
@@ -206,7 +205,7 @@ class Advice:
         rows = [self._row(use) for use in self.uses]
         rows += [finding.row for finding in (*self.missing, *self.left_out)]
         columns = {n: [row.get(n, empty) for row in rows] for n, empty in _COLUMNS.items()}
-        return Table(columns, dict.fromkeys(_PURE, "1"), index="effect")
+        return data_frame(columns)
 
     def _row(self, use) -> dict[str, Any]:
         known = {"since_s": use.since_s, "energy_J": use.energy_J, "energy_share": use.share}

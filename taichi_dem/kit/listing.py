@@ -14,8 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from taichi_dem.kit.progress.lasting_output import lasting_output
-from taichi_dem.kit.terminal import show_heading, show_names
+from taichi_dem.kit.terminal import lasting_output, show_heading, show_names
 from taichi_dem.kit.version import __version__
 
 #: Name and line; title and rows.

@@ -1,15 +1,16 @@
 """The look of all programs: with style on a terminal, plain text in a pipe or a file."""
 
+import contextlib
 import os
 import sys
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 #: Most columns of a paragraph.
 _WIDE = 100
 #: Cells of a table that say nothing.
-BLANK = ("", "None", "nan")
+_BLANK = ("", "None", "nan")
 #: Blanks between two columns.
 _GAP = 2
 
@@ -30,94 +31,99 @@ def show_paragraph(text: str) -> None:
 
 
 def print_table(rows: Sequence[Sequence[Any]], header: Sequence[str]) -> None:
-    """Print rows of cells under a header, columns as wide as they need to be; blanks as a dash.
-
-    Parameters
-    ----------
-    rows, header
-        Cells and names of the columns, as many in each row. On a terminal that is too narrow, cells
-        go on in further lines of their column; where even words do not fit, columns go on in
-        further tables, each with the first column.
-    """
-    filled = [["-" if str(cell) in BLANK else str(cell) for cell in row] for row in rows]
-    cells, console = [[*header], *filled], _console()
+    """Print rows of cells under a header; blanks as a dash, wide cells folded on a terminal."""
+    cells = [["-" if str(cell) in _BLANK else str(cell) for cell in row] for row in rows]
+    console = _console()
     if console is None:
-        print(*aligned(cells), sep="\n")
+        print(*aligned([[*header], *cells]), sep="\n")
         return
-    least = [max(len(word) for row in cells for word in [*row[k].split(), ""]) for k in _of(cells)]
-    # A name that takes more than half of a line is cut.
-    least = [min(width, (console.width - _GAP) // 2) for width in least]
-    for number, part in enumerate(_parts(least, console.width)):
-        print(end="\n" if number else "")
-        _show_styled(console, [[row[k] for k in part] for row in cells], [least[k] for k in part])
-
-
-def _of(cells):
-    """Numbers of the columns."""
-    return range(len(cells[0]))
-
-
-def _parts(least, width):
-    """Numbers of the columns of each table, as many as fit at their least widths."""
-    parts = [[0]]
-    for k in range(1, len(least)):
-        if sum(least[i] + _GAP for i in parts[-1]) + least[k] > width and len(parts[-1]) > 1:
-            parts.append([0])
-        parts[-1].append(k)
-    return parts
-
-
-def _show_styled(console, cells, least):
-    """A table by rich, its widest columns as narrow as the terminal asks for."""
     from rich.table import Table
     from rich.text import Text
 
-    widths = [max(len(row[k]) for row in cells) for k in _of(cells)]
-    while sum(widths) + _GAP * (len(widths) - 1) > console.width and widths != least:
-        widest = max(_of(cells), key=lambda k: widths[k] if widths[k] > least[k] else -1)
-        widths[widest] -= 1
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, _GAP, 0, 0))
-    for name, width in zip(cells[0], widths):
-        table.add_column(Text(name), overflow="fold", width=width)
-    for row in cells[1:]:
+    for name in header:
+        table.add_column(Text(name), overflow="fold")
+    for row in cells:
         table.add_row(*map(Text, row))
     console.print(table)
 
 
 def aligned(cells: Sequence[Sequence[str]]) -> list[str]:
     """Lines of rows of cells, columns as wide as they need to be."""
-    widths, gap = [max(len(row[k]) for row in cells) for k in _of(cells)], " " * _GAP
+    widths, gap = [max(map(len, column)) for column in zip(*cells)], " " * _GAP
     padded = ([cell.ljust(width) for cell, width in zip(row, widths)] for row in cells)
     return [gap.join(row).rstrip() for row in padded]
 
 
 def show_names(title: str, rows: Iterable[tuple[str, str]]) -> None:
-    """Print a title and, below it, names with a line on each; nothing where there are none.
-
-    Lines stand beside their names, or below them where the terminal is too narrow for that.
-    """
-    rows = list(rows)
+    """Print a title and, below it, names with a line on each; nothing where there are none."""
+    rows = [(f"  {name}", line) for name, line in rows]
     if not rows:
         return
     show_heading(f"\n{title}")
-    console, width = _console(), max(len(name) for name, _ in rows)
-    lines = [f"  {name:{width}}  {line}".rstrip() for name, line in rows]
-    if console is None or max(map(len, lines)) <= console.width:
-        print(*lines, sep="\n")
+    console = _console()
+    if console is None:
+        print(*aligned(rows), sep="\n")
         return
-    from rich.padding import Padding
+    from rich.table import Table
     from rich.text import Text
 
-    for name, line in rows:
-        print(f"  {name}")
-        if line:
-            console.print(Padding(Text(line, style="dim"), (0, 0, 0, 6)))
+    table = Table.grid(padding=(0, _GAP, 0, 0))
+    table.add_column(no_wrap=True)
+    for row in rows:
+        table.add_row(*map(Text, row))
+    console.print(table)
 
 
 def _console():
-    """Rich's console on standard output, None where that is no terminal or one without style."""
-    if sys.stdout is None or not sys.stdout.isatty() or os.environ.get("TERM") == "dumb":
+    """Rich's console on standard output, None where that is no terminal."""
+    if sys.stdout is None or not sys.stdout.isatty():
         return None
     from rich.console import Console
 
     return Console(file=sys.stdout, highlight=False)
+
+
+@contextlib.contextmanager
+def lasting_output() -> Iterator[None]:
+    """Discard prints in the block silently once their reader has left, as ``| head -1`` does."""
+    if hasattr(sys.stdout, "reconfigure"):
+        # Question marks for characters that the encoding of the stream lacks.
+        sys.stdout.reconfigure(errors="replace")
+    output = _LastingOutput(sys.stdout)
+    with contextlib.redirect_stdout(output):
+        yield
+    output.flush()
+
+
+class _LastingOutput:
+    """A text stream that drops text which can no longer be written."""
+
+    def __init__(self, stream):
+        self._stream = stream
+
+    def write(self, text):
+        """Write text, or drop it."""
+        with self._dropping():
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self):
+        """Flush the buffer, or drop its contents."""
+        with self._dropping():
+            self._stream.flush()
+
+    @contextlib.contextmanager
+    def _dropping(self):
+        try:
+            yield
+        except OSError as error:
+            if not isinstance(error, BrokenPipeError):
+                print(f"standard output cannot be written to: {error.strerror}", file=sys.stderr)
+            # The buffer keeps unsent text, and Python would complain of it at the exit.
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._stream.fileno())
+            os.close(nowhere)
+
+    def __getattr__(self, name):
+        return getattr(self._stream, name)

@@ -20,7 +20,6 @@ from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.products import dot
-from taichi_dem.kit.sealed import Sealed
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import float_array, shown
 from taichi_dem.materials import CONCRETE, Material
@@ -36,8 +35,8 @@ Travel = tuple[tuple[float, ...], tuple[float, ...]]
 NEAR = 1.0 - 1e-9
 
 
-class Effect(Sealed):
-    """Base of all effects; one that has been made cannot be changed.
+class Effect:
+    """Base of all effects.
 
     role: its place in the step. name: the word used in reports and on the command line, by default
     that of the class. Kernels of a bound effect read its numbers in the field ``self.law``,

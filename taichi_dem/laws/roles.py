@@ -4,13 +4,24 @@ All are ``ti.func`` methods of the bound effect, but for attributes, which are w
 arguments, and functions of the model. b is a bond, u one of its three contact units (3 b, 3 b + 1,
 3 b + 2), i a body, k a sphere pair, m a pair of materials, whose numbers a law reads as
 ``self.law[m, 0]`` and on.
+
+And the laws that a scene takes from its material where it names none: effects="auto" and "all".
 """
 
-import inspect
+from collections.abc import Iterable
 from typing import Any
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.state.model import ROLES
+from taichi_dem.kit.validation import shown
+from taichi_dem.laws.base import PARTS_OF_BOND, Effect
+from taichi_dem.laws.body_contact import BodyContact
+from taichi_dem.laws.bond import BondDamping, ShearSlip, Softening
+from taichi_dem.laws.friction import StickingFriction
+from taichi_dem.laws.sphere_contact import ONCE_BROKEN
+from taichi_dem.materials.body_materials import BodyMaterials
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.topology import parts_of
+from taichi_dem.state.model import ROLES, SINGLE
 
 #: Members of each role as they are called, then those of an effect that says so by an attribute.
 MEMBERS = {
@@ -152,6 +163,9 @@ _DOES = {
     "contact": ("normal", "elastic", "nearest"),
     "friction": ("limit", "force", "spring"),
 }
+AUTO, ALL, LISTED = "auto", "all", "listed"
+#: Words for the effects of a scene.
+WORDS = (AUTO, ALL)
 
 
 def check_activation(effect: Any) -> None:
@@ -189,25 +203,64 @@ def check_effect(effect: Any) -> None:
     further = [key for key in MEMBERS if key not in ROLES and getattr(effect, key, False)]
     wanted = [member for key in (effect.role, *further) for member in MEMBERS[key]]
     for member in wanted:
-        _check_member(effect, member, wanted)
+        if not hasattr(type(effect), member.partition("(")[0]):
+            raise InputError(
+                f"effect {type(effect).__name__} must have a member {member}, as its role "
+                f"{effect.role} asks for {', '.join(wanted)}"
+            )
 
 
-def _check_member(effect, member, wanted):
-    """Raise InputError where a member is missing, or takes another number of arguments."""
-    name, _, arguments = member.partition("(")
-    refused = f"effect {type(effect).__name__} must have a member {member}"
-    if not hasattr(type(effect), name):
-        raise InputError(f"{refused}, as its role {effect.role} asks for {', '.join(wanted)}")
-    given = _argument_names(getattr(type(effect), name))
-    if given is not None and len(given) != len(arguments.split(",")):
-        raise InputError(f"{refused}, got {name}({', '.join(given)})")
+class ChosenEffects(tuple):
+    """Effects of a scene. word: "auto", "all", or "listed" where the user listed them."""
+
+    word: str
+
+    def __new__(cls, effects: Iterable[Effect], word: str = LISTED) -> "ChosenEffects":
+        """Keep the word with the effects."""
+        made = super().__new__(cls, effects)
+        made.word = word
+        return made
 
 
-def _argument_names(member):
-    """Names of the arguments of a function beside self; None where any number is taken."""
-    if not callable(member):
-        return None
-    found = list(inspect.signature(member).parameters.values())
-    if any(each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD) for each in found):
-        return None
-    return [each.name for each in found[1:] if each.default is each.empty]
+def chosen_effects(
+    word: Any, mesh: Mesh, material: BodyMaterials, given: Iterable[Effect]
+) -> ChosenEffects:
+    """Effects for a word, "auto" or "all": laws that any of the materials needs, and those given.
+
+    given: loads, supports, and laws in place of the usual ones. Bodies may touch at outer faces
+    from the start where the mesh has several parts, else once something has broken. Raises
+    InputError for an unknown word, or, with "auto", a law whose author does not say when it begins
+    to act.
+    """
+    if word not in WORDS:
+        raise InputError(
+            f"effects must be a list of effects or one of {', '.join(map(repr, WORDS))}, "
+            f"got {shown(word)}"
+        )
+    given = tuple(given)
+    taken = {getattr(effect, "role", "") for effect in given}
+    laws = _laws(mesh, material, taken)
+    if "bond" in taken:
+        taken |= {*PARTS_OF_BOND}
+    by_role = {effect.role: effect for effect in laws if effect.role not in taken}
+    chosen = [by_role[role] for role in SINGLE if role in by_role]
+    effects = ChosenEffects((*chosen, *given), word)
+    if word == AUTO:
+        for effect in effects:
+            if isinstance(effect, Effect):
+                check_activation(effect)
+    return effects
+
+
+def _laws(mesh, material, taken):
+    """The laws that a material has numbers for; coefficients of zero need none."""
+    laws = [Softening(), ShearSlip()]
+    if material.has_bond_damping:
+        laws.append(BondDamping())
+    if "contact" not in taken:
+        # Nothing meets a solid of one piece at its outer faces before something has come loose.
+        meets = parts_of(mesh).max() > 0 or mesh.has_open_faces
+        laws.append(BodyContact(outer_faces=True if meets else ONCE_BROKEN))
+    if material.friction > 0.0:
+        laws.append(StickingFriction())
+    return laws

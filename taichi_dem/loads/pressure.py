@@ -1,23 +1,72 @@
-"""Pressure on a group of outer faces, and its history."""
+"""Weight, pressure on a group of outer faces, that of the blast gas (Konno et al., eq. 4)."""
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import taichi as ti
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.elementary import sine_and_cosine, sine_shortfall
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.likely_units import PRESSURE, in_unit
+from taichi_dem.kit.likely_units import ACCELERATION, BLAST_RISE, PRESSURE, in_unit
 from taichi_dem.kit.products import cross, matvec
 from taichi_dem.kit.types import vec3
-from taichi_dem.kit.validation import finite, positive, shown, word
-from taichi_dem.laws.base import Effect
+from taichi_dem.kit.validation import direction, finite, positive, real_numbers, shown, word
+from taichi_dem.laws.base import Effect, Travel
 from taichi_dem.loads.history import History, history_points, shortest_piece
 from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
 from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import Model
+
+
+@ti.data_oriented
+class Gravity(Effect):
+    """Uniform acceleration of all bodies.
+
+    Parameters
+    ----------
+    acceleration : sequence of float, default (0.0, -9.81, 0.0)
+        Acceleration along x, y and z [m/s^2].
+
+    Examples
+    --------
+    >>> Gravity((0.0, -1.62, 0.0)).name
+    'gravity'
+    """
+
+    role = "load"
+
+    def __init__(self, acceleration: Sequence[float] = (0.0, -9.81, 0.0)):
+        self._acceleration = direction("acceleration", acceleration)
+        in_unit("size of acceleration", math.hypot(*self._acceleration), ACCELERATION)
+
+    def numbers(self, material: Material) -> tuple[float, ...]:
+        """Acceleration [m/s^2], three components."""
+        return self._acceleration
+
+    def stress(self, material: Material, size: float) -> float:
+        """Weight of a column as high as the block."""
+        return material.density * size * sum(x * x for x in self._acceleration) ** 0.5
+
+    def travel(self) -> Travel:
+        """Without end along the acceleration."""
+        low = tuple(-math.inf if x < 0.0 else 0.0 for x in self._acceleration)
+        return low, tuple(math.inf if x > 0.0 else 0.0 for x in self._acceleration)
+
+    @ti.func
+    def acts_on(self, i):
+        """Every body has weight."""
+        return 1
+
+    @ti.func
+    def wrench(self, i, motion):
+        """Force [N] and torque about the centre [N m] on body i."""
+        return self.tables.mass[i] * vec3(self.law[0], self.law[1], self.law[2]), vec3(0.0)
 
 
 @ti.data_oriented
@@ -157,3 +206,140 @@ class Pressure(FacePressure):
     def mean_pressure(self, since, until):
         """Mean pressure [Pa] from a time to a later one [s]."""
         return self.history.mean(since, until)
+
+
+@ti.pyfunc
+def pulse(peak, rise, decay_ratio, t):
+    """Pressure [Pa] of eq. 4: a squared cosine up to the peak, a cosine down to zero."""
+    pressure = 0.0
+    s = t / rise - 1.0
+    if 0.0 <= t and s <= 0.0:
+        _, swing = sine_and_cosine(0.5 * math.pi * s)
+        pressure = peak * (swing * swing)
+    elif 0.0 < s and s <= decay_ratio:
+        _, swing = sine_and_cosine(0.5 * math.pi * s / decay_ratio)
+        pressure = peak * swing
+    return pressure
+
+
+@ti.func
+def mean_pulse(peak, rise, decay_ratio, since, until):
+    """Mean of ``pulse`` [Pa] from a time to a later one.
+
+    The mean of a cosine is its value in the middle times sin(w) / w, w half of the angle, which
+    for a short time is 1: nothing is lost to rounding at any step.
+    """
+    end, mean = (1.0 + decay_ratio) * rise, 0.0
+    low, high = ti.max(since, 0.0), ti.min(until, rise)
+    if low < high:
+        less = sine_shortfall(0.5 * math.pi * (high - low) / rise)
+        middle = pulse(peak, rise, decay_ratio, 0.5 * (low + high))
+        mean += (high - low) / (until - since) * (middle - less * (middle - 0.5 * peak))
+    low, high = ti.max(since, rise), ti.min(until, end)
+    if low < high:
+        less = sine_shortfall(0.25 * math.pi * (high - low) / (decay_ratio * rise))
+        middle = pulse(peak, rise, decay_ratio, 0.5 * (low + high))
+        mean += (high - low) / (until - since) * (1.0 - less) * middle
+    return mean
+
+
+@ti.data_oriented
+class GasPressure(FacePressure):
+    """Pressure on the faces of a group along their current normal, also after they came loose.
+
+    Parameters
+    ----------
+    group : str, default "hole"
+        Name of the face group.
+    peak : float, default 575000000.0
+        Peak pressure [Pa].
+    rise : float, default 0.000133
+        Time to the peak [s].
+    decay_ratio : float, default 2.75
+        Ratio of the time from the peak to zero to the rise.
+    start : float, default 0.0
+        Time at which the pressure begins [s]: holes with a ``GasPressure`` each fire one after the
+        other.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range.
+
+    Notes
+    -----
+    The pressure is a squared cosine up to the peak and a cosine down to zero. The area is that of
+    the mesh.
+
+    References
+    ----------
+    Konno et al., section 4.1, eq. 4, Fig. 11.
+
+    Examples
+    --------
+    >>> gas = GasPressure(rise=1e-4, decay_ratio=3.0)
+    >>> round(gas.duration, 6)
+    0.0004
+    """
+
+    name = "gas_pressure"
+
+    def __init__(
+        self,
+        group: str = "hole",
+        peak: float = 575e6,
+        rise: float = 1.33e-4,
+        decay_ratio: float = 2.75,
+        start: float = 0.0,
+    ):
+        self.group = word("group", group)
+        self.peak = in_unit("peak", positive("peak", peak), PRESSURE)
+        self.rise = in_unit("rise", positive("rise", rise), BLAST_RISE)
+        self.decay_ratio = positive("decay_ratio", decay_ratio)
+        self.start = positive("start", start, zero_allowed=True)
+
+    @property
+    def duration(self) -> float:
+        """Time from its start until there is no pressure any more [s]."""
+        return (self.decay_ratio + 1.0) * self.rise
+
+    def numbers(self, material: Material) -> tuple[float, ...]:
+        """Peak [Pa], rise [s], decay ratio and start [s]."""
+        return self.peak, self.rise, self.decay_ratio, self.start
+
+    def stress(self, material: Material, size: float) -> float:
+        """The peak pressure."""
+        return self.peak
+
+    def change_time(self) -> float:
+        """Time to the peak, or from there to zero."""
+        return self.rise * min(1.0, self.decay_ratio)
+
+    @ti.func
+    def changes(self, since, until):
+        """Nonzero where there is pressure between two times [s]."""
+        end = self.law[3] + (1.0 + self.law[2]) * self.law[1]
+        return since < end and self.law[3] < until
+
+    @ti.func
+    def mean_pressure(self, since, until):
+        """Mean pressure [Pa] from a time to a later one [s]."""
+        start = self.law[3]
+        return mean_pulse(self.law[0], self.law[1], self.law[2], since - start, until - start)
+
+    def pressure_at(self, times: ArrayLike) -> np.ndarray:
+        """Pressure at given times, for pictures.
+
+        Parameters
+        ----------
+        times : array_like
+            Times [s].
+
+        Returns
+        -------
+        ndarray
+            Pressure [Pa].
+        """
+        since = real_numbers("times", times) - self.start
+        at = np.vectorize(pulse, otypes=[float])
+        return at(self.peak, self.rise, self.decay_ratio, since)

@@ -7,7 +7,7 @@ ASCE 95(EM4), 1969, 859-877, eq. 1 and 2.
 import numpy as np
 import taichi as ti
 
-from taichi_dem.elasticity.wave_moduli import wave_moduli
+from taichi_dem.elasticity.rates import wave_moduli
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length, product, transposed

@@ -39,10 +39,6 @@ def checked_arrays(
         _refuse_coincident(places, pairs, extent)
     corners = _positive(places, corners, notes)
     _refuse_bad_sharing(corners)
-    if coincident and tolerance:
-        raise InputError(
-            f"weld_tolerance must be 0 with keep_coincident=True, got {shown(tolerance)}"
-        )
     if len(pairs):
         # Joined where they coincide, no body may lie in another.
         _refuse_bad_sharing(geometry.components(len(places), pairs)[corners])
@@ -71,12 +67,16 @@ def _rows(what, values, width, kinds, words):
         found = np.asarray(values)
     except ValueError:
         raise InputError(f"{what} must be rows of {width} {words} each") from None
-    if found.size == 0:
-        raise InputError(f"{what} must not be empty")
-    if found.dtype.kind not in kinds:
-        raise InputError(f"{what} must hold {words}, got {found.dtype}")
-    if found.ndim != 2 or found.shape[1] != width:
-        raise InputError(f"{what} must have shape (n, {width}), got {found.shape}")
+    if (
+        found.ndim != 2
+        or found.shape[1] != width
+        or not len(found)
+        or found.dtype.kind not in kinds
+    ):
+        raise InputError(
+            f"{what} must be rows of {width} {words} each, at least one, got an array of "
+            f"{found.dtype} of shape {found.shape}"
+        )
     return found
 
 

@@ -3,9 +3,12 @@
 import contextlib
 import io
 import os
+import re
+import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -17,7 +20,6 @@ from taichi_dem.kit.timeout import run_with_timeout
 from taichi_dem.kit.validation import FileName, path_name, positive
 from taichi_dem.mesh import cells
 from taichi_dem.mesh.check import checked_points, unbonded_places, weld_labels
-from taichi_dem.mesh.gmsh_files import keyed_by_dimension, read_gmsh
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import edge_lengths
 
@@ -30,6 +32,22 @@ _REMEDY = (
     "mesh in three dimensions (gmsh -3) with a physical group of the volume too, without which "
     "Gmsh does not save it, or fill a closed surface by taichi_dem.shapes.from_surface"
 )
+
+_ENDS = re.compile(rb"^\$((?:End)?(?:Nodes|Elements))[ \t\r]*$", re.MULTILINE)
+_WHOLE = [b"Nodes", b"EndNodes", b"Elements", b"EndElements"]
+_NAMES = re.compile(rb"^\$PhysicalNames\s*\n(.*?)^\$EndPhysicalNames", re.MULTILINE | re.DOTALL)
+_NAME = re.compile(rb'^([ \t]*\d+[ \t]+\d+[ \t]+)("?)(.*?)\2[ \t\r]*$', re.MULTILINE)
+
+
+class PhysicalName(NamedTuple):
+    """A name in a file, the dimension of the cells that it names, and the number that they carry.
+
+    These are the keys of ``field_data`` and ``cell_sets`` of a Gmsh file.
+    """
+
+    dimension: int
+    tag: int
+    name: str
 
 
 def read_mesh(
@@ -177,8 +195,100 @@ def _meshio_read(path):
 
     with np.errstate(over="ignore"):  # an STL's text, tried as if it were binary
         if path.lower().endswith(".msh"):
-            return read_gmsh(path)
-        return keyed_by_dimension(meshio.read(path), {})
+            return _read_gmsh(path)
+        return _keyed_by_dimension(meshio.read(path), [])
+
+
+def _read_gmsh(path):
+    """A Gmsh file of meshio's with groups by PhysicalName; InputError for a bad one.
+
+    Meshio reads a copy in which each physical group has a name of its own: of faces and bodies in
+    groups of one name it loses the faces, and it takes some letters for escapes.
+    """
+    import meshio
+
+    with open(path, "rb") as file:
+        content = file.read()
+    _refuse_bad_gmsh(content)
+    names: list[str] = []
+
+    def keyed(row):
+        names.append(row[3].decode("utf-8"))
+        return row[1] + str(len(names) - 1).encode()
+
+    copy = _NAMES.sub(lambda section: _NAME.sub(keyed, section[0]), content, count=1)
+    with tempfile.TemporaryDirectory() as folder:
+        place = os.path.join(folder, "keyed.msh")
+        with open(place, "wb") as other:
+            other.write(copy)
+        return _keyed_by_dimension(meshio.read(place), names)
+
+
+def _refuse_bad_gmsh(content):
+    """Refuse a Gmsh file of which meshio would make another mesh: damaged, or cut off.
+
+    Its sections must be whole; in text they have as many rows as they say, and points have numbers
+    from 1 on, as meshio counts others from the end. Other files are left to other readers.
+    """
+    if not content.startswith(b"$MeshFormat"):
+        return
+    marks = list(_ENDS.finditer(content))
+    if [mark[1] for mark in marks] != _WHOLE:
+        raise InputError("it must have one whole section $Nodes, then $Elements; it may be cut off")
+    version, kind = content[:200].split()[1:3]
+    if kind == b"1" or version not in (b"2", b"2.2", b"4", b"4.1"):
+        return
+    nodes, elements = (
+        [line.split() for line in content[start.end() : end.start()].splitlines()[1:]]
+        for start, end in zip(marks[::2], marks[1::2])
+    )
+    try:
+        numbers = _numbers_2 if version.startswith(b"2") else _numbers_4
+        points, corners = (np.array(found, dtype=np.int64) for found in numbers(nodes, elements))
+    except (ValueError, IndexError, OverflowError):
+        raise InputError("its sections must hold as many whole numbers as they announce") from None
+    if points.min() < 1 or corners.min() < 1 or len(np.unique(points)) < len(points):
+        raise InputError("its points must have different numbers from 1 on")
+
+
+def _numbers_2(nodes, elements):
+    """Numbers of points and of corners in version 2.2, where each row says how many tags it has."""
+    sizes: dict[bytes, int] = {}
+    corners: list[bytes] = []
+    for _, kind, tags, *rest in elements[1:]:
+        own = rest[int(tags) :]
+        _require(int(tags) >= 0 and len(own) == sizes.setdefault(kind, len(own)))
+        corners += own
+    _require(all(int(rows[0][0]) == len(rows) - 1 for rows in (nodes, elements)))
+    _require(all(len(row) == 4 for row in nodes[1:]))
+    return [row[0] for row in nodes[1:]], corners
+
+
+def _numbers_4(nodes, elements):
+    """The same in version 4.1, where rows of four numbers head blocks; these are positive too."""
+    for rows, each in ((nodes, 2), (elements, 1)):
+        blocks, count = map(int, rows[0][:2])
+        _require(len(rows) == 1 + blocks + each * count)
+    points = [row[0] for row in nodes if len(row) == 1]
+    _require(len(points) == int(nodes[0][1]))
+    return points, [number for row in elements for number in row[1:]]
+
+
+def _require(right):
+    if not right:
+        raise ValueError
+
+
+def _keyed_by_dimension(raw, names):
+    """A file of meshio's with groups by PhysicalName; names: the true ones, by their numbers."""
+    keys = {
+        key: PhysicalName(int(value[1]), int(value[0]), names[int(key)] if names else key)
+        for key, value in raw.field_data.items()
+        if np.shape(value) == (2,)
+    }
+    raw.field_data = {keys[key]: raw.field_data[key] for key in keys}
+    raw.cell_sets = {keys.get(key, key): members for key, members in raw.cell_sets.items()}
+    return raw
 
 
 def _of_dropped_cells(printed):

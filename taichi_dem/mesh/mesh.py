@@ -1,24 +1,39 @@
 """Mesh of tetrahedra with named groups; x points to the right, y up, z towards the viewer."""
 
+import copy
 import os
-from collections.abc import Mapping
-from dataclasses import InitVar, dataclass, field
-from types import MappingProxyType
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import InitVar, dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit import pictures
+from taichi_dem.kit.display import counted, embedded, in_brief, titled
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import flag, fraction, instance, shown
+from taichi_dem.kit.fixed_order import dot
+from taichi_dem.kit.validation import (
+    FileName,
+    direction,
+    flag,
+    fraction,
+    instance,
+    shown,
+    unit_vector,
+    word,
+)
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.check import checked_arrays, checked_body_groups, joined_bodies
-from taichi_dem.mesh.mesh_methods import MeshMethods
+
+#: Given the centres of faces or bodies [m], (n, 3), whether each is chosen, (n,).
+Choice = Callable[[np.ndarray], Any]
+#: Digits of the entries of a rotation: those that every machine's sine agrees on.
+_DIGITS = 15
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh(MeshMethods):
+class Mesh:
     """Tetrahedra and named groups of faces; immutable.
 
     Made from arrays it is checked and mended as ``checked_mesh`` says; ``dataclasses.replace``
@@ -86,25 +101,13 @@ class Mesh(MeshMethods):
         bodies = checked_body_groups(self.body_groups, len(arrays[1]))
         names = "points", "tetrahedra", "groups", "inner_groups", "body_groups", "notes"
         found = zip(names, (*arrays, bodies, tuple(dict.fromkeys(notes))))
-        self.__setstate__({**vars(self), **dict(found)})
+        self.__dict__.update(found)
+        for array in (*arrays[:2], *self.groups.values(), *bodies.values()):
+            array.setflags(write=False)
 
     #: Not among the options: see ``bonded_by``.
     bonded_shares: ClassVar[tuple[tuple[str, float], ...]] = ()
     inner_groups: ClassVar[tuple[str, ...]] = ()
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "groups": dict(self.groups), "body_groups": dict(self.body_groups)}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        groups, body_groups = state["groups"], state["body_groups"]
-        held = state["points"], state["tetrahedra"], *groups.values(), *body_groups.values()
-        for array in held:
-            array.setflags(write=False)
-        read_only = {
-            "groups": MappingProxyType(groups),
-            "body_groups": MappingProxyType(body_groups),
-        }
-        self.__dict__.update({**state, **read_only})
 
     def __repr__(self):
         groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
@@ -198,14 +201,121 @@ class Mesh(MeshMethods):
                     f"group {name} must be of inner faces, which two bodies share, to be unbonded "
                     "or bonded weaker, got one of outer faces"
                 )
-        made = object.__new__(Mesh)
-        made.__dict__.update({**vars(self), "bonded_shares": tuple(sorted(shares.items()))})
+        made = copy.copy(self)
+        made.__dict__["bonded_shares"] = tuple(sorted(shares.items()))
         return made
 
     @property
     def has_open_faces(self) -> bool:
         """Whether faces may lie on each other that no bond joins."""
         return self.keep_coincident or any(share == 0.0 for _, share in self.bonded_shares)
+
+    def group(self, name: str, chosen: Choice) -> "Mesh":
+        """Return the mesh with one more group: outer faces chosen by their centres.
+
+        Parameters
+        ----------
+        name : str
+            Name of the new group.
+        chosen : callable
+            Function of the centres of all outer faces [m], (n, 3), that returns n truth values.
+
+        Returns
+        -------
+        Mesh
+            The mesh with the group.
+
+        Raises
+        ------
+        InputError
+            The name is taken, no face is chosen, or other values are returned.
+
+        Examples
+        --------
+        >>> mesh = read_mesh(PAPER_BLOCK).group("high", lambda x: x[:, 1] > 1.9)
+        >>> "high" in mesh.groups
+        True
+        """
+        outer = geometry.outer_faces(self.tetrahedra)
+        return _with_group(self, "groups", name, outer[_choose(self, outer, chosen)])
+
+    def body_group(self, name: str, chosen: Choice) -> "Mesh":
+        """Return the mesh with one more group of bodies, chosen by their centres.
+
+        Parameters
+        ----------
+        name : str
+            Name of the new group.
+        chosen : callable
+            Function of the centres of all bodies [m], (n, 3), that returns n truth values.
+
+        Returns
+        -------
+        Mesh
+            The mesh with the group.
+
+        Raises
+        ------
+        InputError
+            The name is taken, no body is chosen, or other values are returned.
+        """
+        bodies = np.flatnonzero(_choose(self, self.tetrahedra, chosen, "bodies"))
+        return _with_group(self, "body_groups", name, bodies)
+
+    def moved(
+        self,
+        *,
+        by: Sequence[float] = (0.0, 0.0, 0.0),
+        turned: Sequence[float] = (0.0, 0.0, 0.0),
+        about: Sequence[float] | None = None,
+    ) -> "Mesh":
+        """Return the mesh at another place: turned, then shifted.
+
+        Parameters
+        ----------
+        by : sequence of float, default (0.0, 0.0, 0.0)
+            Shift [m].
+        turned : sequence of float, default (0.0, 0.0, 0.0)
+            Vector along the axis of the turn, right-handed, and as long as its angle [degrees]:
+            (0, 0, 90) turns x into y.
+        about : sequence of float, optional
+            Point on the axis [m]; the middle of the mesh's box by default.
+
+        Returns
+        -------
+        Mesh
+            The moved mesh, with the same groups.
+
+        Raises
+        ------
+        InputError
+            A value is not three finite numbers.
+        """
+        shift, turn = np.array(direction("by", by)), _rotation(direction("turned", turned))
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        origin = 0.5 * (low + high) if about is None else np.array(direction("about", about))
+        points = self.points
+        if any(turned):
+            points = origin + ((points - origin)[:, None, :] * turn).sum(axis=2)
+        return replace(self, points=points + shift)
+
+    def picture(self, path: FileName) -> None:
+        """Write a PNG picture of the outer faces, coloured by group, with axes in m.
+
+        Parameters
+        ----------
+        path : path
+            File; its name ends in .png.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        pictures.write_picture(self, path)
+
+    def _repr_html_(self) -> str:
+        return titled(repr(self), embedded(pictures.png(self), "The mesh, coloured by group"))
 
 
 def volumes(mesh: Mesh) -> np.ndarray:
@@ -266,3 +376,80 @@ def checked_mesh(
     options = {"weld_tolerance": weld_tolerance, "keep_coincident": keep_coincident}
     bodies = {} if body_groups is None else body_groups
     return made(points, tetrahedra, groups, body_groups=bodies, **options)
+
+
+def with_inner_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
+    """The mesh with one more group: faces between two bodies chosen by their centres.
+
+    ``Scene(unbonded=[name])`` makes a notch or an open joint of it. chosen, errors: as for
+    ``Mesh.group``.
+    """
+    inner = _inner_faces(mesh)[0]
+    return _with_group(mesh, "groups", name, inner[_choose(mesh, inner, chosen)])
+
+
+def with_cut(
+    mesh: Mesh,
+    name: str,
+    point: Sequence[float],
+    normal: Sequence[float],
+    chosen: Choice | None = None,
+) -> Mesh:
+    """The mesh with one more group: the faces along which a plane divides the bodies.
+
+    Those between a body whose centre lies behind the plane and one that lies before it, so that no
+    bond is left across: as rough as the mesh is, and flat where faces lie in the plane. point [m]
+    and normal: of the plane. chosen: which of them, by the centres of the faces, as for
+    ``Mesh.group``; None for all. Raises InputError as that, and for a normal of zero.
+    """
+    origin, along = np.array(direction("point", point)), unit_vector("normal", normal)
+    inner, bodies = _inner_faces(mesh)
+    centre = mesh.points[mesh.tetrahedra].mean(axis=1)
+    before = dot(centre - origin, along) > 0.0
+    faces = inner[before[bodies[:, 0]] != before[bodies[:, 1]]]
+    if chosen is not None:
+        faces = faces[_choose(mesh, faces, chosen)]
+    return _with_group(mesh, "groups", name, faces)
+
+
+def _inner_faces(mesh):
+    """Faces between two bodies, (n, 3), and these bodies, (n, 2)."""
+    rows = geometry.shared_faces(mesh.tetrahedra)
+    return geometry.all_faces(mesh.tetrahedra)[rows[:, 0]], rows // 4
+
+
+def _rotation(turned):
+    """Rotation matrix of a vector in degrees: cos 1 + sin [n x] + (1 - cos) n n^T."""
+    angle = float(np.sqrt(np.square(turned).sum()))
+    if angle == 0.0:
+        return np.eye(3)
+    axis, radians = np.array(turned) / angle, np.radians(angle % 360.0)
+    cross = np.cross(np.eye(3), axis)
+    cos, sin = np.cos(radians), np.sin(radians)
+    made = cos * np.eye(3) + sin * cross + (1.0 - cos) * axis[:, None] * axis[None, :]
+    return np.round(made, _DIGITS)
+
+
+def _choose(mesh: Mesh, corners: np.ndarray, chosen: Choice, what: str = "faces") -> np.ndarray:
+    """Which faces or bodies, given by their corners, a choice takes, (n,)."""
+    centres = mesh.points[corners].mean(axis=1)
+    if not callable(chosen):
+        raise InputError(f"chosen must be a function of centres of {what}, got {shown(chosen)}")
+    found = np.asarray(chosen(centres))
+    if found.shape != (len(corners),) or found.dtype != bool:
+        raise InputError(
+            f"chosen must return one truth value for each of {len(corners)} {what}, got an "
+            f"array of {found.dtype} of shape {found.shape}"
+        )
+    return found
+
+
+def _with_group(mesh: Mesh, kind: str, name: str, members: np.ndarray) -> Mesh:
+    """The mesh with one more of its "groups" of faces or "body_groups"."""
+    groups = getattr(mesh, kind)
+    if word("name", name) in groups:
+        raise InputError(f"name must be that of a new group, got {shown(name)}, which is there")
+    if not len(members):
+        raise InputError(f"group {name} must have at least one member, but none was chosen")
+    more: Any = {kind: {**groups, name: members}}
+    return replace(mesh, **more)

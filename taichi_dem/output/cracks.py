@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.data_table import data_frame
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.validation import unit_vector, whole
 from taichi_dem.mesh.tetrahedra import area_vectors, unit_normals
@@ -12,29 +12,6 @@ from taichi_dem.state.model import Model
 
 #: Sine of the angle between a face and a plane below which they count as parallel.
 _PARALLEL = 1e-6
-
-
-class Rose(Table):
-    """Directions of cracks in a plane: crack area by sector.
-
-    Attributes
-    ----------
-    width_deg : float
-        Width of a sector [degree].
-    parallel_m2 : float
-        Area of the cracks that lie in the plane, which have no direction there [m^2].
-    axis : ndarray, shape (3,)
-        Normal of the plane, towards the viewer.
-
-    Notes
-    -----
-    Sectors are centred at the multiples of their width, from 0 to below 180 degrees. With
-    ``parallel_m2`` their areas add up to the area of all cracks.
-    """
-
-    width_deg: float
-    parallel_m2: float
-    axis: np.ndarray
 
 
 def picture_axes(toward: np.ndarray) -> Any:
@@ -57,7 +34,7 @@ def crack_areas(model: Model) -> np.ndarray:
     return length(area_vectors(model.mesh.points, top.vertices)) * top.bonded_share
 
 
-def cracks_of(model: Model, broken_time: np.ndarray) -> Table:
+def cracks_of(model: Model, broken_time: np.ndarray) -> Any:
     """Tabulate the broken faces in the order in which they broke.
 
     Parameters
@@ -68,7 +45,7 @@ def cracks_of(model: Model, broken_time: np.ndarray) -> Table:
 
     Returns
     -------
-    Table
+    pandas.DataFrame
         ``time_s``, ``bond``, ``area_m2``, ``crack_area_m2`` of all cracks so far, place of the
         face at rest, its unit normal out of the master, strike and dip.
 
@@ -93,7 +70,7 @@ def cracks_of(model: Model, broken_time: np.ndarray) -> Table:
         "strike_deg": strike,
         "dip_deg": dip,
     }
-    return Table(columns)
+    return data_frame(columns)
 
 
 def strike_and_dip(normal: np.ndarray) -> Any:
@@ -108,7 +85,7 @@ def strike_and_dip(normal: np.ndarray) -> Any:
 
 def rose_of(
     model: Model, broken: np.ndarray, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36
-) -> Rose:
+) -> Any:
     """Sum up the area of cracks by the direction of their traces in a plane.
 
     Parameters
@@ -122,9 +99,12 @@ def rose_of(
 
     Returns
     -------
-    Rose
+    pandas.DataFrame
         ``angle_deg``, the middle of a sector, counter-clockwise from the right of a picture seen
-        along the axis (from x for the axis z); ``area_m2`` and number of ``faces`` in it.
+        along the axis (from x for the axis z); ``area_m2`` and number of ``faces`` in it. In its
+        ``attrs``: ``width_deg`` of a sector, ``axis``, and ``parallel_m2``, the area of the cracks
+        that lie in the plane, which have no direction there. With it the areas of the sectors add
+        up to the area of all cracks.
     """
     axis, sectors = unit_vector("axis", axis), whole("sectors", sectors, 2, 360)
     bond = np.flatnonzero(broken)
@@ -139,6 +119,5 @@ def rose_of(
         "area_m2": np.bincount(sector, area[seen], sectors),
         "faces": np.bincount(sector, minlength=sectors),
     }
-    made = Rose(columns, index="angle_deg")
-    made.width_deg, made.parallel_m2, made.axis = width, float(area[~seen].sum()), axis
-    return made
+    beside = float(area[~seen].sum())
+    return data_frame(columns, width_deg=width, parallel_m2=beside, axis=tuple(axis.tolist()))

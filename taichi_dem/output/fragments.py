@@ -1,52 +1,35 @@
-"""Fragments: bodies that unbroken bonds still join, as one rigid piece each."""
+"""Fragments: bodies that unbroken bonds still join, as one rigid piece each.
+
+And values by which bodies are coloured, by name.
+"""
+
+from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.validation import choice
 from taichi_dem.mesh.tetrahedra import signed_volumes
 from taichi_dem.output.record import Frame
 from taichi_dem.state.model import Model, centres, sums
 
 _AXES = "xyz"
+#: Multiples of the golden ratio, less whole numbers, lie far apart.
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+#: Unit and words of what bodies can be coloured by.
+COLOURS = {
+    "speed": ("m/s", "speed"),
+    "peak_speed": ("m/s", "largest speed so far"),
+    "displacement": ("m", "displacement"),
+    "damage": ("1", "damage"),
+    "level": ("1", "level of the step"),
+    "fragment": ("1", "fragment, by falling mass"),
+}
 
 
-class Fragments(Table):
-    """Table of the fragments at one time, the heaviest first.
-
-    Attributes
-    ----------
-    of_body : ndarray of int, shape (body_count,)
-        Fragment of each body, a row of the table.
-    time_s : float
-        Time [s].
-
-    Notes
-    -----
-    ``diameter_m`` is that of the sphere of the same volume. ``sieve_m`` estimates the opening of
-    the square sieve that a fragment just passes: the middle edge of the cuboid with the same
-    volume density and principal moments of inertia, in the shape at rest. A fragment's velocity is
-    its momentum by its mass, its spin its angular momentum by its inertia. ``kinetic_J`` is that of
-    its bodies; the share in ``translation_J`` and ``rotation_J`` is that of a rigid piece, the
-    rest is vibration.
-    """
-
-    of_body: np.ndarray
-    time_s: float
-
-    def vectors(self, name: str) -> np.ndarray:
-        """Collect the three columns of a vector.
-
-        Parameters
-        ----------
-        name : str
-            "centre" [m], "velocity" [m/s] or "spin" [rad/s].
-
-        Returns
-        -------
-        ndarray, shape (fragments, 3)
-        """
-        endings = {"centre": "m", "velocity": "m_s", "spin": "rad_s"}
-        return np.stack([self[f"{name}_{axis}_{endings[name]}"] for axis in _AXES], axis=1)
+def vectors_of(fragments: Any, name: str) -> np.ndarray:
+    """Three columns of a table as vectors, (n, 3); name: "centre", "velocity" or "spin"."""
+    endings = {"centre": "m", "velocity": "m_s", "spin": "rad_s"}
+    return np.stack([fragments[f"{name}_{axis}_{endings[name]}"] for axis in _AXES], axis=1)
 
 
 def fragment_of_body(model: Model, broken: np.ndarray) -> np.ndarray:
@@ -69,24 +52,33 @@ def fragment_of_body(model: Model, broken: np.ndarray) -> np.ndarray:
     return rank[number.reshape(-1)]
 
 
-def fragments_of(model: Model, frame: Frame, broken_time: np.ndarray) -> Fragments:
-    """Tabulate the fragments in a frame.
+def fragments_of(model: Model, frame: Frame, of_body: np.ndarray) -> dict[str, np.ndarray]:
+    """Tabulate the fragments in a frame, the heaviest first.
 
     Parameters
     ----------
     model : Model
     frame : Frame
-    broken_time : ndarray, shape (bond_count,)
-        When each bond broke [s], NaN while it holds.
+    of_body : ndarray of int, shape (body_count,)
+        Fragment of each body.
 
     Returns
     -------
-    Fragments
+    dict of str to ndarray
+        Columns by name.
+
+    Notes
+    -----
+    ``diameter_m`` is that of the sphere of the same volume. ``sieve_m`` estimates the opening of
+    the square sieve that a fragment just passes: the middle edge of the cuboid with the same
+    volume density and principal moments of inertia, in the shape at rest. A fragment's velocity is
+    its momentum by its mass, its spin its angular momentum by its inertia. ``kinetic_J`` is that of
+    its bodies; the share in ``translation_J`` and ``rotation_J`` is that of a rigid piece, the
+    rest is vibration.
     """
-    of_body = fragment_of_body(model, broken_time <= frame.time_s)
     mass = sums(of_body, model.body_mass)
     volume = sums(of_body, signed_volumes(model.mesh.points, model.mesh.tetrahedra))
-    columns = {
+    return {
         "fragment": np.arange(len(mass)),
         "bodies": np.bincount(of_body),
         "mass_kg": mass,
@@ -95,9 +87,6 @@ def fragments_of(model: Model, frame: Frame, broken_time: np.ndarray) -> Fragmen
         "sieve_m": _middle_edges(model, of_body, mass),
         **_motion(model, frame, of_body, mass),
     }
-    made = Fragments(columns, index="fragment")
-    made.of_body, made.time_s = of_body, frame.time_s
-    return made
 
 
 def _motion(model, frame, of_body, mass):
@@ -187,22 +176,37 @@ def rigid_motion(model: Model, frame: Frame, of_body: np.ndarray) -> tuple[np.nd
     return centre, left @ right
 
 
-def quaternions_of(rotation: np.ndarray) -> np.ndarray:
-    """Unit quaternions x, y, z, w of rotation matrices (n, 3, 3); (n, 4).
+def rotations_of(matrices: np.ndarray) -> Any:
+    """Rotation matrices (n, 3, 3) as a ``Rotation`` of SciPy."""
+    from scipy.spatial.transform import Rotation
 
-    Four formulas differ in the component that they divide by; the largest is taken (S. W. Shepperd,
-    J. Guidance and Control 1, 1978, 223-224).
+    return Rotation.from_matrix(matrices)
+
+
+def body_values(result: Any, frame: Frame, colour: str) -> np.ndarray:
+    """Value of every body of a ``Result`` in a frame, (body_count,); colour: one of COLOURS."""
+    if choice("colour", colour, COLOURS) == "fragment":
+        return fragment_of_body(result.model, result.broken_time <= frame.time_s)
+    if colour == "peak_speed":
+        return result.peak_speed
+    if colour == "displacement":
+        return np.linalg.norm(frame.displacement, axis=1)
+    return getattr(frame, colour)
+
+
+def scale_end(values: np.ndarray) -> float:
+    """Value that a fiftieth of the bodies exceed, or the largest where that is 0."""
+    return float(np.percentile(values, 98.0) or values.max())
+
+
+def shares_of_scale(result: Any, frame: Frame, colour: str) -> np.ndarray:
+    """Values of bodies as shares of a scale from 0 to 1, (body_count,).
+
+    1 is what a fiftieth of the bodies exceed. Fragments are spread over the scale, so that
+    neighbours differ.
     """
-    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(rotation, 0, -1)
-    x, y, z = h - f, c - g, d - b
-    candidates = np.array(
-        [
-            (1.0 + a + e + i, x, y, z),
-            (x, 1.0 + a - e - i, b + d, c + g),
-            (y, b + d, 1.0 - a + e - i, f + h),
-            (z, c + g, f + h, 1.0 - a - e + i),
-        ]
-    )
-    best = np.einsum("kkn->kn", candidates).argmax(axis=0)
-    found = candidates[best, :, np.arange(len(best))]
-    return np.roll(found / np.linalg.norm(found, axis=1)[:, None], -1, axis=1)
+    values = body_values(result, frame, colour)
+    if colour == "fragment":
+        return values * _GOLDEN % 1.0
+    top = scale_end(values)
+    return np.clip(values / top, 0.0, 1.0) if top > 0.0 else np.zeros(len(values))

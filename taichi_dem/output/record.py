@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.allocation import values
-from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.files import output_folder, remove_files, write_csv
 from taichi_dem.kit.validation import FileName, file_stem, instance, several
-from taichi_dem.loads.gas_pressure import GasPressure
+from taichi_dem.loads.pressure import GasPressure
 from taichi_dem.mesh.files import write_pvd, write_vtu
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.output.hole_monitor import HoleMonitor
@@ -173,11 +172,10 @@ class Recorder:
         own = np.append(damage, 0.0)[bond]
         return own.sum(axis=1) / np.maximum(1, (bond >= 0).sum(axis=1))
 
-    def history(self) -> Table:
-        """Time series, a row a sample."""
+    def history(self) -> dict[str, np.ndarray]:
+        """Time series, columns by name with a row a sample."""
         names = self.rows[0].keys() if self.rows else ()
-        columns = {name: np.array([row[name] for row in self.rows]) for name in names}
-        return Table(columns, index="time_s")
+        return {name: np.array([row[name] for row in self.rows]) for name in names}
 
     def broken_time(self) -> np.ndarray:
         """When each bond was released [s], (bond_count,); NaN while it holds."""

@@ -4,8 +4,7 @@ Each function returns a matplotlib figure, which a notebook shows, and writes it
 ``path`` is given (InputError where it cannot). ``plot_energy(result)`` is ``result.plot.energy()``.
 """
 
-from taichi_dem.plot.block import plot_acting, plot_cracks, plot_steps
-from taichi_dem.plot.film import plot_film
+from taichi_dem.plot.block import plot_acting, plot_cracks, plot_film, plot_steps
 from taichi_dem.plot.series import plot_energy
 from taichi_dem.plot.tables import (
     plot_attenuation,

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 
 from taichi_dem.kit.plot_style import PURPLE, RED, picture, seconds
 from taichi_dem.kit.validation import FileName
-from taichi_dem.output.run_tables import RunTables
-from taichi_dem.plot.bodies import shades
+from taichi_dem.plot.view import shades
 
 #: Energy terms from the bottom of the stack up, with colours and dashes: blue is held, orange lost
 #: in bonds, purple in contacts; within a group they differ in lightness.
@@ -37,9 +36,9 @@ def _span(axes, time):
     axes.set_xlim(0.0, time[-1] if time[-1] > 0.0 else 1.0)
 
 
-def plot_energy(result: RunTables, *, path: FileName | None = None) -> Figure:
+def plot_energy(result: Any, *, path: FileName | None = None) -> Figure:
     """Draw the terms of the energy balance over time, and what is unexplained."""
-    history = result.history
+    history = result.series
     time = 1e3 * history["time_s"]
     present = {key: look for key, look in ENERGY_TERMS.items() if key in history}
     terms = {key: look for key, look in present.items() if np.abs(history[key]).max() > 0.0}

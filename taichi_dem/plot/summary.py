@@ -8,10 +8,8 @@ from matplotlib.ticker import MaxNLocator
 from taichi_dem.kit.display import scale
 from taichi_dem.kit.plot_style import BLACK, BLUE, png_of, styled
 from taichi_dem.output.record import outward_columns
-from taichi_dem.output.run_tables import RunTables
 from taichi_dem.plot.block import draw_breaks
-from taichi_dem.plot.bodies import draw_bodies, frame_block
-from taichi_dem.plot.view import View
+from taichi_dem.plot.view import View, draw_bodies, frame_block
 
 #: From this ratio of its sides on, a block lies above the curves and not beside them.
 _LONG = 2.2
@@ -32,7 +30,7 @@ _ENERGIES: dict[str, Any] = {
 }
 
 
-def picture_of_run(result: RunTables) -> Any:
+def picture_of_run(result: Any) -> Any:
     """PNG, in bytes: the block beside energy and broken bonds over time.
 
     Where no bond broke, the block shows the displacement in the last frame, or the largest speeds
@@ -51,7 +49,7 @@ def picture_of_run(result: RunTables) -> Any:
         panels = figure.subplot_mosaic(places, height_ratios=(1.0, 1.3) if long else (1.0, 1.0))
         drawn, label = _draw_block(panels["block"], view, result)
         figure.colorbar(drawn, ax=panels["block"], label=label, aspect=25)
-        _draw_curves(panels, result.history)
+        _draw_curves(panels, result.series)
         return png_of(figure)
 
 

@@ -1,6 +1,6 @@
 """Pictures of what a result has calculated: columns, shares, fragments, cracks, the block."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,16 +8,13 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.data_table import arrays_of, unit_of, without_unit
 from taichi_dem.kit.display import scale
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, SPARE_COLOURS, area_key, picture
-from taichi_dem.kit.units import without_unit
 from taichi_dem.kit.validation import FileName, choices, positive, unit_vector
-from taichi_dem.output.body_values import COLOURS, body_values, scale_end
-from taichi_dem.output.run_tables import RunTables
-from taichi_dem.plot.bodies import ALONG_Z, JOINT, draw_bodies, frame_block
+from taichi_dem.output.fragments import COLOURS, body_values, scale_end
 from taichi_dem.plot.series import ENERGY_TERMS
-from taichi_dem.plot.view import View
+from taichi_dem.plot.view import ALONG_Z, JOINT, View, draw_bodies, frame_block
 
 #: Fragments of a colour of their own; lighter ones are grey.
 _NAMED = 6
@@ -28,7 +25,7 @@ _AT_HOLE = ("monitor_displacement_mm", "hole_radial_displacement_mm")
 
 
 def plot_history(
-    result: RunTables, names: Sequence[str] | None = None, *, path: FileName | None = None
+    result: Any, names: Sequence[str] | None = None, *, path: FileName | None = None
 ) -> Figure:
     """Draw columns of the history over time.
 
@@ -40,27 +37,29 @@ def plot_history(
         broken faces, smallest step.
     path : str or path, optional
     """
-    history = result.history
+    history = result.series
     if names is None:
         moved = [name for name in _AT_HOLE if name in history] or ["largest_speed_m_s"]
         names = [*moved, "broken_faces", "smallest_step_s"]
     return plot_columns(path, history, names)
 
 
-def plot_crack_area(result: RunTables, *, path: FileName | None = None) -> Figure:
+def plot_crack_area(result: Any, *, path: FileName | None = None) -> Figure:
     """Draw the area of all cracks over time."""
-    return plot_columns(path, result.crack_area(), ["crack_area_m2"])
+    return plot_columns(path, arrays_of(result.crack_area()), ["crack_area_m2"])
 
 
-def plot_columns(path: FileName | None, table: Table, names: Sequence[str]) -> Figure:
+def plot_columns(
+    path: FileName | None, table: Mapping[str, np.ndarray], names: Sequence[str]
+) -> Figure:
     """Draw columns of a table over its time_s; those of one unit share a panel."""
     names = choices("names", names, [name for name in table if name != "time_s"])
-    units = list(dict.fromkeys(table.units[name] for name in names))
+    units = list(dict.fromkeys(map(unit_of, names)))
     factor, unit = scale(float(np.abs(table["time_s"]).max(initial=0.0)), "s")
     shape = {"size": (6.4, 1.0 + 2.2 * len(units)), "sharex": True, "squeeze": False}
     with picture(path, max(1, len(units)), 1, **shape) as (figure, panels):
         for axes, one in zip(panels[:, 0], units):
-            group = [name for name in names if table.units[name] == one]
+            group = [name for name in names if unit_of(name) == one]
             _draw(axes, factor * table["time_s"], table, group, one)
         panels[-1, 0].set(xlabel=f"time [{unit}]")
     return figure
@@ -84,12 +83,12 @@ def _draw(axes, time, table, names, unit):
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def plot_energy_shares(result: RunTables, *, path: FileName | None = None) -> Figure:
+def plot_energy_shares(result: Any, *, path: FileName | None = None) -> Figure:
     """Draw every term of the energy balance as a share of the energy given, over time.
 
     What is missing to 100 % is unexplained.
     """
-    shares = result.energy_shares()
+    shares = arrays_of(result.energy_shares())
     factor, unit = scale(float(shares["time_s"].max(initial=0.0)), "s")
     looks = {key.replace("_J", "_share"): look for key, look in ENERGY_TERMS.items()}
     terms = {name: look for name, look in looks.items() if name in shares and shares[name].any()}
@@ -108,12 +107,12 @@ def plot_energy_shares(result: RunTables, *, path: FileName | None = None) -> Fi
     return figure
 
 
-def plot_fragments(result: RunTables, frame: int = -1, *, path: FileName | None = None) -> Figure:
+def plot_fragments(result: Any, frame: int = -1, *, path: FileName | None = None) -> Figure:
     """Draw the share of the mass that passes a sieve over its opening, in a frame.
 
     Shaded: the sizes of single bodies, below which the mesh and not the material decides.
     """
-    fragments = result.fragments(frame)
+    fragments = arrays_of(result.fragments(frame))
     order = np.argsort(fragments["sieve_m"], kind="stable")
     size, mass = 1e3 * fragments["sieve_m"][order], fragments["mass_kg"][order]
     passing = 100.0 * np.cumsum(mass) / mass.sum()
@@ -128,12 +127,12 @@ def plot_fragments(result: RunTables, frame: int = -1, *, path: FileName | None 
         count = f"{len(size):,} fragment{'s' * (len(size) != 1)}"
         axes.set(xscale="log", xlim=(low, high), yscale="log", ylim=(0.7 * passing[0], 130.0))
         axes.set(xlabel="opening of the sieve [mm]", ylabel="share of the mass that passes [%]")
-        axes.set_title(f"{count} at {1e3 * fragments.time_s:.3g} ms")
+        axes.set_title(f"{count} at {1e3 * result.frame(frame).time_s:.3g} ms")
     return figure
 
 
 def plot_rose(
-    result: RunTables,
+    result: Any,
     axis: Sequence[float] = ALONG_Z,
     *,
     sectors: int = 36,
@@ -143,11 +142,12 @@ def plot_rose(
 
     The direction of a crack has no sense: both ends are shown.
     """
-    rose = result.rose(axis, sectors)
-    angle, width = np.radians(rose["angle_deg"]), np.radians(rose.width_deg)
-    view = View(rose.axis.tolist())
+    table = result.rose(axis, sectors)
+    rose, parallel_m2 = arrays_of(table), table.attrs["parallel_m2"]
+    angle, width = np.radians(rose["angle_deg"]), np.radians(table.attrs["width_deg"])
+    view = View(table.attrs["axis"])
     with picture(path, size=(5.0, 4.6), subplot_kw={"projection": "polar"}) as (figure, axes):
-        total = rose["area_m2"].sum() + rose.parallel_m2
+        total = rose["area_m2"].sum() + parallel_m2
         factor, unit = (1.0, "m²") if total > 0.1 else (1e4, "cm²")
         look = {"width": width, "color": BLUE, "edgecolor": "white", "linewidth": 0.5}
         for turn in (0.0, np.pi):
@@ -177,7 +177,7 @@ def _emptiest(rose):
 
 
 def plot_attenuation(
-    result: RunTables,
+    result: Any,
     group: str | None = None,
     *,
     nearest: float = 4.0,
@@ -228,7 +228,7 @@ def plot_attenuation(
 
 
 def plot_block(
-    result: RunTables,
+    result: Any,
     frame: int = -1,
     *,
     colour: str = "speed",
@@ -244,7 +244,7 @@ def plot_block(
     frame : int
         Number of the frame.
     colour : {"speed", "peak_speed", "displacement", "damage", "level", "fragment"}
-        ``taichi_dem.output.body_values.COLOURS``.
+        ``taichi_dem.output.fragments.COLOURS``.
     magnify : float
         Factor of the displacement.
     axis : sequence of 3 floats

@@ -1,20 +1,47 @@
-"""What a viewer sees of a block along an axis: facing faces from back to front, crack traces.
+"""What all pictures of a block are made of: a view along an axis, its faces from back to front.
 
-NumPy only. Corners are world positions (body_count, 4, 3) [m], as ``record.body_corners`` gives.
+Bodies are coloured by a value, lines by another, a mesh before a run by its groups. Corners are
+world positions (body_count, 4, 3) [m], as ``record.body_corners`` gives.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import matplotlib
 import numpy as np
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import ListedColormap, to_rgb
+from matplotlib.text import OffsetFrom
 
+from taichi_dem.kit.display import counted
+from taichi_dem.kit.plot_style import area_key, png_of, styled
+from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
 from taichi_dem.mesh.topology import Topology, skin
 from taichi_dem.output.cracks import picture_axes
+from taichi_dem.output.record import Frame, body_corners
+from taichi_dem.state.model import Model
 
 #: Faces that lean away from the viewer by less than this sine count as seen edge on.
 _EDGE_ON = 1e-6
+STONE, JOINT = "#E4E0D6", "#C9C3B5"
+#: A view along the z axis.
+ALONG_Z = (0.0, 0.0, 1.0)
+#: Colours of groups, one after the other; those of colour-blind eyes first.
+_COLOURS = (
+    *("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255", "#999933"),
+    *("#6A51A3", "#8C6D31", "#222222", "#F0E442"),
+)
+_NONE = "#DDDDDD"
+#: Directions to the viewer, of both views.
+_AXES = (0.55, 0.5, 1.0), (-0.55, -0.5, -1.0)
+#: Share of the light on a face that is seen edge on.
+_DARKEST, _SQUARE = 0.7, 2.0**0.5
+#: Centre of the arrows of x, y and z, from the upper right corner, and their length [points].
+_TRIAD, _ARROW = (-30.0, 24.0), 18.0
+#: Most lines of the legend.
+_MOST = 24
 
 
 class View:
@@ -101,3 +128,197 @@ def _edges(triangles):
 def _edge_keys(edges, point_count):
     """One number for every edge (n, 2), whichever way round it is given."""
     return edges.min(axis=1).astype(np.int64) * point_count + edges.max(axis=1)
+
+
+def shades(name: str, low: float, high: float, count: int = 256) -> ListedColormap:
+    """A part of a map of colours of matplotlib; low, high: shares of it."""
+    return ListedColormap(matplotlib.colormaps[name](np.linspace(low, high, count)))
+
+
+def displaced(model: Model, frame: Frame, magnify: float) -> np.ndarray:
+    """Corners of all bodies (body_count, 4, 3) [m], their displacement magnified."""
+    rest = model.mesh.points[model.mesh.tetrahedra]
+    return rest + magnify * (body_corners(model, frame) - rest)
+
+
+def frame_block(axes: Any, view: View, model: Model, margin: float = 0.05) -> None:
+    """Limits, equal scales and labels of a view of the whole block; margin: share of its size."""
+    flat = view.project(model.mesh.points)
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    pad = margin * (high - low).max()
+    axes.set(xlim=(low[0] - pad, high[0] + pad), ylim=(low[1] - pad, high[1] + pad))
+    axes.set_aspect("equal")
+    axes.locator_params(nbins=5)
+    axes.grid(False)
+
+
+def draw_stone(axes: Any, view: View, model: Model) -> None:
+    """Draw the outer faces of the block at rest, all in one colour."""
+    rest = model.mesh.points[model.mesh.tetrahedra]
+    polygons, _, _ = surface(model.topology, view, rest, np.zeros(model.bond_count, dtype=bool))
+    axes.add_collection(PolyCollection(polygons, facecolor=STONE, edgecolor=JOINT, linewidth=0.4))
+
+
+def draw_lines(axes: Any, segments: np.ndarray, values: np.ndarray, **look: Any) -> Any:
+    """Draw lines (n, points, 2) coloured by a value each; look: of the ``LineCollection``.
+
+    By default colours run from dark to orange: light yellow would vanish on the stone.
+    """
+    lines = LineCollection(segments, **{"cmap": shades("plasma", 0.0, 0.88), **look})
+    lines.set_array(values)
+    lines.set_capstyle("round")
+    axes.add_collection(lines)
+    return lines
+
+
+def draw_bodies(
+    axes: Any,
+    model: Model,
+    frame: Frame | None,
+    values: np.ndarray,
+    *,
+    magnify: float = 1.0,
+    broken: Any = None,
+    axis: Sequence[float] = ALONG_Z,
+    **look: Any,
+) -> Any:
+    """Draw the bodies where they are, coloured by a value each; returns the collection.
+
+    frame: a ``Frame``, None for the bodies at rest. values: (n,). magnify: of the displacement.
+    broken: (bond_count,) bool, bonds into which one sees. axis: towards the viewer. look: of the
+    ``PolyCollection``, such as cmap, norm, clim.
+    """
+    drawn = PolyCollection([], **{"linewidth": 0.3, "edgecolor": "#00000060", **look})
+    move_bodies(drawn, model, frame, values, magnify=magnify, broken=broken, axis=axis)
+    axes.add_collection(drawn)
+    axes.set_aspect("equal")
+    axes.grid(False)
+    return drawn
+
+
+def move_bodies(
+    drawn: Any,
+    model: Model,
+    frame: Frame | None,
+    values: np.ndarray,
+    *,
+    magnify: float = 1.0,
+    broken: Any = None,
+    axis: Sequence[float] = ALONG_Z,
+) -> None:
+    """Change what ``draw_bodies`` has drawn to another frame: arguments as there."""
+    corners = model.mesh.points[model.mesh.tetrahedra]
+    if frame is not None:
+        corners = displaced(model, frame, magnify)
+    whole = np.zeros(model.bond_count, dtype=bool)
+    seen = whole if broken is None else broken
+    polygons, body, _ = surface(model.topology, View(axis), corners, seen)
+    drawn.set_verts(polygons)
+    drawn.set_array(values[body])
+
+
+def picture_of_groups(mesh: Mesh, acting: Mapping[str, Sequence[str]]) -> bytes:
+    """The outer faces of a mesh as PNG, from the front and from behind, coloured by group.
+
+    A face in several groups has the colour of the smallest. Without groups of faces, colours are
+    those of the groups of bodies.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    acting : dict
+        Group to what acts on it, words for the legend.
+    """
+    faces = geometry.all_faces(mesh.tetrahedra)
+    rows = geometry.outer_rows(faces)
+    outer = faces[rows]
+    names, member = _members(mesh, outer, rows // 4)
+    with styled(1, 2, size=(9.6, 4.8), sharey=True) as (figure, panels):
+        for axes, axis, title in zip(panels, _AXES, ("from the front", "from behind and below")):
+            view = ObliqueView(axis)
+            _draw(axes, mesh, outer, member, view)
+            _draw_axes(axes, view)
+            axes.set_title(title, fontsize=9)
+        panels[0].set_ylabel("in the picture [m]")
+        keys = _keys(mesh, names, member, acting)
+        figure.legend(handles=keys, loc="outside lower center", ncols=3, fontsize=8)
+        return png_of(figure)
+
+
+def _keys(mesh, names, member, acting):
+    """Lines of the legend."""
+    counts = [(member == k).sum() for k in range(len(names))]
+    keys = [
+        area_key(_label(name, counts[k], acting), facecolor=_COLOURS[k % len(_COLOURS)])
+        for k, name in enumerate(names[:_MOST])
+    ]
+    if len(names) > _MOST:
+        keys.append(area_key(f"and {len(names) - _MOST} more groups", facecolor="white"))
+    if (member < 0).any():
+        keys.append(area_key(_label("no group", (member < 0).sum(), {}), facecolor=_NONE))
+    return keys
+
+
+def _members(mesh, outer, bodies):
+    """Names of groups, and the place of that of each outer face, -1 for none, (n,)."""
+    sizes = {name: len(faces) for name, faces in mesh.groups.items()}
+    names = [name for name in sizes if name not in mesh.inner_groups]
+    member = np.full(len(outer), -1)
+    if names:
+        number, *members = geometry.numbers_in(outer, *(mesh.groups[name] for name in names))
+        chosen = np.full(max(map(np.max, (number, *members))) + 1, -1)
+        for k in sorted(range(len(names)), key=lambda k: -sizes[names[k]]):
+            chosen[members[k]] = k
+        member = chosen[number]
+    else:
+        names = list(mesh.body_groups)
+        for k, name in enumerate(names):
+            member[np.isin(bodies, mesh.body_groups[name])] = k
+    shown = [k for k in range(len(names)) if (member == k).any()]
+    places = np.full(len(names) + 1, -1)
+    places[shown] = np.arange(len(shown))
+    return [names[k] for k in shown], places[member]
+
+
+class ObliqueView(View):
+    """A view along any axis, y up in the picture. axis: from the mesh to the viewer."""
+
+    def __init__(self, axis: Sequence[float]):
+        self.toward = np.array(axis) / np.linalg.norm(axis)
+        right = np.cross([0.0, 1.0, 0.0], self.toward)
+        self.right = right / np.linalg.norm(right)
+        self.up = np.cross(self.toward, self.right)
+
+
+def _draw(axes, mesh, outer, member, view):
+    """Faces that are seen, from back to front, the darker the more they lean away."""
+    triangles = mesh.points[outer]
+    seen = view.facing(triangles)
+    palette = np.array([to_rgb(colour) for colour in (*_COLOURS, _NONE)])
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    light = normal @ (view.toward + view.up) / np.linalg.norm(normal, axis=1)
+    shade = _DARKEST + (1.0 - _DARKEST) * np.clip(light[seen] / _SQUARE, 0.0, 1.0)
+    place = np.where(member < 0, len(_COLOURS), member % len(_COLOURS))
+    look = {"facecolors": palette[place[seen]] * shade[:, None], "edgecolors": "#00000055"}
+    axes.add_collection(PolyCollection(view.project(triangles[seen]), linewidths=0.25, **look))
+    axes.set(xlabel="in the picture [m]", aspect="equal")
+    axes.grid(False)
+    axes.autoscale_view()
+    axes.margins(0.08)
+
+
+def _draw_axes(axes, view):
+    """Directions of x, y and z above the upper right corner."""
+    middle = np.array(_TRIAD)
+    fixed = {"xycoords": "axes fraction", "textcoords": "offset points", "annotation_clip": False}
+    for name, along in zip("xyz", view.project(np.eye(3))):
+        end, letter = middle + _ARROW * along, middle + (_ARROW + 7.0) * along
+        line = {"arrowstyle": "->", "lw": 0.9, "shrinkA": 0.0, "shrinkB": 0.0}
+        tip = OffsetFrom(axes, (1.0, 1.0))
+        axes.annotate("", end, middle, xycoords=tip, textcoords=tip, arrowprops=line)
+        axes.annotate(name, (1.0, 1.0), letter, ha="center", va="center", fontsize=8, **fixed)
+
+
+def _label(name, count, acting):
+    """Name of a group with its number of faces, and what acts on it."""
+    return ", ".join([f"{name}: {counted(int(count), 'face')}", *acting.get(name, ())])

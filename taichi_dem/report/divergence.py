@@ -12,7 +12,7 @@ from taichi_dem.physics.sphere_pair import DEEPEST_SHARE, SUNK
 from taichi_dem.report.energy_balance import EnergyBalance, unexplained_share
 from taichi_dem.report.readings import Run
 from taichi_dem.report.shared_volume import SharedVolume
-from taichi_dem.stability.stable_step import dashpot_step, spring_step
+from taichi_dem.stability.body_limits import dashpot_step, spring_step
 from taichi_dem.stability.step_report import bond_steps
 from taichi_dem.step.drivers import CALL_SECONDS
 

@@ -1,17 +1,27 @@
-"""Effects of a run: what acted, since when, and with what share of the energy."""
+"""Effects of a run: what acted, since when, and with what share of the energy.
 
+And the certificate of a run with effects="auto": what was left out.
+"""
+
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.audit import Audit
+from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.mesh.topology import parts_of
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.report.energy_balance import EnergyBalance
-from taichi_dem.report.missing_effects import bond_rounding
+from taichi_dem.report.estimates import AIR, BENDS, WEIGHT, Estimate, PartScales
+from taichi_dem.report.missing_effects import MissingEffect, bond_rounding
 from taichi_dem.report.readings import Run
-from taichi_dem.state.activity import LATER
-from taichi_dem.state.timeline import NEVER
+from taichi_dem.state.state import LATER
+from taichi_dem.state.timeline import MACRO_TICKS, NEVER
 
 _EPSILON = np.finfo(np.float64).eps
 #: Terms of the account that pass through bonds; dashpots are compared with their sum.
@@ -28,6 +38,7 @@ _LAWS = {
 }
 _WITHOUT_WORK = ", and holds without doing work"
 _OWN = "the account need not show what an effect of your own does"
+_SHARE = "share of the energy put in, at most"
 
 
 def on_demand(run: Run) -> tuple[dict[str, np.ndarray], int, int]:
@@ -155,3 +166,204 @@ class _Uses:
         if role in ("bond", "tension", "shear"):
             found.update(evaluations=self.evaluated, skipped=self.skipped)
         return found
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What acted in a run with effects="auto", and a bound of what was left out.
+
+    Parameters
+    ----------
+    acting : tuple of EffectUse
+        Activity, onset and evaluations of each effect.
+    sleep : float
+        Share that was asked for [-], see ``Scene``.
+    asleep : float
+        Share of bodies times time that were asleep.
+    impulse : float
+        Bound of the impulse that sleeping bonds of a connected part left out, as a share of the
+        momentum of that part; of the part where this is largest.
+    energy : float
+        Bound of the energy that they left out, as a share of the energy of that part, likewise.
+    audits : tuple of Audit
+        Audit of what sleeps.
+    left_out : tuple of Estimate
+        Estimate of each effect that no law of the scene serves.
+    missing : tuple of MissingEffect, default ()
+        Effects that were left out and would have acted.
+    """
+
+    acting: tuple[EffectUse, ...]
+    sleep: float
+    asleep: float
+    impulse: float
+    energy: float
+    audits: tuple[Audit, ...]
+    left_out: tuple[Estimate, ...]
+    missing: tuple[MissingEffect, ...] = ()
+
+    @property
+    def law_evaluations(self) -> int:
+        """Evaluations of the law of bonds, one for each unit; effects that share it share them."""
+        return max((use.evaluations for use in self.acting), default=0)
+
+    @property
+    def all_law_evaluations(self) -> int:
+        """Evaluations of them that effects="all" makes."""
+        return self.law_evaluations + max((use.skipped for use in self.acting), default=0)
+
+    @property
+    def law_ratio(self) -> float:
+        """Factor by which evaluations of the law of bonds are fewer than with effects="all"."""
+        return self.all_law_evaluations / max(1, self.law_evaluations)
+
+    @property
+    def holds(self) -> bool:
+        """Whether no audit found a miss, no part left out more than asked, nothing is missed."""
+        return not self.failure
+
+    @property
+    def failure(self) -> str:
+        """Why the certificate does not hold, and what settles it; ``""`` where it holds."""
+        missed = [audit.failure for audit in self.audits if audit.misses]
+        if not self.impulse <= self.sleep:
+            missed.append(
+                f"sleep left out {self.impulse:.2g} of a part's impulse, {self.sleep:g} asked"
+            )
+        missed += [one.what for one in self.missing]
+        remedy = "run the scene with effects='all'"
+        if self.missing:
+            remedy = f"list {', '.join(one.effect for one in self.missing)}"
+        return f"{', and '.join(missed)}: {remedy}" if missed else ""
+
+    def __repr__(self):
+        return in_brief(self, *self._acted(), "" if self.holds else "does not hold")
+
+    def as_dict(self) -> dict[str, Any]:
+        """All figures, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Figures by name.
+        """
+        laws = "law_evaluations", "all_law_evaluations", "law_ratio"
+        return {
+            "acting_since_s": {use.effect: use.since_s for use in self.acting},
+            **{name: getattr(self, name) for name in (*laws, "sleep", "asleep", "holds")},
+            "left_out_impulse": self.impulse,
+            "left_out_energy": self.energy,
+            "audits": [audit.as_dict() for audit in self.audits],
+            "left_out": [estimate.as_dict() for estimate in self.left_out],
+        }
+
+    def __str__(self):
+        """A line for every kind of thing."""
+        return "\n".join([*self._acted(), *self.left_out_lines()])
+
+    def left_out_lines(self) -> list[str]:
+        """What was left out, in lines."""
+        skipped = 100.0 * (1.0 - self.law_evaluations / max(1, self.all_law_evaluations))
+        asleep = "asleep: no body, as sleep is 0"
+        if self.sleep:
+            asleep = (
+                f"asleep: {100.0 * self.asleep:.3g} % of body-steps (left out: at most "
+                f"{self.impulse:.1g} of the impulse, {self.energy:.1g} of the energy of a part; "
+                f"{self.sleep:g} asked)"
+            )
+        lines = [
+            f"law of bonds: {skipped:.3g} % of its evaluations skipped",
+            asleep,
+            *(f"left out: {estimate}" for estimate in self.left_out),
+            *(f"audit: {audit}" for audit in self.audits if audit.skipped),
+        ]
+        if not self.holds:
+            lines.append(f"this certificate does not hold, as {self.failure}")
+        return lines
+
+    def _acted(self):
+        """A line for each effect: what it did, and since when."""
+        for use in self.acting:
+            begun = f" from {1e3 * use.since_s:.3g} ms" if use.since_s is not None else ""
+            yield f"{use.effect}: {'never' if use.idle else use.acted + begun}"
+
+
+def certificate_of(simulation: Any, report: Any) -> Certificate:
+    """Certificate of a run so far.
+
+    simulation: the ``Simulation``, started. report: its ``Report`` without a certificate.
+    """
+    run, now = simulation.parts, simulation.time_s
+    schedule = run.schedule
+    awake = np.nan_to_num(on_demand(run)[0]["awake"], nan=now)
+    links = np.stack([run.model.topology.master, run.model.topology.slave])
+    # Evaluations of bonds that sleep has spared, at the largest step.
+    until = awake[links].max(axis=0, initial=0.0)
+    asleep = int(until.sum() / (schedule.tick_seconds * MACRO_TICKS))
+    audit = simulation.step.audit
+    audited, missed = int(values(audit.audited)), int(values(audit.misses))
+    scales = PartScales(run.model, parts_of(run.model.mesh))
+    energy = _energy(run, simulation.energy_balance, scales)
+    impulse, left_energy = _left_out(run, simulation.energy_balance, scales, energy)
+    return Certificate(
+        acting=report.effect_activity,
+        sleep=float(values(schedule.sleeping.share)),
+        asleep=float(awake.mean() / now) if now > 0.0 else 0.0,
+        impulse=impulse,
+        energy=left_energy,
+        audits=(Audit(max(asleep, audited), audited, missed, "bonds asleep"),),
+        left_out=_not_served(simulation, scales, energy),
+        missing=report.missing_effects,
+    )
+
+
+def _energy(run, balance, scales):
+    """Energy that each part got [J]: from loads and supports, or what it has and took if more.
+
+    Zero where it is no more than rounding leaves.
+    """
+    body, bond, _ = balance.tables()
+    given = sum(np.abs(scales.sum(column)) for column in body[:, 1:3].T)
+    taken = scales.sum(body[:, 0]) + scales.sum_of_bonds(bond.sum(axis=1))
+    energy = np.maximum(given, taken)
+    return np.where(energy > scales.sum_of_bonds(bond_rounding(run)), energy, 0.0)
+
+
+def _left_out(run, balance, scales, energy):
+    """Largest shares of impulse and energy of a part that sleep left out there."""
+    table = np.zeros((max(1, run.model.bond_count), 2))
+    run.readings.left_out(table)
+    left = [scales.sum_of_bonds(column) for column in table[: run.model.bond_count].T]
+    wholes = balance.momentum_exchanged(scales.sum), energy
+    return [float((part / np.maximum(whole, 1e-300)).max()) for part, whole in zip(left, wholes)]
+
+
+def _not_served(simulation, scales, energy):
+    """Estimates of what no law of the scene serves, from where the run has brought the bodies.
+
+    Shares of the energy that each part got, 0 where nothing moved it: work of the weight along the
+    way and its fall, and of the drag of air on balls of the bodies' size at their present speed.
+    Where a support, ground or contact bears a part, weight strains it too.
+    """
+    motion, model, until, found = simulation.motion(), simulation.model, simulation.time_s, []
+    way = np.linalg.norm(motion["position"] - simulation.first_motion["position"], axis=1)
+    speed = np.linalg.norm(motion["velocity"], axis=1)
+    if not any(effect.name == "gravity" for effect in model.loads):
+        active = values(simulation.state.active_effects, slice(model.body_count))
+        borne = scales.under((*model.supports, *model.ground))
+        borne |= scales.sum(active & np.int64(CONTACT)) > 0
+        fall = WEIGHT * until
+        work = model.body_mass * (WEIGHT * way + fall * speed + 0.5 * fall**2)
+        share = _share(scales.sum(work), energy)
+        # What is borne and not moved at all does not fall.
+        share = np.where(borne & (energy == 0.0), 0.0, share)
+        groups = (share, _SHARE), (scales.bent(until, borne), BENDS)
+        found.append(scales.worst("gravity", *groups))
+    drag = 0.5 * AIR * math.pi * model.body_radius**2 * speed**2
+    return (*found, scales.worst("air drag", (_share(scales.sum(drag * way), energy), _SHARE)))
+
+
+def _share(work, energy):
+    """Share of an energy; not known where there is none."""
+    none = np.where(work > 0.0, np.nan, 0.0)
+    return np.where(energy > 0.0, work / np.where(energy > 0.0, energy, 1.0), none)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.validation import instance, positive
-from taichi_dem.mesh.parts import may_meet, part_boxes, parts_of, parts_under
+from taichi_dem.mesh.topology import may_meet, part_boxes, parts_of, parts_under
 from taichi_dem.scene import Scene
 from taichi_dem.state.model import Model, centres, sums
 

@@ -13,9 +13,8 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.products import norm
 from taichi_dem.kit.types import vec3
-from taichi_dem.state.activity import PARTS
 from taichi_dem.state.model import Model
-from taichi_dem.state.state import State
+from taichi_dem.state.state import PARTS, State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.multirate.half_step import HalfStep

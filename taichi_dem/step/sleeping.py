@@ -13,7 +13,7 @@ import taichi as ti
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.products import dot, norm, squared
 from taichi_dem.kit.types import real, vec2, vec3
-from taichi_dem.mesh.parts import parts_of
+from taichi_dem.mesh.topology import parts_of
 from taichi_dem.physics.bond import unit_arm, unit_opening, unit_velocity
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State

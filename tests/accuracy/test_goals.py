@@ -63,7 +63,7 @@ def bodies_at(mesh, group):
 
 def test_values_of_a_run(blast):
     """Each by a formula of its own; sums of other orders round in the last digits."""
-    mesh, last, history = blast.scene.mesh, blast.frames[-1], blast.history
+    mesh, last, history = blast.scene.mesh, blast.frames[-1], blast.series
     speeds = np.array([frame.speed for frame in blast.frames])
     work = history["gas_work_J"][-1]
     wanted = {

@@ -2,10 +2,10 @@
 
 import pytest
 
-from taichi_dem import BranchedAnswer, goals
-from taichi_dem.accuracy.job import Job
+from taichi_dem import goals
+from taichi_dem.accuracy.runs import Job
 from taichi_dem.kit.audit import Audit
-from taichi_dem.report.certificate import Certificate
+from taichi_dem.report.effects import Certificate
 from tests.accuracy.made_up_runs import scattered, searched
 from tests.accuracy.small_bar import UNTIL, struck_bar
 
@@ -108,7 +108,7 @@ def test_runs_that_come_to_two_ends_are_branches(monkeypatch):
         events=True,
         change_between=lambda a, b: 0.1,
     )
-    assert isinstance(answer, BranchedAnswer) and not answer.reached
+    assert answer.branches and not answer.reached
     assert [round(one.value, 9) for one in answer.branches] == [3.0, 4.0]
     assert answer.value == 3.0
 

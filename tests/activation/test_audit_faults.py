@@ -4,7 +4,7 @@ import pytest
 import taichi as ti
 
 from taichi_dem.kit.products import squared
-from taichi_dem.step import audit
+from taichi_dem.step import phases
 from taichi_dem.step.sleeping import Sleeping
 from tests.activation.late_runs import Run
 
@@ -19,7 +19,7 @@ def too_deep(self, i, is_fast):
 
 def test_sleep_that_is_too_deep_is_found(monkeypatch, compiled_anew):
     """Every bond is audited in every substep, in engines of this test alone."""
-    monkeypatch.setattr(audit, "RATE", 1)
+    monkeypatch.setattr(phases, "RATE", 1)
     compiled_anew()
     monkeypatch.setattr(Sleeping, "_opens", too_deep)
     made = Run("far_end 0", "auto")

@@ -113,7 +113,7 @@ def test_an_answer_is_reached_only_if_its_certificate_holds():
     """A bar sleeps beside a block of 20 t that flies at 9 km/s; to the word, "all" differs."""
     mesh = beside(bar(0.4, 0.05, (8, 1, 1)), bar(2.0, 1.0, (2, 1, 1)), [0.0, 5.0, 0.0])
     flies = np.arange(mesh.body_count)[:, None] >= 48
-    blow = effects.GasPressure("first left", peak=3e7, rise=2e-5, decay_ratio=0.5)
+    blow = effects.GasPressure("first_left", peak=3e7, rise=2e-5, decay_ratio=0.5)
     scene = Scene(mesh, CONCRETE, "auto", loads=[blow], velocity=9e3 * flies * [0.0, 1.0, 0.0])
     answer = solve(scene, until=6e-4, goal=goals.broken_faces())
     assert answer.error == 0.0 and answer.reached == answer.certificate.holds

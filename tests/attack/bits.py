@@ -32,7 +32,7 @@ def tables():
         "bonds": tuple(model.bonds.values()),
         "spheres": tuple(vars(model.spheres).values()),
         "rates": [subset_rates(*shape, dashpots_of(model.material))],
-        "contacts": contact_eigenvalues(model.mesh, 2400.0, 5, True),
+        "contacts": (contact_eigenvalues(model.mesh, 2400.0, 5, True),),
         "functions": [(*sine_and_cosine(x), fifth_root(x)) for x in at],
     }
     return {name: digest(*arrays) for name, arrays in made.items()}
@@ -47,7 +47,7 @@ def blast():
     )
     result = simulate(scene, method=ImplicitDashpots(2e-7), until=4e-5, frames=1, progress=None)
     last = result.frames[-1]
-    return digest(*result.history.values(), last.position, last.velocity, last.damage)
+    return digest(*result.series.values(), last.position, last.velocity, last.damage)
 
 
 def damper():

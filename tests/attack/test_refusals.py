@@ -2,8 +2,8 @@
 
 import pytest
 
-from docs.site.public_api import PACKAGES
 from tests.bad_input.test_calls import faults
+from tests.public_api import PACKAGES
 
 pytestmark = pytest.mark.attack
 

@@ -69,7 +69,7 @@ def run_in(length, mass, time, number, weight, speed):
     result = simulate(scene, method=method, until=3e-5 * time, frames=1, progress=None)
     last, report = result.frames[-1], result.report
     assert report.broken_faces > 0 and report.pair_evaluations > 0
-    joules = [v / of(2, 1, -2) for k, v in result.history.items() if k.endswith("_J")]
+    joules = [v / of(2, 1, -2) for k, v in result.series.items() if k.endswith("_J")]
     motion = [last.position / length, last.rotation, last.velocity / of(1, 0, -1)]
     work = [report.substeps, report.bond_evaluations, report.pair_evaluations, report.searches]
     return [*motion, result.broken_time / time, *joules, work]

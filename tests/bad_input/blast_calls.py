@@ -7,8 +7,6 @@ import tempfile
 from dataclasses import fields
 from functools import partial
 
-import numpy as np
-
 from taichi_dem import (
     CONCRETE,
     PAPER_BLOCK,
@@ -26,7 +24,6 @@ from taichi_dem import (
     Scene,
     Simulation,
     StepControl,
-    Table,
     Uniform,
     checked_mesh,
     effects,
@@ -45,7 +42,7 @@ from taichi_dem import (
     step_report,
     write_paraview,
 )
-from taichi_dem.mesh.face_groups import with_inner_group
+from taichi_dem.mesh.mesh import with_inner_group
 from taichi_dem.mesh.shapes import bar, pair, single
 from tests.made_result import made_result
 
@@ -180,9 +177,6 @@ def _results():
     yield "ProgressBar", ProgressBar, {"title": "x"}
     yield "ProgressBar.at", bar_title.at, {"share": 0.5}
     yield "ProgressBar.count", bar_title.count, {"done": 1, "total": 2}
-    columns = {"time_s": np.arange(3.0), "x": np.arange(3.0)}
-    yield "Table", Table, {"columns": columns, "units": {"x": "m"}, "index": "time_s"}
-    yield "Table.write_csv", Table(columns).write_csv, {"path": path("t.csv")}
     series = {"folder": path("pv"), "model": done.model, "frames": done.frames}
     yield "write_paraview", write_paraview, series
     where = "result.Result"
@@ -191,7 +185,7 @@ def _results():
     yield f"{where}.show", run(frames=1).show, page
     yield f"{where}.write_xyz", done.write_xyz, {"path": path("v.xyz")}
     yield f"{where}.write_gltf", done.write_gltf, {"path": path("v.glb")}
-    for name in ("frame", "fragments"):
+    for name in ("frame", "fragments", "fragment_of_body"):
         key = "number" if name == "frame" else "frame"
         yield f"{where}.{name}", getattr(done, name), {key: 1}
     yield f"{where}.rose", done.rose, {"axis": (0.0, 0.0, 1.0)}

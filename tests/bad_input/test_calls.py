@@ -6,18 +6,17 @@ import inspect
 import numpy as np
 import pytest
 
-from docs.site.docstrings import parsed
-from docs.site.public_api import PACKAGES, declared, entries, returned
 from taichi_dem import InputError
 from taichi_dem.kit.validation import shown
 from tests.bad_input.blast_calls import blast_calls
 from tests.bad_input.damper_calls import damper_calls
 from tests.bad_input.kinds import wrong_values
 from tests.bad_input.refusals import ends_within
+from tests.public_api import PACKAGES, declared, entries, parameters, returned
 
 CALLS = {"taichi_dem": functools.cache(blast_calls), "ca_damper": functools.cache(damper_calls)}
 #: Classes that users are given and do not make.
-GIVEN = """Answer Branch BranchedAnswer Progress Received RunView SweepTable AmplitudeResponse
+GIVEN = """Answer Branch Progress Received RunView SweepTable AmplitudeResponse
     Certificate CollectAndCollide DamperMap Report Response SimulationDiverged StructureHistory
     Sweep TimeHistory runtime.Settings""".split()
 #: Functions that need more than values to be tried: processes, an STL file, or a session.
@@ -30,9 +29,9 @@ def documented(package):
     """(entry, types of its parameters) by name, of all that the docs of a package describe."""
     found = {}
     for entry in [*entries(package), *returned(package)]:
-        rows = parsed(declared(entry).text).lists.get("Parameters", ())
-        if rows:
-            found[entry.name] = entry, {row.name: row.type for row in rows}
+        types = parameters(declared(entry).text)
+        if types:
+            found[entry.name] = entry, types
     return found
 
 

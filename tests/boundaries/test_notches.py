@@ -15,12 +15,11 @@ from taichi_dem import (
     in_space_order,
     read_mesh,
 )
-from taichi_dem.mesh.face_groups import with_cut, with_inner_group
 from taichi_dem.mesh.files import write_mesh
-from taichi_dem.mesh.parts import parts_of
+from taichi_dem.mesh.mesh import with_cut, with_inner_group
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.mesh.tetrahedra import area_vectors
-from taichi_dem.mesh.topology import topology_of
+from taichi_dem.mesh.topology import parts_of, topology_of
 from taichi_dem.scene import outer_faces_warnings
 
 PAIR = with_inner_group(pair(), "middle", lambda x: x[:, 0] < 1.0)

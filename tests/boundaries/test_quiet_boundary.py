@@ -15,7 +15,7 @@ from taichi_dem import (
     Uniform,
     effects,
 )
-from taichi_dem.elasticity.wave_moduli import wave_moduli
+from taichi_dem.elasticity.rates import wave_moduli
 from taichi_dem.mesh.shapes import bar, single
 
 #: Concrete whose bonds have no dashpots, so that no wave fades.

@@ -5,8 +5,8 @@ import math
 import numpy as np
 
 from ca_damper import Automaton, Oscillator, goals
-from ca_damper.accuracy.error_reduction import Reduction
 from ca_damper.accuracy.job import Job
+from ca_damper.accuracy.search import Search
 from ca_damper.report.measures import MEASURE_UNITS
 
 
@@ -81,11 +81,10 @@ def two_motions(fall, rise, low=0.7, noise=0.02):
 
 def asked(make, seed, tolerance):
     """(value, half-width, whether branched) of rms at f0, of drawn runs."""
-    job = Job(Automaton(), 10, Oscillator(), None, None)
-    job.goals, job.tolerance = (goals.rms_at(1.0),), tolerance
-    done = Reduction(job, DrawnRuns(make, np.random.default_rng(seed)), 2e-4)
-    (found,) = done.run()
-    return float(found.value[0]), float(found.parts.total[0]), done._is_branched(found)
+    job = Job(Automaton(), 10, Oscillator(), (goals.rms_at(1.0),), tolerance)
+    (found,) = Search(job, DrawnRuns(make, np.random.default_rng(seed)), 2e-4).run()
+    is_branched = len(found.clusters(tolerance)) > 1
+    return float(found.value[0]), float(found.parts.total[0]), is_branched
 
 
 def share_held(make, mean, count, tolerance):

@@ -9,7 +9,6 @@ import pytest
 from ca_damper import (
     Automaton,
     Batch,
-    BranchedAnswer,
     Empty,
     Oscillator,
     RigidMass,
@@ -19,9 +18,9 @@ from ca_damper import (
     goals,
     solve_response,
 )
-from ca_damper.accuracy import steady_runs
+from ca_damper.accuracy import runs
 from ca_damper.accuracy.job import Job
-from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
+from ca_damper.accuracy.runs import SceneKey, SceneRuns
 from ca_damper.report.certificate import Certificate
 from taichi_dem.kit.audit import Audit
 from tests.paper import outside, paper
@@ -112,7 +111,7 @@ def test_several_steady_motions_come_as_branches(monkeypatch):
     """Three seeds differ by more than 1 %: twelve make two clusters of 8 and 4."""
     monkeypatch.setattr(MODULE, "SceneRuns", TwoMotions)
     answer = grains(0.01)
-    assert isinstance(answer, BranchedAnswer) and not answer.reached
+    assert not answer.reached
     assert len(answer.branches) == 2 and answer.branches[1].share < 0.5
     many, few = answer.branches
     assert few.value == pytest.approx(0.75 * many.value, rel=0.02) and answer.value == many.value
@@ -165,7 +164,7 @@ def test_scenes_go_on_from_where_they_are_each_as_far_as_asked():
 
 def test_a_scene_that_is_never_steady_says_so(monkeypatch):
     """A damping ratio of 1e-6 takes 160,000 cycles; 400 are allowed here."""
-    monkeypatch.setattr(steady_runs, "_MOST_CYCLES", 400)
+    monkeypatch.setattr(runs, "_MOST_CYCLES", 400)
     answer = solve_response(
         Empty(), particles=0, goal=goals.rms_at(1.0), oscillator=light(1e-6), **QUIET
     )
@@ -206,4 +205,4 @@ def test_spheres_that_start_at_given_places_are_not_drawn():
         (Spheres(start=places), False),
         (Spheres(start=places, sizes=[(1, 6e-3), (1, 5e-3)]), True),
     ):
-        assert Job(filling, 2, Oscillator(), None, None).is_drawn == drawn
+        assert Job(filling, 2, Oscillator()).is_drawn == drawn

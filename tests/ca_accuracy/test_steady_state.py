@@ -12,7 +12,7 @@ from ca_damper.report.steady_state import (
     period,
     steady_part,
 )
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.bars.chance import t_quantile
 
 
 def remembering(count, near, rng):

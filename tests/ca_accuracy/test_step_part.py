@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ca_damper.accuracy.step_part import step_part
+from taichi_dem.kit.bars.step import step_part
 
 THREE = (1.0, 2.0, 4.0)
 FIVE = (1.0, 2.0**0.5, 2.0, 8.0**0.5, 4.0)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from taichi_dem.kit.accuracy.student import f_outside, t_outside, t_quantile
+from taichi_dem.kit.bars.chance import f_outside, t_outside, t_quantile
 
 
 @pytest.mark.parametrize(

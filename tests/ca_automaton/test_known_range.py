@@ -58,7 +58,6 @@ def test_a_change_of_the_scenes_is_looked_at_again():
     [
         ({"accounting": "landing"}, "accounting must be 'all' with rules 'place'.*rules='paper'"),
         ({"rules": "paper", "friction": 0.5}, "friction must be None with rules 'paper'"),
-        ({"rules": "paper", "ledger": True}, "ledger must be False"),
     ],
 )
 def test_options_that_do_not_belong_together_are_refused(options, words):

@@ -93,7 +93,7 @@ def found(name):
     scene = make()
     counted = {"samples": 4, "frames": 2, "progress": None}
     result = simulate(scene, method=method, until=until, driver=driver, **counted)
-    named = ((np.frombuffer(key.encode(), np.uint8), result.history[key]) for key in result.history)
+    named = ((np.frombuffer(key.encode(), np.uint8), result.series[key]) for key in result.series)
     arrays = [part for pair in sorted(named, key=lambda pair: pair[0].tobytes()) for part in pair]
     for frame in result.frames:
         arrays += [frame.position, frame.rotation, frame.velocity]

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import ImplicitDashpots, Simulation, runtime
-from taichi_dem.step.auto_driver import PARALLEL_FROM, RESIDENT_BELOW, AutoDriver, driver_name
-from taichi_dem.step.drivers import DRIVERS
+from taichi_dem.step.drivers import DRIVERS, PARALLEL_FROM, RESIDENT_BELOW, AutoDriver, driver_name
 from tests.bar_blast import UNTIL, bar_scene
 
 METHOD = ImplicitDashpots(4e-7, refresh=1e-5)
@@ -42,7 +41,8 @@ def test_the_faster_driver_is_chosen_again_and_again_and_changes_no_bit():
     straight.advance_to(STEPS)
     changing, clock = Simulation(bar_scene(), METHOD, "resident"), Slow("resident")
     drivers = {name: kind(changing.step) for name, kind in DRIVERS.items()}
-    changing.driver = AutoDriver(changing.step, drivers, clock)
+    changing.driver = AutoDriver(changing.step, drivers)
+    changing.driver.clock = clock
     changing.start()
     clock.time_calls(changing.driver)
     names = [changing.driver.name]

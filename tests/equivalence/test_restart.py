@@ -12,7 +12,7 @@ from taichi_dem import CONCRETE, Checkpoint, InputError, Scene, Simulation, effe
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.checkpoint import read_checkpoint
 from taichi_dem.kit.field_memory import FieldMemory, fields_of
-from taichi_dem.mesh.face_groups import with_cut
+from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.record import Recorder
 from taichi_dem.saving import saved_run
@@ -178,12 +178,12 @@ def test_simulate_goes_on_to_a_later_time(light, tmp_path):
     path, job = light
     whole = simulate(light_scene(), until=1e-5, **job)
     rest = simulate(light_scene(), until=1e-5, resume=path, **job)
-    marks = np.round(1e6 * rest.history["time_s"], 9).tolist()
+    marks = np.round(1e6 * rest.series["time_s"], 9).tolist()
     assert marks == [0, 1, 2, 3, 4, 5, 6, 8, 10]
     assert len(rest.frames) == 5 - 1
     assert np.array_equal(rest.frames[-1].position, whole.frames[-1].position)
-    for name, column in whole.history.items():
-        assert rest.history[name][-1] == column[-1], name
+    for name, column in whole.series.items():
+        assert rest.series[name][-1] == column[-1], name
 
 
 def test_a_full_disk_at_the_end_names_the_checkpoint(light, tmp_path, monkeypatch):

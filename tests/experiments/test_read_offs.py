@@ -29,7 +29,7 @@ from taichi_dem.kit.study.work_precision import Point, answers, cheapest
 from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import topology_of
-from taichi_dem.output.attenuation import Attenuation, attenuation_of
+from taichi_dem.output.hole_monitor import Attenuation, attenuation_of
 from taichi_dem.state.model import Model
 
 # The package has functions of these names.

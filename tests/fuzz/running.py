@@ -54,8 +54,8 @@ def run_blast(trial):
     judge_blast(result)
     if trial.kind.both and trial.draws.chance(0.2):
         other = moving(trial, "parallel")
-        for name, column in result.history.items():
-            assert column.tobytes() == other.history[name].tobytes(), f"{name} by parallel loops"
+        for name, column in result.series.items():
+            assert column.tobytes() == other.series[name].tobytes(), f"{name} by parallel loops"
         assert same(vars(result.frames[-1]), vars(other.frames[-1]), ("velocity",))
 
 
@@ -71,13 +71,13 @@ def moving(trial, driver):
 def judge_blast(result):
     """No number that is none, no momentum from nowhere, no account left open, without a word."""
     report = result.report
-    for name, column in result.history.items():
+    for name, column in result.series.items():
         assert np.isfinite(column).all(), f"no finite {name}, without a word"
     for frame in result.frames:
         for name in ("position", "rotation", "velocity", "damage"):
             assert np.isfinite(getattr(frame, name)).all(), f"no finite {name}, without a word"
     # Where supports hold all that is loaded, bodies exchange nothing but rounding.
-    if result.history["kinetic_J"].max() > report.round_off_J:
+    if result.series["kinetic_J"].max() > report.round_off_J:
         assert report.linear_momentum_error <= MOMENTUM
     share = unexplained_share(report.energy_balance, report.round_off_J)
     assert share <= UNEXPLAINED or report.unresolved, f"{share:.3g} of the energy unexplained"

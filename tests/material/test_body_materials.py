@@ -14,7 +14,7 @@ from taichi_dem import (
 )
 from taichi_dem.materials.body_materials import joined
 from taichi_dem.materials.bond_rules import bond_geometry
-from taichi_dem.materials.moduli import bond_moduli
+from taichi_dem.materials.material import bond_moduli
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import body_properties, topology_of
 from taichi_dem.methods import Uniform

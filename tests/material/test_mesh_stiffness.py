@@ -8,7 +8,7 @@ import pytest
 from _closed_forms import LinearBonds
 from taichi_dem import checked_mesh, mesh_stiffness
 from taichi_dem.materials.bond_rules import ModulusOverDistance
-from taichi_dem.materials.moduli import POISSON, SPREAD, bond_moduli, elastic_constants
+from taichi_dem.materials.material import POISSON, SPREAD, bond_moduli, elastic_constants
 from taichi_dem.mesh.shapes import bar
 from tests.material.blocks import DENSITY, E, disphenoids, random_block, rock
 

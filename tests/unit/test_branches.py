@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from taichi_dem.kit.accuracy.branches import branches_of, clusters_of
+from taichi_dem.kit.bars.answer import branches_of
+from taichi_dem.kit.bars.chance import clusters_of
 
 SEEDS = tuple(range(1, 13))
 

@@ -63,8 +63,8 @@ def test_an_idle_scene_does_not_diverge_however_long_it_rests():
 def test_a_diverged_run_leaves_its_last_good_output(diverged):
     error, folder = diverged
     assert error.result.diverged == str(error)
-    times = error.result.history["time_s"]
-    assert len(times) >= 1 and np.isfinite(error.result.history["kinetic_J"]).all()
+    times = error.result.series["time_s"]
+    assert len(times) >= 1 and np.isfinite(error.result.series["kinetic_J"]).all()
     rows = (folder / "history.csv").read_text().splitlines()
     assert len(rows) == len(times) + 1
     assert "diverged at t" in (folder / "report.json").read_text()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import write_paraview
+from taichi_dem.output.fragments import vectors_of
 from tests.made_result import made_result
 
 
@@ -67,10 +68,11 @@ def test_xyz_holds_places_sizes_velocities_and_fragments(result, tmp_path, of):
         assert float(about["Time"]) == pytest.approx(frame.time_s)
         alike = {"rel": 1e-9, "abs": 1e-9}
         if of == "bodies":
-            wanted = frame.position, frame.velocity, result.model.body_mass, fragments.of_body
+            numbers = result.fragment_of_body(k)
+            wanted = frame.position, frame.velocity, result.model.body_mass, numbers
         else:
-            vectors = fragments.vectors("centre"), fragments.vectors("velocity")
-            wanted = *vectors, fragments["mass_kg"], fragments["fragment"]
+            vectors = vectors_of(fragments, "centre"), vectors_of(fragments, "velocity")
+            wanted = *vectors, fragments["mass_kg"].to_numpy(), fragments["fragment"].to_numpy()
         for name, values in zip(("pos", "velo", "mass", "fragment"), wanted):
             values = np.reshape(values, (len(values), -1))
             assert found[name] == pytest.approx(values, **alike), name

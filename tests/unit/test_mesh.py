@@ -1,4 +1,9 @@
-"""A mesh is mended or refused, never silently wrong; shapes, turned and joined ones are right."""
+"""A mesh is mended or refused, never silently wrong; shapes, turned and joined ones are right.
+
+Bonds, outer faces and mass properties of bodies are those of the mesh, whatever its order.
+Contact spheres against their definition, face by face (Konno et al., 2.2, Fig. 5).
+Colours of bonds: links of one colour share no body.
+"""
 
 import itertools
 
@@ -8,16 +13,28 @@ import pytest
 from _meshes import group_area, with_neighbours
 from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, join, read_mesh
 from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.contact_spheres import interior_crossings, spheres_of_faces
 from taichi_dem.mesh.joined import in_space_order
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.shapes import bar, pair, single
-from taichi_dem.mesh.topology import topology_of
+from taichi_dem.mesh.topology import (
+    body_properties,
+    edge_colours,
+    face_vertices,
+    faces_of_group,
+    topology_of,
+)
 from tests.turns import matrix, quaternion
 
 # Two tetrahedra on both sides of the triangle 0 1 2, apexes 3 (z > 0) and 4 (z < 0).
 POINTS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, 1], [0.2, 0.2, -1]]
 BODIES = [[0, 1, 2, 3], [0, 2, 1, 4]]
 BAR = bar(0.2, 0.1, (2, 1, 1))
+MESHES = {"bar": bar(1.0, 0.2, (5, 2, 3)), "block": read_mesh(PAPER_BLOCK)}
+EACH = pytest.mark.parametrize("name", MESHES)
+EPS = np.finfo(float).eps
+#: A tetrahedron has four faces, so no body has more links.
+DEGREE = 4
 
 
 def built(points=POINTS, bodies=BODIES, groups=None, **options):
@@ -212,3 +229,200 @@ def test_meshes_that_touch_are_bonded_only_where_asked():
     assert topology_of(bonded).bond_count == 2 * single_bonds + 2
     assert set(bonded.inner_groups) == {"first_right", "second_left"}
     assert group_area(bonded, "left") == pytest.approx(0.01)
+
+
+def shuffled(mesh, seed):
+    """The same mesh with points, bodies and corners in another order."""
+    rng = np.random.default_rng(seed)
+    place = rng.permutation(mesh.point_count)  # old point -> new point
+    points = np.empty_like(mesh.points)
+    points[place] = mesh.points
+    bodies = rng.permuted(place[mesh.tetrahedra][rng.permutation(mesh.body_count)], axis=1)
+    return checked_mesh(points, bodies, {name: place[f] for name, f in mesh.groups.items()})
+
+
+@EACH
+def test_both_bodies_of_a_bond_own_its_face(name):
+    mesh, top = MESHES[name], topology_of(MESHES[name])
+    of_master = face_vertices(mesh, top.master, top.master_face)
+    of_slave = face_vertices(mesh, top.slave, top.slave_face)
+    assert np.array_equal(of_master, top.vertices)
+    assert np.array_equal(np.sort(of_slave, axis=1), np.sort(top.vertices, axis=1))
+
+
+@EACH
+def test_bond_normal_points_from_master_to_slave(name):
+    mesh, top = MESHES[name], topology_of(MESHES[name])
+    normal = geometry.area_vectors(mesh.points, top.vertices)
+    middle = mesh.points[top.vertices].mean(axis=1)
+    centre = mesh.points[mesh.tetrahedra].mean(axis=1)
+    assert np.all(np.einsum("ij,ij->i", normal, middle - centre[top.master]) > 0.0)
+    assert np.all(np.einsum("ij,ij->i", normal, centre[top.slave] - middle) > 0.0)
+
+
+@EACH
+def test_slots_of_the_bodies_name_their_bonds(name):
+    mesh, top = MESHES[name], topology_of(MESHES[name])
+    expected = np.full((mesh.body_count, 4), -1)
+    for bond in range(top.bond_count):
+        expected[top.master[bond], top.master_face[bond]] = bond
+        expected[top.slave[bond], top.slave_face[bond]] = bond
+    assert np.array_equal(top.body_bond, expected)
+    assert sorted(zip(top.outer_body, top.outer_face)) == sorted(zip(*np.nonzero(expected < 0)))
+
+
+def test_faces_of_a_group_are_its_own_in_its_order():
+    mesh = shuffled(MESHES["block"], 4)
+    top = topology_of(mesh)
+    for name, wanted in mesh.groups.items():
+        body, face = faces_of_group(mesh, top, name)
+        found = face_vertices(mesh, body, face)
+        assert np.array_equal(np.sort(found, axis=1), np.sort(wanted, axis=1))
+        assert np.all(top.body_bond[body, face] == -1)
+
+
+@pytest.mark.parametrize("cells", [(1, 1, 1), (2, 3, 1)])
+def test_bodies_of_a_box_add_up_to_its_inertia(cells):
+    # Parallel axes: sum of (I + m (r.r 1 - r r^T)) = m/12 diag(b2+c2, a2+c2, a2+b2) of the box.
+    length, width, density = 0.7, 0.3, 1500.0
+    mass, centre, inertia = body_properties(bar(length, width, cells), density)
+    r = centre - [length / 2.0, width / 2.0, width / 2.0]
+    square = np.einsum("ni,ni->n", r, r)[:, None, None] * np.eye(3)
+    total = (inertia + mass[:, None, None] * (square - r[:, :, None] * r[:, None, :])).sum(axis=0)
+    assert mass.sum() == pytest.approx(density * length * width**2, rel=1e-12)
+    assert np.average(r, axis=0, weights=mass) == pytest.approx(np.zeros(3), abs=1e-14)
+    moments = [2.0 * width**2, length**2 + width**2, length**2 + width**2]
+    assert total == pytest.approx(mass.sum() / 12.0 * np.diag(moments), abs=1e-12 * mass.sum())
+
+
+@pytest.fixture(scope="module")
+def block():
+    """Mesh of the paper's block and the centres of its bodies."""
+    mesh = read_mesh(PAPER_BLOCK)
+    return mesh, mesh.points[mesh.tetrahedra].mean(axis=1)
+
+
+def plane_distances(mesh, points):
+    """Distance of points (n, 4, k, 3) of every body from its four faces, inside positive.
+
+    Face g is the one opposite vertex g: the distance is the share of that vertex's height.
+    """
+    corners = mesh.points[mesh.tetrahedra]
+    distances = []
+    for g in range(4):
+        a, b, c = (corners[:, k] for k in range(4) if k != g)
+        normal = np.cross(b - a, c - a)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        normal *= np.sign(np.einsum("nx,nx->n", corners[:, g] - a, normal))[:, None]
+        distances.append(np.einsum("nfkx,nx->nfk", points - a[:, None, None], normal))
+    return np.stack(distances, axis=-1)
+
+
+@pytest.mark.parametrize(("divisions", "count"), [(3, 1), (5, 6)])
+def test_lines_through_n_parts_cross_at_their_number_of_points(divisions, count):
+    """(n - 1)(n - 2) / 2 crossings, all inside, all multiples of 1 / n; the paper has six."""
+    crossings = interior_crossings(divisions)
+    assert crossings.shape == (count, 3)
+    assert len(np.unique(crossings, axis=0)) == count
+    assert crossings.min() > 0.0
+    assert np.abs(crossings.sum(axis=1) - 1.0).max() < 4 * EPS
+    assert np.array_equal(crossings * divisions, np.round(crossings * divisions))
+
+
+def test_spheres_touch_their_face_and_another_and_stay_inside(block):
+    """Distance r from the own face, at least r from the others, r from one of them.
+
+    Distances are differences of coordinates of 2 m; the radius divides by 1 - m_f . m_g, which in
+    this mesh is above 0.01.
+    """
+    mesh, centre = block
+    spheres = spheres_of_faces(mesh, centre, 5)
+    error = 16 * EPS * 2.0 / 0.01
+    distance = plane_distances(mesh, spheres.centre + centre[:, None, None, :])
+    own = distance[:, np.arange(4), :, np.arange(4)].transpose(1, 0, 2)
+    assert np.abs(own - spheres.radius).max() < error
+    distance[:, np.arange(4), :, np.arange(4)] = np.inf
+    assert np.abs(distance.min(axis=-1) - spheres.radius).max() < error
+    assert spheres.radius.min() > 1e6 * error
+
+
+def test_spheres_sit_at_the_crossings(block):
+    """The touching point, a radius inward of which the sphere sits, divides the face in fifths."""
+    mesh, centre = block
+    spheres = spheres_of_faces(mesh, centre, 5)
+    corners = mesh.points[mesh.tetrahedra]
+    place = spheres.centre + centre[:, None, None, :]
+    for f in range(4):
+        face = corners[:, [k for k in range(4) if k != f]]
+        normal = np.cross(face[:, 1] - face[:, 0], face[:, 2] - face[:, 0])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        normal *= -np.sign(np.einsum("nx,nx->n", corners[:, f] - face[:, 0], normal))[:, None]
+        touch = place[:, f] + spheres.radius[:, f, :, None] * normal[:, None]
+        solved = np.linalg.pinv(face.transpose(0, 2, 1)) @ touch.transpose(0, 2, 1)
+        fifths = 5.0 * solved.transpose(0, 2, 1)
+        # Faces in a plane through the origin do not give back the share of every corner.
+        whole = np.abs(np.linalg.det(face)) > 1e-4 * np.abs(face).max() ** 2
+        assert whole.sum() > 100
+        assert np.abs(fifths - np.round(fifths))[whole].max() < 1e-6
+
+
+def test_extent_holds_the_spheres_of_its_body_and_no_more(block):
+    """The ball around the centre touches the farthest sphere from outside."""
+    mesh, centre = block
+    spheres = spheres_of_faces(mesh, centre, 5)
+    reach = np.linalg.norm(spheres.centre, axis=-1) + spheres.radius
+    assert np.array_equal(spheres.extent, reach.reshape(len(reach), -1).max(axis=1))
+
+
+def test_cluster_holds_the_spheres_of_its_face(block):
+    mesh, centre = block
+    spheres = spheres_of_faces(mesh, centre, 5)
+    middle, reach = spheres.cluster[:, :, None, :3], spheres.cluster[:, :, None, 3]
+    outermost = np.linalg.norm(spheres.centre - middle, axis=-1) + spheres.radius
+    assert (outermost <= reach * (1.0 + 4 * EPS)).all()
+
+
+def random_links(random, body_count, tries):
+    """Links of a random graph without doubles in which no body has more than DEGREE."""
+    degree, links = [0] * body_count, {}
+    for i, j in np.sort(random.integers(0, body_count, (tries, 2)), axis=1).tolist():
+        if i != j and (i, j) not in links and max(degree[i], degree[j]) < DEGREE:
+            degree[i], degree[j] = degree[i] + 1, degree[j] + 1
+            links[i, j] = None
+    return list(links)
+
+
+def is_proper(links, colours):
+    """Whether no body has two links of one colour."""
+    links, colours = np.asarray(links), np.asarray(colours)
+    seen = np.concatenate([1000 * links[:, 0] + colours, 1000 * links[:, 1] + colours])
+    return len(np.unique(seen)) == len(seen)
+
+
+@pytest.fixture(scope="module")
+def graphs():
+    """Random graphs, from a few links to as many as there can be, as (body_count, links)."""
+    random = np.random.default_rng(0)
+    sizes = [(int(n), int(t) * int(n)) for n, t in random.integers([5, 1], [40, 12], (150, 2))]
+    listed = [(n, random_links(random, n, tries)) for n, tries in sizes]
+    return [(n, links) for n, links in listed if links]
+
+
+def test_links_of_a_colour_share_no_body(graphs):
+    """At most five colours for four links a body (Vizing), none left out."""
+    most = 0
+    for body_count, links in graphs:
+        colours = edge_colours(links, body_count)
+        assert is_proper(links, colours)
+        assert sorted(set(colours.tolist())) == list(range(colours.max() + 1))
+        most = max(most, colours.max() + 1)
+    assert most == 5
+
+
+def test_the_block_of_the_paper_takes_five_colours_at_most():
+    mesh = read_mesh(PAPER_BLOCK)
+    top = topology_of(mesh)
+    links = np.stack([top.master, top.slave], axis=1)
+    colours = edge_colours(links, mesh.body_count)
+    assert is_proper(links, colours)
+    assert DEGREE <= colours.max() + 1 <= 5

@@ -1,5 +1,10 @@
-"""A run says where effects that were left out would have acted, and says nothing else."""
+"""A run says where effects that were left out would have acted, and says nothing else.
 
+A run tells energy that no load gave: from 1 % injected by overlaps, from half unexplained.
+Residual slip of bonds that hold: measured, reported, warned of.
+"""
+
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +13,14 @@ import pytest
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.report.energy_balance import (
+    TERMS,
+    injected_words,
+    open_account,
+    unexplained_share,
+)
 from taichi_dem.report.missing_effects import unserved
+from taichi_dem.report.resolution import MOST_SLIP
 from taichi_dem.state.model import Model
 from tests.probe import BondProbe
 from tests.scenes import beside
@@ -18,6 +30,7 @@ TWO = beside(single(EDGE), single(EDGE), [1.0, 0.0, 0.0])
 LOSSLESS = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0, friction=0.0)
 BONDS = (effects.BondDamping(), effects.Softening(), effects.ShearSlip())
 BROKEN_ONLY = effects.SphereContact(3, outer_faces=False)
+EPS = np.finfo(float).eps
 
 
 @pytest.mark.parametrize(
@@ -138,3 +151,74 @@ def test_damping_is_missed_only_where_bonds_strain_beyond_rounding(speed, missin
     away = checked_mesh(away.points + 100.0, away.tetrahedra, away.groups)
     found = pulled(away, speed).report().missing_effects
     assert tuple(m.effect for m in found) == missing
+
+
+@pytest.mark.parametrize(
+    "terms",
+    [
+        {"load_work": 150.0, "support_work": -50.0, "friction": 100.0},
+        # Bodies that had 200 J at the start and have half of it.
+        {"friction": 100.0, "kinetic": 100.0},
+        {"load_work": 120.0, "kinetic": 180.0, "residual": 20.0},
+    ],
+)
+def test_the_share_is_of_work_and_of_the_energy_at_the_start(terms):
+    def told(injected):
+        account = {**dict.fromkeys(TERMS, 0.0), "injected": injected, **terms}
+        return injected_words({**account, "kinetic": account["kinetic"] + injected})
+
+    assert "2.01 J by overlaps" in told(2.01)
+    assert told(1.99) == told(0.0) == ""
+
+
+def test_an_open_account_is_said():
+    account = {"kinetic": 1.0, "bond_dashpot": -3.0, "residual": 2.1}
+    assert unexplained_share(account) == pytest.approx(2.1 / 4.0)
+    assert "2.1 J unexplained" in open_account(account, 0.0)[0]
+    assert open_account({**account, "residual": 1.9}, 0.0) == ()
+    assert open_account({"kinetic": 1e-20, "residual": 1e-19}, 1e-20) == ()
+    assert open_account({**account, "residual": math.nan}, 0.0)
+
+
+def slid(share):
+    """Simulation of the pair, sampled with a residual slip of a share of an edge in a unit."""
+    simulation = Simulation(Scene(pair(EDGE), CONCRETE, [effects.ShearSlip()]), Uniform(1e-8))
+    simulation.start()
+    write_slip(simulation, share)
+    simulation.sample()
+    return simulation
+
+
+def write_slip(simulation, share):
+    """Let the second unit of the bond have slipped by a share of an edge, oblique to the axes."""
+    field = simulation.state.fields()["shear_slip_slip"]
+    slip = values(field)
+    slip[1, :2] = share * EDGE * np.array([0.6, -0.8])
+    assign(field, slip)
+
+
+def test_share_is_that_of_the_shortest_edge():
+    """To the rounding of a length over another."""
+    report = slid(0.03).report()
+    (found,) = report.bond_slip
+    assert found.share == pytest.approx(0.03, abs=16 * EPS)
+    assert found.where == 0 and found.count == 0
+
+
+def test_far_slip_is_warned_of_and_an_effect_that_weakens_is_missed():
+    report = slid(2.0 * MOST_SLIP).report()
+    assert any("bond 0 " in need and "by 10 %" in need for need in report.needs)
+    advice = report.advice()
+    assert [one.effect for one in advice.missing] == ["SlipWeakening"]
+    table = advice.table()
+    assert table["effect"].tolist() == ["shear_slip", "SlipWeakening"]
+    assert table["advice"].tolist() == ["keep", "list it"] and table["where"][1] == "bond 0"
+
+
+def test_largest_of_all_recordings_is_kept():
+    """Not that of the end: bonds that slipped far are often released later."""
+    simulation = slid(0.1)
+    write_slip(simulation, 0.02)
+    simulation.sample()
+    (found,) = simulation.report().bond_slip
+    assert found.share == pytest.approx(0.1, abs=16 * EPS) and found.count == 1

@@ -59,11 +59,11 @@ def test_an_observer_sees_the_run_as_its_result_tells_it_and_changes_no_bit():
     )
     costs = RunCosts()
     watched = run(seen, costs, frames=4)
-    assert seen["kinetic"].tolist() == alone.history["kinetic_J"].tolist()
+    assert seen["kinetic"].tolist() == alone.series["kinetic_J"].tolist()
     assert seen["rows"].tolist() == [1, 2, 3, 4, 5]
     assert seen["place"][-1].tobytes() == alone.frames[-1].position.tobytes()
-    for name, column in alone.history.items():
-        assert column.tobytes() == watched.history[name].tobytes(), name
+    for name, column in alone.series.items():
+        assert column.tobytes() == watched.series[name].tobytes(), name
     assert costs.columns["evaluations"][-1] == alone.report.contact_evaluations
 
 
@@ -89,7 +89,7 @@ def test_a_diverged_run_has_been_observed_until_then():
     times = Collector(Every(samples=1), time=lambda view: view.time_s)
     with pytest.raises(SimulationDiverged) as caught:
         run(times, method=Uniform(2e-5), until=1e-2, samples=500)
-    assert times["time"].tolist() == caught.value.result.history["time_s"].tolist() != []
+    assert times["time"].tolist() == caught.value.result.series["time_s"].tolist() != []
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def test_points_of_a_turning_bar_move_on_their_circles(result):
     middle = np.array([0.1, 0.05, 0.05])
     for name, at in POINTS.items():
         got, arm = result.receivers[name], np.array(at) - middle
-        assert got.time_s.tobytes() == result.history["time_s"].tobytes()
+        assert got.time_s.tobytes() == result.series["time_s"].tobytes()
         cos, sin = np.cos(W[2] * got.time_s), np.sin(W[2] * got.time_s)
         x, y = cos * arm[0] - sin * arm[1], sin * arm[0] + cos * arm[1]
         turned = np.stack([x, y, np.full_like(x, arm[2])], axis=1)

@@ -85,5 +85,5 @@ def test_a_signal_saves_the_run_which_goes_on_with_the_bits_of_one_never_stopped
     with pytest.raises(Interrupted, match="interrupted at t = "):
         simulate(scene, checkpoint=Checkpoint(path), observers=observers, **job)
     resumed, alone = simulate(scene, resume=path, **job), simulate(scene, **job)
-    for name, column in alone.history.items():
-        assert column.tobytes() == resumed.history[name].tobytes(), name
+    for name, column in alone.series.items():
+        assert column.tobytes() == resumed.series[name].tobytes(), name

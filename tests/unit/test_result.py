@@ -31,20 +31,20 @@ def test_a_notebook_shows_picture_and_figures(flown):
 
 
 def nothing_but_nan(result):
-    history = {name: np.full(len(column), NAN) for name, column in result.history.items()}
+    history = {name: np.full(len(column), NAN) for name, column in result.series.items()}
     ledger = dict.fromkeys(result.report.energy_balance, NAN)
     report = dataclasses.replace(result.report, energy_balance=ledger, run_seconds=NAN)
     frame = dataclasses.replace(
         result.frames[-1], displacement=NAN * result.frames[-1].displacement
     )
     speed = np.full(result.model.body_count, NAN)
-    more = {"history": history, "report": report, "frames": (frame,), "peak_speed": speed}
+    more = {"series": history, "report": report, "frames": (frame,), "peak_speed": speed}
     return dataclasses.replace(result, **more)
 
 
 def without_rows(result):
-    history = {name: column[:0] for name, column in result.history.items()}
-    return dataclasses.replace(result, history=history, frames=())
+    history = {name: column[:0] for name, column in result.series.items()}
+    return dataclasses.replace(result, series=history, frames=())
 
 
 @pytest.mark.parametrize("how", [nothing_but_nan, without_rows])
@@ -88,7 +88,7 @@ def test_a_folder_used_before_keeps_nothing_of_the_earlier_series(flown, tmp_pat
 
 def test_fragments_hold_the_kinetic_energy_of_the_account(flown):
     """Frames and samples are of one time; the share that bodies turn with is in both."""
-    energy = flown.history["kinetic_J"]
+    energy = flown.series["kinetic_J"]
     assert flown.fragments()["kinetic_J"].sum() == pytest.approx(energy[-1], rel=1e-12)
     assert flown.fragments(2)["kinetic_J"].sum() == pytest.approx(energy[2], rel=1e-12)
 

@@ -1,16 +1,36 @@
-"""A scene whose parts may meet or whose friction never acts is told so before a run."""
+"""A scene whose parts may meet or whose friction never acts is told so before a run.
 
+A scene that begins in motion runs as one whose bodies were set in motion by hand.
+"""
+
+import pickle
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, effects
-from taichi_dem.mesh.shapes import bar, pair
+from taichi_dem import (
+    CONCRETE,
+    Checkpoint,
+    InputError,
+    Multirate,
+    Scene,
+    Simulation,
+    Uniform,
+    effects,
+    simulate,
+)
+from taichi_dem.mesh.shapes import bar, pair, placed_together
 from taichi_dem.scene import outer_faces_warnings, scene_warnings
+from taichi_dem.simulate import run_simulation
 from tests.scenes import beside
 
 BAR = bar(0.2, 0.05, (4, 1, 1))
-FALL, HELD = effects.Gravity(), effects.Fixed("first left")
+FALL, HELD = effects.Gravity(), effects.Fixed("first_left")
+START = bar(0.2, 0.1, (2, 1, 1))
+CENTRE = START.points[START.tetrahedra].mean(axis=1)
+COUNT, METHOD, UNTIL = START.body_count, Uniform(1e-7), 2e-6
+ROWS = np.random.default_rng(3).uniform(-1.0, 1.0, (2, COUNT, 3))
 
 
 def moved(which, *velocity, frequency=0.0):
@@ -28,11 +48,11 @@ def told(shift, *listed):
     ("shift", "listed", "expected"),
     [
         # Driven along x past each other, and away.
-        ([3.0, 1.0, 0], [moved("first left", 50, 0, 0)], False),
-        ([3.0, 0, 0], [moved("first left", -50, 0, 0)], False),
+        ([3.0, 1.0, 0], [moved("first_left", 50, 0, 0)], False),
+        ([3.0, 0, 0], [moved("first_left", -50, 0, 0)], False),
         # A shaker moves as far as its velocity over 2 pi f: 8 mm and 8 m.
-        ([3.0, 0, 0], [moved("first left", 50, 0, 0, frequency=1000.0)], False),
-        ([3.0, 0, 0], [moved("first left", 50, 0, 0, frequency=1.0)], True),
+        ([3.0, 0, 0], [moved("first_left", 50, 0, 0, frequency=1000.0)], False),
+        ([3.0, 0, 0], [moved("first_left", 50, 0, 0, frequency=1.0)], True),
         # Side by side on one shaker: only what is near may touch.
         ([0, 0.06, 0], [moved("left", 50, 0, 0)], True),
         ([1.0, 0, 0], [moved("left", 50, 0, 0)], False),
@@ -40,7 +60,7 @@ def told(shift, *listed):
         ([0, 1.0, 0], [HELD, FALL], True),
         ([1.0, 0, 0], [HELD, FALL], False),
         ([0, 0.06, 0], [FALL], False),
-        ([3.0, 1.0, 0], [effects.GasPressure("first left")], True),
+        ([3.0, 1.0, 0], [effects.GasPressure("first_left")], True),
     ],
 )
 def test_parts_without_contact_are_told_where_they_may_come_to_meet(shift, listed, expected):
@@ -61,3 +81,91 @@ def test_friction_that_no_dashpot_carries_is_told_before_a_run(contact, friction
     made = Scene(pair(), material, [contact, friction()])
     assert len(scene_warnings(made)) == count
     assert made.damped() == (damping > 0.0) and not made.damped(touching=False)
+
+
+def scene(**options):
+    return Scene(START, CONCRETE, [], **options)
+
+
+@pytest.fixture(scope="module")
+def by_hand(taichi_session):
+    """Result of a run whose motion was set before it."""
+    simulation = Simulation(scene(), METHOD)
+    simulation.state.set_motion(simulation.model.centre, velocity=ROWS[0], spin=ROWS[1])
+    return run_simulation(simulation, until=UNTIL, samples=2, frames=1, progress=None)
+
+
+def assert_same(result, other):
+    for name in ("position", "velocity", "rotation"):
+        first, second = (getattr(one.frames[-1], name) for one in (result, other))
+        assert first.tobytes() == second.tobytes(), name
+    for name, column in result.series.items():
+        assert column.tobytes() == other.series[name].tobytes(), name
+
+
+def test_a_moving_scene_has_the_bits_of_a_motion_set_by_hand(by_hand):
+    moving = scene(velocity=lambda x: ROWS[0], spin=ROWS[1])
+    options = {"method": METHOD, "until": UNTIL, "samples": 2, "frames": 1, "progress": None}
+    assert_same(simulate(moving, **options), by_hand)
+    assert_same(simulate(pickle.loads(pickle.dumps(moving)), **options), by_hand)
+
+
+def test_a_reset_begins_with_the_motion_of_its_scene(by_hand):
+    simulation = Simulation(scene(), METHOD)
+    simulation.advance_to(3)
+    simulation.reset(scene(velocity=ROWS[0], spin=ROWS[1]))
+    options = {"until": UNTIL, "samples": 2, "frames": 1, "progress": None}
+    assert_same(run_simulation(simulation, **options), by_hand)
+    simulation.reset(scene())
+    assert not simulation.state.motion()["velocity"].any()
+
+
+def test_a_checkpoint_belongs_to_the_motion_it_began_with(by_hand, tmp_path):
+    moving, path = scene(velocity=ROWS[0], spin=ROWS[1]), tmp_path / "half.npz"
+    options = {"method": METHOD, "samples": 2, "frames": 1, "progress": None}
+    simulate(moving, until=UNTIL / 2, checkpoint=Checkpoint(path), **options)
+    resumed = simulate(moving, until=UNTIL, resume=path, **options)
+    assert resumed.frames[-1].position.tobytes() == by_hand.frames[-1].position.tobytes()
+    with pytest.raises(InputError, match="is of another initial motion"):
+        simulate(scene(velocity=-ROWS[0], spin=ROWS[1]), until=UNTIL, resume=path, **options)
+
+
+def test_one_spin_turns_all_bodies_as_one_rigid_body():
+    spin = np.array([0.0, 3.0, -4.0])
+    motion = scene(velocity=(1.0, 0.0, 0.0), spin=spin).initial_motion
+    expected = np.array([1.0, 0.0, 0.0]) + np.cross(spin, CENTRE - [0.1, 0.05, 0.05])
+    np.testing.assert_allclose(motion["velocity"], expected, atol=1e-15)
+    assert (motion["spin"] == spin).all()
+
+
+def test_body_groups_move_and_turn_each_for_itself():
+    two = placed_together({"a": (START, (0, 0, 0)), "b": (START, (1.0, 0, 0))})
+    spin = np.array([0.0, 0.0, 5.0])
+    made = Scene(two, CONCRETE, [], velocity={"a": (1, 0, 0)}, spin={"b": spin})
+    expected, motion = np.cross(spin, CENTRE - [0.1, 0.05, 0.05]), made.initial_motion
+    assert (motion["velocity"][:COUNT] == [1.0, 0.0, 0.0]).all()
+    assert not motion["spin"][:COUNT].any()
+    np.testing.assert_allclose(motion["velocity"][COUNT:], expected, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("speed", "aside", "expected"), [(5.0, 0.0, True), (-5.0, 0.0, False), (5.0, 1.0, False)]
+)
+def test_parts_without_contact_are_told_where_they_may_meet(speed, aside, expected):
+    rows = np.repeat([[speed, 0.0, 0.0], [0.0, 0.0, 0.0]], COUNT, axis=0)
+    made = Scene(beside(START, START, [3.0, aside, 0.0]), CONCRETE, [], velocity=rows)
+    assert bool(outer_faces_warnings(made)) == expected
+
+
+@pytest.mark.parametrize("method", [Uniform(1e-6, 1e-8), Multirate(1e-6, 1e-8)])
+def test_no_body_moves_further_than_the_distance_in_its_first_step(method):
+    """dt_i <= l / |v_i| (Konno et al., 3.1): 1 m/s and 10 nm give 10 ns, below dt0 / 2^6.
+
+    A uniform run takes the step of the faster body for both.
+    """
+    velocity = np.array([[1.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
+    simulation = Simulation(Scene(pair(), CONCRETE, velocity=velocity), method)
+    simulation.start()
+    step = 1e-6 / 2.0 ** simulation.values(simulation.state.level)
+    assert np.all(step * velocity[:, 0] <= 1e-8)
+    assert np.all(2.0 * step.min() * velocity[0, 0] > 1e-8)

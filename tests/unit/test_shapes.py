@@ -6,8 +6,8 @@ import pytest
 from _meshes import group_area
 from taichi_dem import shapes
 from taichi_dem.mesh.mesh import volumes
-from taichi_dem.mesh.parts import parts_of
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors, edge_lengths, outer_rows
+from taichi_dem.mesh.topology import parts_of
 
 #: Name to a solid, its volume [m3] and the areas of its sides [m2]; round walls apart.
 SOLIDS = {

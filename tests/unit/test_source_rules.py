@@ -8,10 +8,10 @@ ROOT = Path(__file__).resolve().parents[2]
 LAYERS = {
     "taichi_dem": """
         kit | meshes mesh shapes | materials | elasticity | physics | state
-        | laws | loads | effects initial_motion | scene | step_control | methods | contact
+        | laws | loads | effects | scene | step_control | methods | contact
         | stability | step | report | engine | simulation
         | output observers | plot | viewer
-        | result scene_pictures | saving simulate needed_effects | goals
+        | result | saving simulate needed_effects | goals
         | accuracy | solve | demo | __init__ | __main__""",
     "ca_damper": """
         errors report | oscillator structure excitation | theory | scenes | filling

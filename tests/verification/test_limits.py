@@ -25,8 +25,7 @@ from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import pair, placed_together, single
 from taichi_dem.mesh.topology import topology_of
-from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED
-from taichi_dem.stability.stable_step import dashpot_step, spring_step
+from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED, dashpot_step, spring_step
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL
 
 STILL = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
@@ -227,8 +226,8 @@ def test_sphere_springs_hold_up_to_their_limit(divisions, contacts):
 
     found = bisected(calm, 0.5 * exact, 1.5 * exact)
     assert found == pytest.approx(exact, rel=0.007), found / exact
-    one, whole = contact_eigenvalues(model.mesh, CONCRETE.density, divisions, False)
-    formula = spring_step(CONCRETE.contact_stiffness * (whole if contacts > 1 else one)).min()
+    whole = contact_eigenvalues(model.mesh, CONCRETE.density, divisions, False)
+    formula = spring_step(CONCRETE.contact_stiffness * whole).min()
     assert exact / 2.0 < formula <= exact * (1 + 1e-6)
 
 
@@ -252,8 +251,8 @@ def test_sphere_dashpots_kick_back_from_their_limit_on(divisions, contacts):
     exact = model.body_mass[0] / (contacts * CONCRETE.contact_damping)
     found = bisected(calm, 0.3 * exact, 1.9 * exact)
     assert found == pytest.approx(exact, rel=0.005)
-    one, whole = contact_eigenvalues(model.mesh, CONCRETE.density, divisions, False)
-    formula = dashpot_step(CONCRETE.contact_damping * (whole if contacts > 1 else one)).min()
+    whole = contact_eigenvalues(model.mesh, CONCRETE.density, divisions, False)
+    formula = dashpot_step(CONCRETE.contact_damping * whole).min()
     if contacts == 1:
         assert formula == pytest.approx(exact, rel=1e-6)
     assert exact / 3.0 < formula <= exact * (1 + 1e-6)

@@ -37,7 +37,7 @@ def blown(method, damped=True):
 def recorded(method, damped):
     """Energies and a velocity at the end."""
     result = blown(method, damped)
-    energies = [result.history[name][-1] for name in COLUMNS[: 3 + damped]]
+    energies = [result.series[name][-1] for name in COLUMNS[: 3 + damped]]
     return np.array([*energies, result.frames[-1].velocity[5, 0]])
 
 

@@ -13,12 +13,8 @@ from ca_damper.plot import Box
 from taichi_dem.kit.viewer import quantise
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
-from taichi_dem.viewer.block import rotation_vectors
 from tests.bad_input.refusals import steady
-from tests.turns import matrix, quaternion
 from tests.viewer.made import MESH, block, damper, data_of, of_frames, unpacked
-
-UNIT = st.floats(-1.0, 1.0)
 
 
 @steady
@@ -29,19 +25,6 @@ def test_quantised_values_differ_by_at_most_half_a_step(values):
     assert (np.abs(found - values) <= half * (1.0 + 1e-11)).all()
     largest = np.abs(values).max(axis=1)
     assert half[:, 0] * 2.0 == pytest.approx(largest / 32767, abs=1e-320)
-
-
-@steady
-@given(st.tuples(UNIT, UNIT, UNIT), st.one_of(st.floats(-np.pi, np.pi), st.just(np.pi)))
-def test_a_rotation_vector_turns_as_its_matrix(axis, angle):
-    axis = np.array(axis) if np.linalg.norm(axis) > 1e-3 else np.array([0.0, 0.0, 1.0])
-    turn = matrix(quaternion(axis, angle))
-    (vector,) = rotation_vectors(turn[None])
-    found = np.linalg.norm(vector)
-    assert found <= np.pi * (1.0 + 1e-15)
-    again = matrix(quaternion(vector, found)) if found > 0.0 else np.eye(3)
-    # The sine of half an angle of about pi is known to the rounding of one.
-    assert again == pytest.approx(turn, abs=1e-14)
 
 
 @pytest.fixture(scope="module")

@@ -6,12 +6,13 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import ClassVar
 
 from taichi_dem.kit.validation import FileName
 
 #: Share of a job below which its first calls, which take longer than later ones, rule its speed.
 LEAST_SHARE = 0.01
+#: Phases whose end nobody knows: a kernel may come from the cache or be compiled.
+_UNTIMED = ("compiling", "drawing")
 
 
 @dataclass(frozen=True)
@@ -24,88 +25,30 @@ class Progress:
         Share of the job that is done, from 0 to 1.
     seconds : float
         Time spent on it so far, without compiling [s].
+    phase : str, default "running"
+        "compiling", "stepping", "drawing" or "running".
+    words : str, default ""
+        Speed of the job, how much of it is done, or what is compiled or drawn.
     """
 
-    phase: ClassVar[str] = "running"
     share: float
     seconds: float
+    phase: str = "running"
+    words: str = ""
 
     @property
     def seconds_left(self) -> float:
         """Time expected until the end [s]; infinite while too little is known of it."""
-        if self.share < LEAST_SHARE:
+        if self.phase in _UNTIMED or self.share < LEAST_SHARE:
             return math.inf
         return max(0.0, self.seconds * (1.0 / self.share - 1.0))
 
-    @property
-    def speed(self) -> str:
-        """Speed of the job in words; may be empty."""
-        return ""
-
     def __str__(self):
-        """Phase, percent done, time left and speed in one line."""
+        """Phase, percent done, time left and words in one line."""
+        if self.phase in _UNTIMED:
+            return f"{self.phase} {self.words}"
         done = f"{self.phase} {100.0 * self.share:3.0f} %"
-        return ", ".join(part for part in (done, time_left(self.seconds_left), self.speed) if part)
-
-
-@dataclass(frozen=True)
-class Counted(Progress):
-    """Progress of a job that consists of a number of runs; done of total are finished."""
-
-    done: int
-    total: int
-
-    @property
-    def speed(self) -> str:
-        """How many runs are done."""
-        return f"{self.done} of {self.total} runs"
-
-
-@dataclass(frozen=True)
-class Worded(Progress):
-    """Progress of a run that says in words how fast it is, or how much is done."""
-
-    phase: ClassVar[str] = "stepping"
-    words: str
-
-    @property
-    def speed(self) -> str:
-        """The words."""
-        return self.words
-
-
-@dataclass(frozen=True)
-class Compiling(Progress):
-    """Progress of compiling kernels before the first step.
-
-    part: which of them, in words; it is the one of this number of all parts.
-    """
-
-    phase: ClassVar[str] = "compiling"
-    part: str
-    number: int
-    total: int
-
-    @property
-    def seconds_left(self) -> float:
-        """Infinite, as unknown: a part may come from the cache of kernels or be compiled."""
-        return math.inf
-
-    def __str__(self):
-        """Number and name of the part, in one line."""
-        return f"compiling {self.number} of {self.total}, {self.part}, the next start is faster"
-
-
-@dataclass(frozen=True)
-class Drawing(Progress):
-    """Progress of drawing, after the run. file: name of the picture that is next."""
-
-    phase: ClassVar[str] = "drawing"
-    file: str
-
-    def __str__(self):
-        """The picture."""
-        return f"drawing {self.file}"
+        return ", ".join(part for part in (done, time_left(self.seconds_left), self.words) if part)
 
 
 def time_left(seconds: float) -> str:
@@ -143,7 +86,7 @@ _listeners: list[tuple[Listener, float]] = []
 
 @contextlib.contextmanager
 def listening(listener: Listener) -> Iterator[None]:
-    """Call listener with a Compiling or Drawing where one begins in the block; inner blocks win."""
+    """Call listener with a Progress where compiling or drawing begins in the block."""
     _listeners.append((listener, time.perf_counter()))
     try:
         yield
@@ -153,15 +96,16 @@ def listening(listener: Listener) -> Iterator[None]:
 
 def compiling(part: str, number: int, total: int) -> None:
     """Report that a part of the kernels is compiled next, the one of a number of all parts."""
-    _tell(Compiling, (number - 1) / total, part, number, total)
+    words = f"{number} of {total}, {part}, the next start is faster"
+    _tell((number - 1) / total, "compiling", words)
 
 
 def drawing(path: FileName) -> None:
     """Report that a picture is drawn next, by its path."""
-    _tell(Drawing, 1.0, os.path.basename(path))
+    _tell(1.0, "drawing", os.path.basename(path))
 
 
-def _tell(kind, share, *more):
+def _tell(share, phase, words):
     if _listeners:
         listener, since = _listeners[-1]
-        listener(kind(share, time.perf_counter() - since, *more))
+        listener(Progress(share, time.perf_counter() - since, phase, words))

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from taichi_dem.kit.checkpoint import identity_of
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, write_text
-from taichi_dem.kit.sweeps.dependencies import Dependencies
 
 
 def cached(
@@ -22,23 +22,19 @@ def cached(
     anew. Returns (result, whether it came from the file).
     """
     path = Path(output_folder(folder), f"{name}-{digest(settings, packages)}.json")
+    if not path.exists():
+        result = compute()
+        write_text(path, json.dumps(result))
+        return result, False
     try:
-        result = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(result, dict):
-            raise ValueError("it holds no result")
-        return result, True
-    except FileNotFoundError:
-        pass
-    except (OSError, ValueError, RecursionError) as error:
+        return dict(json.loads(path.read_text(encoding="utf-8")).items()), True
+    except (OSError, ValueError, AttributeError, RecursionError) as error:
         raise InputError(f"cannot read the kept result {path}: {error}; delete it") from None
-    result = compute()
-    write_text(path, json.dumps(result))
-    return result, False
 
 
 def digest(settings: Any, packages: Iterable[str]) -> str:
     """Twelve letters that change with the settings and with any source of the packages."""
-    made = hashlib.sha256(Dependencies(settings).digest.encode())
+    made = hashlib.sha256(identity_of(settings).encode())
     for package in packages:
         root = Path(str(importlib.util.find_spec(package).origin)).parent  # type: ignore[union-attr]
         for path in sorted(root.rglob("*.py")):

@@ -8,6 +8,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from taichi_dem.kit.terminal import show_heading
+
 #: File of the entries in the folder of the scripts.
 ENTRIES = "_gallery_pages.txt"
 #: Python as a user types it in a checkout: no environment has to be active.
@@ -76,3 +78,12 @@ def entry_of(run: Callable) -> Entry | None:
 def is_key_figure(name: str, item: Mapping[str, Any], patterns: Sequence[str]) -> bool:
     """Whether a figure of summary.json has a paper's value or a name that fits a pattern."""
     return item["paper"] is not None or any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def show_opening(description: str | None, entry: Entry | None, quick: bool = False) -> None:
+    """Print what a program does, and how long it is expected to take where that is known."""
+    show_heading(entry.question if entry else (description or "").strip().partition("\n")[0])
+    if entry:
+        smaller = "" if quick else f"; with --quick {entry.quick}"
+        # A pipe or a file shows it before the work, too.
+        print(f"Takes about {entry.expected_time(quick)}{smaller}.\n", flush=True)

@@ -4,31 +4,28 @@ import json
 import os
 import subprocess
 import sys
-from argparse import Action, ArgumentParser, Namespace
+import time
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from functools import partial
 from inspect import getfile, unwrap
 from pathlib import Path
-from typing import Any
 
 from taichi_dem.kit import children, runtime
-from taichi_dem.kit.errors import InputError, SimulationDiverged
-from taichi_dem.kit.files import claiming, write_csv, write_text
-from taichi_dem.kit.sweeps.job import Job, jobs_of
-from taichi_dem.kit.sweeps.journal import Journal
-from taichi_dem.kit.sweeps.rows import ADDED, Row, read_rows
-from taichi_dem.kit.sweeps.sweep import run_missing
-from taichi_dem.kit.sweeps.table import SweepTable
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import output_folder, write_text
+from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study.cached_result import cached
 from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.validation import shown
 
-#: Options that are of the sweep, not of a row.
-_OWN = ("sweep", "workers", "out")
-#: Those without a value.
-_LOUDNESS = ("quiet", "json", "help")
+#: Options that are of the sweep, not of a row, and those without a value.
+_OWN, _LOUDNESS = ("sweep", "workers", "out"), ("quiet", "json", "help")
 #: Cells of a column that is an option without a value.
 _SWITCH = {"yes": True, "true": True, "1": True, "no": False, "false": False, "0": False}
-#: Columns of the row of a job.
-_OF_JOBS = ("script", "arguments", "out")
+#: Columns that sweep.csv has beside those of the table and the figures.
+_ADDED = ("error", "version", "commit", "machine", "seconds")
 
 
 def add_sweep(made: ArgumentParser, count: Callable[[str], int]) -> None:
@@ -41,56 +38,70 @@ def add_sweep(made: ArgumentParser, count: Callable[[str], int]) -> None:
 def run_sweep(
     run: Callable, made: ArgumentParser, options: Namespace, arguments: Sequence[str]
 ) -> int:
-    """Run all rows that are missing, gather their figures in sweep.csv; returns the exit code."""
-    table = read_rows(options.sweep, typed=False)
+    """Run all rows that are missing, gather their figures in sweep.csv; returns the exit code.
+
+    A row is done where an earlier sweep ran it with the same options, files and sources.
+    """
+    if options.json:
+        raise InputError("json must be left out with --sweep, which writes sweep.csv")
+    table = _rows(options.sweep)
     count = options.workers or runtime.usable_cores()
     lines = _lines(made, table, options, arguments, count)
-    name = os.path.basename(getfile(unwrap(run)))
-    script = os.path.abspath(getfile(unwrap(run)))
-    with claiming():
-        journal = Journal(options.out, f"experiments/{name}")
-        folders = [os.path.join(options.out, f"row_{k}") for k in range(len(table))]
-        cells = zip([script] * len(table), map(json.dumps, lines), folders)
-        rows: list[Row] = [dict(zip(_OF_JOBS, row)) for row in cells]
-        jobs = jobs_of(run_row, rows, 0, _files(script, lines))
-        for job in jobs:
-            if not os.path.exists(_summary_of(job)):
-                journal.forget(job)
-        records = run_missing(run_row, jobs, journal, count=count)
-    return _show(table, SweepTable(jobs, records, seeded=False), options.out)
+    script, folder = os.path.abspath(getfile(unwrap(run))), output_folder(options.out)
+    with ThreadPoolExecutor(count) as pool, ProgressBar("sweep") as bar:
+        places = (os.path.join(folder, f"row_{k}") for k in range(len(lines)))
+        jobs = [pool.submit(_run_row, script, *job) for job in zip(lines, places)]
+        try:
+            for done, _ in enumerate(as_completed(jobs), 1):
+                bar.count(done, len(jobs))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    return _show(table, [job.result() for job in jobs], folder)
 
 
-def run_row(row: Row) -> dict[str, Any]:
-    """Figures of the summary.json that a job leaves; run in a process of its own.
+def _rows(path):
+    """Rows of a CSV file, texts by column name."""
+    import pandas
 
-    Raises InputError and SimulationDiverged with the job's sentence, RuntimeError for another end.
-    """
-    script, arguments, out = (str(row[name]) for name in _OF_JOBS)
-    line = [sys.executable, script, *json.loads(arguments), f"--out={out}"]
+    try:
+        rows = pandas.read_csv(path, dtype=str, keep_default_na=False).to_dict("records")
+    except (OSError, ValueError) as error:
+        raise InputError(f"table {shown(path)} must be a CSV file: {error}") from None
+    if not rows:
+        raise InputError(f"table {shown(path)} must have at least one row, got none")
+    return rows
+
+
+def _run_row(script, line, folder):
+    """Figures of a row's summary.json, and what computed them; or why it failed, in error."""
+    words = [word for text in line for word in text.split("=")]
+    files = [*Path(script).parent.glob("*.py"), *filter(os.path.isfile, words)]
+    content = {str(name): Path(name).read_bytes().hex() for name in sorted(map(str, files))}
+    packages, begun = ("taichi_dem", "ca_damper"), time.perf_counter()
+    try:
+        run = partial(_figures, [sys.executable, script, *line, f"--out={folder}"], folder)
+        return cached(folder, "sweep", (line, content), packages, run)[0]
+    except RuntimeError as error:
+        return {"error": str(error), "seconds": time.perf_counter() - begun}
+
+
+def _figures(line, folder):
+    """Run a job and return its figures by name; RuntimeError with its last words."""
+    begun = time.perf_counter()
     done = children.run(line, stdin=subprocess.DEVNULL)
     if done.returncode != 0:
-        kinds = {2: InputError, 3: SimulationDiverged}
-        words = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
-        raise kinds.get(done.returncode, RuntimeError)(words)
-    write_text(os.path.join(out, "output.txt"), done.stdout)
-    with open(os.path.join(out, "summary.json"), encoding="utf-8") as file:
-        figures = json.load(file)["figures"]
-    # No figure has the name of a column of the job or of the provenance.
-    return {
-        f"{name}_figure" if name in (*row, *ADDED) else name: one["value"]
-        for name, one in figures.items()
-        if one["value"] is not None
+        said = done.stderr.strip().splitlines()
+        raise RuntimeError(said[-1] if said else f"exit code {done.returncode}")
+    write_text(os.path.join(folder, "output.txt"), done.stdout)
+    summary = json.loads(Path(folder, "summary.json").read_text(encoding="utf-8"))
+    figures = {
+        f"{name}_figure" if name in _ADDED else name: one["value"]
+        for name, one in summary["figures"].items()
     }
-
-
-def _files(script, lines):
-    """Files on which rows depend: scripts in the folder of the job's, and those in arguments."""
-    scripts = map(str, Path(script).parent.glob("*.py"))
-    return [*scripts, *(word for line in lines for text in line for word in text.split("="))]
-
-
-def _summary_of(job: Job) -> str:
-    return os.path.join(str(job.row["out"]), "summary.json")
+    versions, place = summary["versions"], summary["machine"]["processor"]
+    made = "", versions["taichi-dem"], versions["commit"], place, time.perf_counter() - begun
+    return {**figures, **dict(zip(_ADDED, made))}
 
 
 def _lines(made, table, options, arguments, count):
@@ -101,19 +112,12 @@ def _lines(made, table, options, arguments, count):
     for name in _LOUDNESS:
         own.add_argument(f"--{name}", action="store_true")
     common = own.parse_known_args(arguments)[1]
-    known = _options_of(made)
-    for column in table[0]:
-        if column not in known:
-            raise InputError(
-                f"columns of table {options.sweep} must be out of {', '.join(known)}, "
-                f"got {shown(column)}"
-            )
     if "threads" not in table[0] and options.threads is None:
         common = [*common, f"--threads={max(1, runtime.usable_cores() // count)}"]
     lines = []
     for k, row in enumerate(table):
         try:
-            given = [_argument(known[name], name, str(cell)) for name, cell in row.items()]
+            given = [_argument(made, name, cell) for name, cell in row.items()]
             lines.append([*common, *filter(None, given)])
             made.parse_args(lines[-1])
         except InputError as error:
@@ -121,20 +125,13 @@ def _lines(made, table, options, arguments, count):
     return lines
 
 
-def _options_of(made: ArgumentParser) -> dict[str, Action]:
-    """Options that a column may name, by their long names without dashes."""
-    found = {
-        text[2:]: action
-        for action in made._actions
-        for text in action.option_strings
-        if text.startswith("--")
-    }
-    return {name: action for name, action in found.items() if name not in (*_OWN, *_LOUDNESS)}
-
-
-def _argument(action, name, cell):
+def _argument(made, name, cell):
     """The argument that a cell stands for, "" for a switch that is off."""
-    if action.nargs != 0:
+    known = {text[2:]: one for text, one in made._option_string_actions.items()}
+    known = {text: one for text, one in known.items() if text not in ("", *_OWN, *_LOUDNESS)}
+    if name not in known:
+        raise InputError(f"columns must be out of {', '.join(known)}, got {shown(name)}")
+    if known[name].nargs != 0:
         return f"--{name}={cell}"
     if cell.lower() not in _SWITCH:
         raise InputError(f"{name} must be one of {', '.join(_SWITCH)}, got {shown(cell)}")
@@ -143,16 +140,16 @@ def _argument(action, name, cell):
 
 def _show(table, found, folder):
     """Write sweep.csv and print what became of each row; 1 where one has failed."""
-    given = {name: [row[name] for row in table] for name in table[0]}
-    figures = {name: column for name, column in found.items() if name not in _OF_JOBS}
-    named = {f"{name}_figure" if name in given else name: figures[name] for name in figures}
-    provenance = {name: found.provenance[name] for name in ADDED[1:]}
+    import pandas
+
+    made, given = pandas.DataFrame(found), pandas.DataFrame(table)
+    figures = made.drop(columns=[name for name in _ADDED if name in made])
+    figures.columns = [f"{name}_figure" if name in given else name for name in figures]
+    whole = pandas.concat([given, figures, made.reindex(columns=_ADDED)], axis="columns")
     path = os.path.join(folder, "sweep.csv")
-    write_csv(path, {**given, **named, **provenance})
-    rows = [
-        [*row.values(), f"{seconds:.1f} s", error or "done"]
-        for row, seconds, error in zip(table, found.provenance["seconds"], found["error"])
-    ]
+    write_text(path, whole.to_csv(index=False, na_rep="nan"))
+    ends = [(f"{one['seconds']:.1f} s", one["error"] or "done") for one in found]
+    rows = [[*row.values(), *end] for row, end in zip(table, ends)]
     print_table(rows, [*given, "time", "end"])
     print(f"\nFigures of all rows are in {path}, their pictures and tables in row_0, row_1, ...")
-    return int(any(found["error"]))
+    return int(any(one["error"] for one in found))

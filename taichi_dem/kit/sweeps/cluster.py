@@ -6,7 +6,6 @@ from collections.abc import Generator, Iterable
 from typing import Any
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.optional import optional
 from taichi_dem.kit.sweeps.job import Job, Record, Work, failed, run_in_worker
 from taichi_dem.kit.validation import shown
 
@@ -77,7 +76,9 @@ def _wait(ended, client, active):
 
 
 def _dask():
-    return optional("distributed")
+    import distributed
+
+    return distributed
 
 
 def _submitted(client, work, job, arch):

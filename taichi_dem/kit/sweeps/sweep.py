@@ -9,7 +9,7 @@ from typing import Any
 from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import claiming
-from taichi_dem.kit.progress.progress import Counted, Listener
+from taichi_dem.kit.progress.progress import Listener, Progress
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.sweeps.cluster import check_client, run_on_cluster
 from taichi_dem.kit.sweeps.dependencies import Dependencies
@@ -143,7 +143,8 @@ def _counter(listen: Listener | None, total: int) -> Callable[[int], None]:
 
     def count(done):
         if listen is not None:
-            listen(Counted(done / total, time.perf_counter() - started, done, total))
+            words = f"{done} of {total} runs"
+            listen(Progress(done / total, time.perf_counter() - started, words=words))
 
     count(0)
     return count

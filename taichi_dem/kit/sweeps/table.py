@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.data_table import data_frame
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.sweeps.job import Job, Record
@@ -17,7 +17,7 @@ from taichi_dem.kit.validation import FileName
 _OF_RECORDS = ("version", "commit", "machine", "seconds")
 
 
-class SweepTable(Table):
+class SweepTable(dict[str, np.ndarray]):
     """Result of ``sweep``: column name -> array, a row for each row of the input, in its order.
 
     Columns are those of the input, the results, NaN or "" where a row has none, and ``error``: the
@@ -69,7 +69,7 @@ class SweepTable(Table):
 
     def __repr__(self):
         failures = int((self["error"] != "").sum())
-        rows = counted(self.row_count, "row"), counted(len(self), "column")
+        rows = counted(len(self["error"]), "row"), counted(len(self), "column")
         return in_brief(self, *rows, f"{failures} failed" if failures else "", ", ".join(self))
 
     @property
@@ -93,13 +93,8 @@ class SweepTable(Table):
         Returns
         -------
         pandas.DataFrame
-
-        Raises
-        ------
-        InputError
-            Where pandas is not installed.
         """
-        return Table(self._with(provenance)).to_pandas()
+        return data_frame(self._with(provenance))
 
     def write_csv(self, path: FileName, provenance: bool = True) -> None:
         """Write the table as a CSV file.

@@ -8,10 +8,9 @@ from taichi_dem.kit.products import cross, dot, matvec, norm, squared
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import place_in, unit3
 from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to
-from taichi_dem.step.contact_force import PairForces
+from taichi_dem.step.contact_force import PairForces, TangentialSprings
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.multirate.schedule import Schedule
-from taichi_dem.step.tangential_springs import TangentialSprings
 
 #: Colours of pairs that share no body; pairs without a free one are visited last, in turn.
 COLOURS = 16

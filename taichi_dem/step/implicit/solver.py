@@ -8,9 +8,8 @@ from taichi_dem.kit.types import real, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.state.model import Model
 from taichi_dem.step.implicit.bonds import BOND_COLOURS, BondDashpots
-from taichi_dem.step.implicit.ground import GroundSweeps
 from taichi_dem.step.implicit.pairs import PairDashpots
-from taichi_dem.step.implicit.velocities import Velocities
+from taichi_dem.step.implicit.velocities import GroundSweeps, Velocities
 from taichi_dem.step.multirate.schedule import Schedule
 
 

@@ -19,8 +19,7 @@ from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL, coarsest_active, ticks_of
 from taichi_dem.step.multirate.lists import ActiveList, Everyone
-from taichi_dem.step.multirate.members import Members
-from taichi_dem.step.multirate.neighbours import AppliedUntil, LevelLimit
+from taichi_dem.step.multirate.members import AppliedUntil, LevelLimit, Members
 from taichi_dem.step.sleeping import Sleeping
 from taichi_dem.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 
