@@ -76,8 +76,7 @@ class Cycles:
     steps: np.ndarray
     record: np.ndarray
 
-    def __repr__(self):
-        return by_fields(self)
+    __repr__ = by_fields
 
     def mean_of(self, name: str) -> np.ndarray:
         """Mean of a column over cycles.

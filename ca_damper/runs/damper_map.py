@@ -13,7 +13,7 @@ from ca_damper.filling import Filling, check_filling
 from ca_damper.report.progress import Stages
 from ca_damper.report.report import Report
 from ca_damper.runs.result import Result, scenes_over
-from ca_damper.scenes.checks import MOST_CYCLES, MOST_SCENES, run_seeds
+from ca_damper.scenes.checks import STARTS, check_run, run_seeds
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.scenes.table import SceneTable
 from ca_damper.theory.collect_and_collide import CollectAndCollide, collect_and_collide
@@ -24,7 +24,6 @@ from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import (
     AUTO,
     positive,
-    progress_option,
     several,
     shown,
     whole,
@@ -214,23 +213,14 @@ def damper_map(
     ...     Spheres(), amplitudes=[5e-3, 1e-2], frequencies=10.0, particles=30
     ... )  # doctest: +SKIP
     """
-    progress_option("progress", progress)
     axes: dict[str, Any] = {
         "particles": several("particles", particles, lambda n, x: whole(n, x, 1, 1_000_000)),
         "amplitudes": several("amplitudes", amplitudes, positive),
         "frequencies": several("frequencies", frequencies, positive),
         "seeds": run_seeds(seeds),
     }
-    scenes = math.prod(map(len, axes.values()))
-    if scenes > MOST_SCENES:
-        raise InputError(
-            f"amplitudes x frequencies x particles x seeds must make at most {MOST_SCENES} "
-            f"scenes, got {scenes}"
-        )
-    cycles = (
-        whole("transient_cycles", transient_cycles, 0, MOST_CYCLES),
-        whole("measured_cycles", measured_cycles, 1, 100_000),
-    )
+    check_run(transient_cycles, measured_cycles, STARTS[0], progress)
+    cycles = transient_cycles, measured_cycles
     longest = automatic_dt(check_filling(filling).default_dt, max(axes["frequencies"]))
     step = longest if dt is None else positive("dt", dt)
     ways = (None,) if clearances is None else several("clearances", clearances, positive)

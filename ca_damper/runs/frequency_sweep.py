@@ -174,7 +174,7 @@ def sweep_up_and_down(
         tells which, and their results are nan.
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
-    check_run(transient_cycles, start, progress)
+    check_run(transient_cycles, measured_cycles, start, progress)
     ways = _Ways(grid)
     with reporting(progress, "sweep") as report_progress:
         batch = grid.batch(grid.ratios[:1], measured_cycles)

@@ -118,12 +118,10 @@ def shake(
     excitation, numbered = _one_for_all(excitation), run_seeds(seeds)
     own = instance("oscillator", Oscillator() if oscillator is None else oscillator, Oscillator)
     counts = several("particles", particles, lambda n, x: whole(n, x, 0, filling.capacity))
-    if len(counts) * len(numbered) > MOST_SCENES:
-        raise InputError(f"particles x seeds must make at most {MOST_SCENES} scenes")
     most = filling.default_dt if dt is None else positive("dt", dt)
     window = _window(excitation, duration, most, interval)
     structure = 0.0, own.mass, own.stiffness, own.damping
-    number, seed = scenes_over(particles=counts, seed=numbered).values()
+    number, seed = scenes_over(particles=counts, seeds=numbered).values()
     table = SceneTable(number, seed, window.dt, 1.0 / window.duration, *structure)
     start = {"displacement": displacement, "velocity": velocity}
     job = f"shaken {identity_of((counts, numbered, window, own, mount, start))}"
