@@ -134,7 +134,6 @@ def _batches():
 
 def _structures():
     yield "Oscillator", Oscillator, {}
-    yield "Oscillator.energy", OSCILLATOR.energy, {"x": 0.1, "v": 0.1}
     for name in ("transfer", "rms", "steady_state", "right_hand_side"):
         yield f"Oscillator.{name}", getattr(OSCILLATOR, name), {"frequency": 6.0}
     yield "Oscillator.peak", OSCILLATOR.peak, {}
