@@ -450,11 +450,11 @@ class Grid:
 
     def batch(self, ratios: np.ndarray, measured_cycles: int, effects: str = "listed") -> Batch:
         """Batch of all scenes at these ratios, amplitude by amplitude, seeds running fastest."""
-        o, axes = (
-            self.oscillator,
-            {"particles": self.particles, "ratio": ratios, "seed": self.seeds},
+        o = self.oscillator
+        scenes = scenes_over(
+            amplitudes=self.amplitudes, particles=self.particles, ratios=ratios, seeds=self.seeds
         )
-        amplitude, number, ratio, seed = scenes_over(amplitudes=self.amplitudes, **axes).values()
+        amplitude, number, ratio, seed = scenes.values()
         structure = (amplitude, o.mass, o.stiffness, o.damping)
         table = SceneTable(number, seed, self.dt, ratio * o.natural_frequency, *structure)
         return Batch(self.filling, table, measured_cycles=measured_cycles, effects=effects)
