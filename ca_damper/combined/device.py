@@ -17,7 +17,7 @@ from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import vec2
 from ca_damper.spheres.dynamics import DeviceSpheres
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.audit import Audit
+from taichi_dem.kit.certificate import Audit
 from taichi_dem.kit.effect_usage import EffectUse
 
 # Steps that a flight must be clear of contacts: itself, and half of one, by which positions lead.

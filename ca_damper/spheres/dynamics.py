@@ -38,7 +38,7 @@ from ca_damper.spheres.rotation import NoRotation, Rotation
 from ca_damper.spheres.wall_contacts import WallContacts
 from ca_damper.spheres.wall_forces import WallForces
 from taichi_dem.kit.allocation import values
-from taichi_dem.kit.audit import Audit
+from taichi_dem.kit.certificate import Audit
 from taichi_dem.kit.effect_usage import EffectUse
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, effects, estimated_effects, join, shapes
+from taichi_dem.kit.certificate import NEEDED, NEGLIGIBLE, UNCLEAR
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.report.estimates import NEEDED, NEGLIGIBLE, UNCLEAR
 from taichi_dem.state.model import Model
 
 BLOCK = shapes.block(0.1, element=0.1)
