@@ -39,7 +39,7 @@ class Periods:
         return f"{', '.join(found) or 'none'}, {self.others} not periodic ({test})"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Certificate(BaseCertificate):
     """What was computed, what was left out, and how that is known.
 

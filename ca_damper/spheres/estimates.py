@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 # Blows that may all turn a sphere the same way.
 _BLOWS = 1000
 _AIR_DENSITY = 1.2
-_IN_MOTION = "share of the energy in motion, at most,"
 # Shares below which an effect is negligible, and from which on it is needed.
 _LIMITS = (1e-3, 1e-2)
 
@@ -30,13 +29,16 @@ def rotation_estimate(spheres: "Spheres", particles: int) -> Estimate:
     meets = spheres.wall_friction > 0.0 or (particles > 1 and spheres.friction > 0.0)
     if not meets or particles == 0:
         why = "no friction turns a sphere" if particles else "there is no sphere"
-        return Estimate("rotation", 0.0, f"{_IN_MOTION}, as {why},", _LIMITS)
+        return Estimate("rotation", 0.0, f"share of the energy in motion, as {why}:", _LIMITS)
     friction = max(spheres.friction, spheres.wall_friction)
     restitution = max(spheres.restitution, spheres.wall_restitution)
     slides, sticks = friction * (1.0 + restitution), 2.0 / 7.0
     change = math.sqrt(0.5) * min(_BLOWS * slides, sticks)
-    why = f"in blows at 45 degrees, friction {friction:g}, {_BLOWS} of them turning the same way,"
-    return Estimate("rotation", 2.5 * change * change, f"{_IN_MOTION} {why}", _LIMITS)
+    words = (
+        f"share of the energy in motion after {_BLOWS} blows at 45 degrees that all turn a sphere "
+        f"the same way, friction {friction:g}, at most"
+    )
+    return Estimate("rotation", 2.5 * change * change, words, _LIMITS)
 
 
 def air_estimate(spheres: "Spheres") -> Estimate:

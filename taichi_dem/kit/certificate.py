@@ -120,7 +120,7 @@ class Audit:
         return f"{counts}, {self._misses()} (< {100.0 * self.misses_bound:.2g} %)"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class BaseCertificate:
     """What the certificates of both packages have in common.
 

@@ -167,7 +167,7 @@ class _Uses:
         return found
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Certificate(BaseCertificate):
     """What acted in a run with effects="auto", and a bound of what was left out.
 
