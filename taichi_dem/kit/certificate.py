@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.effect_usage import EffectUse
 
 NEGLIGIBLE, NEEDED, UNCLEAR = "negligible", "needed", "unclear"
@@ -184,5 +183,4 @@ class BaseCertificate:
         """A line for every kind of thing."""
         return "\n".join([*self.acted(), *self.left_out_lines()])
 
-    def __repr__(self):
-        return in_brief(self, *self.acted(), "" if self.holds else "does not hold")
+    __repr__ = __str__
