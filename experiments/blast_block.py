@@ -51,8 +51,8 @@ from taichi_dem import (
 from taichi_dem.kit import study
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.process_memory import peak_memory_mb
 from taichi_dem.kit.progress.progress import time_left
+from taichi_dem.kit.provenance import peak_memory_mb
 from taichi_dem.mesh.joined import in_space_order
 from taichi_dem.output.hole_monitor import HoleMonitor
 

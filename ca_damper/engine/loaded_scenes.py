@@ -26,14 +26,13 @@ from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
-from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, instance, positive, whole
 
 #: Parts in which the kernels of a batch are compiled.
 _PARTS = 3
 
 
-class LoadedScenes(Uncopied):
+class LoadedScenes:
     """A filling and a table of scenes on an engine; the arguments are those of a Batch.
 
     numbers: of the scenes, as SceneNumbers. time_origin: when step 0 would have been at the present
