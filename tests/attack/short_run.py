@@ -27,7 +27,6 @@ def iterate(values: ti.types.ndarray(dtype=ti.f64, ndim=1)):
 def work(options):
     """Print a digest, and write it to the folder of the output."""
     path = study.output_paths(options.out)
-    print("begun", flush=True)
     values = np.linspace(0.0, 1.0, 2000)
     iterate(values)
     pressure = effects.GasPressure("hole").pressure_at(np.linspace(0.0, 5e-4, 300))
