@@ -4,32 +4,30 @@
 from taichi_dem.kit import runtime  # isort: skip
 
 from ca_damper import excitation, goals
-from ca_damper.amplitude_response import AmplitudeResponse
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
-from ca_damper.certificate import Certificate
-from ca_damper.collect_and_collide import CollectAndCollide, collect_and_collide
 from ca_damper.combined import Combined
-from ca_damper.damper_map import DamperMap, damper_map
-from ca_damper.decay import logarithmic_decrement
 from ca_damper.errors import InputError, SimulationDiverged
-from ca_damper.film import film
 from ca_damper.fixed_mass import Empty, RigidMass
-from ca_damper.frequency_sweep import Sweep, sweep_up_and_down
 from ca_damper.goals import Goal
-from ca_damper.impact_damper import ImpactDamper
-from ca_damper.needed_effects import needed_effects
 from ca_damper.oscillator import Oscillator
-from ca_damper.report import Report
-from ca_damper.response import Response, frequency_response
+from ca_damper.report.certificate import Certificate
+from ca_damper.report.needed_effects import needed_effects
+from ca_damper.report.report import Report
+from ca_damper.runs.damper_map import DamperMap, damper_map
+from ca_damper.runs.film import film
+from ca_damper.runs.frequency_sweep import Sweep, sweep_up_and_down
+from ca_damper.runs.history import StructureHistory, TimeHistory
+from ca_damper.runs.response import AmplitudeResponse, Response, frequency_response
+from ca_damper.runs.shake import shake, shake_structure
 from ca_damper.scenes.table import SceneTable
-from ca_damper.shake import TimeHistory, shake
-from ca_damper.shake_structure import StructureHistory, shake_structure
 from ca_damper.solve_response import solve_response
 from ca_damper.spheres import Spheres
 from ca_damper.structure import Box, ModalStructure
-from taichi_dem.kit.accuracy.answer import Answer
-from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
+from ca_damper.theory.collect_and_collide import CollectAndCollide, collect_and_collide
+from ca_damper.theory.decay import logarithmic_decrement
+from ca_damper.theory.impact_damper import ImpactDamper
+from taichi_dem.kit.bars.answer import Answer, Branch
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.sweeps.sweep import sweep
@@ -43,7 +41,6 @@ __all__ = [
     "Batch",
     "Box",
     "Branch",
-    "BranchedAnswer",
     "Certificate",
     "CollectAndCollide",
     "Combined",

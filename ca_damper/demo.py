@@ -29,7 +29,6 @@ import numpy as np
 
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
-from ca_damper.certificate import EFFECTS
 from ca_damper.demo_pictures import (
     LEVEL,
     Decay,
@@ -39,17 +38,17 @@ from ca_damper.demo_pictures import (
     sentences,
     write_decays,
 )
-from ca_damper.film import Film, film
 from ca_damper.fixed_mass import RigidMass
 from ca_damper.oscillator import Oscillator
-from ca_damper.progress import Stages
+from ca_damper.report.certificate import EFFECTS
+from ca_damper.report.progress import Stages
+from ca_damper.runs.film import Film, film
 from ca_damper.scenes.table import SceneTable
 from ca_damper.spheres import Spheres
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.study.entries import Entry
-from taichi_dem.kit.study.summary_entries import add_to_summary
 from taichi_dem.kit.terminal import show_paragraph
 
 NAME = "damper_demo"
@@ -131,7 +130,7 @@ def let_go(options: Namespace, name: str) -> None:
     draw = partial(picture, decays, (rigid, shown), options)
     study.finish(options, name, figures_of(decays, options), reports.values(), draw=draw)
     if report.certificate is not None:
-        add_to_summary(options.out, certificate=report.certificate.as_dict())
+        study.add_to_summary(options.out, certificate=report.certificate.as_dict())
 
 
 def picture(decays: Mapping[str, Decay], fillings: Sequence[Any], options: Namespace) -> None:

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 import taichi as ti
 
-from ca_damper.contracts import check_members, members_of
+from ca_damper.scenes.contracts import check_members, members_of
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.effect_usage import EffectUse

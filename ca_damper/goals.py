@@ -3,28 +3,25 @@
 A goal of one's own takes a few lines; its function gets a Response of one particle number and
 returns one value for each seed, or a row of them:
 
-    largest_swing = Goal("largest swing", "m", "extreme", lambda found: found.amplitude[0].max(0))
+    largest_swing = Goal("largest swing", "m", lambda found: found.amplitude[0].max(0), "extreme")
 """
 
 import itertools
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from ca_damper.response import Response
+from ca_damper.runs.response import Response
+from taichi_dem.kit.bars.goal import BaseGoal
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, instance, positive, several, shown, word
-
-#: "value": at given frequencies. "extreme": of the curve, which is followed to its peak. "curve":
-#: a value for each of the given frequencies.
-KINDS = ("value", "extreme", "curve")
+from taichi_dem.kit.validation import instance, positive, several, shown
 
 
 @dataclass(frozen=True)
-class Goal:
+class Goal(BaseGoal):
     """Output of a damper that can be asked for with a tolerance.
 
     Parameters
@@ -33,12 +30,12 @@ class Goal:
         Name of the output.
     unit : str
         Unit of the output, ``"1"`` for none.
-    kind : str
-        ``"value"``: at given frequencies. ``"extreme"``: of the curve, which is followed to its
-        peak. ``"curve"``: a value for each of the given frequencies.
-    function : callable, optional
+    function : callable
         Function of a Response of one particle number, with as many seeds as there are runs; returns
         an array (seeds,) or (seeds, places).
+    kind : str, default "value"
+        ``"value"``: at given frequencies. ``"extreme"``: of the curve, which is followed to its
+        peak. ``"curve"``: a value for each of the given frequencies.
     ratios : tuple of float, default ()
         Frequency ratios f/f0 [-] that the goal needs; none for an ``"extreme"``, whose Response has
         at least three around the highest RMS.
@@ -50,24 +47,17 @@ class Goal:
 
     Examples
     --------
-    >>> Goal("swing", "m", "extreme", lambda found: found.amplitude[0].max(0)).kind
+    >>> Goal("swing", "m", lambda found: found.amplitude[0].max(0), "extreme").kind
     'extreme'
     """
 
-    name: str
-    unit: str
-    kind: str
-    function: Callable[[Response], Any] = field(repr=False)
+    kinds: ClassVar[tuple[str, ...]] = ("value", "extreme", "curve")
+    given: ClassVar[str] = "Response"
+
     ratios: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        word("name of a goal", self.name)
-        word("unit of a goal", self.unit)
-        choice("kind of a goal", self.kind, KINDS)
-        if not callable(self.function):
-            raise InputError(
-                f"function of a goal must be a function of a Response, got {shown(self.function)}"
-            )
+        super().__post_init__()
         if self.kind == "extreme":
             if self.ratios:
                 raise InputError(
@@ -116,7 +106,7 @@ def peak_ratio() -> Goal:
     Goal
         The ratio [-].
     """
-    return Goal("peak ratio", "1", "extreme", lambda found: found.peaks()[0][0])
+    return Goal("peak ratio", "1", lambda found: found.peaks()[0][0], "extreme")
 
 
 def peak_rms() -> Goal:
@@ -127,7 +117,7 @@ def peak_rms() -> Goal:
     Goal
         The RMS displacement [m].
     """
-    return Goal("peak RMS", "m", "extreme", lambda found: found.peaks()[1][0])
+    return Goal("peak RMS", "m", lambda found: found.peaks()[1][0], "extreme")
 
 
 def rms_at(ratio: float) -> Goal:
@@ -197,12 +187,14 @@ def response_curve(ratios: Sequence[float] | np.ndarray) -> Goal:
     (0.95, 0.97)
     """
     given = several("ratios", ratios, positive)
-    return Goal("response curve", "m", "curve", lambda found: found.rms[0].T, given)
+    return Goal("response curve", "m", lambda found: found.rms[0].T, "curve", given)
 
 
 def _measure_at(name, unit, measure, ratio):
     """Goal of a measure of a Response at one frequency ratio."""
     place = positive("ratio", ratio)
-    return Goal(
-        f"{name} at {place:g}", unit, "value", lambda found: getattr(found, measure)[0, 0], (place,)
-    )
+
+    def found(response):
+        return getattr(response, measure)[0, 0]
+
+    return Goal(f"{name} at {place:g}", unit, found, "value", (place,))

@@ -12,33 +12,40 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.accuracy.error_reduction import STEP_ORDER, Reduction
-from ca_damper.accuracy.error_sources import ONE_SEED, shortfall
-from ca_damper.accuracy.goal_estimate import Estimate, response_of
-from ca_damper.accuracy.job import Job
-from ca_damper.accuracy.plan import DamperPlan, checked_plan
-from ca_damper.accuracy.scene_runs import SceneRuns
-from ca_damper.accuracy.step_part import step_part
+from ca_damper.accuracy.estimate import STEP_ORDER, Estimate
+from ca_damper.accuracy.job import Job, Stage
+from ca_damper.accuracy.runs import SceneRuns
+from ca_damper.accuracy.search import Search
 from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import Filling, check_filling
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
-from ca_damper.progress import OpenEnded
-from ca_damper.response import Grid
-from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan, doubted
-from taichi_dem.kit.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
-from taichi_dem.kit.accuracy.student import t_quantile
+from ca_damper.report.progress import OpenEnded
+from ca_damper.runs.response import Grid
+from taichi_dem.kit.bars.answer import (
+    Answer,
+    ErrorParts,
+    Plan,
+    branched,
+    branches_of,
+    cost_curve,
+    doubted,
+)
+from taichi_dem.kit.bars.chance import t_quantile
+from taichi_dem.kit.bars.step import step_part
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, between, finite, instance, positive, shown
+from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive, several, shown
 
-# Tolerances whose cost an answer tells.
-_ASKED_OFTEN = (0.1, 0.03, 0.01, 0.003)
 # A run that diverges is repeated at a shorter step so often.
 _MOST_SHORTENED = 6
 _SHORTER = 1.5
+#: Why one seed of a filling that draws is no answer.
+_ONE_SEED = (
+    "the spread from seed to seed was not measured and is not in the bar: two seeds or more show it"
+)
 
 
 def solve_response(
@@ -88,7 +95,7 @@ def solve_response(
     Returns
     -------
     Answer or tuple of Answer
-        The tuple for several goals. A BranchedAnswer where seeds come to several steady motions.
+        A tuple for several goals. It has branches where seeds come to several steady motions.
 
     Raises
     ------
@@ -106,106 +113,98 @@ def solve_response(
     --------
     >>> solve_response(Automaton(), particles=30, goal=goals.peak_rms())  # doctest: +SKIP
     """
-    goals = _goals_of(goal)
-    question = _question(filling, particles, oscillator, ratios, seeds)
-    question.goals, question.budget_s = goals, _budget(budget_s)
-    question.tolerance = _share("tolerance", tolerance)
-    question.plan = checked_plan(plan, filling, question.particles)
-    question.confidence = between("confidence", confidence, 0.5, 0.9999)
-    with reporting(progress, "answer") as listener:
-        question.listener = OpenEnded(listener)
-        reduction, estimates = _answered(question)
-        question.listener.end()
-    failures = reduction.runs.failures
-    made = (_answer(question, reduction, found) for found in estimates)
-    answers = tuple(doubted(answer, *failures) for answer in made)
-    return answers if isinstance(goal, (list, tuple)) else answers[0]
-
-
-def _question(filling, particles, oscillator, ratios, seeds):
-    """Job of the checked arguments."""
     check_filling(filling)
     oscillator = Oscillator() if oscillator is None else oscillator
     instance("oscillator", oscillator, Oscillator)
     one = Grid(filling, particles, 1.0, 1 if seeds is None else seeds, oscillator, None)
     if len(one.particles) != 1:
         raise InputError(f"particles must be one whole number, got {shown(particles)}")
-    fixed = None if seeds is None else one.seeds
-    return Job(filling, one.particles[0], oscillator, _range(ratios), fixed)
+    question = Job(
+        filling,
+        one.particles[0],
+        oscillator,
+        goals=several("goal", goal, lambda name, one: instance(name, one, Goal)),
+        tolerance=between("tolerance", tolerance, SMALLEST, 1.0),
+        confidence=between("confidence", confidence, 0.5, 0.9999),
+        budget_s=math.inf if budget_s is None else positive("budget_s", budget_s),
+        span=_range(ratios),
+        fixed=None if seeds is None else one.seeds,
+        begin=_stage_of(plan, filling, one.particles[0]),
+    )
+    with reporting(progress, "answer") as listener:
+        open_ended = OpenEnded(listener)
+        search, estimates = _answered(replace(question, listener=open_ended))
+        open_ended.end()
+    failures = search.runs.failures
+    answers = tuple(doubted(_answer(search, found), *failures) for found in estimates)
+    return answers if isinstance(goal, (list, tuple)) else answers[0]
 
 
-def _goals_of(goal):
-    goals = tuple(goal) if isinstance(goal, (list, tuple)) else (goal,)
-    for one in goals:
-        if not isinstance(one, Goal):
-            raise InputError(
-                f"goal must be a Goal such as goals.peak_rms(), or a list of them, got {shown(one)}"
-            )
-    if not goals:
-        raise InputError("goal must be a Goal or a list of at least one, got none")
-    return goals
-
-
-def _share(name, value):
-    if not finite(value) or not 0.0 < value <= 1.0:
+def _stage_of(plan, filling, particles):
+    """Stage at which a plan ended, None for none; InputError for a plan of something else."""
+    if plan is None:
+        return None
+    stage = getattr(plan, "begin", None)
+    if not isinstance(stage, Stage) or (stage.filling, stage.particles) != (filling, particles):
         raise InputError(
-            f"{name} must be a share in (0, 1], such as 0.01 for 1 %, got {shown(value)}"
+            f"plan must be that of an answer of solve_response for {shown(filling)} and "
+            f"{particles} particles, got {shown(plan)}"
         )
-    return float(value)
-
-
-def _budget(budget_s):
-    return math.inf if budget_s is None else positive("budget_s", budget_s)
+    return stage
 
 
 def _range(ratios):
     """(lowest, highest) of a range, or None."""
     if ratios is None:
         return None
-    listed = isinstance(ratios, (list, tuple, np.ndarray)) and getattr(ratios, "ndim", 1) == 1
-    two = listed and len(ratios) == 2
-    if not two or not all(map(finite, ratios)) or not 0.0 < ratios[0] < ratios[1]:
+    ends = several("ratios", ratios, positive)
+    if len(ends) != 2 or ends[0] >= ends[1]:
         raise InputError(
             "ratios must be None or two numbers (lowest, highest) with 0 < lowest < highest, "
             f"got {shown(ratios)}"
         )
-    return float(ratios[0]), float(ratios[1])
+    return ends
 
 
-def _answered(job: Job) -> tuple[Reduction, list[Estimate]]:
+def _answered(job: Job) -> tuple[Search, list[Estimate]]:
     """Estimates that are good enough, or the best ones; shorter steps where runs diverge."""
     runs = SceneRuns(job.filling, job.particles, job.oscillator, job.listener)
     dt = job.first_step()
-    for attempt in range(_MOST_SHORTENED + 1):
-        reduction = Reduction(job, runs, dt)
+    for _ in range(_MOST_SHORTENED):
+        search = Search(job, runs, dt)
         try:
-            return reduction, reduction.run()
+            return search, search.run()
         except SimulationDiverged:
-            if attempt == _MOST_SHORTENED:
-                raise
             dt /= _SHORTER
-    raise AssertionError("unreachable")
+    search = Search(job, runs, dt)
+    return search, search.run()
 
 
-def _answer(job: Job, done: Reduction, found: Estimate) -> Answer:
+def _answer(done: Search, found: Estimate) -> Answer:
     """Answer of an estimate, with branches where its seeds fall into clusters."""
-    goal, ratios = found.goal, done.ratios_of(found.goal)
-    response = response_of(done.runs, ratios, done.seeds, done.dt, done.steady.begins())
+    job, goal, seeds = done.job, found.goal, done.at.seeds
     value, parts = _told(goal, found.value, found.parts)
-    base: dict[str, Any] = {"goal": goal.name, "unit": goal.unit, "plan": _plan(job, done)}
-    base.update(result=response, tolerance=job.tolerance, confidence=job.confidence)
-    branches = _branches(job, done, found)
-    if len(branches) > 1:
-        first, words = branches[0], sentence(branches, goal.unit)
+    made = Answer(
+        goal=goal.name,
+        unit=goal.unit,
+        value=value,
+        parts=parts,
+        tolerance=job.tolerance,
+        confidence=job.confidence,
+        plan=_plan(done),
+        result=done.readings.response(done.ratios_of(goal), seeds, done.at.dt),
+        shortfall=found.shortfall(job.tolerance, done.ended),
+    )
+    clusters = found.clusters(job.tolerance)
+    if len(clusters) > 1:
+        t = t_quantile(job.confidence, found.fine.freedom)
+        error = math.sqrt(float(found.fine.variance[0]))
+        branches = branches_of(found.fine.values[:, 0], clusters, seeds, error, t)
         step = _step_of(branches, done.steps, found, job.confidence)
-        parts = ErrorParts(step=step, chance=first.error)
-        found_value = {"value": first.value, "parts": parts}
-        return BranchedAnswer(**base, **found_value, shortfall=words, branches=branches)
-    words = shortfall(found, job.tolerance, done.ended)
-    if job.is_drawn and len(done.seeds) == 1:
-        words = "; ".join(filter(None, (words, ONE_SEED)))
-    made = Answer(**base, value=value, parts=parts, shortfall=words)
-    return replace(made, cost_curve=tuple(_expenses(job, done, made)))
+        return branched(made, branches, step, "seed", "took {} steady motions")
+    if job.is_drawn and len(seeds) == 1:
+        made = doubted(made, _ONE_SEED)
+    return replace(made, cost_curve=_cost_curve(done, made))
 
 
 def _told(goal, value, parts):
@@ -216,18 +215,6 @@ def _told(goal, value, parts):
     return float(value[0]), ErrorParts(**{name: float(getattr(parts, name)[0]) for name in names})
 
 
-def _branches(job, done, found):
-    """Branches of the seeds, of goals with one value."""
-    if found.value.size != 1:
-        return ()
-    values, error = found.fine.values[:, 0], math.sqrt(float(found.fine.variance[0]))
-    clusters = clusters_of(values, error, 0.5 * found.allowed(job.tolerance))
-    if len(clusters) < 2:
-        return ()
-    t = t_quantile(job.confidence, found.fine.freedom)
-    return branches_of(values, clusters, done.seeds, error, t)
-
-
 def _step_of(branches, steps, found, confidence):
     """Error by the step of the first branch, from its seeds at each step."""
     rows = []
@@ -236,8 +223,7 @@ def _step_of(branches, steps, found, confidence):
         distance = np.abs(values[:, None] - [branch.value for branch in branches])
         own = values[distance.argmin(axis=1) == 0]
         if len(own):
-            error = np.sqrt(level.variance / len(own)).item()
-            rows.append((step, own.mean(), error))
+            rows.append((step, own.mean(), np.sqrt(level.variance / len(own)).item()))
     some = np.array(rows)
     if len(some) < 2 or 2.0 not in some[:, 0]:
         return 0.0
@@ -245,40 +231,30 @@ def _step_of(branches, steps, found, confidence):
     return float(step_part(some[:, 0].tolist(), *values, STEP_ORDER, confidence).error[0])
 
 
-def _plan(job, done):
+def _plan(done):
     """Plan in words."""
-    label, seeds = job.filling.label, counted(len(done.seeds), "seed")
-    frequencies = done.frequencies()
-    several = "1 frequency" if len(frequencies) == 1 else f"{len(frequencies)} frequencies"
-    method = f"{label}, {done.dt:.3g} s, {several}, {seeds}, up to {done.longest()} cycles"
-    return DamperPlan(
-        method,
-        runs=done.runs.runs,
-        pilot_s=done.pilot_s,
-        final_s=done.runs.cpu_s - done.pilot_s,
-        filling=job.filling,
-        particles=job.particles,
-        dt=done.dt,
-        seeds=len(done.seeds),
-        window=done.window,
-        has_between=done.has_between,
-        margin=done.margin,
-    )
+    label, seeds = done.job.filling.label, counted(len(done.at.seeds), "seed")
+    count = len(done.frequencies())
+    several = "1 frequency" if count == 1 else f"{count} frequencies"
+    method = f"{label}, {done.at.dt:.3g} s, {several}, {seeds}, up to {done.longest()} cycles"
+    final_s = done.runs.cpu_s - done.pilot_s
+    return Plan(method, done.runs.runs, done.pilot_s, final_s, begin=done.at)
 
 
-def _expenses(job, done, made):
+def _cost_curve(done, made):
     """Costs of usual tolerances: that of the cycles and seeds beyond the transients grows as 1/x^2.
 
     One that has been reached costs what was paid at most.
     """
-    paid, fixed = (
-        done.runs.cpu_s,
-        done.pilot_s + done.transient_share() * (done.runs.cpu_s - done.pilot_s),
-    )
     if not math.isfinite(made.share) or made.share <= 0.0:
-        return
-    for tolerance in sorted({*_ASKED_OFTEN, job.tolerance}, reverse=True):
-        is_paid = tolerance == job.tolerance and made.reached
+        return ()
+    paid = done.runs.cpu_s
+    fixed = done.pilot_s + done.transient_share() * (paid - done.pilot_s)
+
+    def cost(tolerance):
+        if tolerance == made.tolerance and made.reached:
+            return paid, True
         wider = made.share / tolerance
-        more = max(1.0, wider * wider)
-        yield Expense(tolerance, paid if is_paid else fixed + (paid - fixed) * more, is_paid)
+        return fixed + (paid - fixed) * max(1.0, wider * wider), False
+
+    return tuple(cost_curve(made.tolerance, cost))

@@ -20,8 +20,7 @@ from taichi_dem.kit import runtime  # isort: skip
 from taichi_dem import effects, goals, methods, shapes
 from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.goals import Goal
-from taichi_dem.kit.accuracy.answer import Answer
-from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
+from taichi_dem.kit.bars.answer import Answer, Branch
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import Progress
@@ -31,8 +30,8 @@ from taichi_dem.kit.sweeps.table import SweepTable, parameter_grid
 from taichi_dem.kit.version import __version__
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh.files import read_mesh
-from taichi_dem.mesh.joined import in_space_order, join
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
+from taichi_dem.mesh.shapes import in_space_order, join
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects
@@ -52,7 +51,6 @@ __all__ = [
     "Answer",
     "At",
     "Branch",
-    "BranchedAnswer",
     "Checkpoint",
     "Collector",
     "Every",

@@ -7,20 +7,13 @@ A goal of one's own takes a line; its function gets a ``Result`` with a frame at
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from taichi_dem.kit.bars.goal import BaseGoal
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import (
-    choice,
-    finite,
-    flag,
-    instance,
-    shown,
-    whole,
-    word,
-)
+from taichi_dem.kit.validation import choice, finite, flag, instance, shown, whole, word
 from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.output.fragments import fragment_of_body
 from taichi_dem.output.hole_monitor import HoleMonitor
@@ -30,7 +23,7 @@ from taichi_dem.scene import Scene
 
 
 @dataclass(frozen=True)
-class Goal:
+class Goal(BaseGoal):
     """Output of a run that can be asked for with a tolerance.
 
     Parameters
@@ -60,21 +53,14 @@ class Goal:
     'value'
     """
 
-    name: str
-    unit: str
-    function: Callable[[Result], float] = field(repr=False)
-    kind: str = "value"
+    kinds: ClassVar[tuple[str, ...]] = ("value", "extreme", "count")
+    given: ClassVar[str] = "Result"
+
     averaged: bool = False
     check: Callable[[Scene], Any] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        word("name of a goal", self.name)
-        word("unit of a goal", self.unit)
-        choice("kind of a goal", self.kind, ("value", "extreme", "count"))
-        if not callable(self.function):
-            raise InputError(
-                f"function of a goal must be a function of a Result, got {shown(self.function)}"
-            )
+        super().__post_init__()
         flag("averaged of a goal", self.averaged)
         if self.check is not None and not callable(self.check):
             raise InputError(

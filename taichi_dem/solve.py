@@ -2,14 +2,13 @@
 
 import math
 
-from taichi_dem.accuracy.job import Job
+from taichi_dem.accuracy.runs import Job
 from taichi_dem.accuracy.search import Search
 from taichi_dem.goals import Goal
-from taichi_dem.kit.accuracy import plans
-from taichi_dem.kit.accuracy.answer import Answer, Plan
+from taichi_dem.kit.bars.answer import Answer, Plan, known_partings
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive
+from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive, whole
 from taichi_dem.scene import Scene, kind_of
 
 
@@ -71,10 +70,10 @@ def solve(
     between("tolerance", tolerance, SMALLEST, 1.0)
     between("confidence", confidence, SMALLEST, math.nextafter(1.0, 0.0))
     budget = math.inf if budget_s is None else positive("budget_s", budget_s)
-    first = 0 if plan is None else instance("plan", plan, Plan).begin
+    first = 0 if plan is None else whole("begin of plan", instance("plan", plan, Plan).begin, 0, 99)
     job = Job(scene, until, goal, tolerance, confidence)
     with reporting(progress, goal.name) as report_progress:
         answer = Search(job, budget, report_progress, first).answer()
     if math.isfinite(answer.plan.parting_s):
-        plans.remember(kind_of(scene), plans.parting(answer.plan.parting_s, until))
+        known_partings[kind_of(scene)] = answer.plan.parting
     return answer

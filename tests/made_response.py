@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from ca_damper import Oscillator, Response
-from ca_damper.measures import MEASURE_UNITS
+from ca_damper.report.measures import MEASURE_UNITS
 
 RATIOS = np.linspace(0.9, 1.1, 41)
 

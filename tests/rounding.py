@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ca_damper.automaton.impulse_balance import QUANTUM
+from ca_damper.automaton.accounting import QUANTUM
 
 _EPS = np.finfo(float).eps
 

@@ -1,48 +1,68 @@
 """A checked question to ``solve_response``, and where its runs begin."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Any
 
-from ca_damper.accuracy.plan import DamperPlan
 from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
 from ca_damper.spheres.options import Spheres
-from taichi_dem.kit.accuracy.branches import LEAST_SEEDS
+from taichi_dem.kit.bars.chance import LEAST_SEEDS
 
 # First coarse step by the filling's own and by its bound, which is that of safe runs.
 _OF_DEFAULT, _OF_BOUND = 1.5, 1.4
 # Seeds to begin with: so many particles in all, as few of them often have several steady motions.
 # Fewer than LEAST_SEEDS may agree by luck where there are two motions: three do in one of four.
 _MANY_SEEDS, _PARTICLES = 8, 80
+# Cycles of the steady part of a scene, at least.
+_LEAST_WINDOW = 32
 # Range of a search by the peak of the rigid mass and by the natural frequency.
 _BELOW, _ABOVE = 0.95, 1.04
 
 
-@dataclass
+@dataclass(frozen=True)
+class Stage:
+    """Which runs make an estimate; another question of the same filling may begin at it.
+
+    filling, particles: that they are of. dt: finest step [s]. window: steady cycles of each scene.
+    has_between: whether there are steps between dt and 4 dt. margin: further frequencies on either
+    side of a peak. level: of halving of the frequencies around it.
+    """
+
+    filling: Any
+    particles: int
+    dt: float
+    seeds: tuple[int, ...]
+    window: int = _LEAST_WINDOW
+    has_between: bool = False
+    margin: int = 0
+    level: int = 0
+
+
+@dataclass(frozen=True)
 class Job:
     """A checked question. span: range of ratios or None. fixed: seeds, or None for ours.
 
-    plan: where to begin, or None.
+    begin: stage at which an earlier question ended, or None. listener: of progress.
     """
 
     filling: Any
     particles: int
     oscillator: Oscillator
-    span: tuple[float, float] | None
-    fixed: tuple[int, ...] | None
     goals: tuple[Goal, ...] = ()
     tolerance: float = 0.01
     confidence: float = 0.95
     budget_s: float = math.inf
-    plan: DamperPlan | None = None
-    listener: Any = field(default=None, repr=False)
+    span: tuple[float, float] | None = None
+    fixed: tuple[int, ...] | None = None
+    begin: Stage | None = None
+    listener: Any = None
 
     def first_step(self) -> float:
         """Coarse step to begin with [s]."""
-        if self.plan is not None:
-            return 2.0 * self.plan.dt
+        if self.begin is not None:
+            return 2.0 * self.begin.dt
         return min(_OF_DEFAULT * self.filling.default_dt, self.longest_step())
 
     def longest_step(self) -> float:
@@ -50,15 +70,23 @@ class Job:
         bound = self.filling.step_bound
         return math.inf if bound is None else _OF_BOUND * bound[0]
 
-    def first_seeds(self) -> tuple[int, ...]:
+    def first_stage(self, coarse: float) -> Stage:
+        """Stage to begin at, half a coarse step [s]."""
+        dt, seeds = coarse / 2.0, self._first_seeds()
+        if self.begin is None:
+            return Stage(self.filling, self.particles, dt, seeds)
+        return replace(self.begin, dt=dt, seeds=seeds, level=0)
+
+    def _first_seeds(self):
         """Seeds to begin with; one of a filling that draws nothing."""
         if self.fixed is not None:
             return self.fixed
         if not self.is_drawn:
             return (1,)
-        several = math.ceil(_PARTICLES / self.particles) if self.plan is None else self.plan.seeds
-        most = max(_MANY_SEEDS, several) if self.plan is not None else _MANY_SEEDS
-        return tuple(range(1, 1 + min(most, max(LEAST_SEEDS, several))))
+        if self.begin is not None:
+            return tuple(range(1, 1 + max(LEAST_SEEDS, len(self.begin.seeds))))
+        several = math.ceil(_PARTICLES / self.particles)
+        return tuple(range(1, 1 + min(_MANY_SEEDS, max(LEAST_SEEDS, several))))
 
     @property
     def is_drawn(self) -> bool:
@@ -67,6 +95,11 @@ class Job:
             # Only the places of spheres, and who has which size, are drawn.
             return self.particles > 0 and (self.filling.start is None or bool(self.filling.sizes))
         return self.particles > 0 and not isinstance(self.filling, (Empty, RigidMass))
+
+    @property
+    def follows_peak(self) -> bool:
+        """Whether a goal lies on the peak, which is to be found."""
+        return not all(goal.ratios for goal in self.goals)
 
     def search_range(self) -> tuple[float, float]:
         """Range in which to look for a peak first."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ca_damper.measures import peak, vertex
+from ca_damper.report.measures import peak, vertex
 from taichi_dem.kit.errors import InputError
 
 #: Frequencies of the first look, evenly over the range.
@@ -19,13 +19,12 @@ _DEEPEST = 24
 LEAST_RATIO, MOST_RATIO = 0.05, 4.0
 
 
-@dataclass
+@dataclass(frozen=True)
 class Lattice:
     """Ratios origin + k spacing / 2^level, the same numbers whatever way they are found."""
 
     origin: float
     spacing: float
-    level: int = 0
 
     def ratio(self, k: int, level: int) -> float:
         """The k-th ratio of a level."""
@@ -35,23 +34,21 @@ class Lattice:
         """Place of a ratio on a level, not rounded."""
         return (ratio - self.origin) / self.spacing * 2**level
 
-    def around(self, ratio: float) -> tuple[float, ...]:
-        """Three ratios of our level around one, or four where it lies between two of them."""
-        place = self.position(ratio, self.level)
+    def around(self, ratio: float, level: int) -> tuple[float, ...]:
+        """Three ratios of a level around one, or four where it lies between two of them."""
+        place = self.position(ratio, level)
         k = round(place)
         first = k - 2 if place - k < -0.2 else k - 1
         last = k + 2 if place - k > 0.2 else k + 1
-        return tuple(self.ratio(j, self.level) for j in range(first, last + 1))
+        return tuple(self.ratio(j, level) for j in range(first, last + 1))
 
-    def wide(self, ratio: float) -> tuple[tuple[float, ...], ...]:
+    def wide(self, ratio: float, level: int) -> tuple[tuple[float, ...], ...]:
         """Triples twice as far apart: around the middle one of ``around``, or each of two."""
-        place = self.position(ratio, self.level)
+        place = self.position(ratio, level)
         middle = {round(place), math.floor(place), math.ceil(place)}
-        if len(self.around(ratio)) == 3:
+        if len(self.around(ratio, level)) == 3:
             middle = {round(place)}
-        return tuple(
-            tuple(self.ratio(j, self.level) for j in (k - 2, k, k + 2)) for k in sorted(middle)
-        )
+        return tuple(tuple(self.ratio(j, level) for j in (k - 2, k, k + 2)) for k in sorted(middle))
 
 
 class PeakSearch:
@@ -70,11 +67,11 @@ class PeakSearch:
     ):
         self.rms_at, self.may_extend = rms_at, may_extend
         self.lowest, self.highest = lowest, highest
-        self.lattice = Lattice(lowest, (highest - lowest) / FIRST)
+        self.lattice, self.level = Lattice(lowest, (highest - lowest) / FIRST), 0
         self.found: dict[float, float] = {}
 
-    def run(self) -> tuple[float, Lattice]:
-        """Ratio of the peak, and the lattice at the level on which it is resolved.
+    def run(self) -> tuple[float, Lattice, int]:
+        """Ratio of the peak, the lattice, and its level on which the peak is resolved.
 
         Raises InputError for a peak outside.
         """
@@ -85,11 +82,12 @@ class PeakSearch:
             # A plateau wants no finer spacing; beside a zero or no number, none is fine enough.
             widest = self.lattice.spacing
             wanted = min(widest, max(widest / 2.0**_DEEPEST, wanted))
-            step = min(math.ceil(math.log2(widest / wanted)), self.lattice.level + 3)
-            self.lattice.level = max(self.lattice.level, step)
-            missing = [one for one in self.lattice.around(ratio) if one not in self.found]
+            level = min(math.ceil(math.log2(widest / wanted)), self.level + 3)
+            self.level = max(self.level, level)
+            around = self.lattice.around(ratio, self.level)
+            missing = [one for one in around if one not in self.found]
             if not missing:
-                return ratio, self.lattice
+                return ratio, self.lattice, self.level
             self._measure(missing)
 
     def _measure(self, ratios):

@@ -10,69 +10,93 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.automaton.collision_laws import deflected, speed_after_pair, speed_after_wall
-from ca_damper.automaton.conflict_resolution import above_others, rank
-from ca_damper.automaton.event_counts import HOLDS, WALLS
-from ca_damper.automaton.event_counts import PAIRS as PAIRS_MET
-from ca_damper.automaton.impulse_balance import PAIRS
-from ca_damper.lattice import EMPTY, WALL, mirrored, turned_back
-from ca_damper.random_numbers import DEFLECT, EVENT, bits, unit
-from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.automaton.conflict_resolution import rank
+from ca_damper.automaton.device import HOLDS, PAIRS, WALLS
+from ca_damper.automaton.lattice import DIRECTIONS, EMPTY, WALL, mirrored, turned_back
+from ca_damper.engine.random_numbers import DEFLECT, EVENT, bits, unit
+from ca_damper.filling import Recoil
+from ca_damper.scenes.scene_fields import Part
 
 NOTHING, JOIN, FLOOR, SIDE, PAIR = range(5)
 _CELL_BITS = 16
 
 
+@ti.func
+def speed_after_pair(speed, other, restitution):
+    """Speed [m/s] of the particle that hits, eq. (9); ``other`` is that of the equal it meets.
+
+    Speeds are signed along the direction of the particle that hits; a result below zero sends that
+    particle back. With the two exchanged it is the speed of the one that is hit: their sum stays.
+    """
+    return 0.5 * ((speed + other) - restitution * (speed - other))
+
+
+@ti.func
+def speed_after_wall(speed, wall, restitution):
+    """Speed [m/s] of a particle that meets a wall of speed ``wall`` and great mass, eq. (10)."""
+    return wall - restitution * (speed - wall)
+
+
+@ti.func
+def deflected(direction, draw):
+    """Way back from ``direction``: straight for half of the draws in [0, 1), oblique else (5.3)."""
+    back = turned_back(direction)
+    if draw >= 0.75:
+        back = (back + 1) % DIRECTIONS
+    elif draw >= 0.5:
+        back = (back + DIRECTIONS - 1) % DIRECTIONS
+    return back
+
+
 @ti.data_oriented
-class Collisions:
+class Collisions(Part):
     """Judge and carry out the events of a step.
 
-    contacts: cells of touching particles, then cell and event in one number, shape (scenes, cells).
-    other: speed of what is met, along the direction of the particle that meets it [m/s].
-    ranks: of the events among their rivals.
-    both: whether both of a pair are updated. pairs_first: whether pairs come before walls.
+    Of shape (scenes, cells), events: cell and event in one number; other: speed of what is met,
+    along the direction of the particle that meets it [m/s]; ranks: of the events among their
+    rivals. both: whether both of a pair are updated.
     """
 
-    def __init__(self, table: SceneFields, components: Any, both: bool, pairs_first: bool):
-        self.cells, self.lattice = components.cells, components.lattice
-        self.conflict_resolution = components.conflict_resolution
-        self.accumulator, self.resting = components.accumulator, components.resting
-        self.accounting, self.parameters = components.accounting, components.parameters
-        self.event_counts = components.event_counts
-        self.both, self.pairs_first = both, pairs_first
-        self.contacts = table.field(ti.i32, "cells")
-        self.other = table.field(ti.f64, "cells")
-        self.ranks = table.field(ti.i64, "cells")
+    def __init__(self, automaton: Any, both: bool):
+        super().__init__(automaton)
+        self.both, self.events = both, self.table.field(ti.i32, "cells")
+        self.other = self.table.field(ti.f64, "cells")
+        self.ranks = self.table.field(ti.i64, "cells")
 
     @ti.func
-    def resolve(self, s, step, shared, count, velocity, pull, pressed):
-        """All events of a step; returns velocity along x from counted impacts [quanta].
-
-        velocity: of the container [m/s]. pull: g dt [m/s].
-        """
-        events = self.find_events(s, step, shared, count, velocity, pull, pressed)
+    def resolve(self, s, step, shared, motion, pull, pressed):
+        """All events of a step; returns velocity along x from counted impacts [quanta]."""
         impulse = ti.cast(0, ti.i64)
-        for k in range(events):
-            entry = self.contacts[s, k]
-            cell, event = entry & ((1 << _CELL_BITS) - 1), entry >> _CELL_BITS
+        for k in range(self.find_events(s, step, shared, motion.v, pull, pressed)):
+            cell, event = (
+                self.events[s, k] & ((1 << _CELL_BITS) - 1),
+                self.events[s, k] >> _CELL_BITS,
+            )
             if self.wins(s, cell, event, self.ranks[s, k]):
-                impulse += self.carry_out(s, shared, cell, event, self.other[s, k], velocity, pull)
+                impulse += self.carry_out(s, shared, cell, event, self.other[s, k], motion.v, pull)
         return impulse
 
     @ti.func
-    def find_events(self, s, step, shared, count, velocity, pull, pressed):
-        """Keep those of the contacts in which something happens; returns their number."""
+    def recoil(self, s):
+        """None: blows count as if the container had a great mass."""
+        return Recoil(0.0, 0.0)
+
+    @ti.func
+    def strike_container(self, s, recoil):
+        """All blows have been carried out."""
+        return ti.cast(0, ti.i64)
+
+    @ti.func
+    def find_events(self, s, step, shared, velocity, pull, pressed):
+        """Find those of the touching particles to which something happens; returns their number."""
         events = 0
-        for k in range(count):
-            cell = self.contacts[s, k]
+        for k in range(self.transport.touching_count[s]):
+            cell = self.transport.touching[s, k]
             event, other = self.find_event(s, cell, velocity, pull, pressed)
             if event != NOTHING:
-                self.contacts[s, events] = cell | (event << _CELL_BITS)
+                self.events[s, events] = cell | (event << _CELL_BITS)
                 self.other[s, events] = other
                 ranked = rank(step, shared, cell, EVENT)
-                if ti.static(self.pairs_first):
-                    if event == PAIR:
-                        ranked = above_others(ranked)
                 self.ranks[s, events] = ranked
                 self.claim(s, cell, event, ranked)
                 events += 1
@@ -124,9 +148,8 @@ class Collisions:
         before = self.cells.vertical_speed(s, cell)
         impulse = ti.cast(0, ti.i64)
         if event == PAIR:
-            self.event_counts.note(s, PAIRS_MET)
-            gain = self.collide(s, shared, cell, other)
-            impulse = self.accounting.lattice_impulse(s, PAIRS, gain)
+            self.event_counts.note(s, PAIRS)
+            impulse = self.accounting.lattice_impulse(self.collide(s, shared, cell, other))
         elif event == JOIN:
             # The container carries the particle over this whole step, its weight with it.
             self.event_counts.note(s, HOLDS)

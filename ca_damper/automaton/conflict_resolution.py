@@ -8,11 +8,13 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.random_numbers import bits
+from ca_damper.engine.random_numbers import EVENT, bits, scrambled
 from ca_damper.scenes.scene_fields import SceneFields
 
 #: Room for cell numbers in a rank.
 MOST_CELLS = 1 << 12
+#: Claims that a cell can make in a phase.
+SLOTS = 8
 
 
 @ti.func
@@ -26,9 +28,15 @@ def rank(step, shared, cell, purpose: ti.template()):
 
 
 @ti.func
-def above_others(ranked):
-    """The rank above all that are drawn in the same step."""
-    return ranked | (ti.cast(1, ti.i64) << 31)
+def rank_in_phase(step, shared, phase: ti.template(), cell, slot):
+    """Rank of a claim (i64) in one of four phases of a step, of which a later one ranks higher.
+
+    Step, phase, 15 random bits, then cell and slot to tell all apart. shared: hash of seed and
+    step.
+    """
+    chance = scrambled(bits(shared, cell, EVENT) + ti.cast(slot + SLOTS * phase, ti.u32)) >> 17
+    low = (ti.cast(chance, ti.i64) << 15) | ti.cast(cell * SLOTS + slot, ti.i64)
+    return (ti.cast(step + 1, ti.i64) << 32) | (ti.cast(phase, ti.i64) << 30) | low
 
 
 @ti.data_oriented
@@ -36,13 +44,12 @@ class ConflictResolution:
     """Largest rank that ever claimed a cell, shape (scenes, cells + 1)."""
 
     def __init__(self, table: SceneFields, lattice: Any):
-        self.lattice = lattice
-        self.claims = table.field(ti.i64, "cells")
+        self.lattice, self.claims = lattice, table.field(ti.i64, "cells")
 
     @ti.func
     def clear(self, s):
         """No claims."""
-        for cell in range(self.lattice.cell_count() + 1):
+        for cell in range(self.lattice.size[None].cells + 1):
             self.claims[s, cell] = ti.cast(0, ti.i64)
 
     @ti.func

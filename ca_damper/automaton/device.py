@@ -1,97 +1,176 @@
-"""Automaton on the device, and the order in which its rules act."""
+"""What automata of all rules have in common on the device, and the order in which rules act."""
 
 from typing import Any
 
 import numpy as np
 import taichi as ti
 
-from ca_damper.automaton.collisions import Collisions
-from ca_damper.automaton.components import assemble
-from ca_damper.automaton.ejection import Ejection
-from ca_damper.automaton.impulse_balance import GRAVITY, QUANTUM
-from ca_damper.automaton.lattice_device import LatticeDevice
-from ca_damper.automaton.placement import DrawnCells, NamedCells
-from ca_damper.automaton.transport import Transport
+from ca_damper.automaton.accounting import QUANTUM
+from ca_damper.automaton.cells import Cells, Placement
+from ca_damper.automaton.conflict_resolution import ConflictResolution
+from ca_damper.automaton.lattice import Geometry, Lattice
+from ca_damper.engine.random_numbers import stream
 from ca_damper.filling import Action
-from ca_damper.lattice import DIRECTIONS, DOWN, EMPTY, HELD, WALL, unit_vectors
-from ca_damper.random_numbers import stream
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.effect_usage import EffectUse
+
+PAIRS, WALLS, PUSHES, HOLDS = range(4)
+#: Counted events by the effect that they belong to.
+_COUNTED = {
+    "pairs": (PAIRS, "pairs met"),
+    "landing": (WALLS, "blows to walls"),
+    "ejection": (PUSHES, "particles pushed along"),
+    "static contact": (HOLDS, "particles came to rest"),
+}
 
 
 @ti.data_oriented
-class DeviceAutomaton(LatticeDevice):
-    """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``."""
+class Parameters:
+    """Parameters that kernels read; in fields, so that another value compiles nothing.
 
-    def __init__(self, options: Any, table: SceneFields):
-        components = assemble(options, table)
-        placement = DrawnCells if options.start is None else NamedCells
-        super().__init__(table, components, placement(table, components.cells, DOWN))
-        self.accounting, self.impulse_balance = components.accounting, components.impulse_balance
-        self.transport, self.ejection = Transport(table, components), Ejection(table, components)
-        both, pairs_first = options.pair_rule == "both", options.priority == "pairs_first"
-        self.collisions = Collisions(table, components, both, pairs_first)
+    width of a cell [m], mass of a particle [kg], gravity [m/s^2], restitution of particle and wall;
+    threshold of static contact in units of g dt; friction of two particles, and wall_friction.
+    """
+
+    def __init__(self):
+        for name in ("width", "mass", "gravity", "particle", "wall", "threshold"):
+            setattr(self, name, ti.field(ti.f64, shape=()))
+        self.friction, self.wall_friction = (ti.field(ti.f64, shape=()) for _ in range(2))
+
+    def load(self, options: Any) -> None:
+        """Take the values from the options."""
+        values = {
+            "width": options.width,
+            "mass": options.particle_mass,
+            "gravity": options.gravity,
+            "particle": options.restitution,
+            "wall": options.wall_restitution,
+            "threshold": options.static_threshold,
+            **dict(zip(("friction", "wall_friction"), options.frictions)),
+        }
+        for name, value in values.items():
+            assign(getattr(self, name), value)
+
+
+@ti.data_oriented
+class EventCounts:
+    """Events since the reset and the step of the first, shape (scenes, kinds of event).
+
+    step: the present one, (scenes,).
+    """
+
+    def __init__(self, table: SceneFields):
+        self.table, self.step = table, table.field(ti.i32)
+        self.events, self.first = table.field(ti.i64, HOLDS + 1), table.field(ti.i32, HOLDS + 1)
+
+    @ti.func
+    def clear(self, s):
+        """Nothing has happened yet."""
+        for kind in range(HOLDS + 1):
+            self.events[s, kind] = ti.cast(0, ti.i64)
+
+    @ti.func
+    def note(self, s, kind):
+        """Count one event."""
+        if self.events[s, kind] == 0:
+            self.first[s, kind] = self.step[s]
+        # Not "+=", which would be an atomic addition; a scene is one thread.
+        self.events[s, kind] = self.events[s, kind] + 1
+
+    def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
+        """Step in which each counted effect first acted, infinite if never, (scenes,)."""
+        first, events = map(self.table.in_use, (self.first, self.events))
+        steps = np.where(events > 0, first.astype(np.float64), np.inf)
+        return {name: steps[:, _COUNTED[name][0]] for name in effects if name in _COUNTED}
+
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
+        """An EffectUse for each named effect that is an event, over all scenes.
+
+        The automaton keeps no account of energy: what it does steers.
+        """
+        total = self.table.in_use(self.events).sum(axis=0)
+        found = [(name, *_COUNTED[name]) for name in effects if name in _COUNTED]
+        return tuple(EffectUse(name, what, int(total[k]), steers=True) for name, k, what in found)
+
+
+@ti.data_oriented
+class LatticeDevice:
+    """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``.
+
+    Rules add ``transport`` (with follow, fly_all and move_all) and ``collisions`` (with resolve,
+    recoil and strike_container). velocity: of the container at the beginning of the last step
+    [m/s]. gained: velocity along x that the container gave to the particles in this step [quanta].
+    Both (scenes,).
+    """
+
+    def __init__(self, table: SceneFields):
+        self.table, self.parameters, self.lattice = table, Parameters(), Lattice(table)
+        self.conflict_resolution = ConflictResolution(table, self.lattice)
+        self.event_counts = EventCounts(table)
+        self.velocity, self.gained = table.field(ti.f64), table.field(ti.i64)
+
+    def _fill(self, options: Any, cells: Cells, resting: Any, way: int) -> None:
+        """Add cells, what rests in them, and how they are filled."""
+        self.cells, self.resting = cells, resting
+        self.placement = Placement(self.table, cells, way, options.start is not None)
+
+    def load(self, options: Any) -> None:
+        """Take over the numbers of an automaton of the same structure."""
+        self.lattice.load(Geometry(options.columns, options.rows))
+        self.parameters.load(options)
+        self.placement.load(options.start)
 
     @ti.func
     def reset(self, s):
-        """Particles at rest in their first cells, headed down."""
+        """Particles at rest in their first cells; nothing has happened."""
         self.cells.clear(s)
-        self.accounting.clear(s)
-        self.place_all(s)
+        self.conflict_resolution.clear(s)
+        self.resting.held[s] = 0
+        self.event_counts.clear(s)
+        self.placement.fill(s)
+        self.velocity[s] = 0.0
 
     @ti.func
     def advance(self, s, step, motion):
-        """One step: the walls move, particles fly, meet, and change cells."""
-        pull = self.parameters.gravity[None] * self.table.dt[s]
+        """One step of a container on its own."""
+        self.meet(s, step, motion)
+        return self.carry_out(s, step, motion, self.collisions.recoil(s))
+
+    @ti.func
+    def meet(self, s, step, motion):
+        """First part of a step: the lattice follows the container, particles fly and meet."""
+        gravity = self.parameters.gravity[None]
+        pull, pressed = gravity * self.table.dt[s], motion.a > -gravity
         shared = stream(self.table.seed[s], step)
-        self.velocity[s] = motion.v
-        self.event_counts.begin(s, step)
-        pressed = motion.a > -self.parameters.gravity[None]
-        impulse = self.ejection.follow(s, step, motion)
+        self.velocity[s], self.event_counts.step[s] = motion.v, step
+        self.gained[s] = self.transport.follow(s, step, motion)
         if not pressed:
             self.resting.release(s, motion.v)
-        contacts, due, oblique = self.transport.fly_all(
-            s, self.table.dt[s], pull, self.collisions.contacts
-        )
-        impulse += self.collisions.resolve(s, step, shared, contacts, motion.v, pull, pressed)
-        # On an oblique flight gravity acts by a quarter: the lattice holds the rest.
-        impulse += self.accounting.lattice_impulse(s, GRAVITY, 0.75 * pull * oblique)
-        self.transport.move_all(s, step, shared, due)
-        mass = self.parameters.mass[None]
-        return Action(-mass * QUANTUM * ti.cast(impulse, ti.f64), mass * self.resting.count(s))
+        self.gained[s] = self.gained[s] + self.transport.fly_all(s, motion, pull)
+        met = self.collisions.resolve(s, step, shared, motion, pull, pressed)
+        self.gained[s] = self.gained[s] + met
 
     @ti.func
-    def energy(self, s):
-        """Kinetic and potential energy [J]; held particles move as the container did last."""
-        total = 0.0
-        for cell in range(self.lattice.cell_count()):
-            kind = self.cells.at(s, cell)
-            if kind != EMPTY and kind != WALL:
-                speed = self.velocity[s] if kind == HELD else self.cells.speed[s, cell]
-                height = self.lattice.height_of(cell) * self.parameters.width[None]
-                height += self.cells.travelled[s, cell] * self.lattice.upward(kind)
-                total += 0.5 * speed * speed + self.parameters.gravity[None] * height
+    def carry_out(self, s, step, motion, recoil):
+        """Second part of a step: blows that wait for the container's recoil, changes of cell."""
+        gained = self.gained[s] + self.collisions.strike_container(s, recoil)
+        self.transport.move_all(s, step, stream(self.table.seed[s], step))
+        mass = self.parameters.mass[None]
+        return Action(-mass * QUANTUM * ti.cast(gained, ti.f64), mass * self.resting.held[s])
+
+    @ti.func
+    def momentum(self, s):
+        """Momentum along x [kg m/s]; held particles move as the container did last."""
+        total = self.resting.held[s] * self.velocity[s]
+        for cell in range(self.lattice.size[None].cells):
+            total += self.cells.vertical_speed(s, cell)
         return self.parameters.mass[None] * total
 
-    @ti.func
-    def divergence_code(self, s):
-        """1 when a particle would cross more than one cell a step, which no rule allows."""
-        fastest = 0.0
-        for cell in range(self.lattice.cell_count()):
-            fastest = max(fastest, self.cells.speed[s, cell])
-        return 0 if fastest * self.table.dt[s] < self.parameters.width[None] else 1
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
+        """How often each of the named effects acted."""
+        return self.event_counts.uses(effects)
 
-    def snapshot(self, s: int) -> dict[str, np.ndarray]:
-        """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""
-        geometry = self.lattice.geometry
-        kind, travelled, speed = (
-            self.table.row(field, s)[: geometry.cells]
-            for field in (self.cells.kind, self.cells.travelled, self.cells.speed)
-        )
-        flying, present = kind < DIRECTIONS, (kind != EMPTY) & (kind != WALL)
-        way = np.zeros((len(kind), 2))
-        way[flying] = unit_vectors()[kind[flying]]
-        position = geometry.centres(self.parameters.width[None])
-        position = position + way * travelled[:, None]
-        velocity = way * speed[:, None]
-        velocity[kind == HELD, 1] = self.velocity[s]
-        return {"position": position[present], "velocity": velocity[present]}
+    def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
+        """Step in which each counted effect first acted, infinite if never, (scenes,)."""
+        return self.event_counts.first_steps(effects)

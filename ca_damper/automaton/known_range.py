@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.checked_range import CheckedRange, Driven
+from ca_damper.report.checked_range import CheckedRange, Driven
 
 _G = 9.81
 _PAPER = (

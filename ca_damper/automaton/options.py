@@ -2,18 +2,17 @@
 
 from dataclasses import dataclass, replace
 from numbers import Integral
-from typing import Any
+from typing import Any, ClassVar
 
-from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting
-from ca_damper.automaton.accumulator import READINGS
+from ca_damper.automaton.accounting import ACCOUNTINGS, Uncounted
 from ca_damper.automaton.conflict_resolution import MOST_CELLS
-from ca_damper.automaton.device import DeviceAutomaton
+from ca_damper.automaton.device import LatticeDevice
 from ca_damper.automaton.known_range import range_of
-from ca_damper.automaton.lattice_device import LatticeDevice
+from ca_damper.automaton.paper import PaperAutomaton
 from ca_damper.automaton.place.device import PlaceAutomaton
-from ca_damper.checked_range import CheckedRange, Driven
-from ca_damper.contracts import check_members, members_of
+from ca_damper.automaton.transport import READINGS
 from ca_damper.filling import Structure
+from ca_damper.report.checked_range import CheckedRange, Driven
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import GRAIN, GRAIN_MASS, in_unit
@@ -30,13 +29,7 @@ from taichi_dem.kit.validation import (
 
 RULES = ("paper", "place")
 #: Options that only the rules of the paper have; the others want these values.
-_OF_THE_PAPER = {
-    "accounting": "all",
-    "pair_rule": "both",
-    "priority": "random",
-    "accumulator": "signed",
-    "ledger": False,
-}
+_OF_THE_PAPER = {"accounting": "all", "pair_rule": "both", "accumulator": "signed"}
 #: Friction by the rules of place unless the user says otherwise, that of the spheres.
 _FRICTION = 0.5
 
@@ -64,8 +57,6 @@ class Automaton:
     pair_rule : str, default "both"
         ``"both"``: both particles of a pair change and momentum along its line is conserved;
         ``"one_sided"``: as printed in the paper, each particle that looks at another changes alone.
-    priority : str, default "random"
-        Order of the events of a particle: ``"random"`` or ``"pairs_first"``.
     accumulator : str, default "signed"
         Effect of a turn on the distance travelled, one of ``accumulator.READINGS``.
     static_threshold : float, default 5.0
@@ -87,13 +78,11 @@ class Automaton:
         from the seed of the scene.
     traversal : str, default "list"
         ``"list"`` of particles or ``"scan"`` of all cells; both give the same bits.
-    ledger : bool, default False
-        Whether to record the momentum that the accounting leaves out.
     rules : str, default "place"
         ``"place"``: particles fly in any direction, collide where their positions meet, and all
-        impacts of a step are given to the container together; accounting, pair_rule, priority,
-        accumulator and ledger have no other value than their default. ``"paper"``: rules of the
-        paper, for reproducing it; a UserWarning before a run says where they are known to fail.
+        impacts of a step are given to the container together; accounting, pair_rule and
+        accumulator have no other value than their default. ``"paper"``: rules of the paper, for
+        reproducing it; a UserWarning before a run says where they are known to fail.
     friction : float, optional
         Friction coefficient between particles, for rules ``"place"`` only. None: 0.5 there, no
         friction by the rules of the paper.
@@ -121,7 +110,6 @@ class Automaton:
     restitution: float = 0.75
     wall_restitution: float = 0.75
     pair_rule: str = "both"
-    priority: str = "random"
     accumulator: str = "signed"
     static_threshold: float = 5.0
     width: float = 6e-3
@@ -132,19 +120,20 @@ class Automaton:
     v_max: float = 5.0
     start: tuple | None = None
     traversal: str = "list"
-    ledger: bool = False
     rules: str = "place"
     friction: float | None = None
     wall_friction: float | None = None
 
+    #: The paper's step [s].
+    default_dt: ClassVar[float] = 1e-4
+
     def __post_init__(self) -> None:
         plain_fields(self)
         choice("accounting", self.accounting, ACCOUNTINGS)
-        check_members(f"accounting {self.accounting!r}", self._accounting, members_of(Accounting))
         choice("pair_rule", self.pair_rule, ("both", "one_sided"))
-        choice("priority", self.priority, ("random", "pairs_first"))
         choice("accumulator", self.accumulator, READINGS)
         choice("traversal", self.traversal, ("list", "scan"))
+        choice("rules", self.rules, RULES)
         for name in ("restitution", "wall_restitution"):
             fraction(name, getattr(self, name))
         for name in ("width", "particle_mass", "v_max"):
@@ -153,12 +142,12 @@ class Automaton:
         in_unit("particle_mass", self.particle_mass, GRAIN_MASS, self.particle_mass / self.width**3)
         for name in ("gravity", "static_threshold"):
             positive(name, getattr(self, name), zero_allowed=True)
-        choice("rules", self.rules, RULES)
-        self._check_friction()
+        if self.static_contact is not None:
+            flag("static_contact", self.static_contact)
         self._check_rules()
         self._check_lattice()
 
-    def _check_friction(self) -> None:
+    def _check_rules(self) -> None:
         for name in ("friction", "wall_friction"):
             value = getattr(self, name)
             if value is not None:
@@ -168,28 +157,12 @@ class Automaton:
                         f"{name} must be None with rules {self.rules!r}, whose blows have no "
                         f"friction, got {value:g}"
                     )
-
-    def _check_rules(self) -> None:
-        flag("ledger", self.ledger)
-        if self.rules == "place":
-            for name, value in _OF_THE_PAPER.items():
-                if getattr(self, name) != value:
-                    raise InputError(
-                        f"{name} must be {value!r} with rules 'place', which leave no choice, got "
-                        f"{getattr(self, name)!r}: pass rules='paper' for the rules that do"
-                    )
-        if self.static_contact is not None:
-            flag("static_contact", self.static_contact)
-        if self.ledger and self._accounting.counts_all:
-            raise InputError(
-                f"ledger must be False with accounting {self.accounting!r}, where everything acts "
-                "on the container and nothing is left to write down, got True"
-            )
-        if self.pair_rule == "one_sided" and self.priority != "random":
-            raise InputError(
-                "priority must be 'random' with pair_rule 'one_sided', where each particle changes "
-                f"alone and no two events compete, got {self.priority!r}"
-            )
+        for name, value in _OF_THE_PAPER.items():
+            if self.rules == "place" and getattr(self, name) != value:
+                raise InputError(
+                    f"{name} must be {value!r} with rules 'place', which leave no choice, got "
+                    f"{getattr(self, name)!r}: pass rules='paper' for the rules that do"
+                )
 
     def _check_lattice(self) -> None:
         for name in ("columns", "rows"):
@@ -222,7 +195,7 @@ class Automaton:
         return whole_numbers and 0 <= column < self.columns and 0 <= row < self.rows
 
     @property
-    def _accounting(self) -> type[Accounting]:
+    def _accounting(self) -> type[Uncounted]:
         return ACCOUNTINGS[self.accounting]
 
     @property
@@ -250,15 +223,9 @@ class Automaton:
     def effects(self) -> tuple[str, ...]:
         """Effects that are computed, in words for the report."""
         resting = ("static contact",) if self.particles_rest else ()
-        ledger = ("ledger",) if self.ledger else ()
         if self.rules == "place":
             return ("pairs", "landing", *resting)
-        return ("pairs", "landing", *self._accounting.effects, *resting, *ledger)
-
-    @property
-    def default_dt(self) -> float:
-        """The paper's step, 1e-4 s."""
-        return 1e-4
+        return ("pairs", "landing", *self._accounting.effects, *resting)
 
     @property
     def capacity(self) -> int:
@@ -342,18 +309,7 @@ class Automaton:
             )
 
     def checked_range(self, driven: Driven) -> CheckedRange:
-        """Range in which the rules were checked, and what of the scenes lies outside it.
-
-        Parameters
-        ----------
-        driven : Driven
-            What is known of the scenes before they run.
-
-        Returns
-        -------
-        CheckedRange
-            The range, what is outside, and a sentence where the rules are known to fail.
-        """
+        """Range in which the rules were checked, and what of the scenes lies outside it."""
         return range_of(self, driven)
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
@@ -364,12 +320,11 @@ class Automaton:
     @property
     def structure(self) -> Structure:
         """Rules are compiled; numbers, the size of the lattice and the cells of start are not."""
-        rules = (self.accounting, self._accounting, self.particles_rest, self.accumulator)
-        pairs = self.pair_rule, self.priority
-        key = (self.rules, *rules, *pairs, self.traversal, self.ledger, self.start is None)
+        rules = self.rules, self._accounting, self.pair_rule, self.accumulator
+        key = (*rules, self.particles_rest, self.traversal, self.start is None)
         # One more for the cell beyond the lattice.
         return Structure(key, {"cells": (self.columns + 2) * (self.rows + 2) + 1})
 
     def bind(self, table: SceneFields) -> LatticeDevice:
         """The automaton on the device, for all scenes of a table."""
-        return (PlaceAutomaton if self.rules == "place" else DeviceAutomaton)(self, table)
+        return (PlaceAutomaton if self.rules == "place" else PaperAutomaton)(self, table)

@@ -11,30 +11,20 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.lattice import DOWN, HELD, UP, WALL
-from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.automaton.lattice import DOWN, HELD, UP, WALL
 
 
 @ti.data_oriented
 class StaticContact:
     """Particles held by the container.
 
-    held: number of them, shape (scenes,).
+    rests: whether any is ever held; if not, the compiler removes every question about it. held:
+    number of them, shape (scenes,).
     """
 
-    def __init__(self, table: SceneFields, cells: Any, accumulator: Any, parameters: Any):
-        self.cells, self.accumulator, self.parameters = cells, accumulator, parameters
-        self.held = table.field(ti.i32)
-
-    @ti.func
-    def clear(self, s):
-        """No particle is held."""
-        self.held[s] = 0
-
-    @ti.func
-    def count(self, s):
-        """Particles held."""
-        return self.held[s]
+    def __init__(self, automaton: Any, cells: Any, accumulator: Any, rests: bool):
+        self.cells, self.accumulator, self.rests = cells, accumulator, rests
+        self.parameters, self.held = automaton.parameters, automaton.table.field(ti.i32)
 
     @ti.func
     def supported(self, s, cell):
@@ -44,17 +34,20 @@ class StaticContact:
     @ti.func
     def noticed(self, s, cell, kind):
         """Whether a rising particle has support below; a falling one has it in the cell ahead."""
-        return kind == UP and self.supported(s, cell)
+        if ti.static(self.rests):
+            return kind == UP and self.supported(s, cell)
+        return False
 
     @ti.func
     def joins(self, s, cell, velocity, pull, pressed):
         """Whether a particle is to be held; velocity: of the container, pull: g dt [m/s]."""
-        kind = self.cells.at(s, cell)
         result = False
-        if pressed and (kind == UP or kind == DOWN):
-            relative = self.cells.vertical_speed(s, cell) - velocity
-            if abs(relative) < self.parameters.threshold[None] * pull:
-                result = self.supported(s, cell)
+        if ti.static(self.rests):
+            kind = self.cells.at(s, cell)
+            if pressed and (kind == UP or kind == DOWN):
+                relative = self.cells.vertical_speed(s, cell) - velocity
+                if abs(relative) < self.parameters.threshold[None] * pull:
+                    result = self.supported(s, cell)
         return result
 
     @ti.func
@@ -66,8 +59,11 @@ class StaticContact:
     @ti.func
     def caught(self, s, cell, velocity):
         """Whether the floor, or the heap on it, rises into a particle that rises slower."""
-        rising = self.cells.at(s, cell) == UP and self.cells.speed[s, cell] < velocity
-        return rising and self.supported(s, cell)
+        result = False
+        if ti.static(self.rests):
+            rising = self.cells.at(s, cell) == UP and self.cells.speed[s, cell] < velocity
+            result = rising and self.supported(s, cell)
+        return result
 
     @ti.func
     def release(self, s, velocity):
@@ -80,40 +76,3 @@ class StaticContact:
                 if self.cells.at(s, cell) == HELD:
                     self.cells.put(s, cell, kind, abs(velocity), travelled)
             self.held[s] = 0
-
-
-@ti.data_oriented
-class NoStaticContact:
-    """No particle is ever held; the compiler removes every question about it."""
-
-    @ti.func
-    def clear(self, s):
-        """Nothing to clear."""
-
-    @ti.func
-    def count(self, s):
-        """No particle."""
-        return 0
-
-    @ti.func
-    def noticed(self, s, cell, kind):
-        """Support is not considered."""
-        return False
-
-    @ti.func
-    def joins(self, s, cell, velocity, pull, pressed):
-        """No particle joins."""
-        return False
-
-    @ti.func
-    def caught(self, s, cell, velocity):
-        """Only the staircase of the floor catches up with particles."""
-        return False
-
-    @ti.func
-    def hold(self, s, cell):
-        """Never called."""
-
-    @ti.func
-    def release(self, s, velocity):
-        """Nothing to release."""

@@ -1,49 +1,116 @@
-"""Transport: free flight and the change of cell (Komatsuzaki et al., 5.2)."""
+"""Transport by the rules of the paper: free flight, changes of cell (5.2), the lattice (Fig. 7).
+
+The lattice moves with the container, whose displacement is rounded to whole cells. When that
+staircase steps, moving particles stay in place in the room: one cell the other way. Those that
+touch the wall behind them, and the cluster that touches these, are pushed along: they keep their
+cell, and those slower than the wall take its velocity. A column always has room for this: a
+particle that stays has no pushed one in its way, or it would touch it and be pushed.
+"""
 
 from typing import Any
 
 import taichi as ti
 
 from ca_damper.automaton.conflict_resolution import rank
-from ca_damper.lattice import DOWN, EMPTY
-from ca_damper.random_numbers import MOVE
-from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.automaton.device import PUSHES
+from ca_damper.automaton.lattice import DIRECTIONS, DOWN, EMPTY, HELD, UP, Lattice
+from ca_damper.engine.random_numbers import MOVE
+from ca_damper.scenes.scene_fields import Part
+
+#: Effects of a turn on the distance travelled.
+READINGS = ("signed", "signed_through_walls", "reset", "kept")
 
 
 @ti.data_oriented
-class Transport:
-    """Free flight: speeds, distances, and particles that meet an obstacle or may change cells.
+class Accumulator:
+    """Distance travelled after a turn: one of four readings of a rule that the paper leaves open.
 
-    crossing: cells of particles that may change their cell, shape (scenes, cells).
+    The paper says that the distance is summed up to a cell's width (eq. 8), but not how a turn
+    changes the sum. ``signed`` takes the sum for a position: the distance along the new direction
+    is the component of the old one, so that a turn straight back changes its sign, and a wall sets
+    it to the wall's position, which is zero while the container does not move.
+    ``signed_through_walls`` leaves walls out, ``reset`` starts from zero at every turn, and
+    ``kept`` keeps the sum.
     """
 
-    def __init__(self, table: SceneFields, components: Any):
-        self.cells, self.lattice = components.cells, components.lattice
-        self.conflict_resolution = components.conflict_resolution
-        self.accumulator, self.resting = components.accumulator, components.resting
-        self.accounting, self.parameters = components.accounting, components.parameters
-        self.crossing = table.field(ti.i16, "cells")
+    def __init__(self, reading: str, lattice: Lattice):
+        self.reading, self.lattice = reading, lattice
 
     @ti.func
-    def fly_all(self, s, dt, pull, contacts: ti.template()):
-        """One step of all particles.
+    def turned(self, travelled, old, new):
+        """Distance travelled [m] after a turn from direction old to new."""
+        result = travelled
+        if ti.static(self.reading.startswith("signed")):
+            result = travelled * self.lattice.cosine[old, new]
+        elif ti.static(self.reading == "reset"):
+            if old != new:
+                result = 0.0
+        return result
 
-        Returns the numbers of particles that touch something, may move on, and fly obliquely.
+    @ti.func
+    def after_wall(self, travelled, old, new, place):
+        """Distance travelled [m] after meeting a wall that stands ``place`` [m] above its cells."""
+        result = self.at_wall(new, place)
+        if ti.static(self.reading != "signed"):
+            result = self.turned(travelled, old, new)
+        return result
+
+    @ti.func
+    def at_wall(self, kind, place):
+        """Distance travelled [m] of a particle that leaves a wall."""
+        result = 0.0
+        if ti.static(self.reading == "signed"):
+            result = place * self.lattice.upward(kind)
+        return result
+
+    @ti.func
+    def distance_to_wall(self, travelled, kind, way, width):
+        """Distance travelled [m] of a particle ahead of a wall that pushes its cell along.
+
+        A particle that flies straight (up for way 1, down for -1) keeps its place in the room.
         """
-        contact_count, crossing_count, oblique = 0, 0, 0
+        result = 0.0
+        if ti.static(self.reading == "signed"):
+            if self.lattice.upward(kind) * way == 1.0:
+                result = max(travelled - width, -width)
+        return result
+
+
+@ti.data_oriented
+class Transport(Part):
+    """Flight of the particles, and how they follow the lattice.
+
+    Of shape (scenes, cells), touching: cells of particles that meet an obstacle; crossing: of those
+    that may change their cell; pushed: 1 for a cell in the cluster that a wall pushes along;
+    border: cells of the cluster still to look around. touching_count, crossing_count: (scenes,).
+    """
+
+    def __init__(self, automaton: Any):
+        super().__init__(automaton)
+        table = self.table
+        self.touching, self.crossing = table.field(ti.i32, "cells"), table.field(ti.i16, "cells")
+        self.touching_count, self.crossing_count = table.field(ti.i32), table.field(ti.i32)
+        self.pushed, self.border = table.field(ti.i8, "cells"), table.field(ti.i16, "cells")
+
+    @ti.func
+    def fly_all(self, s, motion, pull):
+        """One step of all particles; returns what the lattice gives the container [quanta]."""
+        touching, crossing, oblique = 0, 0, 0
         for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
             cell = self.cells.traversal.cell(s, k)
-            touches, free, upward = self.fly(s, cell, dt, pull)
+            touches, free, upward = self.fly(s, cell, self.table.dt[s], pull)
             if touches:
-                contacts[s, contact_count] = cell
-                contact_count += 1
+                self.touching[s, touching] = cell
+                touching += 1
             if free:
-                self.crossing[s, crossing_count] = ti.cast(cell, ti.i16)
-                crossing_count += 1
-            if ti.static(self.accounting.needs_lattice_impulse):
+                self.crossing[s, crossing] = ti.cast(cell, ti.i16)
+                crossing += 1
+            if ti.static(self.accounting.counts_all):
                 if upward * upward == 0.25:
                     oblique += 1
-        return contact_count, crossing_count, oblique
+        self.touching_count[s], self.crossing_count[s] = touching, crossing
+        # On an oblique flight gravity acts by a quarter: the lattice holds the rest.
+        return self.accounting.lattice_impulse(0.75 * pull * oblique)
 
     @ti.func
     def fly(self, s, cell, dt, pull):
@@ -76,10 +143,10 @@ class Transport:
         return touches, due and not blocked, upward
 
     @ti.func
-    def move_all(self, s, step, shared, crossing_count):
+    def move_all(self, s, step, shared):
         """Move particles to their new cells, one claimant for each cell."""
         claimants = 0
-        for k in range(crossing_count):
+        for k in range(self.crossing_count[s]):
             cell = ti.cast(self.crossing[s, k], ti.i32)
             # A collision may have turned it since.
             if self.cells.travelled[s, cell] >= self.parameters.width[None]:
@@ -95,3 +162,74 @@ class Transport:
                 left = self.cells.travelled[s, cell] - self.parameters.width[None]
                 self.cells.relocate(s, cell, target, left)
                 self.accounting.arrive(s, target)
+
+    @ti.func
+    def follow(self, s, step, motion):
+        """Follow the container's staircase; returns what pushes give it [quanta]."""
+        way = self.cells.step_along(s, step, motion, self.parameters.width[None])
+        impulse = ti.cast(0, ti.i64)
+        if way != 0:
+            self.mark(s, way)
+            for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
+                cell = self.cells.traversal.cell(s, k)
+                if self.pushed[s, cell] == 1 and self.cells.at(s, cell) != HELD:
+                    impulse += self.push(s, cell, way, motion.v)
+            self.shift(s, way)
+            self.cells.traversal.sort(s, self.cells)
+        return impulse
+
+    @ti.func
+    def mark(self, s, way):
+        """Mark the particles that touch the wall behind and all that hang together with them."""
+        number, lattice = 0, self.lattice.size[None]
+        for cell in range(lattice.cells + 1):
+            self.pushed[s, cell] = ti.cast(0, ti.i8)
+        for column in range(lattice.columns):
+            row = 0 if way > 0 else lattice.rows - 1
+            number = self.reach(s, self.lattice.cell_of(column, row), way, number)
+        while number > 0:
+            number -= 1
+            cell = ti.cast(self.border[s, number], ti.i32)
+            for direction in range(DIRECTIONS):
+                number = self.reach(s, self.lattice.cell_ahead(cell, direction), way, number)
+
+    @ti.func
+    def reach(self, s, cell, way, number):
+        """Mark a particle, unless it is, and put it on the border; returns the border's new size.
+
+        The floor pushes through the heap that it holds; the ceiling pushes against no heap.
+        """
+        result = number
+        kind = self.cells.at(s, cell)
+        found = kind < DIRECTIONS or (kind == HELD and way > 0)
+        if found and self.pushed[s, cell] == 0:
+            self.pushed[s, cell] = ti.cast(1, ti.i8)
+            self.border[s, number] = ti.cast(cell, ti.i16)
+            result = number + 1
+        return result
+
+    @ti.func
+    def push(self, s, cell, way, velocity):
+        """Push one particle along; returns its counted gain of velocity along x [quanta]."""
+        kind = self.cells.at(s, cell)
+        gain = velocity - self.cells.vertical_speed(s, cell)
+        if gain * way > 0.0:
+            self.event_counts.note(s, PUSHES)
+            kind = UP if velocity > 0.0 else DOWN
+            travelled = self.accumulator.at_wall(kind, self.cells.offset[s])
+            self.cells.put(s, cell, kind, abs(velocity), travelled)
+        else:
+            gain = 0.0
+            self.cells.travelled[s, cell] = self.accumulator.distance_to_wall(
+                self.cells.travelled[s, cell], kind, way, self.parameters.width[None]
+            )
+        return self.accounting.push(s, gain)
+
+    @ti.func
+    def shift(self, s, way):
+        """Keep all others in place in the room: one cell the other way, those in front first."""
+        for column in range(self.lattice.size[None].columns):
+            for k in range(self.lattice.size[None].rows):
+                cell = self.lattice.cell_from(column, k, way)
+                if self.cells.at(s, cell) < DIRECTIONS and self.pushed[s, cell] == 0:
+                    self.cells.relocate(s, cell, cell - way, self.cells.travelled[s, cell])

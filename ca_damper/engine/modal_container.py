@@ -8,7 +8,7 @@ boxes come before: ``set_blows`` of every box, then ``resolve``, then ``recoil_o
 import numpy as np
 import taichi as ti
 
-from ca_damper import rk45
+from ca_damper.engine import rk45
 from ca_damper.engine.container import MOST_ATTEMPTS, IntegratedContainer
 from ca_damper.engine.modal_mount import ModalMount
 from ca_damper.engine.signals import BASES, FORCES

@@ -9,7 +9,7 @@ import numpy as np
 from ca_damper.excitation.signal import Signal
 from taichi_dem.kit.checkpoint import identity_of
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import LARGEST, choice, shown, whole
+from taichi_dem.kit.validation import choice, real_numbers, shown, whole
 
 
 class ExcitationKind(NamedTuple):
@@ -261,13 +261,7 @@ def _signals(name: str, value: Any) -> tuple[Signal, ...] | None:
 
 def _numbers(name, value):
     """A float, or a tuple of them; InputError for anything else."""
-    try:
-        numbers = np.asarray(value)
-    except ValueError:
-        numbers = np.empty(0, dtype=object)
-    right = numbers.dtype.kind in "iuf" and numbers.ndim <= 1 and numbers.size > 0
-    if not right or not (np.abs(numbers.astype(np.float64)) <= LARGEST).all():
-        raise InputError(
-            f"{name} must be a finite number or one for each scene, got {shown(value)}"
-        )
+    numbers = real_numbers(name, value)
+    if numbers.ndim > 1 or not numbers.size:
+        raise InputError(f"{name} must be one number or one for each scene, got {shown(value)}")
     return float(numbers) if numbers.ndim == 0 else tuple(map(float, numbers))

@@ -125,16 +125,15 @@ def _even_step(times):
 
 def _check_spectrum(step, samples):
     """InputError unless nearly all of the power lies where a spline follows."""
+    from scipy import signal
+
     count = len(samples)
-    line = np.polynomial.Polynomial.fit(np.arange(count), samples, 1)
-    rest = (samples - line(np.arange(count))) * np.hanning(count)
-    power = np.abs(np.fft.rfft(rest)) ** 2
-    total = power.sum()
+    options = {"window": "hann", "detrend": "linear", "scaling": "spectrum"}
+    frequency, power = signal.periodogram(samples, 1.0 / step, **options)
     # What a straight line leaves of one is rounding, which has no spectrum.
-    if total <= 1e-20 * (samples**2).sum():
+    if count * power.sum() <= 1e-20 * (samples**2).mean():
         return
-    frequency = np.fft.rfftfreq(count, step)
-    most = float(frequency[np.searchsorted(np.cumsum(power), POWER_SHARE * total)])
+    most = float(frequency[np.searchsorted(np.cumsum(power), POWER_SHARE * power.sum())])
     # To within the width of the window's lobe.
     if most > 1.0 / (SAMPLES_A_CYCLE * step) + 2.0 / (count * step):
         got, longest = told_apart(step, 1.0 / (SAMPLES_A_CYCLE * most))

@@ -189,8 +189,8 @@ def _inner(right):
     """Second derivatives at the inner nodes, by elimination without a search for pivots."""
     # First and last equation are 6 m = r, so that those between see known neighbours.
     first, last = right[0] / 6.0, right[-1] / 6.0
-    if len(right) < 3:
-        return [first, last][: len(right)] if len(right) == 2 else [first]
+    if len(right) == 2:
+        return [first, last]
     middle = right[1:-1]
     middle[0] -= first
     middle[-1] -= last
@@ -206,20 +206,10 @@ def _inner(right):
 
 def _nodes(name, values):
     """A copy of finite numbers (nodes,) that refuses to be written."""
-    try:
-        nodes = np.array(values)
-    except ValueError:
-        nodes = np.empty(0)
-    right = nodes.dtype.kind in "iuf" and nodes.ndim == 1
-    if not right or not LEAST_NODES <= len(nodes) <= MOST_NODES:
+    nodes = real_numbers(name, values)
+    if nodes.ndim != 1 or not LEAST_NODES <= len(nodes) <= MOST_NODES:
         raise InputError(
             f"{name} must be from {LEAST_NODES} to {MOST_NODES} numbers, got {shown(values)}"
-        )
-    nodes = nodes.astype(np.float64)
-    bad = np.flatnonzero(~(np.abs(nodes) <= LARGEST))
-    if len(bad):
-        raise InputError(
-            f"{name} must be finite numbers up to {LARGEST:g}, got {nodes[bad[0]]} at node {bad[0]}"
         )
     nodes.flags.writeable = False
     return nodes

@@ -1,16 +1,21 @@
 """Pictures of the damper; the only part of the package that imports matplotlib."""
 
-from ca_damper.plot.animation import moving_picture
-from ca_damper.plot.box import Box, DrawnBox, frame_panel
-from ca_damper.plot.cycle import FilmMeasures, picture_cycle
-from ca_damper.plot.film_strip import animate_films, picture_film_strips
-from ca_damper.plot.hanging import Hanging, film_hanging
-from ca_damper.plot.response import (
+from ca_damper.plot.boxes import (
+    Box,
+    DrawnBox,
+    Hanging,
+    animate_films,
+    film_hanging,
+    frame_panel,
+    picture_film_strips,
+)
+from ca_damper.plot.curves import (
     picture_compared,
     picture_hysteresis,
     picture_measures,
     picture_responses,
 )
+from ca_damper.plot.cycle import FilmMeasures, picture_cycle
 
 __all__ = [
     "Box",
@@ -20,7 +25,6 @@ __all__ = [
     "animate_films",
     "film_hanging",
     "frame_panel",
-    "moving_picture",
     "picture_compared",
     "picture_cycle",
     "picture_film_strips",

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.measures import first_harmonic
+from ca_damper.report.measures import first_harmonic
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.plot_style import BLACK, GREY, area_key, line_key, picture, styles_of
 from taichi_dem.kit.validation import FileName

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.gravity import gravity_along
 from ca_damper.oscillator import Oscillator
 from ca_damper.scenes.clock import steps_per_cycle
+from ca_damper.scenes.gravity import gravity_along
 from ca_damper.scenes.table import SceneTable
 
 _STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from ca_damper.random_numbers import uniform
+from ca_damper.engine.random_numbers import uniform
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign, assign_members, values
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.random_numbers import bits, stream
+from ca_damper.engine.random_numbers import bits, stream
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.search import EXPECTED, TOUCHING, AllPairs, CellList

@@ -2,17 +2,22 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from taichi_dem.accuracy.job import Job
-from taichi_dem.accuracy.runs import Runs
-from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan, doubted
-from taichi_dem.kit.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
-from taichi_dem.kit.accuracy.step_error import StepError, step_error
-from taichi_dem.kit.accuracy.student import mean_and_deviation, t_quantile
+from taichi_dem.accuracy.runs import Job, Runs
+from taichi_dem.kit.bars.answer import (
+    Answer,
+    ErrorParts,
+    Plan,
+    branched,
+    branches_of,
+    cost_curve,
+    doubted,
+)
+from taichi_dem.kit.bars.chance import clusters_of, mean_and_deviation, t_quantile
+from taichi_dem.kit.bars.step import StepError, step_error
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.validation import told_apart
 from taichi_dem.report.energy_balance import open_account
@@ -26,12 +31,10 @@ _NEGLIGIBLE, _TWO = 0.25, 2.8
 _FEW, _MANY = 6, 96
 #: Runs there must be of each end, on average, to call it one: more ends are a distribution.
 _OF_EACH = 3
-#: Spread over what is allowed from which on no mean of runs has it, and halvings that none affords.
-_HOPELESS, _BEYOND = 1e6, 1000
+#: Spread over what is allowed from which on no mean of runs has it.
+_HOPELESS = 1e6
 #: Share of all bodies that a run with all effects is compared with, at least.
 _LEAST_AWAKE = 1e-3
-#: Tolerances of which the cost is told.
-_TOLERANCES = (0.1, 0.03, 0.01, 0.003)
 
 
 class Search:
@@ -69,7 +72,7 @@ class Search:
             confidence=job.confidence,
             plan=Plan(words, self.runs.count, pilot_s, spent, last - 1, parting),
             result=self.runs.results[last],
-            cost_curve=tuple(self._cost_curve()),
+            cost_curve=self._cost_curve(),
             shortfall=short,
         )
         made = self._branched(made) if parts.chance > self._allowed else made
@@ -77,18 +80,14 @@ class Search:
 
     def _branched(self, made: Answer) -> Answer:
         """The answer with its branches, where twins come to a few ends; else as it is."""
-        values = self._sample(self.twins_at)
+        values = np.array(self._sample(self.twins_at))
         clusters = clusters_of(values, 0.0, 0.5 * self._allowed)
         few = 2 <= len(clusters) <= len(values) // _OF_EACH
         if self.job.goal.averaged or not few:
             return made
-        branches = branches_of(
-            np.array(values), clusters, range(len(values)), self._step().error, 1.0
-        )
-        words = sentence(branches, made.unit, "run", "that differ by one rounding came to {} ends")
-        parts = replace(made.parts, chance=branches[0].error)
-        given = {"value": branches[0].value, "parts": parts, "shortfall": words}
-        return BranchedAnswer(**{**vars(made), **given}, branches=branches)
+        branches = branches_of(values, clusters, range(len(values)), self._step().error, 1.0)
+        ends = "that differ by one rounding came to {} ends"
+        return branched(made, branches, made.parts.step, "run", ends)
 
     def _begin(self):
         """Find the longest step that is stable, and go on to half of it."""
@@ -153,15 +152,13 @@ class Search:
     def _spread(self):
         """Half-width by which runs that differ by one rounding spread, of one or of their mean.
 
-        To halve the step disturbs a run far more than a rounding does: where that moves a usual
-        body by little, and breaks the same faces, nothing is there that could let twins part.
+        To halve the step disturbs a run far more than a rounding does: where nothing comes of
+        that, nothing is there that could let twins part.
         """
         coarse, averaged = self.twins_at, self.job.goal.averaged
         if self.count == 0:
-            change = self.runs.change(*self.levels[-2:])
-            if not averaged and change <= _NEGLIGIBLE * self.job.tolerance:
-                if self.runs.same_breaks(*self.levels[-2:]):
-                    return 0.0
+            if not averaged and self._is_calm():
+                return 0.0
             if not self._affords(1.0, coarse):
                 return math.inf
             self.count = 1
@@ -175,9 +172,14 @@ class Search:
         found = self._sample(coarse)
         if len(found) <= self.count:
             return math.inf
-        _, spread = mean_and_deviation(found)
-        spread *= t_quantile(self.job.confidence, len(found) - 1)
+        spread = mean_and_deviation(found)[1] * t_quantile(self.job.confidence, len(found) - 1)
         return spread / math.sqrt(len(found)) if averaged else spread
+
+    def _is_calm(self):
+        """Whether half the step moves a usual body by little, and breaks the same faces."""
+        last = self.levels[-2:]
+        change = self.runs.change(*last)
+        return change <= _NEGLIGIBLE * self.job.tolerance and self.runs.same_breaks(*last)
 
     @property
     def _eventful(self):
@@ -264,14 +266,16 @@ class Search:
         others = self.runs.seconds - sum(self.runs.cost[level] for level in levels)
         paid = others + np.cumsum([self.runs.cost[level] for level in levels])
         stages = [(self._step(count), paid[count - 1]) for count in range(2, len(levels) + 1)]
-        for tolerance in sorted({*_TOLERANCES, self.job.tolerance}, reverse=True):
-            enough = [seconds for step, seconds in stages if step.error <= tolerance * size]
-            step, seconds = stages[-1]
+
+        def cost(tolerance):
+            for step, seconds in stages:
+                if step.error <= tolerance * size:
+                    return float(seconds), True
             unseen = 1.0 if self._eventful else self.job.declared
-            order = step.order if step.regular else unseen
-            more = _halvings(step.error, tolerance * size, order)
-            predicted = seconds * (2.0**more if more < _BEYOND else math.inf)
-            yield Expense(tolerance, float(enough[0] if enough else predicted), bool(enough))
+            more = _halvings(step.error, tolerance * size, step.order if step.regular else unseen)
+            return float(seconds) * 2.0**more, False
+
+        return tuple(cost_curve(self.job.tolerance, cost))
 
 
 def _beside(whole, part):

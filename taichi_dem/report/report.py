@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from taichi_dem.kit.accuracy import plans
+from taichi_dem.kit.bars.answer import known_partings
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.methods import order_of
@@ -268,6 +268,6 @@ def known_error(report: Report, scene: Scene, method: Any) -> str:
     closes = f"energy balance: {report.unexplained.replace('; ', ', ')}"
     if "%" in closes:
         closes = f"energy balance closes to {report.unexplained.replace(' of it', '')}"
-    plan = plans.recall(kind_of(scene))
+    plan = known_partings.get(kind_of(scene))
     parts = f"{'steps up to' if varying else 'step'} {method.dt0:.3g} s, {words}", closes
     return "; ".join([*parts, f"in such scenes {plan}"] if plan else parts)

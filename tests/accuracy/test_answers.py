@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Checkpoint, InputError, Scene, effects, goals, simulate, solve
-from taichi_dem.accuracy.job import Job
-from taichi_dem.accuracy.runs import Runs
+from taichi_dem.accuracy.runs import Job, Runs
 from taichi_dem.goals import Goal
 from taichi_dem.mesh.shapes import placed_together, single
 from tests.accuracy.small_bar import BROKEN_UNTIL, UNTIL, broken_bar, laws, struck_bar

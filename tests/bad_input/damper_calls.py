@@ -122,14 +122,14 @@ def _batches():
     yield "Batch.snapshot", on_new_batch("snapshot"), {"s": 0}
     yield "film", film, {"batch": started(), "steps": 4, "frame_every": 2, **SILENT}
     page = {"path": path("f.html"), "scenes": [0], "open_browser": False}
-    yield "film.Film.show", made_film().show, page
-    yield "film.Film.write_xyz", made_film().write_xyz, {"path": path("f.xyz"), "scene": 0}
+    yield "runs.film.Film.show", made_film().show, page
+    yield "runs.film.Film.write_xyz", made_film().write_xyz, {"path": path("f.xyz"), "scene": 0}
     for name in ("mean_of", "per_step", "harmonic", "harmonic_by_cycle"):
-        yield f"measures.Cycles.{name}", getattr(cycles(), name), {"name": "x"}
+        yield f"report.measures.Cycles.{name}", getattr(cycles(), name), {"name": "x"}
     powers = {"base_amplitude": 1e-3, "stiffness": 100.0, "damping": 0.1}
-    yield "measures.Cycles.powers", cycles().powers, powers
-    yield "measures.Cycles.loss_factor", cycles().loss_factor, {"mass": 0.1}
-    yield "measures.Cycles.damping_ratio", cycles().damping_ratio, HELD
+    yield "report.measures.Cycles.powers", cycles().powers, powers
+    yield "report.measures.Cycles.loss_factor", cycles().loss_factor, {"mass": 0.1}
+    yield "report.measures.Cycles.damping_ratio", cycles().damping_ratio, HELD
 
 
 def _structures():

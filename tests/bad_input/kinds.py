@@ -94,13 +94,14 @@ KINDS = {
         recorded_samples s sample_every samples scene scenes sectors seed seeds
         spheres_per_body steps substeps sweeps threads total transient_cycles""",
     "word": """accounting accumulator arch colour dashpot driver effects friction_law
-        if_diverged kind measure mount neighbour of outer_faces pair_rule priority rules search
+        if_diverged kind measure mount neighbour of outer_faces pair_rule rules search
         start traversal way progress term Spheres.damping""",
     "any": """about acceleration axis base bend by displacement factor force history hole notch
         normal phase phases points shapes start_velocity t time_s times times_s turned u v values
         value velocity x y spin sizes motion tetrahedra goal boxes excitation observers amplitude
-        amplitudes effects.Pressure.peak measures.Cycles.base_amplitude measures.Cycles.stiffness
-        measures.Cycles.damping measures.Cycles.mass Oscillator.added_mass Oscillator.frequency
+        amplitudes effects.Pressure.peak report.measures.Cycles.base_amplitude
+        report.measures.Cycles.stiffness report.measures.Cycles.damping
+        report.measures.Cycles.mass Oscillator.added_mass Oscillator.frequency
         Oscillator.gravity ModalStructure.frequency""",
     "text": """column group index label name names notes path role source title treated unit
         unread""",

@@ -31,7 +31,6 @@ from taichi_dem import (
 from taichi_dem.mesh.mesh import with_inner_group
 from taichi_dem.mesh.shapes import pair, single
 from tests.bad_input.refusals import assert_refused
-from tests.paper import paper
 
 PAIR = pair()
 CUT = with_inner_group(PAIR, "notch", lambda x: x[:, 0] < 1.0)
@@ -131,11 +130,6 @@ DAMPERS = {
         "ratios must ascend",
     ),
     "a budget below the pilot": (lambda: solved(budget_s=1e-9), "time for the pilot"),
-    "a ledger by the paper": (lambda: Automaton(rules="paper", ledger=True), "must be False"),
-    "a priority without pairs": (
-        lambda: paper(pair_rule="one_sided", priority="pairs_first"),
-        "priority must be 'random'",
-    ),
     "a cell twice": (lambda: Automaton(start=[(1, 1), (1, 1)]), "must not name a cell twice"),
     "a sphere in the wall": (lambda: Spheres(start=[(0.0, 0.03)]), "off the walls"),
     "spheres that overlap": (lambda: Spheres(start=[(0.03, 0.03), (0.031, 0.03)]), "overlap"),

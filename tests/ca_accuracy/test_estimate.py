@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from ca_damper import Goal
-from ca_damper.accuracy.goal_estimate import SeedValues, estimate
+from ca_damper.accuracy.estimate import SeedValues, estimate
 
-GOAL = Goal("any", "m", "extreme", lambda found: found.rms[0, 0])
+GOAL = Goal("any", "m", lambda found: found.rms[0, 0], "extreme")
 NOTHING = np.zeros(1)
 
 
@@ -36,7 +36,7 @@ def test_an_estimate_has_the_value_of_the_finest_step_and_the_parts_of_all():
     levels = [
         SeedValues(np.full((3, 1), v), np.array([1e-6]), 21, NOTHING) for v in (1.1, 1.2, 1.4)
     ]
-    found = estimate(GOAL, (1.0, 2.0, 4.0), levels, np.array([0.3]), 1.0, 0.95)
+    found = estimate(GOAL, (1.0, 2.0, 4.0), levels, np.array([0.3]), 0.95)
     assert found.value[0] == pytest.approx(1.1) and found.fine is levels[0]
     assert found.step.error[0] == pytest.approx(0.125) and found.step.is_seen
     own = 2.0796 * 1e-3 / 3.0**0.5
@@ -52,6 +52,6 @@ def test_a_bar_holds_the_limit_where_the_step_s_error_is_like_that_of_chance():
             means = 1.0 + sigma * (shift * np.array(steps) + rng.normal(size=3))
             one = np.array([sigma**2])
             levels = [SeedValues(np.array([[mean]]), one, 200, NOTHING) for mean in means]
-            found = estimate(GOAL, steps, levels, NOTHING, 1.0, 0.95)
+            found = estimate(GOAL, steps, levels, NOTHING, 0.95)
             held.append(bool(abs(found.value[0] - 1.0) <= found.parts.total[0]))
     assert 0.93 <= np.mean(held) <= 0.97

@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from ca_damper.steady_state import (
+from ca_damper.report.steady_state import (
     FALSE_ALARMS,
     LEAST_CYCLES,
     mean_and_error,
     period,
     steady_part,
 )
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.bars.chance import t_quantile
 
 
 def remembering(count, near, rng):

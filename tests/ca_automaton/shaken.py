@@ -31,7 +31,7 @@ class Shaken(Driven):
         cells, count = self.device.cells, self.geometry.cells + 1
         fields = [cells.kind, cells.speed, cells.travelled]
         if hasattr(cells, "across"):
-            fields.append(cells.across.velocity)
+            fields.append(cells.across)
         return [self.in_use(field)[:, :count] for field in fields]
 
     def put(self, field, rows):

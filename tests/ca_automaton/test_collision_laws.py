@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from ca_damper.automaton.collision_laws import deflected, speed_after_pair, speed_after_wall
-from ca_damper.lattice import DIRECTIONS
+from ca_damper.automaton.collisions import deflected, speed_after_pair, speed_after_wall
+from ca_damper.automaton.lattice import DIRECTIONS
 
 ARRAY = ti.types.ndarray(dtype=ti.f64, ndim=1)
 EPS = np.finfo(float).eps

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ca_damper import Automaton, Batch, Oscillator, SceneTable, SimulationDiverged
-from ca_damper.automaton.event_counts import PAIRS
+from ca_damper.automaton.device import PAIRS
 from ca_damper.plot import Box
 from taichi_dem.kit.allocation import assign, values
 from tests.paper import expected, paper
@@ -62,10 +62,10 @@ def test_energy_of_heavy_grains_never_grows():
     table = SceneTable(np.full(6, 12), np.arange(6) + 1, DT, 6.0, 0.0, 0.086, 1e-6, 0.0)
     batch = Batch(Automaton(gravity=0.0, particle_mass=0.86), table)
     batch.start()
-    cells = values(batch.device.cells.across.velocity)
+    cells = values(batch.device.cells.across)
     kind = values(batch.device.cells.kind)
     cells[kind < 6] = np.random.default_rng(3).normal(size=(kind < 6).sum())
-    assign(batch.device.cells.across.velocity, cells)
+    assign(batch.device.cells.across, cells)
     total = []
     for _ in range(200):
         now = batch.sample()

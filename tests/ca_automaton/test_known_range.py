@@ -3,7 +3,7 @@
 import pytest
 
 from ca_damper import Automaton, Batch, InputError, SceneTable
-from ca_damper.checked_range import checked_range
+from ca_damper.report.checked_range import checked_range
 from tests.paper import paper
 
 #: A scene of the paper: 30 grains near resonance.
@@ -58,7 +58,6 @@ def test_a_change_of_the_scenes_is_looked_at_again():
     [
         ({"accounting": "landing"}, "accounting must be 'all' with rules 'place'.*rules='paper'"),
         ({"rules": "paper", "friction": 0.5}, "friction must be None with rules 'paper'"),
-        ({"rules": "paper", "ledger": True}, "ledger must be False"),
     ],
 )
 def test_options_that_do_not_belong_together_are_refused(options, words):

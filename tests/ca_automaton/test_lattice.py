@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from ca_damper.lattice import DIRECTIONS, DOWN, EMPTY, UP, Geometry, alignments, unit_vectors
+from ca_damper.automaton.lattice import (
+    DIRECTIONS,
+    DOWN,
+    EMPTY,
+    UP,
+    Geometry,
+    alignments,
+    unit_vectors,
+)
 
 BOX = Geometry(10, 16)
 WIDTH = 6e-3

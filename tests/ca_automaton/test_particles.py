@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ca_damper.lattice import DOWN_LEFT, DOWN_RIGHT, EMPTY, WALL
+from ca_damper.automaton.lattice import DOWN_LEFT, DOWN_RIGHT, EMPTY, WALL
 from tests.ca_automaton.shaken import Shaken
 from tests.paper import paper
 

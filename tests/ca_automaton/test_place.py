@@ -5,7 +5,7 @@ import pytest
 import taichi as ti
 
 from ca_damper.automaton import Automaton
-from ca_damper.automaton.event_counts import PAIRS
+from ca_damper.automaton.device import PAIRS
 from ca_damper.automaton.place.disc_blows import (
     common_velocity,
     dragged,
@@ -24,7 +24,7 @@ NUMBERS = ti.types.ndarray(dtype=ti.f64, ndim=1)
 def kick(box, cell, across=0.0, up=0.0):
     """Give a velocity to the grain in a cell, (column, row), in all scenes."""
     number = box.geometry.cell_of(*cell)
-    for field, value in ((box.device.cells.speed, up), (box.device.cells.across.velocity, across)):
+    for field, value in ((box.device.cells.speed, up), (box.device.cells.across, across)):
         rows = box.in_use(field)
         rows[:, number] = value
         box.put(field, rows)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from ca_damper.random_numbers import DEFLECT, EVENT, PURPOSES, uniform
+from ca_damper.engine.random_numbers import DEFLECT, EVENT, PURPOSES, uniform
 
 MASK = np.uint64(2**32 - 1)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ca_damper.lattice import EMPTY, HELD, WALL
+from ca_damper.automaton.lattice import EMPTY, HELD, WALL
 from tests.ca_automaton.shaken import Shaken
 from tests.paper import paper
 
@@ -33,7 +33,7 @@ def test_with_static_contact_all_are_held_at_the_end():
 
 def test_without_static_contact_a_heap_only_trembles():
     """The energy in motion is below 2 % of the start's: what gravity adds, blows take again."""
-    automaton = paper(accounting="landing+ejection", ledger=True)
+    automaton = paper(accounting="landing+ejection")
     box = Shaken(automaton, PARTICLES, traced=1).run(40000)
     moving = 0.5 * MASS * (box.state()[1] ** 2).sum(axis=1)
     assert np.all(moving < 0.02 * box.traces()[0, :, 3])

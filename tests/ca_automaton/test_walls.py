@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ca_damper.lattice import DOWN, UP
+from ca_damper.automaton.lattice import DOWN, UP
 from tests.ca_automaton.shaken import Shaken
 from tests.paper import paper
 

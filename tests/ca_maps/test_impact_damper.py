@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from ca_damper import ImpactDamper, Oscillator, rk45
+from ca_damper import ImpactDamper, Oscillator
+from ca_damper.engine import rk45
 
 STRUCTURE = Oscillator()
 CASES = [(0.1, 0.75, 12e-3, 6.0288), (0.02, 0.3, 30e-3, 5.9), (0.08, 0.5, 8e-3, 6.1)]

@@ -108,7 +108,7 @@ def set_moving(batch, draw, alike):
     """Give grains velocities across and up; alike: those of one grain number in all boxes."""
     cells = batch.device.cells
     grain = cells.kind.to_numpy() < 6
-    for field in (cells.across.velocity, cells.speed):
+    for field in (cells.across, cells.speed):
         values = field.to_numpy()
         given = draw.normal(size=values.shape)
         values[grain] = (np.broadcast_to(given[0], values.shape) if alike else given)[grain]

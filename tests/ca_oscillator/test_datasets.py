@@ -7,9 +7,9 @@ import pandas
 import pytest
 
 from ca_damper import Automaton, Spheres
-from ca_damper.film import Film
-from ca_damper.measures import MEASURE_UNITS
-from ca_damper.record import Frame
+from ca_damper.report.measures import MEASURE_UNITS
+from ca_damper.report.record import Frame
+from ca_damper.runs.film import Film
 from tests.made_response import response
 
 RNG = np.random.default_rng(2)

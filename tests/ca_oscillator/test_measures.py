@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ca_damper import Automaton, Oscillator
-from ca_damper.force_check import checked_response, force_mismatch
-from ca_damper.measures import COLUMNS, Cycles, peak
+from ca_damper.report.measures import COLUMNS, Cycles, peak
+from ca_damper.runs.force_check import checked_response, force_mismatch
 
 STEPS, COUNT, OMEGA = 500, 4, 2.0 * math.pi * 6.0
 

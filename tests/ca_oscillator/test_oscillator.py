@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from ca_damper import InputError, Oscillator, rk45
+from ca_damper import InputError, Oscillator
+from ca_damper.engine import rk45
 from ca_damper.oscillator import sine_and_cosine
 from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE
 

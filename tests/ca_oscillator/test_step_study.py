@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ca_damper import Spheres
-from ca_damper.step_study import StepStudy
+from ca_damper.accuracy.step_study import StepStudy
 
 
 def test_the_floor_is_the_spread_of_means_over_the_seeds():

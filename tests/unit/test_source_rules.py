@@ -23,16 +23,12 @@ LAYERS = {
         | laws | loads | effects | scene | step_control | methods | contact
         | stability | step | report | engine | simulation
         | output observers | plot | viewer
-        | result | saving simulate needed_effects | goals
+        | result | simulate needed_effects | goals
         | accuracy | solve | demo | __init__ | __main__""",
     "ca_damper": """
-        errors random_numbers progress measures report contracts certificate checked_range
-        steady_state | rk45 oscillator structure record excitation bouncing
-        | gravity collect_and_collide decay impact_damper | checks scenes | window
-        | filling lattice | fixed_mass automaton spheres | combined | engine | activation
-        | batch needed_effects | plot | viewer | film
-        | amplitude_response response frequency_sweep shake shake_structure damper_map
-        | force_check goals | accuracy | solve_response | step_study
+        errors report | oscillator structure excitation | theory | scenes | filling
+        | engine | fixed_mass automaton spheres | combined | batch | plot
+        | runs | goals | accuracy | solve_response
         | demo_pictures | demo | __init__ | __main__""",
 }
 ROWS = {

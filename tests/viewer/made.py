@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from ca_damper import Automaton, Spheres
-from ca_damper.film import Film
-from ca_damper.record import Frame as DamperFrame
+from ca_damper.report.record import Frame as DamperFrame
+from ca_damper.runs.film import Film
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.output.record import Frame

@@ -7,8 +7,8 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.automaton.event_counts import HOLDS, PAIRS, WALLS
-from ca_damper.automaton.impulse_balance import QUANTUM, quanta
+from ca_damper.automaton.accounting import QUANTUM, quanta
+from ca_damper.automaton.device import HOLDS, PAIRS, WALLS
 from ca_damper.automaton.place.contacts import BRUSH, END, JOIN, LINE, OBLIQUE, Contacts
 from ca_damper.automaton.place.disc_blows import (
     chord,
@@ -18,35 +18,33 @@ from ca_damper.automaton.place.disc_blows import (
     most_drag,
     speed_change,
 )
+from ca_damper.engine.random_numbers import LINE as LINE_DRAW
+from ca_damper.engine.random_numbers import bits, unit
 from ca_damper.filling import Blows, Recoil
-from ca_damper.random_numbers import LINE as LINE_DRAW
-from ca_damper.random_numbers import bits, unit
-from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import Part
 
 
 @ti.data_oriented
-class Collisions:
+class Collisions(Part):
     """Carry out the collisions of a step; no two of them change the same grain.
 
     Of a step, (scenes,): count: of the grains that meet the container, ends: of them on floor and
-    ceiling, approaches: their velocities seen from it, joined: velocity that it gave to grains that
-    came to rest [quanta].
+    ceiling, approaches: their velocities seen from it [quanta].
     """
 
-    def __init__(self, table: SceneFields, components: Any):
-        self.table, self.cells, self.heap = table, components.cells, components.resting
-        self.parameters, self.event_counts = components.parameters, components.event_counts
-        self.contacts = Contacts(table, components)
+    def __init__(self, automaton: Any):
+        super().__init__(automaton)
+        table, self.contacts = self.table, Contacts(automaton)
         self.count, self.ends = table.field(ti.i32), table.field(ti.i32)
-        self.approaches, self.joined = table.field(ti.i64), table.field(ti.i64)
+        self.approaches = table.field(ti.i64)
 
     @ti.func
-    def find(self, s, step, shared, pull, pressed, carried):
+    def resolve(self, s, step, shared, motion, pull, pressed):
         """Carry out all but the blows on the container, and note those.
 
-        carried: velocity [m/s] that a grain has where it joins or leaves the heap in this step.
+        Returns the velocity that it gave to grains that came to rest [quanta].
         """
-        count = self.contacts.find_all(s, step, shared, pull, pressed)
+        count, carried = self.contacts.find_all(s, step, shared, pull, pressed), motion.v - pull
         impulse, kept = ti.cast(0, ti.i64), 0
         for k in range(count):
             if self.contacts.wins(s, k):
@@ -58,16 +56,19 @@ class Collisions:
                 elif kind == JOIN:
                     self.event_counts.note(s, HOLDS)
                     impulse += quanta(carried - self.cells.speed[s, cell])
-                    self.heap.join(s, cell)
+                    self.resting.join(s, cell)
                 else:
                     self.event_counts.note(s, PAIRS)
                     self.meet(s, shared, cell, other, kind, carried)
-        self.joined[s] = impulse
         self.note_blows(s, kept)
+        return impulse
 
     @ti.func
     def meet(self, s, shared, cell, other, kind, carried):
-        """Blow of two grains, of which one may have rested."""
+        """Blow of two grains, of which one may have rested.
+
+        carried: velocity [m/s] that a grain has where it leaves the heap in this step.
+        """
         line = ti.Vector([0.0, 1.0])
         if kind == OBLIQUE:
             width = self.parameters.width[None]
@@ -75,8 +76,8 @@ class Collisions:
             line = ti.Vector([chord(rise), rise])
         else:
             line = line_of_centres(unit(bits(shared, cell, LINE_DRAW)))
-        self.heap.free(s, cell, carried)
-        self.heap.free(s, other, carried)
+        self.resting.free(s, cell, carried)
+        self.resting.free(s, other, carried)
         relative = self.cells.velocity(s, cell) - self.cells.velocity(s, other)
         change = speed_change(
             relative, line, self.parameters.particle[None], self.parameters.friction[None]
@@ -106,28 +107,28 @@ class Collisions:
         mass, sides = self.parameters.mass[None], self.count[s] - self.ends[s]
         approaches = QUANTUM * ti.cast(self.approaches[s], ti.f64)
         impulse = mass * (1.0 + self.parameters.wall[None]) * approaches
-        return Blows(impulse, mass * self.ends[s], mass * sides, mass * self.heap.count(s))
+        return Blows(impulse, mass * self.ends[s], mass * sides, mass * self.resting.held[s])
 
     @ti.func
     def recoil(self, s):
         """Recoil of a container on its own."""
         recoil = self.parameters.mass[None] * self.table.recoil[s]
-        recoil = recoil / (1.0 + recoil * self.heap.held[s])
+        recoil = recoil / (1.0 + recoil * self.resting.held[s])
         total, share = QUANTUM * ti.cast(self.approaches[s], ti.f64), self.parameters.wall[None]
         after = common_velocity(self.cells.container[s], total, self.ends[s], recoil, share)
         return Recoil(after, (self.count[s] - self.ends[s]) * recoil)
 
     @ti.func
     def strike_container(self, s, recoil):
-        """Carry out the blows on the container; returns the impulse of the step on it [N s]."""
-        gained = self.joined[s]
+        """Carry out the blows on the container; returns the velocity that it gave [quanta]."""
+        gained = ti.cast(0, ti.i64)
         for k in range(self.count[s]):
             cell, _, kind = self.contacts.read(s, k)
             if kind == END:
                 gained += self.rebound(s, cell, recoil.velocity)
             else:
                 gained += self.brush(s, cell, recoil)
-        return -self.parameters.mass[None] * QUANTUM * ti.cast(gained, ti.f64)
+        return gained
 
     @ti.func
     def since(self, s, cell):
@@ -161,7 +162,7 @@ class Collisions:
         gain = after - self.cells.container[s] - (1.0 + share) * approach
         friction = self.parameters.wall_friction[None] * ti.abs(gain)
         self.cells.accelerate(
-            s, cell, ti.Vector([-dragged(self.cells.across.velocity[s, cell], friction), gain])
+            s, cell, ti.Vector([-dragged(self.cells.across[s, cell], friction), gain])
         )
         back = share * approach + 0.5 * self.cells.closing[s] * since
         self.cells.travelled[s, cell] = self.cells.offset[s] - back * since
@@ -177,7 +178,7 @@ class Collisions:
     @ti.func
     def brush(self, s, cell, recoil):
         """Leave a side wall, which drags the grain towards the velocity of the container."""
-        velocity = self.cells.across.velocity[s, cell]
+        velocity = self.cells.across[s, cell]
         slip = self.cells.speed[s, cell] - recoil.velocity
         push = (1.0 + self.parameters.wall[None]) * velocity
         most = ti.min(

@@ -4,33 +4,33 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.automaton.place.claims import BLOWS, SLOTS, rank_in_phase
+from ca_damper.automaton.conflict_resolution import SLOTS, rank_in_phase
+from ca_damper.automaton.lattice import HELD, UP, WALL
 from ca_damper.automaton.place.disc_blows import chord, contact_rate
-from ca_damper.lattice import HELD, UP, WALL
-from ca_damper.random_numbers import GLANCE, SIDE, bits, scrambled, unit
-from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.engine.random_numbers import GLANCE, SIDE, bits, scrambled, unit
+from ca_damper.scenes.scene_fields import Part
 
 #: Kinds of event: at floor or ceiling, at a side wall, coming to rest, in a column, across columns.
 END, BRUSH, JOIN, LINE, OBLIQUE = range(5)
+#: First phase of the claims of a step.
+_BLOWS = 0
 _CELL_BITS, _CELL = 12, (1 << 12) - 1
 # Slots of the events of a cell; oblique ones have the last four.
 _AT_END, _AT_SIDE, _ABOVE, _BESIDE = range(4)
 
 
 @ti.data_oriented
-class Contacts:
+class Contacts(Part):
     """Find the events of a step and the grains that each of them needs.
 
     events: cell, second cell and kind in one number; ranks: of their claims; shape (scenes, cells,
     SLOTS), filled from the first.
     """
 
-    def __init__(self, table: SceneFields, components: Any):
-        self.table, self.cells, self.lattice = table, components.cells, components.lattice
-        self.parameters, self.heap = components.parameters, components.resting
-        self.conflict_resolution = components.conflict_resolution
-        self.events = table.field(ti.i32, "cells", SLOTS)
-        self.ranks = table.field(ti.i64, "cells", SLOTS)
+    def __init__(self, automaton: Any):
+        super().__init__(automaton)
+        self.events = self.table.field(ti.i32, "cells", SLOTS)
+        self.ranks = self.table.field(ti.i64, "cells", SLOTS)
 
     @ti.func
     def find_all(self, s, step, shared, pull, pressed):
@@ -50,7 +50,7 @@ class Contacts:
     @ti.func
     def note(self, s, step, shared, count, owner, slot, cell, other, kind: ti.template()):
         """Note an event and claim its grains; other: second grain, 0 for none."""
-        ranked = rank_in_phase(step, shared, BLOWS, owner, slot)
+        ranked = rank_in_phase(step, shared, _BLOWS, owner, slot)
         self.conflict_resolution.claim(s, cell, ranked)
         if other != 0:
             self.conflict_resolution.claim(s, other, ranked)
@@ -86,7 +86,7 @@ class Contacts:
         over = self.cells.travelled[s, cell] - self.cells.offset[s]
         approach = self.cells.container[s] - self.cells.speed[s, cell]
         if over <= 0.0 and approach > 0.0 and self.cells.at(s, cell - 1) == WALL:
-            if self.heap.takes(approach, pull, pressed):
+            if self.resting.takes(approach, pull, pressed):
                 result = self.note(s, step, shared, count, cell, _AT_END, cell, 0, JOIN)
             else:
                 result = self.note(s, step, shared, count, cell, _AT_END, cell, 0, END)
@@ -98,10 +98,10 @@ class Contacts:
     def at_side(self, s, step, shared, count, cell):
         """Side walls, met as columns are left: by chance, at the rate |u| / d."""
         result = count
-        velocity = self.cells.across.velocity[s, cell]
+        velocity = self.cells.across[s, cell]
         if velocity != 0.0:
             way = 1 if velocity > 0.0 else -1
-            if self.lattice.in_side_wall(cell + way * self.lattice.column_height()):
+            if self.lattice.in_side_wall(cell + way * self.lattice.size[None].height):
                 share = ti.abs(velocity) * self.table.dt[s] / self.parameters.width[None]
                 if unit(bits(shared, cell, SIDE)) < share:
                     result = self.note(s, step, shared, count, cell, _AT_SIDE, cell, 0, BRUSH)
@@ -115,7 +115,7 @@ class Contacts:
         if self.cells.is_grain(s, upper) and not (held and self.cells.at(s, upper) == HELD):
             approach = self.cells.velocity(s, cell)[1] - self.cells.velocity(s, upper)[1]
             if approach > 0.0 and self.cells.overlap(s, cell) >= 0.0:
-                if held and self.heap.takes(approach, pull, pressed):
+                if held and self.resting.takes(approach, pull, pressed):
                     result = self.note(s, step, shared, count, cell, _ABOVE, upper, 0, JOIN)
                 elif held:
                     result = self.note(s, step, shared, count, cell, _ABOVE, upper, 0, END)
@@ -126,7 +126,7 @@ class Contacts:
     @ti.func
     def beside(self, s, step, shared, count, cell):
         """Grains of the column to the right less than a diameter higher or lower."""
-        result, height = count, self.lattice.column_height()
+        result, height = count, self.lattice.size[None].height
         base = self.lattice.column_beside(cell, 1)
         if not self.lattice.in_side_wall(base):
             # The columns stand half a cell apart, so that one of five rows is too far.

@@ -1,29 +1,12 @@
-"""Grains under way by the rules of place: cells, with a velocity across the columns."""
+"""Grains by the rules of place: under way with a velocity across the columns, or at rest."""
 
 from typing import Any
 
 import taichi as ti
 
-from ca_damper.automaton.state import Cells
-from ca_damper.lattice import HELD, UP
-from ca_damper.scenes.scene_fields import SceneFields
-
-
-@ti.data_oriented
-class Across:
-    """Velocity across the columns, to the right [m/s], shape (scenes, cells + 1).
-
-    Zero in cells without a grain under way.
-    """
-
-    def __init__(self, table: SceneFields):
-        self.velocity = table.field(ti.f64, "cells")
-
-    @ti.func
-    def moved(self, s, origin, target):
-        """Follow a grain to another cell."""
-        self.velocity[s, target] = self.velocity[s, origin]
-        self.velocity[s, origin] = 0.0
+from ca_damper.automaton.cells import Cells
+from ca_damper.automaton.lattice import HELD, UP
+from ca_damper.automaton.static_contact import StaticContact
 
 
 @ti.data_oriented
@@ -31,16 +14,31 @@ class Grains(Cells):
     """Cells of grains that fly any way.
 
     A grain under way has the kind UP, whatever its way; speed and travelled are signed and count
-    upwards. across: velocity to the right. container: its velocity [m/s], (scenes,); this
-    and its offset are those at the end of the step without blows, once all grains have flown.
-    closing: acceleration of the container towards grains that fly [m/s^2].
+    upwards. across: velocity to the right [m/s], (scenes, cells + 1), zero in cells without a grain
+    under way. container: its velocity [m/s], (scenes,); this and its offset are those at the end of
+    the step without blows, once all grains have flown. closing: acceleration of the container
+    towards grains that fly [m/s^2].
     """
 
-    def __init__(self, table: SceneFields, lattice: Any, traversal: Any, parameters: Any):
-        self.across = Across(table)
-        super().__init__(table, lattice, traversal, self.across)
-        self.parameters = parameters
+    def __init__(self, automaton: Any, listed: bool):
+        table, self.parameters = automaton.table, automaton.parameters
+        super().__init__(table, automaton.lattice, listed, self)
+        self.across = table.field(ti.f64, "cells")
         self.container, self.closing = table.field(ti.f64), table.field(ti.f64)
+
+    @ti.func
+    def clear(self, s):
+        """Walls and nothing else."""
+        for cell in range(self.lattice.size[None].cells + 1):
+            self.put(s, cell, ti.cast(self.lattice.blank[cell], ti.i32), 0.0, 0.0)
+            self.across[s, cell] = 0.0
+        self.container[s], self.closing[s] = 0.0, 0.0
+
+    @ti.func
+    def moved(self, s, origin, target):
+        """Follow a grain to another cell."""
+        self.across[s, target] = self.across[s, origin]
+        self.across[s, origin] = 0.0
 
     @ti.func
     def is_grain(self, s, cell):
@@ -72,18 +70,43 @@ class Grains(Cells):
         up = self.speed[s, cell]
         if self.at(s, cell) == HELD:
             up = self.container[s]
-        return ti.Vector([self.across.velocity[s, cell], up])
+        return ti.Vector([self.across[s, cell], up])
 
     @ti.func
     def accelerate(self, s, cell, change):
         """Change the velocity of a grain under way [m/s], (across, up)."""
-        self.across.velocity[s, cell] = self.across.velocity[s, cell] + change[0]
+        self.across[s, cell] = self.across[s, cell] + change[0]
         self.speed[s, cell] = self.speed[s, cell] + change[1]
 
+
+@ti.data_oriented
+class Heap(StaticContact):
+    """Grains at rest on the floor, or on a grain that rests: those that the container carries."""
+
     @ti.func
-    def clear_all(self, s):
-        """Walls and nothing else."""
-        self.clear(s)
-        self.container[s], self.closing[s] = 0.0, 0.0
-        for cell in range(self.lattice.cell_count() + 1):
-            self.across.velocity[s, cell] = 0.0
+    def takes(self, approach, pull, pressed):
+        """Whether a grain that meets floor or heap at a speed [m/s] stays; pull: g dt [m/s]."""
+        result = False
+        if ti.static(self.rests):
+            result = pressed and approach < self.parameters.threshold[None] * pull
+        return result
+
+    @ti.func
+    def join(self, s, cell):
+        """Hold a grain from now on."""
+        self.cells.across[s, cell] = 0.0
+        self.hold(s, cell)
+
+    @ti.func
+    def free(self, s, cell, velocity):
+        """Let a grain go with a velocity along x [m/s], if it is held."""
+        if self.cells.at(s, cell) == HELD:
+            self.cells.put(s, cell, UP, velocity, self.cells.offset[s])
+            self.held[s] = self.held[s] - 1
+
+    @ti.func
+    def release(self, s, velocity):
+        """Release the heap where it is, with the velocity of the container [m/s]."""
+        if self.held[s] > 0:
+            for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
+                self.free(s, self.cells.traversal.cell(s, k), velocity)

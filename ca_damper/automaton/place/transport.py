@@ -1,45 +1,62 @@
-"""Free flight of the grains, and the lattice that steps along with the container."""
+"""Transport by the rules of place: free flight, the lattice, and changes of cell.
+
+Along its column a grain changes its cell by its place, across it by chance.
+"""
 
 from typing import Any
 
 import taichi as ti
 
-from ca_damper.automaton.staircase import Staircase
-from ca_damper.lattice import EMPTY, UP
+from ca_damper.automaton.conflict_resolution import rank_in_phase
+from ca_damper.automaton.lattice import EMPTY, UP
+from ca_damper.engine.random_numbers import HOP, bits, unit
+from ca_damper.scenes.scene_fields import Part
+
+#: Phases of a step after that of the blows, by rising rank.
+_ACROSS, _ALONG = 1, 2
+_NOWHERE = -1
 
 
 @ti.data_oriented
-class PlaceTransport(Staircase):
-    """Grains keep their places in the room when the lattice steps, and fly under full gravity."""
+class Transport(Part):
+    """Grains keep their places in the room when the lattice steps, and fly under full gravity.
 
-    def __init__(self, components: Any):
-        super().__init__(components)
-        self.traversal = components.cells.traversal
+    movers, targets: cells that grains leave and enter, shape (scenes, cells).
+    """
+
+    def __init__(self, automaton: Any):
+        super().__init__(automaton)
+        self.traversal = self.cells.traversal
+        self.movers = self.table.field(ti.i16, "cells")
+        self.targets = self.table.field(ti.i16, "cells")
 
     @ti.func
-    def advance(self, s, way, velocity):
-        """Number the cells anew, one cell up (way 1) or down (-1); nothing moves in the room.
+    def follow(self, s, step, motion):
+        """Number the cells anew when the lattice steps; nothing moves in the room, and none gains.
 
         Each grain takes the cell behind it, those nearest to the wall first. Where that is taken,
         by the wall or by the unbroken run of grains on it, a grain keeps its cell and stands
-        further off its centre. No grain gets any velocity.
+        further off its centre.
         """
         width = self.parameters.width[None]
-        for column in range(self.lattice.column_count()):
-            for k in range(self.lattice.row_count()):
-                row = k if way > 0 else self.lattice.row_count() - 1 - k
-                cell = self.lattice.cell_of(column, row)
-                if self.cells.at(s, cell) == UP:
-                    if self.cells.at(s, cell - way) == EMPTY:
-                        self.cells.relocate(s, cell, cell - way, self.cells.travelled[s, cell])
-                    else:
-                        self.cells.travelled[s, cell] = self.cells.travelled[s, cell] - width * way
-        self.traversal.sort(s, self.cells)
+        way = self.cells.step_along(s, step, motion, width)
+        if way != 0:
+            for column in range(self.lattice.size[None].columns):
+                for k in range(self.lattice.size[None].rows):
+                    cell = self.lattice.cell_from(column, k, way)
+                    if self.cells.at(s, cell) == UP:
+                        travelled = self.cells.travelled[s, cell]
+                        if self.cells.at(s, cell - way) == EMPTY:
+                            self.cells.relocate(s, cell, cell - way, travelled)
+                        else:
+                            self.cells.travelled[s, cell] = travelled - width * way
+            self.traversal.sort(s, self.cells)
         return ti.cast(0, ti.i64)
 
     @ti.func
-    def fly_all(self, s, dt, pull, motion):
+    def fly_all(self, s, motion, pull):
         """One step of all grains under way and of the container, exact for constant gravity."""
+        dt = self.table.dt[s]
         for k in range(self.traversal.begin(), self.traversal.end(s)):
             cell = self.traversal.cell(s, k)
             if self.cells.at(s, cell) == UP:
@@ -49,3 +66,89 @@ class PlaceTransport(Staircase):
                     self.cells.travelled[s, cell] + (speed + 0.5 * pull) * dt
                 )
         self.cells.offset[s] = self.cells.offset[s] + (motion.v + 0.5 * motion.a * dt) * dt
+        self.cells.container[s] = motion.v + motion.a * dt
+        self.cells.closing[s] = motion.a + self.parameters.gravity[None]
+        return ti.cast(0, ti.i64)
+
+    @ti.func
+    def move_all(self, s, step, shared):
+        """Changes of cell, first across the columns, then along them."""
+        self.hop_all(s, step, shared, self.table.dt[s])
+        self.climb_all(s, step, shared)
+
+    @ti.func
+    def hop_all(self, s, step, shared, dt):
+        """Move grains to neighbouring columns.
+
+        Anywhere in its column with equal probability, a grain with velocity u leaves it in a step
+        with the probability |u| dt / d. It keeps its height, at which there must be room for it.
+        """
+        count = 0
+        for k in range(self.traversal.begin(), self.traversal.end(s)):
+            cell = self.traversal.cell(s, k)
+            velocity = self.cells.across[s, cell]
+            if velocity != 0.0:
+                share = ti.abs(velocity) * dt / self.parameters.width[None]
+                if unit(bits(shared, cell, HOP)) < share:
+                    target = self.free_place(s, cell, 1 if velocity > 0.0 else -1)
+                    if target != _NOWHERE:
+                        ranked = rank_in_phase(step, shared, _ACROSS, cell, 0)
+                        for near in range(target - 1, target + 2):
+                            self.conflict_resolution.claim(s, near, ranked)
+                        count = self.note(s, count, cell, target)
+        for k in range(count):
+            cell, target = ti.cast(self.movers[s, k], ti.i32), ti.cast(self.targets[s, k], ti.i32)
+            ranked = rank_in_phase(step, shared, _ACROSS, cell, 0)
+            alone = True
+            for near in range(target - 1, target + 2):
+                alone = alone and self.conflict_resolution.holds(s, near, ranked)
+            if alone:
+                width = self.parameters.width[None]
+                centre = self.lattice.height_of(target) * width
+                self.cells.relocate(s, cell, target, self.cells.height(s, cell) - centre)
+
+    @ti.func
+    def note(self, s, count, cell, target):
+        """Note a change that is claimed; returns the number of them."""
+        self.movers[s, count] = ti.cast(cell, ti.i16)
+        self.targets[s, count] = ti.cast(target, ti.i16)
+        return count + 1
+
+    @ti.func
+    def free_place(self, s, cell, way):
+        """Cell at a grain's height in the next column (way 1: right), if there is room."""
+        width, result = self.parameters.width[None], _NOWHERE
+        base = self.lattice.column_beside(cell, way)
+        if not self.lattice.in_side_wall(base):
+            height = self.cells.height(s, cell)
+            row = self.lattice.nearest_row(base, height / width)
+            target = base + 1 + row
+            room = self.cells.at(s, target) == EMPTY
+            for near in range(target - 1, target + 2):
+                if self.cells.is_grain(s, near):
+                    room = room and ti.abs(self.cells.height(s, near) - height) >= width
+            # Over the floor of that column, and below its ceiling.
+            over = height - self.lattice.height_of(base + 1) * width - self.cells.offset[s]
+            if room and 0.0 <= over <= (self.lattice.size[None].rows - 1) * width:
+                result = target
+        return result
+
+    @ti.func
+    def climb_all(self, s, step, shared):
+        """Move grains that are nearer to the next cell of their column into it."""
+        count = 0
+        for k in range(self.traversal.begin(), self.traversal.end(s)):
+            cell = self.traversal.cell(s, k)
+            away = self.cells.travelled[s, cell] / self.parameters.width[None]
+            if ti.abs(away) > 0.5 and self.cells.at(s, cell) == UP:
+                target = cell + (1 if away > 0.0 else -1)
+                if self.cells.at(s, target) == EMPTY:
+                    ranked = rank_in_phase(step, shared, _ALONG, cell, 0)
+                    self.conflict_resolution.claim(s, target, ranked)
+                    count = self.note(s, count, cell, target)
+        for k in range(count):
+            cell, target = ti.cast(self.movers[s, k], ti.i32), ti.cast(self.targets[s, k], ti.i32)
+            ranked = rank_in_phase(step, shared, _ALONG, cell, 0)
+            if self.conflict_resolution.holds(s, target, ranked):
+                way = self.parameters.width[None] * (target - cell)
+                self.cells.relocate(s, cell, target, self.cells.travelled[s, cell] - way)

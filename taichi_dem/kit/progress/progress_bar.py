@@ -6,6 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from taichi_dem.kit.progress.progress import Listener, Pace, Progress, listening
 from taichi_dem.kit.validation import fraction, instance, progress_option, shown, whole
@@ -135,8 +136,9 @@ def _display():
     python = sys.modules.get("IPython")
     if python is not None and hasattr(python.get_ipython(), "kernel"):
         return _notebook
-    if sys.stderr.isatty() and os.environ.get("TERM") != "dumb":
-        return _terminal
+    if sys.stderr.isatty():
+        # A dumb one cannot move its cursor.
+        return _lines if os.environ.get("TERM") == "dumb" else _terminal
     return _lines if _modes[-1] == "lines" else _nothing
 
 
@@ -177,7 +179,7 @@ def _terminal(title):
     columns = (spinner, name, words) if narrow else (spinner, name, BarColumn(None), words)
     # Prints go where they would go without the bar.
     redirect = sys.stdout is not None and sys.stdout.isatty()
-    options = {"transient": True, "expand": not narrow, "redirect_stdout": redirect}
+    options: Any = {"transient": True, "expand": not narrow, "redirect_stdout": redirect}
     with Bar(*columns, console=console, **options) as bar:
         task = bar.add_task(title, total=1.0, w="")
 

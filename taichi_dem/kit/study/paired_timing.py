@@ -7,9 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import positive, whole
-
 #: Probability that an interval misses the median.
 _MISSED = 0.05
 
@@ -38,12 +35,10 @@ def median_interval(values: Iterable[float]) -> tuple[float, float]:
     """Interval of 95 % for the median of what values are drawn from, by order statistics.
 
     Nothing is assumed of their distribution. Below six values no such interval exists: then it is
-    their range. Raises InputError for no value.
+    their range.
     """
     ordered = sorted(values)
     count = len(ordered)
-    if not count:
-        raise InputError("the interval of a median must have at least one value, got none")
     # Values outside on either side, as many as leave each tail at most half of what may be missed.
     outside, tail = 0, 0.5**count
     while tail <= 0.5 * _MISSED and 2 * outside < count - 1:
@@ -68,32 +63,20 @@ def paired_timing(
     from every state, all of them in random order, so that a busy moment of the machine falls on no
     candidate alone. The ratio of a round is that of the weighted means over the states.
     half_width: of the interval, from which no further round is made. rounds: fewest and most.
-    Raises InputError for fewer than two candidates, no state, or numbers out of range.
     """
-    fewest, most = (whole("rounds", n, 1, 100_000) for n in rounds)
-    positive("half_width", half_width, zero_allowed=True)
-    weights = _weights(shares)
-    if len(candidates) < 2:
-        raise InputError(f"candidates must be two or more, got {len(candidates)}")
+    weights = np.array(shares, dtype=float) / np.sum(shares)
     works, random = [*candidates.values()], np.random.default_rng(seed)
     seconds: list[np.ndarray] = []
-    while len(seconds) < max(fewest, most):
+    while len(seconds) < max(rounds):
         table = np.empty((len(works), len(weights)))
         for turn in random.permutation(table.size):
             place = divmod(int(turn), len(weights))
             table[place] = works[place[0]](place[1])
         seconds.append(table @ weights)
         found = _timings(candidates, np.array(seconds))
-        if len(seconds) >= fewest and all(one.half_width <= half_width for one in found.values()):
+        if len(seconds) >= rounds[0] and all(x.half_width <= half_width for x in found.values()):
             break
     return found
-
-
-def _weights(shares):
-    weights = np.array(shares, dtype=float)
-    if weights.ndim != 1 or not len(weights) or not (weights > 0.0).all():
-        raise InputError(f"shares must be numbers above 0, one for each state, got {shares!r}")
-    return weights / weights.sum()
 
 
 def _timings(names, seconds):
@@ -101,7 +84,7 @@ def _timings(names, seconds):
     made = {}
     for name, own in zip(names, seconds.T):
         ratios = own / seconds[:, 0]
-        low, high = median_interval(ratios)
         middle = statistics.median(ratios)
-        made[name] = PairedTiming(middle, low, high, statistics.median(own), len(seconds))
+        ends = median_interval(ratios)
+        made[name] = PairedTiming(middle, *ends, statistics.median(own), len(seconds))
     return made

@@ -12,24 +12,14 @@ from types import SimpleNamespace
 from typing import Any
 from urllib.parse import quote
 
-from jinja2 import Environment, FileSystemLoader
+from taichi_dem.kit.files import write_text, write_whole
+from taichi_dem.kit.study.entries import PYTHON, Entry, key_figures
+from taichi_dem.kit.study.summary import value_in_words
 
-from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import output_folder, write_text, write_whole
-from taichi_dem.kit.study.entries import PYTHON, Entry, is_key_figure
-from taichi_dem.kit.study.look import value_in_words
-
-_HERE = Path(__file__).resolve().parent
 #: Notes of the program that ran a study, beside its output: seconds, and what it printed.
 RUN = "gallery.json"
-#: Folder of the small pictures of the list, beside the page; their widest side [pixels], colours.
-THUMBNAILS, _THUMBNAIL = "thumbnails", (480, 64)
 #: Words of a run about its own pictures, where there are any.
 CAPTION = "caption.txt"
-#: Key figures shown unfolded; all others are one touch away.
-_MOST_KEY_FIGURES = 12
-#: Text of a table: name, value, paper's value.
-Row = tuple[str, str, str]
 
 
 def markdown_table(entries: Sequence[Entry], root: str | Path, pictures: str) -> str:
@@ -52,16 +42,15 @@ def write_page(root: str, entries: Sequence[Entry], failed: Mapping[str, str]) -
     entry as page, and as failed why it has no result, or "". Raises InputError when it cannot be
     written.
     """
-    for entry in entries:
-        _write_thumbnail(root, entry)
+    from jinja2 import Environment, FileSystemLoader
+
     items = [_shown(entry, root, failed.get(entry.name, "")) for entry in entries]
-    summaries = [read_json(Path(root, entry.name, "summary.json")) for entry in entries]
     options: Any = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
-    environment = Environment(loader=FileSystemLoader(_HERE), **options)
+    environment = Environment(loader=FileSystemLoader(Path(__file__).parent), **options)
     parts = list(dict.fromkeys(entry.part for entry in entries))
     text = environment.get_template("results_page.html").render(
         parts=[(part, [item for item in items if item.page.part == part]) for part in parts],
-        machines=_machines(summaries),
+        machines=list(dict.fromkeys(item.machine for item in items if item.machine)),
         quick=sum(item.quick for item in items if not item.failed),
         count=sum(not item.failed for item in items),
     )
@@ -69,22 +58,12 @@ def write_page(root: str, entries: Sequence[Entry], failed: Mapping[str, str]) -
     return items
 
 
-def _write_thumbnail(root, entry):
-    """Small picture for the page's list; none of a picture that cannot be read."""
-    folder = output_folder(os.path.join(root, THUMBNAILS))
-    try:
-        shrink_picture(entry, root, folder, *_THUMBNAIL)
-    except InputError:
-        Path(folder, f"{entry.name}.png").unlink(missing_ok=True)
-
-
 def shrink_picture(
     entry: Entry, root: str, folder: str | Path, side: int, colours: int
 ) -> str | None:
     """Small copy of a study's first picture in a folder; its path, None without a picture.
 
-    side: the widest [pixels]. Raises InputError when the picture cannot be read or the copy not be
-    written.
+    side: the widest [pixels]. Raises InputError when the copy cannot be written.
     """
     source = Path(root, entry.name, entry.pictures[0])
     target = os.path.join(folder, f"{entry.name}.png")
@@ -111,72 +90,53 @@ def _shown(page, root, failed):
     """Content of the page for an experiment, by the names that the template uses.
 
     page: its entry. root: folder of the page, in which its results stand in root/NAME. failed: why
-    it did not end well, or "". quick: whether it was the smaller job. pictures, more: files shown,
-    and files linked. caption: words of the run about its own pictures. key, rest: rows of figures
-    (name, value, paper).
+    it did not end well, or "". pictures, more: files shown, and files linked. caption: words of the
+    run about its own pictures. key, rest: rows of figures (name, value, paper).
     """
     folder = Path(root, page.name)
     summary, run = read_json(folder / "summary.json"), read_json(folder / RUN)
     files = sorted(path.name for path in folder.glob("*") if path.is_file())
     pictures = [name for name in page.pictures if name in files]
-    command = summary.get("command", page.command.split(" ", 1)[1])
     key, rest = figure_rows(summary.get("figures", {}), page.figures)
-    small = Path(root, THUMBNAILS, f"{page.name}.png").is_file() and page.pictures[0] in files
+    caption = folder / CAPTION
     return SimpleNamespace(
         page=page,
         folder=quote(page.name),
-        command=f"{PYTHON} {command}",
-        # Summaries of older versions have the command alone.
-        quick=summary.get("quick", "--quick" in command.split()),
+        command=f"{PYTHON} {summary['command']}" if summary else page.command,
+        quick=summary.get("quick", False),
         pictures=pictures,
         more=[name for name in files if name not in (*pictures, RUN, CAPTION)],
-        thumbnail=f"{THUMBNAILS}/{quote(page.name)}.png" if small else "",
-        caption=read_text(folder / CAPTION),
+        caption=caption.read_text(encoding="utf-8").strip() if caption.is_file() else "",
         key=key,
         rest=rest,
         seconds=_seconds(summary, run),
         output=run.get("output", ""),
         failed=failed or ("" if summary else "it has not been run"),
+        machine=_machine(summary),
     )
 
 
-def read_text(path: str | Path) -> str:
-    """Text of a file, "" where there is none that can be read."""
-    try:
-        return Path(path).read_text(encoding="utf-8").strip()
-    except (OSError, ValueError):
-        return ""
-
-
 def read_json(path: str | Path) -> dict:
-    """Content of a JSON file, an empty dict where there is none that can be read."""
-    try:
-        content = json.loads(read_text(path))
-    except (ValueError, RecursionError):
-        content = {}
-    return content if isinstance(content, dict) else {}
+    """Content of a JSON file, an empty dict where there is none."""
+    return json.loads(Path(path).read_text(encoding="utf-8")) if Path(path).is_file() else {}
 
 
-def figure_rows(
-    figures: Mapping[str, dict], patterns: Sequence[str]
-) -> tuple[tuple[Row, ...], tuple[Row, ...]]:
+def figure_rows(figures: Mapping[str, dict], patterns: Sequence[str]) -> tuple[list, list]:
     """Rows (name, value, paper) of the key figures, and of all others; paper: "" without a value.
 
-    figures: of summary.json. Key are those with a paper's value and those that match a pattern.
+    figures: of summary.json.
     """
-    key: list[Row] = []
-    rest: list[Row] = []
-    for name, item in figures.items():
-        value, paper = (with_unit(item[k], item["unit"]) for k in ("value", "paper"))
-        known = item["paper"] is not None
-        row = (in_words(name, item["unit"]), value, paper if known else "")
-        (key if is_key_figure(name, item, patterns) else rest).append(row)
-    # Those with a paper's value first, so that the cut never takes them.
-    key.sort(key=lambda row: not row[2])
-    return tuple(key[:_MOST_KEY_FIGURES]), tuple(key[_MOST_KEY_FIGURES:] + rest)
+    key = key_figures(figures, patterns)
+    rest = [name for name in figures if name not in key]
+    return [_row(name, figures[name]) for name in key], [_row(name, figures[name]) for name in rest]
 
 
-def in_words(name: str, unit: str) -> str:
+def _row(name, item):
+    value, paper = (_with_unit(item[k], item["unit"]) for k in ("value", "paper"))
+    return _in_words(name, item["unit"]), value, "" if item["paper"] is None else paper
+
+
+def _in_words(name, unit):
     """A key of summary.json without underscores, and without the unit at its end.
 
     A number before that keeps it: plateau_at_5_MPa is that at 5 MPa.
@@ -186,7 +146,7 @@ def in_words(name: str, unit: str) -> str:
     return (name if kept else bare).replace("_", " ")
 
 
-def with_unit(value: Any, unit: str) -> str:
+def _with_unit(value, unit):
     """A figure in words, with its unit unless it is a pure number, a name or was not found."""
     words = value_in_words(value)
     return words if unit in ("", "1") or value is None else f"{words} {unit}"
@@ -194,20 +154,18 @@ def with_unit(value: Any, unit: str) -> str:
 
 def _seconds(summary, run):
     spent = summary.get("seconds", {})
-    parts = [f"{run['seconds']:.0f} s in all"] if "seconds" in run else []
-    parts += [f"{spent['compile']:.1f} s compiling"] if "compile" in spent else []
-    parts += [f"{spent['run']:.1f} s computing"] if "run" in spent else []
+    parts = [f"{run['seconds']:.0f} s in all"] if run else []
+    parts += (
+        [f"{spent['compile']:.1f} s compiling, {spent['run']:.1f} s computing"] if spent else []
+    )
     return ", ".join(parts)
 
 
-def _machines(summaries):
-    """Machines and versions of the results in words, each only once."""
-    words = []
-    for summary in filter(None, summaries):
-        machine, versions = summary["machine"], summary["versions"]
-        words.append(
-            f"{machine['processor']}, {machine['cores']} cores, {machine['arch']}; "
-            f"taichi {versions['taichi']}, numpy {versions['numpy']}, "
-            f"commit {versions.get('commit') or 'unknown'}"
-        )
-    return list(dict.fromkeys(words))
+def _machine(summary):
+    """Machine and versions of a result in words."""
+    if not summary:
+        return ""
+    machine, versions = summary["machine"], summary["versions"]
+    place = f"{machine['processor']}, {machine['cores']} cores, {machine['arch']}"
+    made = f"taichi {versions['taichi']}, numpy {versions['numpy']}"
+    return f"{place}; {made}, commit {versions.get('commit', 'unknown')}"

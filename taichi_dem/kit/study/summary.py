@@ -9,20 +9,24 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from taichi_dem.kit import runtime
-from taichi_dem.kit.files import write_text
+from taichi_dem.kit.bars.answer import Answer
+from taichi_dem.kit.files import older_files, write_csv, write_text
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.provenance import commit, processor
-from taichi_dem.kit.study.look import print_figures, show_files
-from taichi_dem.kit.terminal import show_paragraph
+from taichi_dem.kit.study.entries import MOST_FIGURES, Entry, key_figures
+from taichi_dem.kit.terminal import print_table, show_heading, show_paragraph
 from taichi_dem.kit.version import __version__, taichi_version
 
-#: A figure by its name, as of ``figure``; ``finish`` takes the arguments of that as well.
-Figures = Mapping[str, dict]
+#: Most pictures of a list.
+_MOST = 12
+#: Endings of what is looked at.
+_PICTURES = (".png", ".gif", ".mp4", ".html")
 
 
 def figure(value: Any, unit: str, paper: Any = None) -> dict:
@@ -52,11 +56,8 @@ def finish(
     or those of compiling alone: all else since ``main`` began counts as running. see: the picture
     to look at first. draw: draws the pictures, once the figures are printed.
     """
-    if isinstance(runs, float):
-        runs = runs, time.perf_counter() - options.started - runs
-    found = _seconds_of(runs) if isinstance(runs, tuple) else _figures_of(list(runs))
     made = {key: figure(*one) if isinstance(one, tuple) else one for key, one in figures.items()}
-    write_summary(options.out, name, made, command=getattr(options, "command", ()), **found)
+    _write_summary(options, name, made, runs)
     entry = getattr(options, "entry", None)
     if made:
         print_figures(made, entry)
@@ -71,53 +72,111 @@ def finish(
     show_files(options.out, getattr(options, "began", 0.0), first)
 
 
-def _seconds_of(pair) -> dict[str, Any]:
-    return dict(zip(("compile_seconds", "run_seconds"), pair))
-
-
-def _figures_of(reports) -> dict[str, Any]:
-    """Arguments of ``write_summary`` from the reports of runs."""
-    names = "compile_seconds", "run_seconds"
-    seconds = _seconds_of(sum(getattr(one, name) for one in reports) for name in names)
-    known = [one.known_error for one in reports if getattr(one, "known_error", "")]
-    return {**seconds, "known_errors": known}
-
-
-def write_summary(
-    folder: str,
-    name: str,
-    figures: Figures,
-    *,
-    compile_seconds: float,
-    run_seconds: float,
-    known_errors: Sequence[str] = (),
-    command: Sequence[str] = (),
-) -> None:
-    """Write summary.json: figures, machine, versions, seconds, command; see ``figure``.
-
-    known_errors: what reports say of the errors of their runs; equal ones are written once.
-    command: words after "python", by default those of the experiment of that name. quick: whether
-    it asked for the smaller job, which the gallery's texts do not describe.
-    """
+def _write_summary(options, name, figures, runs):
+    """Write figures, machine, versions, seconds, and the command."""
     settings: Any = runtime.settings()
-    words = [*command] or [f"experiments/{name}.py", *sys.argv[1:]]
+    words = [*getattr(options, "command", ())] or [f"experiments/{name}.py", *sys.argv[1:]]
     machine = {"processor": processor(), "cores": os.cpu_count(), "arch": settings.arch}
+    (compile_s, run_s), known_errors = _seconds_of(options, runs)
     content = {
         "experiment": name,
         "figures": figures,
         "machine": {**machine, "threads": settings.threads, "system": platform.platform()},
         "versions": versions(),
-        "known_errors": list(dict.fromkeys(known_errors)),
-        "seconds": {"compile": compile_seconds, "run": run_seconds},
+        "known_errors": known_errors,
+        "seconds": {"compile": compile_s, "run": run_s},
         "command": shlex.join(words),
         "quick": "--quick" in words,
     }
-    write_text(os.path.join(folder, "summary.json"), json.dumps(content, indent=1))
+    write_text(os.path.join(options.out, "summary.json"), json.dumps(content, indent=1))
+
+
+def _seconds_of(options, runs):
+    """Seconds of compiling and running, and what reports say of the errors of their runs."""
+    if isinstance(runs, float):
+        return (runs, time.perf_counter() - options.started - runs), []
+    if isinstance(runs, tuple):
+        return runs, []
+    reports = list(runs)
+    seconds = [sum(getattr(one, f"{k}_seconds") for one in reports) for k in ("compile", "run")]
+    errors = (getattr(one, "known_error", "") for one in reports)
+    return seconds, list(dict.fromkeys(filter(None, errors)))
+
+
+def add_to_summary(folder: str, **entries: Any) -> None:
+    """Add entries, which JSON can hold, by name to the summary.json that ``finish`` wrote."""
+    path = Path(folder, "summary.json")
+    content = json.loads(path.read_text(encoding="utf-8"))
+    write_text(path, json.dumps({**content, **entries}, indent=1))
 
 
 def versions() -> dict[str, str]:
     """Versions of what computes, and the commit, "unknown" where there is none."""
     found = {"taichi": taichi_version(), "numpy": np.__version__, "taichi-dem": __version__}
-    found["python"] = platform.python_version()
-    found["commit"] = commit()
-    return found
+    return {**found, "python": platform.python_version(), "commit": commit()}
+
+
+def print_figures(figures: Mapping[str, dict], entry: Entry | None = None) -> None:
+    """Print figures of summary.json, beside the paper's values where it gives any.
+
+    entry: of the study; with one only the key figures are printed, those of a paper first, and no
+    more than a dozen.
+    """
+    shown = [*figures]
+    if entry is not None:
+        shown = key_figures(figures, entry.figures) or shown[:MOST_FIGURES]
+    header, rows = ["figure", "value", "unit", "paper"], []
+    for name in shown:
+        one = figures[name]
+        paper = "" if one["paper"] is None else value_in_words(one["paper"])
+        rows.append([name, value_in_words(one["value"]), one["unit"], paper])
+    columns = 4 if any(row[3] for row in rows) else 3
+    print_table([row[:columns] for row in rows], header[:columns])
+    if len(shown) < len(figures):
+        print(f"and {len(figures) - len(shown)} more in summary.json")
+
+
+def value_in_words(value: Any) -> str:
+    """A figure's value: four digits, or "not found" where the run looked for one in vain."""
+    if value is None or isinstance(value, str):
+        return value or "not found"
+    return f"{value:,}" if isinstance(value, int) else f"{value:.4g}"
+
+
+def show_files(folder: str, since: float = 0.0, first: Sequence[str] = ()) -> None:
+    """Print the paths of the pictures in a folder, and where everything else is.
+
+    since: when the run began, as of ``time.time``; what is older is not named. first: names of
+    pictures in the order in which they tell most.
+    """
+    names = set(os.listdir(folder)) - set(older_files(folder, since))
+    made = sorted(name for name in names if name.endswith(_PICTURES) and not name.startswith("."))
+    made.sort(key=lambda name: first.index(name) if name in first else len(first))
+    print()
+    if made:
+        show_heading("Pictures")
+        print(*(f"  {os.path.join(folder, name)}" for name in made[:_MOST]), sep="\n")
+    if len(made) > _MOST:
+        print(f"  and {len(made) - _MOST} more")
+    print(f"Tables and all figures are in {folder}")
+
+
+def show_answer(label: str, answer: Answer) -> None:
+    """Print an answer, whether it was reached, and what other tolerances cost; label: of what."""
+    print(f"{label}, {answer.goal}: {answer}")
+    asked = f"{100.0 * answer.tolerance:g} %"
+    print(f"  {asked} {'was' if answer.reached else 'was not'} reached")
+    for expense in answer.cost_curve:
+        print(f"  {expense}")
+
+
+def write_accuracy(
+    folder: str, names: Sequence[str], rows: Iterable[tuple[Sequence[Any], Answer]]
+) -> None:
+    """Write accuracy.csv; rows: cells under these names, and the answer that they belong to."""
+    header = [*names, "goal", "unit", "value", "error", "seconds", "reached"]
+    cells = [
+        (*first, one.goal, one.unit, one.value, one.error, one.plan.seconds, one.reached)
+        for first, one in rows
+    ]
+    write_csv(os.path.join(folder, "accuracy.csv"), dict(zip(header, zip(*cells))))

@@ -1,6 +1,5 @@
 """Option --sweep of a study: the job once for each row of a CSV file, each in its own process."""
 
-import hashlib
 import json
 import os
 import subprocess
@@ -9,15 +8,15 @@ import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from functools import partial
 from inspect import getfile, unwrap
 from pathlib import Path
-from typing import Any
 
 from taichi_dem.kit import children, runtime
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import claiming, output_folder, write_text
+from taichi_dem.kit.files import output_folder, write_text
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study.cached_result import digest
+from taichi_dem.kit.study.cached_result import cached
 from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.validation import shown
 
@@ -48,11 +47,17 @@ def run_sweep(
     table = _rows(options.sweep)
     count = options.workers or runtime.usable_cores()
     lines = _lines(made, table, options, arguments, count)
-    script = os.path.abspath(getfile(unwrap(run)))
-    with claiming():
-        folder = output_folder(options.out)
-        notes = _run_missing(script, lines, folder, count)
-    return _show(table, notes, folder)
+    script, folder = os.path.abspath(getfile(unwrap(run))), output_folder(options.out)
+    with ThreadPoolExecutor(count) as pool, ProgressBar("sweep") as bar:
+        places = (os.path.join(folder, f"row_{k}") for k in range(len(lines)))
+        jobs = [pool.submit(_run_row, script, *job) for job in zip(lines, places)]
+        try:
+            for done, _ in enumerate(as_completed(jobs), 1):
+                bar.count(done, len(jobs))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    return _show(table, [job.result() for job in jobs], folder)
 
 
 def _rows(path):
@@ -68,55 +73,35 @@ def _rows(path):
     return rows
 
 
-def _run_missing(script, lines, folder, count):
-    """Notes on all rows: how each ended, and what it depends on."""
-    journal = Path(folder, "sweep.json")
-    notes: dict[str, dict] = json.loads(journal.read_text()) if journal.exists() else {}
-    scripts = [path.read_text() for path in sorted(Path(script).parent.glob("*.py"))]
-    sources = digest(scripts, ("taichi_dem", "ca_damper"))
-    stamps = {f"row_{k}": [sources, *line, *_digests(line)] for k, line in enumerate(lines)}
-    missing = [
-        name
-        for name in stamps
-        if notes.get(name, {}).get("stamp") != stamps[name]
-        or not Path(folder, name, "summary.json").exists()
-    ]
-    with ThreadPoolExecutor(count) as pool, ProgressBar("sweep") as bar:
-        jobs = {
-            pool.submit(_run_row, script, line, os.path.join(folder, name)): name
-            for name, line in zip(stamps, lines)
-            if name in missing
-        }
-        try:
-            for done, job in enumerate(as_completed(jobs)):
-                bar.count(done, len(jobs))
-                error, seconds = job.result()
-                stamp = [] if error else stamps[jobs[job]]
-                notes[jobs[job]] = {"stamp": stamp, "error": error, "seconds": seconds}
-                write_text(journal, json.dumps(notes))
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-    return [notes[name] for name in stamps]
-
-
-def _digests(line):
-    """Digests of the files that arguments name."""
-    words = [word for text in line for word in text.split("=")]
-    files = [Path(word).read_bytes() for word in words if os.path.isfile(word)]
-    return [hashlib.sha256(content).hexdigest() for content in files]
-
-
 def _run_row(script, line, folder):
-    """Run the job of a row; why it failed, or "", and its seconds."""
+    """Figures of a row's summary.json, and what computed them; or why it failed, in error."""
+    words = [word for text in line for word in text.split("=")]
+    files = [*Path(script).parent.glob("*.py"), *filter(os.path.isfile, words)]
+    content = {str(name): Path(name).read_bytes().hex() for name in sorted(map(str, files))}
+    packages, begun = ("taichi_dem", "ca_damper"), time.perf_counter()
+    try:
+        run = partial(_figures, [sys.executable, script, *line, f"--out={folder}"], folder)
+        return cached(folder, "sweep", (line, content), packages, run)[0]
+    except RuntimeError as error:
+        return {"error": str(error), "seconds": time.perf_counter() - begun}
+
+
+def _figures(line, folder):
+    """Run a job and return its figures by name; RuntimeError with its last words."""
     begun = time.perf_counter()
-    line = [sys.executable, script, *line, f"--out={folder}"]
     done = children.run(line, stdin=subprocess.DEVNULL)
-    seconds = time.perf_counter() - begun
     if done.returncode != 0:
-        return (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1], seconds
+        said = done.stderr.strip().splitlines()
+        raise RuntimeError(said[-1] if said else f"exit code {done.returncode}")
     write_text(os.path.join(folder, "output.txt"), done.stdout)
-    return "", seconds
+    summary = json.loads(Path(folder, "summary.json").read_text(encoding="utf-8"))
+    figures = {
+        f"{name}_figure" if name in _ADDED else name: one["value"]
+        for name, one in summary["figures"].items()
+    }
+    versions, place = summary["versions"], summary["machine"]["processor"]
+    made = "", versions["taichi-dem"], versions["commit"], place, time.perf_counter() - begun
+    return {**figures, **dict(zip(_ADDED, made))}
 
 
 def _lines(made, table, options, arguments, count):
@@ -153,36 +138,18 @@ def _argument(made, name, cell):
     return f"--{name}" if _SWITCH[cell.lower()] else ""
 
 
-def _show(table, notes, folder):
+def _show(table, found, folder):
     """Write sweep.csv and print what became of each row; 1 where one has failed."""
     import pandas
 
-    found = [
-        {**row, **note, **({} if note["error"] else _figures(folder, k, row))}
-        for k, (row, note) in enumerate(zip(table, notes))
-    ]
-    names = dict.fromkeys(name for row in found for name in row if name not in ("stamp", *_ADDED))
+    made, given = pandas.DataFrame(found), pandas.DataFrame(table)
+    figures = made.drop(columns=[name for name in _ADDED if name in made])
+    figures.columns = [f"{name}_figure" if name in given else name for name in figures]
+    whole = pandas.concat([given, figures, made.reindex(columns=_ADDED)], axis="columns")
     path = os.path.join(folder, "sweep.csv")
-    content = pandas.DataFrame(found, columns=[*names, *_ADDED])
-    write_text(path, content.to_csv(index=False, na_rep="nan"))
-    rows = [
-        [*row.values(), f"{note['seconds']:.1f} s", note["error"] or "done"]
-        for row, note in zip(table, notes)
-    ]
-    print_table(rows, [*table[0], "time", "end"])
+    write_text(path, whole.to_csv(index=False, na_rep="nan"))
+    ends = [(f"{one['seconds']:.1f} s", one["error"] or "done") for one in found]
+    rows = [[*row.values(), *end] for row, end in zip(table, ends)]
+    print_table(rows, [*given, "time", "end"])
     print(f"\nFigures of all rows are in {path}, their pictures and tables in row_0, row_1, ...")
-    return int(any(note["error"] for note in notes))
-
-
-def _figures(folder, number, row):
-    """Figures of the summary.json of a row, and what computed them."""
-    text = Path(folder, f"row_{number}", "summary.json").read_text(encoding="utf-8")
-    summary: Any = json.loads(text)
-    # No figure has the name of an option or of another column.
-    figures = {
-        f"{name}_figure" if name in (*row, *_ADDED) else name: one["value"]
-        for name, one in summary["figures"].items()
-    }
-    versions = summary["versions"]
-    place = versions["taichi-dem"], versions["commit"], summary["machine"]["processor"]
-    return {**figures, **dict(zip(_ADDED[1:4], place))}
+    return int(any(one["error"] for one in found))

@@ -7,11 +7,21 @@ it: a single lucky run answers nothing.
 
 import itertools
 import math
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+from taichi_dem.kit.study.summary import figure
 from taichi_dem.kit.study.tables import write_rows
 from taichi_dem.kit.study.timing import Timing
+from taichi_dem.kit.terminal import print_table
+
+_ANSWER_HEADER = ["I want", "take", "at a step of", "seconds", "evaluations", "error"]
+_POINT_HEADER = (
+    "method step label error floor evaluations seconds_low seconds_median seconds_high repeats "
+    "residual failure"
+)
 
 
 @dataclass(frozen=True)
@@ -69,6 +79,53 @@ def _answer(method, points, target, floor):
     return Answer(method, min(reached, key=lambda point: point.low))
 
 
+def percent(share: float) -> str:
+    """A share in words: 0.0123 -> 1.2 %."""
+    return f"{100.0 * share:.2g} %"
+
+
+def give_answers(
+    folder: str,
+    points: Sequence[Point],
+    targets: Iterable[float],
+    floors: Mapping[str, float],
+    titles: Mapping[str, str],
+) -> None:
+    """Write points.csv and answers.csv to a folder and print the answers.
+
+    targets: errors asked for. floors: error by method that no step can take away. titles: of the
+    methods.
+    """
+    rows = []
+    for target in targets:
+        for one in answers(points, target, floors):
+            rows.append((percent(target), titles[one.method], *_cells(one)))
+    write_points(os.path.join(folder, "points.csv"), points, floors)
+    write_rows(os.path.join(folder, "answers.csv"), rows, _ANSWER_HEADER)
+    print_table(rows, _ANSWER_HEADER)
+    print()
+
+
+def _cells(answer):
+    """Step, seconds, evaluations and error of an answer, or why there is none."""
+    point = answer.point
+    if point is None:
+        return f"not reached: {answer.reason}", "", "", ""
+    return point.label, f"{point.low:.3g}", f"{point.evaluations:.3g}", percent(point.error)
+
+
+def write_points(path: Any, points: Iterable[Point], floors: Mapping[str, float]) -> None:
+    """CSV of everything a diagram shows; cells of what does not exist are empty."""
+    rows = []
+    for p in points:
+        time = p.seconds
+        seconds = (time.low, time.median, time.high, time.count) if time else [math.nan] * 4
+        run = p.method, p.step, p.label, p.error, floors.get(p.method, 0.0), p.evaluations
+        row = (*run, *seconds, p.residual, p.failure)
+        rows.append(["" if cell != cell else str(cell) for cell in row])
+    write_rows(path, rows, _POINT_HEADER)
+
+
 def cheapest(
     points: Sequence[Point],
     target: float,
@@ -81,46 +138,30 @@ def cheapest(
     return (point.low, point.method) if point else (None, None)
 
 
-def percent(share: float) -> str:
-    """A share in words: 0.0123 -> 1.2 %."""
-    return f"{100.0 * share:.2g} %"
+def cheapest_figures(
+    points: Sequence[Point], target: float, floors: Mapping[str, float], name: str, end: str = ""
+) -> dict[str, dict]:
+    """Figures of the cheapest way to an error: its seconds under a name, and the method.
+
+    end: of both names; "at_1_percent" for an error of 0.01 unless said otherwise.
+    """
+    end = end or _end_of(target)
+    seconds, method = cheapest(points, target, floors)
+    found = {f"{name}_{end}": figure(seconds, "s")}
+    return {**found, f"cheapest_method_{end}": figure(method, "")}
 
 
-def answer_rows(
-    points: Sequence[Point],
-    targets: Iterable[float],
-    floors: Mapping[str, float],
-    titles: Mapping[str, str],
-) -> list[tuple]:
-    """Rows for a table: wanted error, method, step, seconds, evaluations, error had."""
-    rows = []
-    for target in targets:
-        for answer in answers(points, target, floors):
-            title, point = titles[answer.method], answer.point
-            if point is None:
-                rows.append((percent(target), title, f"not reached: {answer.reason}", "", "", ""))
-            else:
-                cost = (f"{point.low:.3g}", f"{point.evaluations:.3g}")
-                rows.append((percent(target), title, point.label, *cost, percent(point.error)))
-    return rows
+def figures_by_method(
+    points: Sequence[Point], target: float, floors: Mapping[str, float]
+) -> dict[str, dict]:
+    """Figures of the seconds that each method needs for an error."""
+    return {
+        f"seconds_{_end_of(target)}_{method}": figure(
+            cheapest(points, target, floors, method)[0], "s"
+        )
+        for method in dict.fromkeys(point.method for point in points)
+    }
 
 
-ANSWER_HEADER = ["I want", "take", "at a step of", "seconds", "evaluations", "error"]
-
-
-def write_points(path: str, points: Iterable[Point], floors: Mapping[str, float]) -> None:
-    """CSV of everything a diagram shows; cells of what does not exist are empty."""
-    names = "method step label error floor evaluations seconds_low seconds_median seconds_high"
-    rows = []
-    for point in points:
-        time = point.seconds
-        seconds = (time.low, time.median, time.high, time.count) if time else [math.nan] * 4
-        row = (point.method, point.step, point.label, point.error, floors.get(point.method, 0.0))
-        row = (*row, point.evaluations, *seconds, point.residual, point.failure)
-        rows.append(["" if cell != cell else str(cell) for cell in row])
-    write_rows(path, rows, f"{names} repeats residual failure")
-
-
-def write_answers(path: str, rows: Sequence[tuple]) -> None:
-    """The table of ``answer_rows`` as CSV."""
-    write_rows(path, rows, ANSWER_HEADER)
+def _end_of(target):
+    return f"at_{percent(target).replace(' %', '_percent')}"

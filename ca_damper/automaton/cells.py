@@ -1,0 +1,188 @@
+"""Contents of the cells of every scene, which of them are visited, and how a scene begins."""
+
+from typing import Any
+
+import taichi as ti
+
+from ca_damper.automaton.lattice import EMPTY, WALL, Lattice
+from ca_damper.engine.random_numbers import START, uniform
+from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign
+
+
+@ti.data_oriented
+class Traversal:
+    """Cells visited in a step: those on a list of particles, or all from the first to the last.
+
+    The order changes no result: rules read only data that no other cell writes, conflicts are
+    resolved by random numbers, and impulses are summed as integers.
+
+    listed: whether there is a list. cells: of particle number k. number: of the particle in a cell,
+    meaningless in the other cells. Both of shape (scenes, cells).
+    """
+
+    def __init__(self, table: SceneFields, lattice: Lattice, listed: bool):
+        self.table, self.lattice, self.listed = table, lattice, listed
+        if listed:
+            self.cells, self.number = table.field(ti.i16, "cells"), table.field(ti.i16, "cells")
+
+    @ti.func
+    def begin(self):
+        """First of the numbers k of the cells to visit in a step."""
+        return 0 if ti.static(self.listed) else self.lattice.size[None].first
+
+    @ti.func
+    def end(self, s):
+        """One past the last of them."""
+        return self.table.particles[s] if ti.static(self.listed) else self.lattice.size[None].end
+
+    @ti.func
+    def cell(self, s, k):
+        """Cell number k to visit."""
+        if ti.static(self.listed):
+            return ti.cast(self.cells[s, k], ti.i32)
+        return k
+
+    @ti.func
+    def placed(self, s, k, cell):
+        """Enter particle number k."""
+        if ti.static(self.listed):
+            self.cells[s, k] = ti.cast(cell, ti.i16)
+            self.number[s, cell] = ti.cast(k, ti.i16)
+
+    @ti.func
+    def moved(self, s, origin, target):
+        """Follow a particle to another cell."""
+        if ti.static(self.listed):
+            self.placed(s, ti.cast(self.number[s, origin], ti.i32), target)
+
+    @ti.func
+    def sort(self, s, cells: ti.template()):
+        """Number the particles by their cells again: neighbours then mostly do alike, and fast."""
+        if ti.static(self.listed):
+            count = 0
+            for cell in range(self.lattice.size[None].first, self.lattice.size[None].end):
+                kind = cells.at(s, cell)
+                if kind != EMPTY and kind != WALL:
+                    self.placed(s, count, cell)
+                    count += 1
+
+
+@ti.data_oriented
+class Cells:
+    """State of all cells; fields of shape (scenes, cells + 1), a scene's cells together in memory.
+
+    kind: direction of a particle, or EMPTY, WALL, HELD. speed: along that direction, >= 0 [m/s].
+    travelled: part of the way to the next cell [m], negative while short of the own cell's centre.
+    Speed and way are zero in cells without a particle under way.
+    stair: displacement of the container in whole cells, (scenes,); offset: what is left of it [m].
+    Velocities are those of the room, not of the container. follower: what else is kept of a cell.
+    """
+
+    def __init__(self, table: SceneFields, lattice: Lattice, listed: bool, follower: Any):
+        self.lattice, self.traversal = lattice, Traversal(table, lattice, listed)
+        self.follower = follower
+        self.kind = table.field(ti.i8, "cells")
+        self.speed, self.travelled = table.field(ti.f64, "cells"), table.field(ti.f64, "cells")
+        self.stair, self.offset = table.field(ti.i32), table.field(ti.f64)
+
+    @ti.func
+    def clear(self, s):
+        """Walls and nothing else."""
+        for cell in range(self.lattice.size[None].cells + 1):
+            self.put(s, cell, ti.cast(self.lattice.blank[cell], ti.i32), 0.0, 0.0)
+        self.follower.clear(s)
+
+    @ti.func
+    def at(self, s, cell):
+        """Kind of the content of a cell, as i32."""
+        return ti.cast(self.kind[s, cell], ti.i32)
+
+    @ti.func
+    def put(self, s, cell, kind, speed, travelled):
+        """Set the content of a cell."""
+        self.kind[s, cell] = ti.cast(kind, ti.i8)
+        self.speed[s, cell] = speed
+        self.travelled[s, cell] = travelled
+
+    @ti.func
+    def relocate(self, s, origin, target, travelled):
+        """Move the content of a cell to another, empty one."""
+        self.put(s, target, self.at(s, origin), self.speed[s, origin], travelled)
+        self.put(s, origin, EMPTY, 0.0, 0.0)
+        self.traversal.moved(s, origin, target)
+        self.follower.moved(s, origin, target)
+
+    @ti.func
+    def vertical_speed(self, s, cell):
+        """Velocity along x of a particle under way [m/s]; 0 in every other cell."""
+        return self.speed[s, cell] * self.lattice.upward(self.at(s, cell))
+
+    @ti.func
+    def step_along(self, s, step, motion, width):
+        """Take the lattice along by whole cells [m]; returns 1 for a step up, -1 down, else 0."""
+        stair, way = ti.cast(ti.floor(motion.x / width + 0.5), ti.i32), 0
+        if step == 0:
+            self.stair[s] = stair
+        elif stair > self.stair[s]:
+            way = 1
+        elif stair < self.stair[s]:
+            way = -1
+        self.stair[s] = self.stair[s] + way
+        self.offset[s] = motion.x - width * self.stair[s]
+        return way
+
+
+@ti.data_oriented
+class Placement:
+    """First cells of the particles: named by the user, or drawn from the scene's seed.
+
+    A full row would fall as one lump. Each cell is taken with the probability needed / left, so
+    that every choice of them is equally likely (selection sampling, Knuth, The Art of Computer
+    Programming 2, 3.4.2).
+
+    way: direction in which the particles head. named, count: cells that the user named.
+    """
+
+    constant_fields = ("named", "count")
+
+    def __init__(self, table: SceneFields, cells: Cells, way: int, is_named: bool):
+        self.table, self.cells, self.lattice = table, cells, cells.lattice
+        self.way, self.is_named = way, is_named
+        if is_named:
+            self.count = ti.field(ti.i32, shape=())
+            self.named = ti.field(ti.i32, shape=table.length("cells"))
+
+    def load(self, start: Any) -> None:
+        """Take over the user's cells: (column, row) of each."""
+        if self.is_named:
+            geometry = self.lattice.geometry
+            assign(self.count, len(start))
+            assign(self.named, [geometry.cell_of(*cell) for cell in start])
+
+    @ti.func
+    def fill(self, s):
+        """Put the particles of scene s into their cells, at rest."""
+        if ti.static(self.is_named):
+            for k in range(self.count[None]):
+                self._put(s, k, self.named[k])
+        else:
+            self._draw(s)
+
+    @ti.func
+    def _draw(self, s):
+        placed, count = 0, self.table.particles[s]
+        size = self.lattice.size[None]
+        left = size.columns * size.rows
+        for column in range(size.columns):
+            for row in range(size.rows):
+                cell = self.lattice.cell_of(column, row)
+                if left * uniform(self.table.seed[s], 0, cell, START) < count - placed:
+                    self._put(s, placed, cell)
+                    placed += 1
+                left -= 1
+
+    @ti.func
+    def _put(self, s, k, cell):
+        self.cells.put(s, cell, self.way, 0.0, 0.0)
+        self.cells.traversal.placed(s, k, cell)

@@ -1,0 +1,200 @@
+"""The triangular lattice of the container (Komatsuzaki et al., 5.1, Fig. 4).
+
+One axis stands along gravity; odd columns are half a cell higher, so that the cells of floor and
+ceiling alternate. Walls are cells too: 16 rows and 10 columns inside make 18 x 12 cells. Columns
+stand one cell apart, as in the paper (10 particles in 60 mm); the angles are those of the
+triangular lattice. Cells are counted upwards, column by column: the cell above is the next one.
+"""
+
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign, assign_members
+
+#: Content of a cell: a particle that moves in one of six directions, clockwise from up ...
+UP, UP_RIGHT, DOWN_RIGHT, DOWN, DOWN_LEFT, UP_LEFT = range(6)
+#: ... or nothing, a wall, or a particle that moves as one with the container.
+EMPTY, WALL, HELD = 6, 7, 8
+KINDS = 9
+DIRECTIONS = 6
+
+_ANGLE = np.deg2rad(60.0) * np.arange(DIRECTIONS)
+
+
+def alignments() -> np.ndarray:
+    """Cosine of the angle between two directions, shape (6, 6), exact."""
+    return np.round(2.0 * np.cos(_ANGLE[:, None] - _ANGLE[None, :])) / 2.0
+
+
+def unit_vectors() -> np.ndarray:
+    """Horizontal and vertical part of the six directions, shape (6, 2)."""
+    return np.column_stack([np.sin(_ANGLE), alignments()[:, UP]])
+
+
+class Geometry:
+    """Which cell lies where, in NumPy; columns and rows are counted inside the walls."""
+
+    def __init__(self, columns: int, rows: int):
+        self.columns, self.rows = columns, rows
+        self.height = rows + 2
+        self.cells = (columns + 2) * self.height
+
+    def cell_of(self, column: Any, row: Any) -> Any:
+        """Number of the cell in a column and row, both 0 at the lower left inner corner."""
+        return (column + 1) * self.height + row + 1
+
+    def column_and_row(self, cell: Any) -> tuple[Any, Any]:
+        """Column and row of a cell, -1 in the lower and left walls; arrays welcome."""
+        return cell // self.height - 1, cell % self.height - 1
+
+    def inside(self, column: Any, row: Any) -> Any:
+        """Whether a particle may stand there; arrays welcome."""
+        return (0 <= column) & (column < self.columns) & (0 <= row) & (row < self.rows)
+
+    def neighbours(self) -> np.ndarray:
+        """Cell ahead of a particle, by its cell and kind, shape (cells + 1, KINDS).
+
+        What does not fly, and all beyond the lattice, looks at cell number ``cells``: nothing ever
+        stands there, so that one rule serves every cell.
+        """
+        column, row = self.column_and_row(np.arange(self.cells))
+        high = (column + 1) % 2
+        steps = (
+            *((column, row + 1), (column + 1, row + high), (column + 1, row + high - 1)),
+            *((column, row - 1), (column - 1, row + high - 1), (column - 1, row + high)),
+        )
+        table = np.full((self.cells + 1, KINDS), self.cells, dtype=np.int32)
+        for direction, (c, r) in enumerate(steps):
+            known = (-1 <= c) & (c <= self.columns) & (-1 <= r) & (r <= self.rows)
+            table[:-1, direction] = np.where(known, self.cell_of(c, r), self.cells)
+        return table
+
+    def blank(self) -> np.ndarray:
+        """WALL or EMPTY for each cell and the one beyond the lattice, shape (cells + 1,)."""
+        column, row = self.column_and_row(np.arange(self.cells))
+        kinds = np.where(self.inside(column, row), EMPTY, WALL)
+        return np.append(kinds, EMPTY).astype(np.int32)
+
+    def centres(self, width: float) -> np.ndarray:
+        """Horizontal and vertical centre of every cell [m], shape (cells, 2).
+
+        Counted from the lower left inner corner of the container. width: of a cell [m].
+        """
+        column, row = self.column_and_row(np.arange(self.cells))
+        return width * np.column_stack([column + 0.5, row + 0.5 + 0.5 * ((column + 1) % 2)])
+
+
+@ti.dataclass
+class LatticeSize:
+    """Columns and rows inside the walls, and with them: height of a column, cells of all.
+
+    first: cell that a particle can take. end: one past the last.
+    """
+
+    columns: ti.i32
+    rows: ti.i32
+    height: ti.i32
+    cells: ti.i32
+    first: ti.i32
+    end: ti.i32
+
+
+@ti.data_oriented
+class Lattice:
+    """The tables of a geometry on the device, with room for others.
+
+    size: a LatticeSize, shape (). level: height of a cell's centre above the floor of the lower
+    columns, in cells. bottom: lowest cell of its column, a wall. raised: whether that column stands
+    half a cell higher.
+    """
+
+    constant_fields = ("size", "neighbour", "blank", "cosine", "level", "bottom", "raised")
+
+    def __init__(self, table: SceneFields):
+        most = table.length("cells")
+        self.size = LatticeSize.field(shape=())
+        self.neighbour = ti.field(ti.i16, shape=(most, KINDS))
+        self.blank = ti.field(ti.i8, shape=most)
+        self.cosine = ti.field(ti.f64, shape=(KINDS, DIRECTIONS))
+        self.level = ti.field(ti.f64, shape=most)
+        self.bottom, self.raised = ti.field(ti.i16, shape=most), ti.field(ti.i8, shape=most)
+
+    def load(self, geometry: Geometry) -> None:
+        """Take over the tables of a geometry."""
+        cosines = np.zeros((KINDS, DIRECTIONS))
+        cosines[:DIRECTIONS] = alignments()
+        height = geometry.rows + 2
+        sizes = {"columns": geometry.columns, "rows": geometry.rows, "height": height}
+        cells = (geometry.columns + 2) * height
+        ends = {"first": height + 1, "end": geometry.columns * height + geometry.rows + 1}
+        assign_members(self.size, cells=cells, **sizes, **ends)
+        column, row = np.divmod(np.arange(cells + 1), height)
+        assign(self.level, row - 0.5 + 0.5 * (column % 2))
+        assign(self.bottom, column * height)
+        assign(self.raised, column % 2)
+        assign(self.blank, geometry.blank())
+        assign(self.neighbour, geometry.neighbours())
+        assign(self.cosine, cosines)
+
+    @property
+    def geometry(self) -> Geometry:
+        """The geometry that is loaded."""
+        size = self.size[None]
+        return Geometry(int(size.columns), int(size.rows))
+
+    @ti.func
+    def nearest_row(self, base, height):
+        """Row nearest to a height [cells] in the column whose lowest cell, a wall, is ``base``."""
+        row = ti.cast(ti.floor(height - self.level[base + 1] + 0.5), ti.i32)
+        return ti.math.clamp(row, 0, self.size[None].rows - 1)
+
+    @ti.func
+    def cell_ahead(self, cell, kind):
+        """Cell ahead of a particle of this kind."""
+        return ti.cast(self.neighbour[cell, kind], ti.i32)
+
+    @ti.func
+    def upward(self, kind):
+        """Vertical part of a direction: 1, 1/2, -1/2 or -1; 0 for particles at rest."""
+        return self.cosine[kind, UP]
+
+    @ti.func
+    def cell_of(self, column, row):
+        """Number of the cell in a column and row, both counted inside the walls."""
+        return (column + 1) * self.size[None].height + row + 1
+
+    @ti.func
+    def cell_from(self, column, k, way):
+        """The k-th cell of a column, counted upwards (way 1) or downwards (-1)."""
+        return self.cell_of(column, k if way > 0 else self.size[None].rows - 1 - k)
+
+    @ti.func
+    def height_of(self, cell):
+        """Height of a cell's centre above the floor of the lower columns, in cells."""
+        return self.level[cell]
+
+    @ti.func
+    def column_beside(self, cell, way):
+        """Lowest cell of the column to the right (way 1) or left (-1) of a cell, a wall."""
+        return ti.cast(self.bottom[cell], ti.i32) + way * self.size[None].height
+
+    @ti.func
+    def in_side_wall(self, cell):
+        """Whether a wall cell belongs to a side wall; the corners do."""
+        size = self.size[None]
+        return cell < size.height or cell >= size.cells - size.height
+
+
+@ti.func
+def turned_back(direction):
+    """Straight back."""
+    return (direction + 3) % DIRECTIONS
+
+
+@ti.func
+def mirrored(direction):
+    """Left and right exchanged."""
+    return (DIRECTIONS - direction) % DIRECTIONS

@@ -1,0 +1,67 @@
+"""Automaton by the rules of the paper on the device."""
+
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from ca_damper.automaton.accounting import ACCOUNTINGS
+from ca_damper.automaton.cells import Cells
+from ca_damper.automaton.collisions import Collisions
+from ca_damper.automaton.device import LatticeDevice
+from ca_damper.automaton.lattice import DIRECTIONS, DOWN, EMPTY, HELD, WALL, unit_vectors
+from ca_damper.automaton.static_contact import StaticContact
+from ca_damper.automaton.transport import Accumulator, Transport
+from ca_damper.scenes.scene_fields import SceneFields
+
+
+@ti.data_oriented
+class PaperAutomaton(LatticeDevice):
+    """Particles fly in six directions, at most a cell a step, and collide with what is ahead."""
+
+    def __init__(self, options: Any, table: SceneFields):
+        super().__init__(table)
+        self.accounting = ACCOUNTINGS[options.accounting](table, self.lattice)
+        self.accumulator = Accumulator(options.accumulator, self.lattice)
+        cells = Cells(table, self.lattice, options.traversal == "list", self.accounting)
+        resting = StaticContact(self, cells, self.accumulator, options.particles_rest)
+        self._fill(options, cells, resting, DOWN)
+        self.transport = Transport(self)
+        self.collisions = Collisions(self, options.pair_rule == "both")
+
+    @ti.func
+    def energy(self, s):
+        """Kinetic and potential energy [J]; held particles move as the container did last."""
+        total = 0.0
+        for cell in range(self.lattice.size[None].cells):
+            kind = self.cells.at(s, cell)
+            if kind != EMPTY and kind != WALL:
+                speed = self.velocity[s] if kind == HELD else self.cells.speed[s, cell]
+                height = self.lattice.height_of(cell) * self.parameters.width[None]
+                height += self.cells.travelled[s, cell] * self.lattice.upward(kind)
+                total += 0.5 * speed * speed + self.parameters.gravity[None] * height
+        return self.parameters.mass[None] * total
+
+    @ti.func
+    def divergence_code(self, s):
+        """1 when a particle would cross more than one cell a step, which no rule allows."""
+        fastest = 0.0
+        for cell in range(self.lattice.size[None].cells):
+            fastest = max(fastest, self.cells.speed[s, cell])
+        return 0 if fastest * self.table.dt[s] < self.parameters.width[None] else 1
+
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
+        """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""
+        geometry = self.lattice.geometry
+        kind, travelled, speed = (
+            self.table.row(field, s)[: geometry.cells]
+            for field in (self.cells.kind, self.cells.travelled, self.cells.speed)
+        )
+        flying, present = kind < DIRECTIONS, (kind != EMPTY) & (kind != WALL)
+        way = np.zeros((len(kind), 2))
+        way[flying] = unit_vectors()[kind[flying]]
+        position = geometry.centres(self.parameters.width[None])
+        position = position + way * travelled[:, None]
+        velocity = way * speed[:, None]
+        velocity[kind == HELD, 1] = self.velocity[s]
+        return {"position": position[present], "velocity": velocity[present]}

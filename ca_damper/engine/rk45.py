@@ -1,0 +1,201 @@
+"""Dormand-Prince 5(4) for any right-hand side, in Python and inside kernels alike.
+
+Every function here but ``solve`` is a ``ti.pyfunc``: called from a kernel it is compiled into it,
+called from Python it runs as it stands, on NumPy vectors. So the formulas are written once. ``rhs``
+is called as ``rhs(context, t, y)`` and returns dy/dt; in a kernel it is a ti.func or a bound method
+of a data-oriented object, ``context`` whatever it needs (a scene number, a struct), and ``y`` a
+ti.Vector. Three things are kept apart: the step, what error it may make, and how long the next is.
+
+Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; step sizes after Hairer, Norsett
+and Wanner, Solving Ordinary Differential Equations I, section II.4.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import taichi as ti
+from numpy.typing import ArrayLike
+
+from taichi_dem.kit.elementary import fifth_root
+from taichi_dem.kit.errors import InputError
+
+#: Attempts after which an integration counts as stuck, unless the caller says otherwise.
+MOST_ATTEMPTS = 1_000_000
+#: Steps below this share of the time itself no longer move the clock.
+_SMALLEST_SHARE = 1e-15
+
+
+@ti.pyfunc
+def step(rhs: ti.template(), context, t, y, slope, h):
+    """One step of length h from y at t, where dy/dt is ``slope``.
+
+    Returns y at t + h (fifth order), dy/dt there (the next step's slope: six new evaluations a
+    step) and the difference to the embedded fourth-order result. In a kernel, unused results cost
+    nothing, as they are not computed.
+    """
+    t2, t3, t4, t5 = t + h * (1 / 5), t + h * (3 / 10), t + h * (4 / 5), t + h * (8 / 9)
+    return stages(rhs, context, t2, t3, t4, t5, t + h, y, slope, h)
+
+
+@ti.pyfunc
+def stages(rhs: ti.template(), context, t2, t3, t4, t5, t_end, y, slope, h):
+    """The step of ``step`` for given times of its stages, t + h (1/5, 3/10, 4/5, 8/9, 1).
+
+    They are passed to rhs as they are, so that what it needs of them may be calculated before.
+    """
+    k1 = slope
+    k2 = rhs(context, t2, y + h * (1 / 5 * k1))
+    k3 = rhs(context, t3, y + h * (3 / 40 * k1 + 9 / 40 * k2))
+    k4 = rhs(context, t4, y + h * (44 / 45 * k1 - 56 / 15 * k2 + 32 / 9 * k3))
+    y5 = 19372 / 6561 * k1 - 25360 / 2187 * k2 + 64448 / 6561 * k3 - 212 / 729 * k4
+    k5 = rhs(context, t5, y + h * y5)
+    y6 = 9017 / 3168 * k1 - 355 / 33 * k2 + 46732 / 5247 * k3 + 49 / 176 * k4
+    k6 = rhs(context, t_end, y + h * (y6 - 5103 / 18656 * k5))
+    y7 = 35 / 384 * k1 + 500 / 1113 * k3 + 125 / 192 * k4 - 2187 / 6784 * k5 + 11 / 84 * k6
+    y_new = y + h * y7
+    k7 = rhs(context, t_end, y_new)
+    gap = 71 / 57600 * k1 - 71 / 16695 * k3 + 71 / 1920 * k4 - 17253 / 339200 * k5
+    return y_new, k7, h * (gap + 22 / 525 * k6 - 1 / 40 * k7)
+
+
+@ti.pyfunc
+def scaled_norm(vector, y, y_new, rtol, atol):
+    """Euclidean length of a vector in units of atol + rtol max(|y|, |y_new|), by component.
+
+    A sum of squares and not a maximum: a maximum would let a NaN pass.
+    """
+    ratio = vector / (atol + rtol * ti.max(abs(y), abs(y_new)))
+    return ti.sqrt((ratio * ratio).sum())
+
+
+@ti.pyfunc
+def growth(error):
+    """By how much the next step is longer, for an error in units of the tolerance.
+
+    The local error grows with the fifth power of the step; 0.9 aims a little short, and 0.2 to 5
+    bound a change. NaN shrinks the step.
+    """
+    factor = 0.2
+    if error < 1e3:
+        factor = min(5.0, max(0.2, 0.9 / fifth_root(max(error, 1e-10))))
+    return factor
+
+
+@ti.pyfunc
+def first_step(rhs: ti.template(), context, t, y, slope, rtol, atol):
+    """Length of a first step (algorithm of Hairer et al.); one evaluation."""
+    size = scaled_norm(y, y, y, rtol, atol)
+    speed = scaled_norm(slope, y, y, rtol, atol)
+    h = 1e-6
+    if min(size, speed) > 1e-5:
+        h = 0.01 * size / speed
+    bend = rhs(context, t + h, y + h * slope) - slope
+    steepest = max(speed, scaled_norm(bend, y, y, rtol, atol) / h)
+    guess = max(1e-6, 1e-3 * h)
+    if steepest > 1e-15:
+        guess = fifth_root(0.01 / steepest)
+    return min(100.0 * h, guess)
+
+
+@ti.pyfunc
+def attempt(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol):
+    """Try a step of length h, or the rest up to t_end.
+
+    Returns (t, y, dy/dt, length tried, error in units of the tolerance): at the end of the step
+    when its error is at most 1, at its beginning otherwise.
+    """
+    left = t_end - t
+    size = min(h, left)
+    y_new, slope_new, gap = step(rhs, context, t, y, slope, size)
+    error = scaled_norm(gap, y, y_new, rtol, atol)
+    t_after, y_after, slope_after = 1.0 * t, y, slope
+    if error <= 1.0:
+        y_after, slope_after = y_new, slope_new
+        t_after = t + size
+        if size == left or t_after > t_end:
+            t_after = 1.0 * t_end
+    return t_after, y_after, slope_after, size, error
+
+
+@ti.pyfunc
+def integrate(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol, most_attempts):
+    """Take y from t to t_end >= t with steps chosen by the error.
+
+    slope: dy/dt at t. h: first step to try, positive.
+    Returns (y, dy/dt, attempts). attempts is -1 when the end was not reached within most_attempts
+    or the step fell to nothing, as it does at a singularity or a NaN.
+    """
+    now, state, change, length, attempts = 1.0 * t, y, slope, 1.0 * h, 0
+    error = 1.0
+    while now < t_end and attempts >= 0:
+        # Chosen here and not after the attempt: the last one needs no successor, and the power in
+        # ``growth`` costs as much as half a step.
+        if attempts > 0:
+            length *= growth(error)
+        now, state, change, length, error = attempt(
+            rhs, context, now, t_end, state, change, length, rtol, atol
+        )
+        attempts += 1
+        if now < t_end and stuck(now, t_end, length, attempts, most_attempts):
+            attempts = -1
+    return state, change, attempts
+
+
+@ti.pyfunc
+def stuck(t, t_end, h, attempts, most_attempts):
+    """Whether to give up: too many attempts, or a step that no longer moves the clock."""
+    return (attempts >= most_attempts) | (h <= _SMALLEST_SHARE * max(abs(t), abs(t_end)))
+
+
+class Solution(NamedTuple):
+    """States y (n, k) at times t (n,), and evaluations of the right-hand side."""
+
+    t: np.ndarray
+    y: np.ndarray
+    evaluations: int
+
+
+def solve(
+    rhs: Callable[[float, np.ndarray], ArrayLike],
+    span: tuple[float, float],
+    y0: ArrayLike,
+    *,
+    rtol: float = 1e-6,
+    atol: float = 1e-9,
+    at: ArrayLike | None = None,
+) -> Solution:
+    """Solve dy/dt = rhs(t, y) from y(span[0]) = y0 to span[1] in Python, as kernels do.
+
+    rtol, atol: local error allowed, |error| <= atol + rtol |y| in the Euclidean mean. at: ascending
+    times in the span at which y is wanted; the steps land on them. All accepted steps are given if
+    None. Raises InputError where the end is not reached in MOST_ATTEMPTS.
+    """
+    t, t_end = map(float, span)
+    y, wanted = (
+        np.atleast_1d(np.asarray(y0, dtype=np.float64)),
+        np.atleast_1d([] if at is None else at),
+    )
+
+    def derivative(_, time, state):
+        """The user's right-hand side, in the shape that the stages call."""
+        return np.asarray(rhs(time, state), dtype=np.float64)
+
+    slope = derivative(None, t, y)
+    h = first_step(derivative, None, t, y, slope, rtol, atol)
+    times, states, attempts = [t], [y], 0
+    for stop in (*wanted[(wanted > t) & (wanted < t_end)], t_end):
+        while t < stop:
+            t, y, slope, size, error = attempt(derivative, None, t, stop, y, slope, h, rtol, atol)
+            attempts += 1
+            if error <= 1.0:
+                times.append(t)
+                states.append(y)
+            # A step cut short by the stop shortens no later one.
+            h = max(h if size < h and error <= 1.0 else 0.0, size * growth(error))
+            if t < stop and stuck(t, stop, h, attempts, MOST_ATTEMPTS):
+                raise InputError(f"rhs must be smooth up to t = {stop:g}, got stuck at t = {t:.6g}")
+    found = Solution(np.array(times), np.array(states), 6 * attempts + 2)
+    if at is None:
+        return found
+    return found._replace(t=wanted, y=found.y[np.searchsorted(found.t, wanted)])

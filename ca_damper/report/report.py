@@ -1,0 +1,204 @@
+"""The short report at the end of a run of the damper."""
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ca_damper.report.certificate import Certificate
+from ca_damper.report.checked_range import CheckedRange
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.files import write_text
+from taichi_dem.kit.validation import FileName
+
+#: Evaluations of the right-hand side in an attempt of RK45; the first slope is the last one's.
+RK45_STAGES = 6
+# Signals that a table describes.
+_MOST_TOLD = 4
+
+
+@dataclass(frozen=True)
+class Report:
+    """Figures and cost of a batch since it was made.
+
+    Parameters
+    ----------
+    method : str
+        Label of the filling.
+    mount : str
+        ``"spring"``, ``"base"``, ``"floor"`` or ``"structure"``.
+    effects : tuple of str
+        Effects that the filling was asked to compute.
+    effect_activity : tuple of EffectUse
+        Activity of each effect that can be counted, since the start.
+    scenes : int
+        Number of scenes.
+    particles : tuple of (int, int)
+        Fewest and most particles of a scene.
+    dt_s : tuple of (float, float)
+        Shortest and longest step [s].
+    simulated_s : float
+        Longest time of a scene since its start [s].
+    step_bound : tuple of (float, str) or None
+        Longest step that the filling allows or advises [s], and why; None where any does.
+    momentum_error : float
+        Momentum of the particles that no impulse explains, as a share of what they and the
+        container exchanged, in the worst scene.
+    scene_steps : int
+        Number of steps of all scenes.
+    particle_steps : int
+        Number of steps of all scenes, each times its particles.
+    container_evaluations : int
+        Evaluations of the container's right-hand side since the start; 0 on the base.
+    compile_seconds : float
+        Time spent on compiling [s].
+    run_seconds : float
+        Time spent on stepping [s].
+    order : int, optional
+        Order of the error in the step; None where the filling declares none.
+    sampling : tuple of (int, float), optional
+        Number of cycles that means were taken over, and half-width of the mean of the highest RMS
+        as a share of it, with a confidence of 95 %; None where it is not known, as it is not of a
+        mean that still changes.
+    certificate : Certificate, optional
+        When effects first acted, what was left out, what was audited.
+    diverged : tuple of str
+        A sentence for each scene that diverged, the first in time first; its results are nan.
+    excitation : tuple of str, default ()
+        What acts beside the sine of the base, and what was done to samples of it, in words.
+    transient : str, default ""
+        Why the mean of the highest RMS is not known, in words.
+    checked : CheckedRange, optional
+        Range in which the filling was checked, and what of the run lies outside; None where the
+        filling names none.
+    """
+
+    method: str
+    mount: str
+    effects: tuple[str, ...]
+    effect_activity: tuple[EffectUse, ...]
+    scenes: int
+    particles: tuple[int, int]
+    dt_s: tuple[float, float]
+    simulated_s: float
+    step_bound: tuple[float, str] | None
+    momentum_error: float
+    scene_steps: int
+    particle_steps: int
+    container_evaluations: int
+    compile_seconds: float
+    run_seconds: float
+    order: int | None = None
+    sampling: tuple[int, float] | None = None
+    certificate: Certificate | None = None
+    diverged: tuple[str, ...] = ()
+    excitation: tuple[str, ...] = ()
+    transient: str = ""
+    checked: CheckedRange | None = None
+
+    def __repr__(self):
+        particles = f"{_range(self.particles)} particles"
+        times = f"{self.simulated_s:.4g} s simulated", f"{self.run_seconds:.3g} s run"
+        scenes = f"{counted(self.scenes, 'scene')} with {particles}"
+        return in_brief(self, self.method, scenes, *times, "print it for all figures")
+
+    @property
+    def particle_steps_per_second(self) -> float:
+        """Speed without compiling [1/s]; 0 before anything has run."""
+        return self.particle_steps / self.run_seconds if self.run_seconds > 0.0 else 0.0
+
+    @property
+    def known_error(self) -> str:
+        """What is known of the error of the run, for nothing extra."""
+        order = "order unknown" if self.order is None else f"order {self.order}"
+        parts = [f"step {_range(self.dt_s)} s, {order}"]
+        parts.append(f"momentum closes to {100.0 * self.momentum_error:.2g} %")
+        if self.sampling is not None:
+            cycles, share = self.sampling
+            known = f"known to {100.0 * share:.2g} %"
+            parts.append(f"highest RMS, a mean over {counted(cycles, 'cycle')}, {known}")
+        elif self.transient:
+            parts.append(f"highest RMS not known: {self.transient}")
+        return "; ".join(parts)
+
+    def as_dict(self) -> dict[str, Any]:
+        """All figures, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Figures by name.
+        """
+        figures = asdict(self)
+        figures["acted"] = figures.pop("effect_activity")
+        if self.certificate is not None:
+            figures["certificate"] = self.certificate.as_dict()
+        derived = ("particle_steps_per_second", "known_error")
+        return {**figures, **{name: getattr(self, name) for name in derived}}
+
+    def write(self, path: FileName) -> None:
+        """Write all figures as JSON.
+
+        Parameters
+        ----------
+        path : path
+            JSON file; it is replaced as a whole.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        write_text(path, json.dumps(self.as_dict(), indent=1))
+
+    def _diverged_rows(self):
+        """Number of scenes that diverged, and the first of them."""
+        if not self.diverged:
+            return ()
+        words = f"{len(self.diverged):,} of them; nan for these and all on one structure with them"
+        return ("diverged", words), ("", self.diverged[0])
+
+    def _further_excitations(self):
+        """Number of the signals that a table has no room for."""
+        more = len(self.excitation) - _MOST_TOLD
+        return (("", f"and {more} more, listed in report.excitation"),) if more > 0 else ()
+
+    def _bound_row(self):
+        """Bound of the step, and the step relative to it."""
+        if self.step_bound is None:
+            return ()
+        most, why = self.step_bound
+        return (("step bound by", f"{why}: {most:.3g} s, {self.dt_s[1] / most:.2g} of it taken"),)
+
+    def __str__(self):
+        """A table of some twelve lines, and one for each effect and signal."""
+        step, *others = self.known_error.split("; ")
+        rows = [
+            ("method", f"{self.method}, container on the {self.mount}"),
+            *(("excitation", words) for words in self.excitation[:_MOST_TOLD]),
+            *self._further_excitations(),
+            ("effects", ", ".join(self.effects) or "none"),
+            *(("", f"{use.effect}: {use}") for use in self.effect_activity),
+            *(self.certificate.rows() if self.certificate is not None else ()),
+            ("scenes", f"{self.scenes:,} with {_range(self.particles)} particles"),
+            ("simulated", f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s"),
+            *self._diverged_rows(),
+            *self._bound_row(),
+            ("momentum error", f"{self.momentum_error:.2g} of what was exchanged"),
+            ("known of the error", step),
+            *(("", part) for part in others),
+            *(self.checked.rows() if self.checked is not None else ()),
+            ("steps", f"{self.scene_steps:,} of scenes, {self.particle_steps:,} of particles"),
+            ("evaluations", f"{self.container_evaluations:,} of the container's motion"),
+            (
+                "time",
+                f"{self.compile_seconds:.1f} s before the first step, {self.run_seconds:.1f} s run "
+                f"({1e-6 * self.particle_steps_per_second:.3g} million particle steps a second)",
+            ),
+        ]
+        return "\n".join(f"{name:18s} {text}" for name, text in rows)
+
+
+def _range(pair):
+    low, high = (f"{value:.3g}" for value in pair)
+    return low if low == high else f"{low} to {high}"

@@ -1,0 +1,1 @@
+"""Questions to many scenes: responses, sweeps, maps, time histories, films."""

@@ -1,0 +1,37 @@
+"""What the results of all runs have in common: values over named axes, as tables and grids."""
+
+from typing import Any
+
+import numpy as np
+
+from taichi_dem.kit.data_table import Tabulated, dataset
+
+
+class Result(Tabulated):
+    """Values of scenes over named axes; ``label`` is a short word for the filling."""
+
+    label: str
+
+    def _axes(self) -> dict[str, Any]:
+        """(values, unit) of each axis, by its dimension."""
+        raise NotImplementedError
+
+    def _variables(self) -> dict[str, Any]:
+        """(dimensions, values, unit) of all values, by name."""
+        raise NotImplementedError
+
+    def to_xarray(self) -> Any:
+        """Give all values as an xarray Dataset over their axes.
+
+        Returns
+        -------
+        xarray.Dataset
+            Units in the attributes of each variable, the filling in its own.
+        """
+        return dataset(self._variables(), self._axes(), filling=self.label)
+
+
+def scenes_over(**axes: Any) -> dict[str, np.ndarray]:
+    """Value on each axis of all scenes, (scenes,) by name; the last axis runs fastest."""
+    grids = np.meshgrid(*axes.values(), indexing="ij")
+    return dict(zip(axes, (grid.ravel() for grid in grids)))

@@ -1,0 +1,360 @@
+"""Shake a structure, or one of several modes with boxes, by a motion or a force that is no sine."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ca_damper.batch import Batch
+from ca_damper.engine.modal_mount import ModalMount
+from ca_damper.excitation.excitation import Excitation, excitation_of
+from ca_damper.excitation.signal import Signal
+from ca_damper.filling import Filling, check_filling
+from ca_damper.oscillator import Oscillator
+from ca_damper.runs.history import StructureHistory, TimeHistory
+from ca_damper.runs.result import scenes_over
+from ca_damper.scenes.checks import MOST_SCENES, MOST_SEED, run_seeds
+from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE, MOST_STEPS_PER_CYCLE, automatic_dt
+from ca_damper.scenes.table import SceneTable
+from ca_damper.structure import Box, ModalStructure
+from taichi_dem.kit.checkpoint import Checkpoint, identity_of
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress import Listener
+from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.validation import (
+    AUTO,
+    FileName,
+    instance,
+    positive,
+    progress_option,
+    real_numbers,
+    several,
+    shown,
+    told_apart,
+    whole,
+)
+
+# Between the seeds of two boxes: larger than the seeds that users count, and prime.
+_BETWEEN_BOXES = 15_485_863
+# Share of a motion at the start that may lie outside the modes.
+_OUTSIDE_MODES = 1e-3
+
+
+def shake(
+    filling: Filling,
+    excitation: Signal | Excitation,
+    *,
+    particles: int | Sequence[int],
+    seeds: int | Sequence[int] = 5,
+    oscillator: Oscillator | None = None,
+    dt: float | None = None,
+    mount: str = "spring",
+    duration: float | None = None,
+    interval: float = 1e-3,
+    displacement: float = 0.0,
+    velocity: float = 0.0,
+    effects: str = "listed",
+    progress: Listener | str | None = AUTO,
+    checkpoint: Checkpoint | None = None,
+    resume: FileName | None = None,
+) -> TimeHistory:
+    """Shake a structure and record its motion.
+
+    Parameters
+    ----------
+    filling : Filling
+        Filling of the container.
+    excitation : Signal or Excitation
+        Motion of the base [m], or an Excitation; the base stands still where its member is None.
+    particles : int or sequence of int
+        Numbers of particles, one or several.
+    seeds : int or sequence of int, default 5
+        Number of seeds, counted from 1, or the seeds themselves.
+    oscillator : Oscillator, optional
+        Primary structure, without its base_amplitude; that of the paper if None.
+    dt : float, optional
+        Largest step [s]; that of the filling if None.
+    mount : str, default "spring"
+        ``"spring"``, ``"base"`` or ``"floor"``, see ``Batch``.
+    duration : float, optional
+        Duration [s]; that of the excitation if None.
+    interval : float, default 0.001
+        Longest time between samples [s]; the measures take all steps into account.
+    displacement : float, default 0.0
+        Displacement of the container at the beginning [m]. With an excitation that is zero, the
+        record is a free decay.
+    velocity : float, default 0.0
+        Velocity of the container at the beginning [m/s].
+    effects : str, default "listed"
+        As in ``frequency_response``.
+    progress : callable or str or None, default "auto"
+        As in ``frequency_response``.
+    checkpoint : Checkpoint, optional
+        As in ``frequency_response``.
+    resume : path, optional
+        As in ``frequency_response``.
+
+    Returns
+    -------
+    TimeHistory
+        Motion and force over time.
+
+    Raises
+    ------
+    InputError
+        An argument is out of its range.
+    SimulationDiverged
+        All scenes left the range in which their numbers mean anything. Where some did, a warning
+        tells which, and their results are nan.
+
+    Examples
+    --------
+    >>> ground = excitation.random_vibration([2.0, 20.0], [0.1, 0.1], duration=10.0)
+    >>> shake(Spheres(), ground, particles=30).relative_rms  # doctest: +SKIP
+    """
+    progress_option("progress", progress)
+    check_filling(filling)
+    excitation, numbered = _one_for_all(excitation), run_seeds(seeds)
+    own = instance("oscillator", Oscillator() if oscillator is None else oscillator, Oscillator)
+    counts = several("particles", particles, lambda n, x: whole(n, x, 0, filling.capacity))
+    if len(counts) * len(numbered) > MOST_SCENES:
+        raise InputError(f"particles x seeds must make at most {MOST_SCENES} scenes")
+    most = filling.default_dt if dt is None else positive("dt", dt)
+    window = _window(excitation, duration, most, interval)
+    structure = 0.0, own.mass, own.stiffness, own.damping
+    scenes = scenes_over(particles=counts, seed=numbered).values()
+    table = SceneTable(*scenes, window.dt, 1.0 / window.duration, *structure)
+    start = {"displacement": displacement, "velocity": velocity}
+    job = f"shaken {identity_of((counts, numbered, window, own, mount, start))}"
+    options = {"excitation": excitation, "mount": mount, "effects": effects}
+    common, motion = _recorded(
+        (filling, table), options, window, start, progress, (job, checkpoint, resume)
+    )
+    shape = len(counts), len(numbered)
+    over_axes = {name: one.reshape(*one.shape[:-1], *shape) for name, one in motion.items()}
+    return TimeHistory(oscillator=own, particles=counts, seeds=numbered, **common, **over_axes)
+
+
+def shake_structure(
+    filling: Filling,
+    structure: ModalStructure,
+    boxes: Box | Sequence[Box],
+    excitation: Signal | Excitation,
+    *,
+    seeds: int | Sequence[int] = 5,
+    dt: float | None = None,
+    duration: float | None = None,
+    interval: float = 1e-3,
+    force_place: int | None = None,
+    displacement: Any = 0.0,
+    velocity: Any = 0.0,
+    effects: str = "listed",
+    progress: Listener | str | None = AUTO,
+    checkpoint: Checkpoint | None = None,
+    resume: FileName | None = None,
+) -> StructureHistory:
+    """Shake a structure with boxes and record its motion.
+
+    Parameters
+    ----------
+    filling : Filling
+        Filling of all boxes.
+    structure : ModalStructure
+        Places and modes.
+    boxes : Box or sequence of Box
+        Boxes, one or several; several may share a place.
+    excitation : Signal or Excitation
+        Motion of the base [m], or an Excitation, whose force acts at ``force_place``.
+    seeds : int or sequence of int, default 5
+        Number of seeds, counted from 1, or the seeds themselves.
+    dt : float, optional
+        Largest step [s]. None: that of the filling, or a fortieth of a cycle of the highest mode
+        where that is shorter.
+    duration : float, optional
+        Duration [s]; that of the excitation if None.
+    interval : float, default 0.001
+        Longest time between samples [s].
+    force_place : int, optional
+        Place where the force of the excitation acts.
+    displacement : float or array_like, default 0.0
+        Displacement of the places at the beginning [m], one number or (places,); a sum of the
+        modes.
+    velocity : float or array_like, default 0.0
+        Velocity of the places at the beginning [m/s], likewise.
+    effects : str, default "listed"
+        As in ``frequency_response``.
+    progress : callable or str or None, default "auto"
+        As in ``frequency_response``.
+    checkpoint : Checkpoint, optional
+        As in ``frequency_response``.
+    resume : path, optional
+        As in ``frequency_response``.
+
+    Returns
+    -------
+    StructureHistory
+        Motion of all places and force on all boxes over time.
+
+    Raises
+    ------
+    InputError
+        An argument is out of its range, or the step is too long for the highest mode.
+    SimulationDiverged
+        All scenes left the range in which their numbers mean anything. Where some did, a warning
+        tells which, and their results are nan.
+    """
+    progress_option("progress", progress)
+    check_filling(filling)
+    excitation, numbered = _one_for_all(excitation), run_seeds(seeds)
+    if (excitation.force is None) != (force_place is None):
+        wanted = "None without" if excitation.force is None else "a place for"
+        raise InputError(
+            f"force_place must be {wanted} a force in the excitation, got {shown(force_place)}"
+        )
+    boxed = _checked_boxes(boxes, filling.capacity)
+    modal = ModalMount(structure, [box.place for box in boxed], force_place)
+    if modal.group * len(numbered) > MOST_SCENES:
+        raise InputError(f"(boxes + empty places) x seeds must be at most {MOST_SCENES}")
+    window = _window(excitation, duration, _longest_step(filling, structure, dt), interval)
+    start = {
+        name: np.tile(_of_places(name, value, structure)[[*modal.scene_places]], len(numbered))
+        for name, value in (("displacement", displacement), ("velocity", velocity))
+    }
+    table = _table_of_groups(modal, boxed, numbered, window)
+    many = structure, boxed, numbered, window, force_place, start
+    job = f"shaken structure {identity_of(many)}"
+    options = {"excitation": excitation, "structure": modal, "effects": effects}
+    common, motion = _recorded(
+        (filling, table), options, window, start, progress, (job, checkpoint, resume)
+    )
+    # A place is that of the first scene there.
+    places = [modal.scene_places.index(i) for i in range(structure.place_count)]
+    taken = {**dict.fromkeys(motion, places), "force": slice(len(boxed))}
+    groups = len(numbered), modal.group
+    over_axes = {
+        name: np.swapaxes(one.reshape(*one.shape[:-1], *groups), -1, -2)[..., taken[name], :]
+        for name, one in motion.items()
+    }
+    return StructureHistory(structure=structure, boxes=boxed, seeds=numbered, **common, **over_axes)
+
+
+class Window(NamedTuple):
+    """A run of ``duration`` [s]: even samples, steps between two of them, and the step [s]."""
+
+    duration: float
+    samples: int
+    every: int
+    dt: float
+
+
+def _window(excitation: Excitation, asked: Any, dt: float, interval: Any) -> Window:
+    """Window with the largest step that makes a whole number of samples, none longer than dt [s].
+
+    asked: duration, that of the excitation if None. interval: between samples at most [s].
+    """
+    end = float(excitation.duration(1)[0])
+    if asked is None and math.isinf(end):
+        raise InputError("duration must be given for an excitation without an end, got None")
+    duration = end if asked is None else positive("duration", asked)
+    samples = math.ceil(duration / positive("interval", interval) * (1 - 1e-12))
+    every = math.ceil(duration / (samples * dt) * (1.0 - 1e-12))
+    every = max(every, math.ceil(LEAST_STEPS_PER_CYCLE / samples))
+    if samples * every > MOST_STEPS_PER_CYCLE:
+        got, most = told_apart(duration, MOST_STEPS_PER_CYCLE * dt)
+        raise InputError(f"duration must be at most {most} s in steps of {dt:.3g} s, got {got}")
+    return Window(duration, samples, every, duration / (samples * every))
+
+
+def _one_for_all(value: Any) -> Excitation:
+    """Excitation of one Signal or SineForce for all scenes; InputError for several or None."""
+    if value is None:
+        raise InputError("excitation must be a Signal or an Excitation, got None")
+    excitation = excitation_of(value)
+    if isinstance(excitation.base, tuple) or isinstance(excitation.force, tuple):
+        raise InputError(
+            f"excitation must be one for all scenes here, got several: {shown(excitation)}"
+        )
+    return excitation
+
+
+def _recorded(scenes, options, window, start, progress, saving):
+    """Run a batch over its window: fields that all scenes share, and those over scenes at the end.
+
+    scenes: filling and table. saving: words for the job, and both options of checkpoints.
+    """
+    job, checkpoint, resume = saving
+    with reporting(progress, "shaking") as tell:
+        batch = Batch(*scenes, measured_cycles=1, recorded_samples=window.samples, **options)
+        batch.start(**start)
+        with batch.checkpointed(checkpoint, resume, {"job": job}) as writer:
+            cycles = batch.run(0, 1, tell, record_every=window.every)
+            writer.save()
+    series, sound = batch.time_series(), int(np.argmin(batch.diverged))
+    common = {"time_s": series["time_s"][:, sound], "base": series["y"][:, sound]}
+    common.update(label=scenes[0].label, excitation=batch.excitation, report=batch.report())
+    highest = np.maximum(cycles.mean_of("x_max"), -cycles.mean_of("x_min"))
+    motion = {name: series[name] for name in ("x", "v", "force")}
+    return common, {**motion, "rms": cycles.rms, "peak": highest}
+
+
+def _checked_boxes(boxes, capacity):
+    """Boxes as a tuple; InputError."""
+    given = (boxes,) if isinstance(boxes, Box) else boxes
+    if not isinstance(given, (list, tuple)) or not given:
+        raise InputError(f"boxes must be a Box or a list of at least one, got {shown(boxes)}")
+    for box in given:
+        whole("particles", instance("boxes", box, Box).particles, 0, capacity)
+    return tuple(given)
+
+
+def _longest_step(filling, structure, dt):
+    """Step asked for [s], or that of the filling and of the highest mode; InputError."""
+    highest = float(structure.frequencies.max())
+    if dt is None:
+        return automatic_dt(filling.default_dt, highest)
+    most, longest = positive("dt", dt), 1.0 / (LEAST_STEPS_PER_CYCLE * highest)
+    if most > longest * (1.0 + 1e-12):
+        got, bound = told_apart(most, longest)
+        raise InputError(
+            f"dt must be at most {bound} s, {LEAST_STEPS_PER_CYCLE} steps to a cycle of the "
+            f"highest mode of {highest:.6g} Hz, got {got}: keep fewer modes, or shorter steps"
+        )
+    return most
+
+
+def _table_of_groups(modal, boxes, seeds, window):
+    """Scenes of all groups, those of a group running fastest; box 0 has the seed of the run."""
+    empty = [0] * (modal.group - len(boxes))
+    numbers = [k if box.seed is None else box.seed for k, box in enumerate(boxes)]
+    started = [
+        [*((seed + number * _BETWEEN_BOXES) % (MOST_SEED + 1) for number in numbers), *empty]
+        for seed in seeds
+    ]
+    particles = [*(box.particles for box in boxes), *empty]
+    structure = modal.structure
+    mass = float(structure.masses.sum())
+    omega = 2.0 * np.pi * float(structure.frequencies.min())
+    damping = 2.0 * mass * omega * float(structure.damping_ratios[0])
+    return SceneTable(
+        *(np.tile(particles, len(seeds)), np.concatenate(started), window.dt),
+        *(1.0 / window.duration, 0.0, mass, mass * omega**2, damping),
+    )
+
+
+def _of_places(name, value, structure):
+    """Motion at the beginning, (places,); InputError unless it is a sum of the modes."""
+    places = structure.place_count
+    try:
+        motion = np.broadcast_to(real_numbers(name, value), places)
+    except ValueError:
+        raise InputError(
+            f"{name} must be a finite number or {places}, one for each place, got {shown(value)}"
+        ) from None
+    left = motion - structure.shapes @ structure.modal(motion)
+    if np.abs(left).max() > _OUTSIDE_MODES * np.abs(motion).max():
+        raise InputError(
+            f"{name} must be a sum of the modes of the structure, got {shown(value)}, of which "
+            f"{np.abs(left).max():.3g} is none: keep more modes"
+        )
+    return motion

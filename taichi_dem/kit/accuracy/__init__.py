@@ -1,1 +1,0 @@
-"""Answers with an error bar: what is asked, what is known of its error, and what it cost."""

@@ -1,0 +1,314 @@
+"""An answer to a question that was asked with a tolerance: value, error bar, and its cost."""
+
+import math
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from taichi_dem.kit.bars.chance import mean_and_deviation, share_error, t_quantile
+from taichi_dem.kit.display import by_fields, counted, in_brief
+
+#: Tolerances of which an answer tells the cost.
+TOLERANCES = (0.1, 0.03, 0.01, 0.003)
+#: Sentences about runs that differ by one rounding, by the kind of their scenes (``kind_of``).
+known_partings: dict[Hashable, str] = {}
+#: Digits that a number has, and unit of the last of them below which it is written with a power of
+#: ten.
+_MOST_DIGITS, _LEAST_UNIT = 17, 1e-15
+#: A number, or one for each place of a curve.
+Values = float | np.ndarray
+
+
+@dataclass(frozen=True)
+class ErrorParts:
+    """Half-widths of an error bar by source, in the unit of the value.
+
+    Sources are independent: their squares add.
+
+    Parameters
+    ----------
+    step : float or ndarray, default 0.0
+        Error of the time step, in the unit of the value, as all.
+    solver : float or ndarray, default 0.0
+        Error of sweeps that end early, in the unit of the value.
+    chance : float or ndarray, default 0.0
+        Spread of runs that differ by one rounding or by their seeds, in the unit of the value.
+    sampling : float or ndarray, default 0.0
+        Error of the time over which a mean was taken, in the unit of the value.
+    """
+
+    step: Values = 0.0
+    solver: Values = 0.0
+    chance: Values = 0.0
+    sampling: Values = 0.0
+
+    @property
+    def total(self) -> Values:
+        """Half-width of the whole bar, in the unit of the value."""
+        total = reduce(np.hypot, (getattr(self, part.name) for part in fields(self)))
+        return total if isinstance(total, np.ndarray) else float(total)
+
+    __repr__ = by_fields
+
+    def __str__(self):
+        found = {part.name: largest(getattr(self, part.name)) for part in fields(self)}
+        unit = 10.0 ** (_places(max(found.values())) if any(found.values()) else 0)
+        shown = (f"{name} {rounded(value, unit)}" for name, value in found.items() if value > 0.0)
+        return ", ".join(shown) or "no error found"
+
+
+@dataclass(frozen=True)
+class Expense:
+    """Cost of one tolerance.
+
+    Parameters
+    ----------
+    tolerance : float
+        Half-width of the bar as a share of the value.
+    seconds : float
+        CPU time [s].
+    measured : bool
+        Whether it was spent, or is predicted from runs.
+    """
+
+    tolerance: float
+    seconds: float
+    measured: bool
+
+    def __str__(self):
+        how = "measured" if self.measured else "predicted"
+        return f"{100.0 * self.tolerance:g} %: {self.seconds:.2g} s {how}"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How an answer was found, and what it cost.
+
+    Parameters
+    ----------
+    method : str
+        Method in words, with its step.
+    runs : int
+        Number of runs of all kinds.
+    pilot_s : float
+        CPU time of the runs that chose the method and step [s].
+    final_s : float
+        CPU time of the runs that gave the answer [s].
+    begin : object, default 0
+        Where a similar question may begin: a level of the step, or a stage of the damper's runs.
+    parting_s : float, default math.inf
+        Simulated time from which runs that differ by one rounding differ by more than was allowed
+        [s]; infinite if never.
+    """
+
+    method: str
+    runs: int
+    pilot_s: float
+    final_s: float
+    begin: Any = 0
+    parting_s: float = math.inf
+
+    @property
+    def seconds(self) -> float:
+        """CPU time of all runs [s]."""
+        return self.pilot_s + self.final_s
+
+    def __str__(self):
+        words = f"{self.method}; {self.seconds:.2g} s, of which pilot {self.pilot_s:.2g} s"
+        return words if math.isinf(self.parting_s) else f"{words}; {self.parting}"
+
+    @property
+    def parting(self) -> str:
+        """When runs that differ by one rounding part, in words."""
+        return f"runs that differ by one rounding part from {self.parting_s:.2g} s"
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One of several ends of a question.
+
+    Parameters
+    ----------
+    value : float
+        Mean over its runs, in the unit of the goal.
+    error : float
+        Half-width of the bar of the mean, in the unit of the goal.
+    share : float
+        Share of all runs that came to it.
+    share_error : float
+        Half-width of the bar of that share.
+    seeds : tuple of int
+        Seeds of its runs.
+    """
+
+    value: float
+    error: float
+    share: float
+    share_error: float
+    seeds: tuple[int, ...]
+
+    def in_words(self, unit: str, runs: str) -> str:
+        """Value, bar and share in words; runs: what a seed stands for, in the plural."""
+        end = f" {unit}" if unit != "1" else ""
+        share = f"{100.0 * self.share:.0f} +- {100.0 * self.share_error:.0f} %"
+        return f"{self.value:.6g} +- {self.error:.2g}{end} for {share} of the {runs}"
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Value of a goal with its error bar.
+
+    Parameters
+    ----------
+    goal : str
+        Name of the goal.
+    unit : str
+        Unit of the value, ``"1"`` for none.
+    value : float or ndarray
+        A number, or one for each place of a curve, in the unit of the goal; that of the most
+        frequent branch where there are several.
+    parts : ErrorParts
+        Half-widths of the error bar by source.
+    tolerance : float
+        Largest error that was allowed, as a share of the value.
+    confidence : float
+        Probability [-] with which the bar holds the true value.
+    plan : Plan
+        How the answer was found, and what it cost.
+    result : object, optional
+        Result of the finest run.
+    cost_curve : sequence of Expense, optional
+        What other tolerances would cost.
+    shortfall : str, default ""
+        Why the answer is not what was asked for, and what would help: the error is larger, or the
+        run itself is in doubt. ``""`` where it is neither.
+    branches : tuple of Branch, default ()
+        Ends to which the runs of a question without a single answer came, the most frequent first.
+
+    Examples
+    --------
+    >>> answer = solve(scene, until=1e-4, goal=goals.hole_displacement())  # doctest: +SKIP
+    >>> answer.value, answer.error, answer.reached  # doctest: +SKIP
+    """
+
+    goal: str
+    unit: str
+    value: Values
+    parts: ErrorParts
+    tolerance: float
+    confidence: float
+    plan: Plan
+    result: Any = None
+    cost_curve: Sequence[Expense] = ()
+    shortfall: str = ""
+    branches: tuple[Branch, ...] = ()
+
+    @property
+    def error(self) -> Values:
+        """Half-width of the error bar, in the unit of the value."""
+        return self.parts.total
+
+    @property
+    def certificate(self) -> Any:
+        """Certificate of the finest run, of a scene with effects="auto"; else None."""
+        return getattr(self.result, "certificate", None)
+
+    @property
+    def share(self) -> float:
+        """Largest half-width as a share of the largest value; infinite where that is zero."""
+        size = largest(self.value)
+        error = largest(self.error)
+        return error / size if size else math.inf if error else 0.0
+
+    @property
+    def reached(self) -> bool:
+        """Whether the bar is as narrow as asked, and no run is in doubt."""
+        return not self.shortfall
+
+    def __repr__(self):
+        return in_brief(self, self.goal, self._bar(), self.shortfall)
+
+    def __str__(self):
+        lines = [f"{self._bar()} ({self.parts}); {self.plan}", self.shortfall]
+        # What the report of the finest run warns of; a Response has none.
+        needs = getattr(getattr(self.result, "report", None), "needs", ())
+        return "\n".join(filter(None, [*lines, *(f"warning: {need}" for need in needs)]))
+
+    def _bar(self):
+        if isinstance(self.value, np.ndarray):
+            count = counted(self.value.size, "value")
+            return f"{count}, each to {largest(self.error):.2g} {self.unit}"
+        size = largest(self.error)
+        unit = 10.0 ** _places(size) if size else 0.0
+        ends = f" {self.unit}" if self.unit != "1" else ""
+        return f"{rounded(self.value, unit)} +- {rounded(size, unit)}{ends}"
+
+
+def doubted(answer: Answer, *reasons: str) -> Answer:
+    """The answer, which is not reached where there are reasons to doubt its run."""
+    return replace(answer, shortfall="; ".join(filter(None, (answer.shortfall, *reasons))))
+
+
+def branched(
+    answer: Answer, branches: tuple[Branch, ...], step: Values, run: str, ends: str
+) -> Answer:
+    """The answer of a question with several ends: that of the most frequent.
+
+    step: error of it by the step. run: what a seed stands for, in the singular. ends: what they
+    did, with a place for how many.
+    """
+    total = counted(sum(len(branch.seeds) for branch in branches), run)
+    each = "; ".join(branch.in_words(answer.unit, f"{run}s") for branch in branches)
+    words = f"no single number: {total} {ends.format(len(branches))}: {each}"
+    first = branches[0]
+    parts = ErrorParts(step=step, solver=answer.parts.solver, chance=first.error)
+    return replace(answer, value=first.value, parts=parts, shortfall=words, branches=branches)
+
+
+def branches_of(
+    values: np.ndarray, clusters: Sequence[np.ndarray], seeds: Sequence[int], error: float, t: float
+) -> tuple[Branch, ...]:
+    """Branches of clusters; error: standard error of a value by sampling, t: its quantile."""
+    return tuple(_branch(values[part], part, seeds, error, t) for part in clusters)
+
+
+def _branch(values, part, seeds, error, t):
+    count = len(part)
+    half = t * error / math.sqrt(count)
+    mean, deviation = mean_and_deviation(values)
+    if count > 1:
+        half = max(half, t_quantile(0.95, count - 1) * deviation / math.sqrt(count))
+    named = tuple(seeds[k] for k in sorted(part.tolist()))
+    return Branch(mean, half, count / len(seeds), share_error(count, len(seeds)), named)
+
+
+def cost_curve(tolerance: float, cost: Callable[[float], tuple[float, bool]]) -> Iterator[Expense]:
+    """Costs of usual tolerances and the one that was asked; cost: CPU time [s], whether spent."""
+    for one in sorted({*TOLERANCES, tolerance}, reverse=True):
+        yield Expense(one, *cost(one))
+
+
+def largest(values: Values) -> float:
+    """Largest magnitude of a value or a curve."""
+    return float(np.abs(values).max(initial=0.0))
+
+
+def rounded(value: float, unit: float) -> str:
+    """A number to a power of ten that its error leaves certain; to six digits for unit 0."""
+    if unit == 0.0 or not math.isfinite(value):
+        return f"{value:.6g}"
+    if 0.0 < abs(value) < 1e-4 or not _LEAST_UNIT <= unit < 1e5:
+        digits = math.floor(math.log10(abs(value)) - math.log10(unit)) + 1 if value else 1
+        return f"{value:.{min(_MOST_DIGITS, max(1, digits))}g}"
+    return f"{value:.{max(0, round(-math.log10(unit)))}f}"
+
+
+def _places(error):
+    """Power of ten of the second digit of an error, of the first where that is at least 3."""
+    if not math.isfinite(error):
+        return -math.inf
+    power = math.floor(math.log10(error))
+    return power if error / 10.0**power >= 3.0 else power - 1
