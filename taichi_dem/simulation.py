@@ -16,7 +16,6 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
-from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, instance, shown, whole
 from taichi_dem.methods import Method
 from taichi_dem.report.divergence import DivergenceCheck
@@ -50,7 +49,7 @@ def _part(name) -> Any:
     return property(lambda simulation: getattr(simulation.engine, name))
 
 
-class Simulation(Uncopied):
+class Simulation:
     """One scene, one method, one driver, on an engine of the session.
 
     ``simulate`` makes one; it is the level below for those who step by themselves. ``tables``,
