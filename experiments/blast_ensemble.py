@@ -55,7 +55,7 @@ def run(options):
     table = sweep(blast, rows, **kept)
     ended = table["error"] == ""
     if ended.sum() < 2:
-        raise InputError(f"two blasts must end well, got: {table['error'][~ended][0]}")
+        raise InputError(f"two blasts must end well, got: {table['error'][~ended].iloc[0]}")
     model = Model(mesh, CONCRETE, ())
     broken = np.array([[*text] for text in table["broken"][ended]]) == "1"
     moves = hole_moves(table, ended)
@@ -71,7 +71,7 @@ def run(options):
 
 def seconds_of(table):
     """Seconds of compiling, which is what blasts took beyond the usual one, and of running."""
-    seconds = table.provenance["seconds"]
+    seconds = table["seconds"]
     compiling = float(np.maximum(0.0, seconds - np.median(seconds)).sum())
     return compiling, float(seconds.sum()) - compiling
 
@@ -92,7 +92,7 @@ def figures_of(broken, last):
 
 def write(at, table, model, broken, columns):
     """Write all that is plotted, and each blast."""
-    table.write_csv(at("members.csv"))
+    table.to_csv(at("members.csv"), index=False)
     write_csv(at("displacement.csv"), columns)
     top, middle = model.topology, model.mesh.points[model.topology.vertices].mean(axis=1)
     places = {f"{axis}_m": middle[:, k] for k, axis in enumerate("xyz")}
