@@ -30,8 +30,8 @@ from taichi_dem.kit.sweeps.table import parameter_grid
 from taichi_dem.kit.version import __version__
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh.files import read_mesh
-from taichi_dem.mesh.joined import in_space_order, join
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
+from taichi_dem.mesh.shapes import in_space_order, join
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects

@@ -23,7 +23,7 @@ LAYERS = {
         | laws | loads | effects | scene | step_control | methods | contact
         | stability | step | report | engine | simulation
         | output observers | plot | viewer
-        | result | saving simulate needed_effects | goals
+        | result | simulate needed_effects | goals
         | accuracy | solve | demo | __init__ | __main__""",
     "ca_damper": """
         errors report | oscillator structure excitation | theory | scenes | filling

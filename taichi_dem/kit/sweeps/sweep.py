@@ -179,7 +179,7 @@ def _here(count: int):
     import dask
     import distributed
 
-    options = {"threads_per_worker": 1, "memory_limit": 0, "dashboard_address": None}
+    options = {"threads_per_worker": 1, "memory_limit": 0, "dashboard_address": ":0"}
     with (
         dask.config.set(_SETTINGS),
         distributed.LocalCluster(count, silence_logs=logging.CRITICAL, **options) as cluster,
