@@ -142,7 +142,8 @@ class Batch(LoadedScenes):
         self.excitation = checked_excitation(excitation, mount)
         self.recorded_samples = checked_samples(recorded_samples, self.count)
         self._more_sizes = self.excitation.sizes(self.count)
-        self.time_origin, self.periods = np.zeros(self.count), None
+        self.time_origin = np.zeros(self.count)
+        self.periods: Periods | None = None
         self.launches, self.compile_seconds = Launches(self.count), 0.0
         # Whether the present run goes on from a checkpoint.
         self.going_on = False
