@@ -1,8 +1,8 @@
-"""The paper's blast, and the methods by which its experiments run it."""
+"""The paper's blast, the methods by which its experiments run it, and what a run has cost."""
 
 from functools import partial
 
-from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, read_mesh, step_report
+import taichi_dem as dem
 from taichi_dem.kit.study import add_checkpoints, checkpoint_of, parser
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.step_control import StepControl
@@ -16,25 +16,27 @@ BLOCK_STEP = 4e-7
 #: Radius of the hole [m], and how many of them away the fall of peak velocities is fitted from.
 HOLE_RADIUS, FROM_RADII = 0.025, 4.0
 EFFECTS = {
-    "bond_damping": effects.BondDamping,
-    "softening": effects.Softening,
-    "shear_slip": effects.ShearSlip,
+    "bond_damping": dem.effects.BondDamping,
+    "softening": dem.effects.Softening,
+    "shear_slip": dem.effects.ShearSlip,
     # The paper's reading: faces carry spheres once they break, outer faces never.
-    "sphere_contact": partial(effects.SphereContact, outer_faces=False),
-    "surface_contact": effects.SphereContact,
+    "sphere_contact": partial(dem.effects.SphereContact, outer_faces=False),
+    "surface_contact": dem.effects.SphereContact,
     # As effects="auto" takes it for a block in one piece.
-    "body_contact": partial(effects.BodyContact, outer_faces="once_broken"),
-    "friction": effects.Friction,
-    "sticking_friction": effects.StickingFriction,
-    "gas_pressure": effects.GasPressure,
-    "gravity": effects.Gravity,
-    "slip_weakening": partial(effects.SlipWeakening, MODE_TWO),
+    "body_contact": partial(dem.effects.BodyContact, outer_faces="once_broken"),
+    "friction": dem.effects.Friction,
+    "sticking_friction": dem.effects.StickingFriction,
+    "gas_pressure": dem.effects.GasPressure,
+    "gravity": dem.effects.Gravity,
+    "slip_weakening": partial(dem.effects.SlipWeakening, MODE_TWO),
 }
 #: Those of the paper's scene, the gas last.
 PAPER = ("bond_damping", "softening", "shear_slip", "sphere_contact", "friction", "gas_pressure")
 
 
-def blast_parser(name, description, drivers=BLAST_DRIVERS, mesh=PAPER_BLOCK, saves=False, **given):
+def blast_parser(
+    name, description, drivers=BLAST_DRIVERS, mesh=dem.PAPER_BLOCK, saves=False, **given
+):
     """Parser of an experiment on a mesh; given: settings and defaults, as of ``parser``.
 
     saves: whether its run is written whole, and saves itself on the way.
@@ -58,14 +60,24 @@ def paper_effects():
     return [EFFECTS[name]() for name in PAPER]
 
 
-def paper_scene(mesh=PAPER_BLOCK):
+def paper_scene(mesh=dem.PAPER_BLOCK):
     """The paper's scene with all of its effects; mesh: a file."""
-    return Scene(read_mesh(mesh), CONCRETE, paper_effects())
+    return dem.Scene(dem.read_mesh(mesh), dem.CONCRETE, paper_effects())
+
+
+def run_costs():
+    """Collector of what a run has cost at every sample, and of the levels of its bodies."""
+    return dem.Collector(
+        dem.Every(samples=1),
+        cpu_s=lambda view: view.cpu_seconds,
+        evaluations=lambda view: view.evaluations,
+        level=lambda view: view.motion()["level"],
+    )
 
 
 def print_quality(scene):
     """Print the worst of a scene's mesh."""
-    print("\n".join(str(step_report(scene)).splitlines()[:10]))
+    print("\n".join(str(dem.step_report(scene)).splitlines()[:10]))
 
 
 def controlled(step):

@@ -18,21 +18,19 @@ Besides, what 10, 3, 1 and 0.3 % cost for the paper's block and for the paper's 
 with steps tuned by hand; and bodies dropped on a slab, of which no single run can tell.
 """
 
-import csv
 import sys
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
-from _accuracy_blast import blast_question, dropped_question, paper_question
-from _accuracy_damper import damper_question
-from _accuracy_pictures import draw_calibration, draw_cost, draw_parting
-from _accuracy_study import answered, cheapest, fixed_runs, judged_blast, judged_damper, twins_of
+import _accuracy as judge
+from _questions import blast_question, damper_question, dropped_question, paper_question
 from ca_damper import Spheres, frequency_response, solve_response
 from ca_damper import goals as damper_goals
-from taichi_dem import ProgressBar
 from taichi_dem.kit import study
+from taichi_dem.kit.plot_style import BLUE, GREY, ORANGE, RED, picture
 
 NAME = "accuracy_on_request"
 QUESTIONS = Path(__file__).with_name("accuracy_questions.csv")
@@ -54,148 +52,167 @@ SETTINGS = {
     "dropped": (0.02, 0.008),
     "twins": (8, 2),
 }
-ROWS = "kind seed question tolerance_percent value error true holds reached cpu_s"
-PRICES = "seed question tolerance_percent solve_s cheapest_s cheapest_method half_step_s ratio"
 #: Times are of one thread.
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
+#: Deviations beyond this many half-widths share the last bar of the histogram.
+FARTHEST = 3.0
+#: Columns of bars.csv.
+COLUMNS = "kind seed question tolerance_percent value error true holds reached cpu_s".split()
 
 
-def run(options):
-    """Ask all questions, judge the answers, write tables and pictures."""
-    folder = study.begin(options)
-    asked = {
-        kind: seeds_of(kind, getattr(options, f"{kind}s"), options.first.get(kind, 0))
-        for kind in ("price", "blast", "damper")
-    }
-    prices = [price_row(blast_question(seed), options.others) for seed in asked["price"]]
-    study.write_rows(folder / "prices.csv", [row for row in prices if row], PRICES)
-    judged = {
-        "blast": [judged_blast(blast_question(seed)) for seed in asked["blast"]],
-        "damper": [judged_damper(damper_question(seed)) for seed in asked["damper"]],
-    }
-    judged = {kind: [one for one in some if one is not None] for kind, some in judged.items()}
-    rows = [one.row(kind) for kind, some in judged.items() for one in some]
-    study.write_rows(folder / "bars.csv", rows, ROWS)
-    ratios = [row[-1] for row in prices if row]
-    found = {**figures_of(ratios, judged), **draw_all(folder, options, judged)}
-    blasts = (one.answer.result.report for one in judged["blast"])
-    compiling = sum(report.compile_seconds for report in blasts)
-    study.finish(options, NAME, found, compiling, see="cost.png")
-
-
-def seeds_of(kind, count, first):
-    """So many seeds of a kind of question in the file, from the first on."""
-    with open(QUESTIONS, newline="", encoding="utf-8") as lines:
-        found = [int(row["seed"]) for row in csv.DictReader(lines) if row["kind"] == kind]
-    return found[first : first + count]
-
-
-def price_row(question, others):
-    """Cells of the table of prices; None where no single run, or no answer, is good enough."""
-    found, runs = judged_blast(question), fixed_runs(question, others)
-    best = found and cheapest(runs, found.true, question.tolerance)
-    if best is None or not found.answer.reached:
+def price_row(seed, others):
+    """Row of the table of prices; None where no single run, or no answer, is good enough."""
+    question = blast_question(seed)
+    found, runs = judge.judged_blast(question), judge.fixed_runs(question, others)
+    if found is None or not found.reached:
         return None
-    words = str(question).replace(",", ";"), 100.0 * question.tolerance
-    fixed = best.seconds, best.method.replace(",", ";"), runs[1].seconds
-    return (question.seed, *words, found.seconds, *fixed, found.seconds / best.seconds)
-
-
-def figures_of(ratios, judged):
-    """Figures of all answers."""
-    everyone = [one for some in judged.values() for one in some]
-    singles = [one for one in everyone if one.single]
-    figures = {
-        "price_ratio_median": (float(np.median(ratios)), "1"),
-        "price_ratio_worst": (max(ratios), "1"),
-        "coverage_percent": (share_held(singles), "%"),
-        "answers": (len(everyone), "1"),
-        "without_a_single_number": (len(everyone) - len(singles), "1"),
-        "reached_percent": (100.0 * np.mean([one.answer.reached for one in everyone]), "%"),
-    }
-    each = {f"coverage_percent_{name}": (share_held(some), "%") for name, some in judged.items()}
-    return {**figures, **each}
-
-
-def share_held(judged):
-    """Share of the bars that hold the true value [%], of answers with a single number."""
-    return 100.0 * float(np.mean([one.holds for one in judged if one.single]))
-
-
-def draw_all(folder, options, judged):
-    """Draw all pictures; figures of the papers' scenes."""
-    panels, figures = {}, {}
-    panels["paper's block, hole displacement"], seconds = cost_of_blast(options)
-    figures["seconds_at_1_percent_blast"] = (seconds, "s")
-    late, spent = answered(paper_question(options.later, 0.01))
-    figures["seconds_at_1_percent_blast_later"] = (spent, "s")
-    figures["hole_later_mm"], figures["hole_later_error_mm"] = (
-        (late.value, "mm"),
-        (late.error, "mm"),
-    )
-    panels["paper's damper, peak RMS"], times = cost_of_damper(options)
-    figures.update({name: (seconds, "s") for name, seconds in times.items()})
-    draw_cost(folder / "cost.png", panels)
-    deviations = {
-        name: [one.deviation for one in some if one.single] for name, some in judged.items()
-    }
-    everyone = [one for some in judged.values() for one in some]
-    draw_calibration(folder / "calibration.png", deviations, share_held(everyone))
-    dropped = dropped_question(options.dropped)
-    answer, _ = answered(dropped, repeats=1)
-    print(f"dropped bodies: {answer}")
-    draw_parting(folder / "twins.png", *twins_of(dropped, options.twins), answer)
-    return figures
+    most = question.tolerance * abs(found.true)
+    good = [(spent, words) for words, value, spent in runs if abs(value - found.true) <= most]
+    if not good:
+        return None
+    least, method = min(good)
+    names = {"solve_s": found.cpu_s, "cheapest_s": least, "cheapest_method": method}
+    ratio = {"half_step_s": runs[1][2], "ratio": found.cpu_s / least}
+    return {"seed": seed, "question": found.question, **names, **ratio}
 
 
 def cost_of_blast(options):
     """Panel of the paper's block, and what 1 % costs there [s]."""
-    found = [judged_blast(paper_question(options.until, share)) for share in options.tolerances]
-    for one in found:
-        print(f"{100 * one.question.tolerance:g} %: {one.answer}")
+    asked = [paper_question(options.until, share) for share in options.tolerances]
+    found = [judge.judged_blast(question) for question in asked]
     true, fixed = found[-1].true, {}
-    for one in fixed_runs(found[-1].question, options.others):
-        name = one.method.split(",")[0]
-        fixed.setdefault(name, []).append((abs(one.value / true - 1.0), one.seconds))
-    seconds = at_one_percent(options.tolerances, [one.seconds for one in found])
-    answers = [
-        (one.answer.error / true, abs(one.answer.value / true - 1.0), one.seconds) for one in found
-    ]
-    return (answers, fixed), seconds
+    for words, value, spent in judge.fixed_runs(asked[-1], options.others):
+        fixed.setdefault(words.split(",")[0], []).append((abs(value / true - 1.0), spent))
+    return panel_of(true, [one.answer for one in found], [one.cpu_s for one in found], fixed)
 
 
 def cost_of_damper(options):
-    """Panel of the paper's damper, and CPU times [s] at 1 % and of the fixed job."""
-    asked = [damper_goals.peak_ratio(), damper_goals.peak_rms()]
-    found = []
-    with ProgressBar("damper") as bar:
-        for share in options.damper_tolerances:
-            given = {"particles": options.particles, "tolerance": share, "progress": bar}
-            found.append(solve_response(Spheres(), goal=asked, **given))
-            print(f"{100 * share:g} %: {found[-1][0]}\n{found[-1][1]}")
-    height, (fixed_s, peak) = [both[1] for both in found], fixed_damper(options)
-    true, times = height[-1].value, [one.plan.seconds for one in height]
-    answers = [(a.error / true, abs(a.value / true - 1.0), a.plan.seconds) for a in height]
-    seconds = at_one_percent(options.damper_tolerances, times)
-    points = {"fixed cycles and frequencies": [(abs(peak / true - 1.0), fixed_s)]}
-    return (answers, points), {"seconds_at_1_percent_damper": seconds, "fixed_damper_s": fixed_s}
-
-
-def fixed_damper(options):
-    """CPU time [s] and peak RMS [m] of the usual job: 150 + 20 cycles at 33 frequencies."""
-    ratios = np.linspace(0.88, 1.04, options.ratios)
-    given = {"particles": options.particles, "ratios": ratios, "seeds": 1, "progress": None}
+    """Panel of the paper's damper, what 1 % costs there, and the fixed job: 150 + 20 cycles [s]."""
+    given = {"particles": options.particles, "progress": None}
+    asked = {"goal": [damper_goals.peak_ratio(), damper_goals.peak_rms()], **given}
+    shares = options.damper_tolerances
+    found = [solve_response(Spheres(), tolerance=share, **asked)[1] for share in shares]
+    job = {"ratios": np.linspace(0.88, 1.04, options.ratios), "seeds": 1, **given}
     # Compiles.
-    frequency_response(Spheres(), **given, transient_cycles=0, measured_cycles=1)
-    begun, (transient, measured) = study.clock(), options.cycles
-    cycles = {"transient_cycles": transient, "measured_cycles": measured}
-    made = frequency_response(Spheres(), **given, **cycles)
-    return study.clock() - begun, float(made.rms[0].max())
+    frequency_response(Spheres(), **job, transient_cycles=0, measured_cycles=1)
+    begun, cycles = study.clock(), zip(("transient_cycles", "measured_cycles"), options.cycles)
+    peak = float(frequency_response(Spheres(), **job, **dict(cycles)).rms[0].max())
+    spent, true = study.clock() - begun, found[-1].value
+    fixed = {"fixed cycles and frequencies": [(abs(peak / true - 1.0), spent)]}
+    return *panel_of(true, found, [one.plan.seconds for one in found], fixed), spent
 
 
-def at_one_percent(tolerances, seconds):
-    """What the tolerance next to 1 % costs [s]."""
-    return seconds[int(np.abs(np.log(np.array(tolerances) / 0.01)).argmin())]
+def panel_of(true, answers, seconds, fixed):
+    """Answers and fixed runs as ``draw_cost`` takes them, and the seconds nearest to 1 %."""
+    for answer in answers:
+        print(f"{100 * answer.tolerance:g} %: {answer}")
+    shares = [(one.error / true, abs(one.value / true - 1.0)) for one in answers]
+    nearest = np.abs(np.log([one.tolerance / 0.01 for one in answers])).argmin()
+    return ([(*both, spent) for both, spent in zip(shares, seconds)], fixed), seconds[nearest]
+
+
+def draw_cost(path, panels):
+    """CPU time against error: answers as a line, single runs with a fixed step as points.
+
+    panels: by title, the answers as (share of the value that the bar is, share that the value is
+    off, seconds), and the fixed runs by method as lists of (share off, seconds).
+    """
+    with picture(path, 1, len(panels), size=(4.5 * len(panels), 4.4), squeeze=False) as (_, axes):
+        for one, (title, (answers, fixed)) in zip(axes[0], panels.items()):
+            for (name, runs), colour, mark in zip(fixed.items(), (ORANGE, RED, GREY), "sDv"):
+                tried = np.maximum(np.array(runs).T, [[1e-6], [0.0]])
+                look = {"color": colour, "label": name, "markersize": 4}
+                one.plot(100.0 * tried[0], tried[1], mark, **look)
+            bars, off, seconds = np.maximum(np.array(answers).T, 1e-6)
+            look = {"color": BLUE, "zorder": 3}
+            one.plot(100.0 * bars, seconds, "-o", label="answer, by its bar", **look)
+            one.plot(100.0 * off, seconds, "x", label="the same, by its true error", **look)
+            one.set(xscale="log", yscale="log", title=title, xlabel="error / value [%]")
+            one.set_ylabel("CPU time, all runs of an answer [s]")
+            one.invert_xaxis()
+            one.legend(loc="lower center", bbox_to_anchor=(0.5, 1.1), ncols=2)
+
+
+def draw_calibration(path, judged, coverage):
+    """Histogram of (value - true) / half-width of its bar, by package; coverage: share inside."""
+    edges = np.linspace(-FARTHEST, FARTHEST, 25)
+    with picture(path, size=(6.6, 4.2)) as (_, axes):
+        axes.axvspan(-1.0, 1.0, color=GREY, alpha=0.15, label="inside the bar")
+        found = [np.clip(deviation, -FARTHEST, FARTHEST) for deviation in judged.values()]
+        names = [f"{len(deviation)} of the {name}" for name, deviation in judged.items()]
+        axes.hist(found, edges, stacked=True, label=names, color=[BLUE, ORANGE][: len(found)])
+        axes.set_xlabel("(value − true value) / half-width of the bar [1]; beyond 3 at the ends")
+        axes.set_ylabel("answers [1]")
+        axes.locator_params(axis="y", integer=True)
+        axes.set_title(f"{coverage:.1f} % of the bars hold the true value (95 % meant)")
+        axes.legend(fontsize=8)
+
+
+def draw_parting(path, time_ms, ways, apart, answer):
+    """How far bodies have gone in runs that differ by one rounding, and how far these are apart.
+
+    time_ms (frames,). ways (runs, frames): mean way [mm]. apart (runs - 1, frames): difference of
+    the usual body, as a share of its way. answer: to the question what the way is at the end.
+    """
+    with picture(path, 1, 2, size=(9.0, 4.2)) as (_, (left, right)):
+        left.plot(time_ms, ways.T, color=BLUE, linewidth=0.8)
+        left.set(xlabel="time [ms]", ylabel="mean way of the bodies [mm]")
+        left.set_title(f"{len(ways)} runs whose starts differ by one rounding")
+        right.semilogy(time_ms[1:], np.maximum(apart[:, 1:].T, 1e-16), color=BLUE, linewidth=0.8)
+        words = f"tolerance, {100 * answer.tolerance:g} %"
+        right.axhline(answer.tolerance, color=ORANGE, label=words)
+        look = {"color": RED, "linestyle": "--", "label": "from here on solve sees them part"}
+        right.axvline(1e3 * answer.plan.parting_s, **look)
+        right.set(xlabel="time [ms]", ylabel="distance from the first run / way [1]")
+        right.set_title("how far they are apart")
+        right.legend(loc="lower right")
+
+
+def run(options):
+    """Ask all questions, judge the answers, write tables and pictures."""
+    folder, listed = study.begin(options), pd.read_csv(QUESTIONS)
+
+    def seeds(kind):
+        own, first = listed.seed[listed.kind == kind], options.first.get(kind, 0)
+        return own[first : first + getattr(options, f"{kind}s")].tolist()
+
+    prices = [price_row(seed, options.others) for seed in seeds("price")]
+    prices = pd.DataFrame([row for row in prices if row])
+    prices.to_csv(folder / "prices.csv", index=False)
+    found = [judge.judged_blast(blast_question(seed)) for seed in seeds("blast")]
+    found += [judge.judged_damper(damper_question(seed)) for seed in seeds("damper")]
+    answers = pd.DataFrame([vars(one) for one in found if one is not None])
+    answers.to_csv(folder / "bars.csv", index=False, columns=COLUMNS)
+    singles = answers[answers.single]
+    held = 100.0 * singles.groupby("kind", sort=False).holds.mean()
+    (block, block_s), (damper, damper_s, fixed_s) = cost_of_blast(options), cost_of_damper(options)
+    late, late_s = judge.answered(paper_question(options.later, 0.01))
+    panels = {"paper's block, hole displacement": block, "paper's damper, peak RMS": damper}
+    draw_cost(folder / "cost.png", panels)
+    deviations = {kind: some.to_numpy() for kind, some in singles.groupby("kind").deviation}
+    draw_calibration(folder / "calibration.png", deviations, 100.0 * singles.holds.mean())
+    dropped = dropped_question(options.dropped)
+    answer, _ = judge.answered(dropped, repeats=1)
+    print(f"dropped bodies: {answer}")
+    draw_parting(folder / "twins.png", *judge.twins_of(dropped, options.twins), answer)
+    figures = {
+        "price_ratio_median": (float(prices.ratio.median()), "1"),
+        "price_ratio_worst": (float(prices.ratio.max()), "1"),
+        "coverage_percent": (float(100.0 * singles.holds.mean()), "%"),
+        "answers": (len(answers), "1"),
+        "without_a_single_number": (len(answers) - len(singles), "1"),
+        "reached_percent": (float(100.0 * answers.reached.mean()), "%"),
+        **{f"coverage_percent_{kind}": (share, "%") for kind, share in held.items()},
+        "seconds_at_1_percent_blast": (block_s, "s"),
+        "seconds_at_1_percent_blast_later": (late_s, "s"),
+        "hole_later_mm": (late.value, "mm"),
+        "hole_later_error_mm": (late.error, "mm"),
+        "seconds_at_1_percent_damper": (damper_s, "s"),
+        "fixed_damper_s": (fixed_s, "s"),
+    }
+    blasts = (one.result.report for one in answers.answer[answers.kind == "blast"])
+    compiling = sum(report.compile_seconds for report in blasts)
+    study.finish(options, NAME, figures, compiling, see="cost.png")
 
 
 if __name__ == "__main__":

@@ -17,22 +17,42 @@ figures over the commits that have been measured on such a processor.
 import json
 import os
 import sys
+import textwrap
 import time
 from dataclasses import asdict
 
-import _bench_blast
-import _bench_block
-import _bench_damper
-import _bench_start
-from _bench_figure import Figure
-from _bench_history import add_run, draw_history, record_of
+from _bench import TIMES, Figure, blast, block, damper
+from _bench_waits import waits
 from taichi_dem.kit import runtime, study
 from taichi_dem.kit.files import output_folder, write_text
+from taichi_dem.kit.plot_style import BLACK, BLUE, line_key, picture
+from taichi_dem.kit.provenance import commit, git
 from taichi_dem.kit.study.floors import MULTIPLY_ADD, Floors
 
 NAME = "bench"
 #: Functions that yield figures; quick: fewer of them, shorter jobs.
-PARTS = (_bench_damper.measure, _bench_start.measure, _bench_blast.measure, _bench_block.measure)
+PARTS = (damper, waits, blast, block)
+#: Runs with the same of these can be compared.
+ALIKE = ("processor", "arch", "threads", "quick")
+#: Panels in a row; height of one and of what is around them, and width of a page [inch].
+COLUMNS, HEIGHT, AROUND, WIDTH = 5, 1.13, 1.1, 7.0
+#: Sizes of letters [pt], and letters in a line of a title.
+TITLE, SMALL, LINE = 7.0, 6.5, 24
+#: Most commits of a picture, the latest ones.
+MOST = 12
+#: Colour and marker of a share of the floor, and of a figure over its first one.
+SHARE, SPEED = "share of the machine's floor", "speed over that of the first run shown"
+LOOKS = {SHARE: {"color": BLUE, "marker": "o"}, SPEED: {"color": BLACK, "marker": "s"}}
+#: Names of the code that are parts of names of figures, in words.
+WORDS = {
+    "paper_uniform": "uniform",
+    "paper_multirate": "multirate",
+    "multirate_controlled": "controlled",
+    "explicit_limited": "limited",
+    "l = 1e-07 m": "l = 0.1 µm",
+    "l = 1e-08 m": "l = 0.01 µm",
+    "0.8 us": "0.8 µs",
+}
 
 
 def options_parser():
@@ -47,12 +67,18 @@ def run(options):
     # Floors are the figures with such a unit.
     rates = {one.name: 1e9 * one.middle for one in figures if one.unit in ("GB/s", "GFlop/s")}
     rows = [row_of(one, one.share(rates)) for one in figures]
-    header = ["figure", "median", "spread", "unit", "bound", "then", "share of the floor"]
+    header = ["figure", "median", "spread", "unit", "bound", "share of the floor"]
     study.print_table(rows, header)
-    write_json(os.path.join(folder, "bench.json"), figures, rates)
+    keys = {one.name: one.middle for one in figures if one.name.endswith("_seconds")}
+    place = {"processor": study.processor(), "versions": study.versions()}
+    shown = [
+        {**dict(zip(("name", "unit", "values", "bound"), one)), "share_of_floor": one.share(rates)}
+        for one in figures
+    ]
+    content = {"figures": shown, **keys, **place, **asdict(runtime.settings())}
+    write_text(os.path.join(folder, "bench.json"), json.dumps(content, indent=1))
     history = os.path.join(folder, "bench_history.jsonl")
-    runs = add_run(history, record_of(figures, rates, options.quick))
-    draw_history(os.path.join(folder, "bench.png"), runs)
+    draw_history(os.path.join(folder, "bench.png"), add_run(history, figures, rates, options.quick))
     seconds = time.perf_counter() - started
     print(f"measured in {seconds:.0f} s; bench.json, bench.png, bench_history.jsonl in {folder}")
 
@@ -79,19 +105,74 @@ def row_of(one, share):
     """Cells of a figure in the table."""
     spread = f"{min(one.values):.3g} .. {max(one.values):.3g}"
     of_floor = "" if share is None else f"{100 * share:.3g} %"
-    return one.name, f"{one.middle:.3g}", spread, one.unit, one.bound, one.then, of_floor
+    return one.name, f"{one.middle:.3g}", spread, one.unit, one.bound, of_floor
 
 
-def write_json(path, figures, rates):
-    """Write all figures; keys at the top are the medians of those that are waits."""
-    shown = [
-        {**dict(zip(("name", "unit", "values", "bound"), one)), "share_of_floor": one.share(rates)}
-        for one in figures
-    ]
-    keys = {one.name: one.middle for one in figures if one.name.endswith("_seconds")}
-    place = {"processor": study.processor(), "versions": study.versions()}
-    content = {"figures": shown, **keys, **place, **asdict(runtime.settings())}
-    write_text(path, json.dumps(content, indent=1))
+def add_run(path, figures, rates, quick):
+    """Add a run to the history; returns the latest run of each commit that can be compared to it.
+
+    rates: of the floors, in bytes and operations a second.
+    """
+    settings = runtime.settings()
+    last = {
+        "commit": commit() + ("+" if git("status", "--porcelain", "-uno") else ""),
+        "date": time.strftime("%Y-%m-%d %H:%M"),
+        **{"processor": study.processor(), "arch": settings.arch, "threads": settings.threads},
+        "quick": quick,
+        "medians": {one.name: one.middle for one in figures},
+        "units": {one.name: one.unit for one in figures},
+        "shares": {one.name: one.share(rates) for one in figures if one.work and rates},
+        "floors": rates,
+    }
+    with open(path, "a+", encoding="utf-8") as file:
+        file.write(json.dumps(last) + "\n")
+        file.seek(0)
+        runs = [json.loads(line) for line in file]
+    alike = [run for run in runs if all(run[name] == last[name] for name in ALIKE)]
+    return list({run["commit"]: run for run in alike}.values())[-MOST:]
+
+
+def draw_history(path, runs):
+    """Draw all figures of the last run over the commits that have been measured like it."""
+    names = [*runs[-1]["medians"]]
+    rows = -(-len(names) // COLUMNS)
+    shape = {"size": (WIDTH, AROUND + HEIGHT * rows), "sharex": True, "squeeze": False}
+    with picture(path, rows, COLUMNS, **shape) as (figure, axes):
+        # The first row is the one with gaps, so that the last one has commits below each column.
+        gap = rows * COLUMNS - len(names)
+        for axis in axes[0, COLUMNS - gap :]:
+            axis.set_axis_off()
+        for axis, name in zip((*axes[0, : COLUMNS - gap], *axes[1:].ravel()), names):
+            draw_figure(axis, name, runs)
+        keys = [line_key(label, ms=4, lw=1.0, **look) for label, look in LOOKS.items()]
+        words = f"Last value in the titles; commits below; on {runs[-1]['processor']}"
+        look = {"title": words, "alignment": "left", "title_fontsize": TITLE + 1.0}
+        figure.legend(handles=keys, loc="outside upper left", ncols=2, **look)
+
+
+def draw_figure(axis, name, runs):
+    """One figure over the runs, in percent; its last median in the title."""
+    last = runs[-1]
+    kind, kept = (SHARE, "shares") if name in last["shares"] else (SPEED, "medians")
+    places, values = zip(*((k, run[kept][name]) for k, run in enumerate(runs) if name in run[kept]))
+    if kind == SPEED:
+        less_is_better = last["units"][name] in TIMES
+        values = [values[0] / now if less_is_better else now / values[0] for now in values]
+    values = [100.0 * one for one in values]
+    axis.plot(places, values, ms=3, lw=1.0, **LOOKS[kind])
+    axis.set(ylim=(0.0, 1.25 * max(values)), xlim=(-0.5, len(runs) - 0.5))
+    axis.set_xticks(range(len(runs)), [f"@{run['commit']}" for run in runs], rotation=90)
+    axis.locator_params(axis="y", nbins=3)
+    axis.tick_params(labelsize=SMALL, length=2.0)
+    axis.set_ylabel("[%]", fontsize=SMALL, labelpad=1.0)
+    value, unit = last["medians"][name], last["units"][name].replace("1", "")
+    words = f"{value:,.0f} {unit}" if value >= 1000.0 else f"{value:.3g} {unit}".strip()
+    for code, plain in WORDS.items():
+        name = name.replace(code, plain)
+    title = f"{name.replace('_seconds', '').replace('_', ' ')}: {words}"
+    # It begins where the numbers of the axis do [pt].
+    look = {"textcoords": "offset points", "va": "bottom", "fontsize": TITLE}
+    axis.annotate(textwrap.fill(title, LINE), (0, 1), (-26, 2), "axes fraction", **look)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ Writes cracks.png, peaks.png, energy.png, history.csv, peaks.csv, mesh, ParaView
 summary.json to results/blast_block/; a run saves itself as blast_fracture.py does.
 """
 
+import itertools
 import os
 import sys
 import time
@@ -26,6 +27,8 @@ from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
+from matplotlib.colors import Normalize
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from _blast import (
     BLOCK_STEP,
@@ -36,25 +39,18 @@ from _blast import (
     print_quality,
     run_options,
 )
-from _crack_sections import plot_deep_cracks
+from _drawing import crossings
 from _meshes import mirrored_copies
 from make_meshes import block_with_hole
-from taichi_dem import (
-    CONCRETE,
-    PAPER_BLOCK,
-    Every,
-    ImplicitDashpots,
-    Scene,
-    read_mesh,
-    simulate,
-)
+from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.process_memory import peak_memory_mb
-from taichi_dem.kit.progress.progress import time_left
-from taichi_dem.mesh.joined import in_space_order
+from taichi_dem.kit.plot_style import GREY, picture
+from taichi_dem.kit.provenance import peak_memory_mb
+from taichi_dem.mesh.shapes import in_space_order
 from taichi_dem.output.hole_monitor import HoleMonitor
+from taichi_dem.plot.view import draw_lines, shades
 
 NAME = "blast_block"
 SETTINGS = {
@@ -75,93 +71,104 @@ options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS, mesh=No
 def mesh_of(options):
     """The mesh asked for; says so where mirrored copies stand in for one by Gmsh."""
     if options.mesh:
-        mesh = read_mesh(options.mesh)
-    elif options.tetrahedra is None and (options.quick or not find_spec("gmsh")):
+        return read_mesh(options.mesh)
+    if options.tetrahedra is None and (options.quick or not find_spec("gmsh")):
         words = f"{options.copies} mirrored copies of the paper's block"
         print(f"{words}; --tetrahedra N asks Gmsh for a mesh")
-        mesh = mirrored_copies(read_mesh(PAPER_BLOCK), options.copies)
-    else:
-        mesh = made_block(study.output_paths(options.out), options.tetrahedra or 20000)
-    return in_space_order(mesh)
-
-
-def made_block(at, tetrahedra):
-    """The block by Gmsh with about this many tetrahedra; from its file where that is there."""
-    path = at(f"block_{tetrahedra}.msh")
+        return mirrored_copies(read_mesh(PAPER_BLOCK), options.copies)
+    tetrahedra = options.tetrahedra or 20000
+    path = study.output_paths(options.out)(f"block_{tetrahedra}.msh")
     if not os.path.exists(path):
-        scale = scale_for(tetrahedra)
+        # Between measured numbers the scale of the sizes is a power of the number.
+        k = 0 if tetrahedra < COUNTS[1] else 1
+        power = np.log(SCALES[k + 1] / SCALES[k]) / np.log(COUNTS[k + 1] / COUNTS[k])
+        scale = float(SCALES[k] * (tetrahedra / COUNTS[k]) ** power)
         block_with_hole(path, depth=3.0, size_hole=scale * SIZE_HOLE, size_far=scale * SIZE_FAR)
     return read_mesh(path)
 
 
-def scale_for(tetrahedra):
-    """Scale of the element sizes for a number of tetrahedra: between measured ones, as a power."""
-    k = 0 if tetrahedra < COUNTS[1] else 1
-    power = np.log(SCALES[k + 1] / SCALES[k]) / np.log(COUNTS[k + 1] / COUNTS[k])
-    return float(SCALES[k] * (tetrahedra / COUNTS[k]) ** power)
+def plot_deep_cracks(path, result, hole):
+    """Broken faces of the block at rest by time of breaking: in space and cut by two planes.
+
+    hole: point on the hole's axis (3,) [m], which runs along z; the planes are half-way along it,
+    and through it.
+    """
+    mesh, topology = result.model.mesh, result.model.topology
+    broken_time, time_s = result.broken_time, result.frames[-1].time_s
+    broken = np.flatnonzero(broken_time <= time_s)
+    # The latest first: early ones, near the hole, stay visible.
+    broken = broken[np.argsort(-broken_time[broken], kind="stable")]
+    triangles, time_ms = mesh.points[topology.vertices[broken]], 1e3 * broken_time[broken]
+    box = np.stack([mesh.points.min(axis=0), mesh.points.max(axis=0)])
+    look = {"cmap": shades("plasma", 0.0, 0.88), "norm": Normalize(0.0, 1e3 * time_s)}
+    with picture(path, 0, size=(9.2, 3.9)) as (figure, _):
+        grid = figure.add_gridspec(1, 3, width_ratios=(1.25, 1.0, 0.8), wspace=0.14)
+        whole = figure.add_subplot(grid[0], projection="3d")
+        in_space(whole, triangles, time_ms, box, look)
+        whole.set_title(f"{len(broken)} broken faces at {1e3 * time_s:.3g} ms")
+        panels = [figure.add_subplot(grid[k]) for k in (1, 2)]
+        for axes, normal, place in zip(panels, (2, 1), (box[:, 2].mean(), hole[1])):
+            segments, which = crossings(triangles, normal, place)
+            across = [0, 1 if normal == 2 else 2]
+            flat = segments[..., across]
+            lines = draw_lines(axes, flat, time_ms[which], linewidth=1.3, **look)
+            names = [f"{'xyz'[k]} [m]" for k in across]
+            axes.set(xlim=box[:, 0], ylim=box[:, across[1]], xlabel=names[0], ylabel=names[1])
+            axes.set(aspect="equal", title=f"Section at {'xyz'[normal]} = {place:.3g} m")
+            axes.locator_params(nbins=5)
+            axes.spines[["top", "right"]].set_visible(True)
+            axes.grid(False)
+        figure.colorbar(lines, ax=panels, label="time of breaking [ms]", shrink=0.8, aspect=25)
 
 
-def figures_of(result, exponent):
-    """Figures for summary.json."""
-    report, history = result.report, result.series
-    step_ms = 1e3 * report.run_cpu_seconds / report.substeps
-    return {
+def in_space(axes, triangles, time_ms, box, look):
+    """Broken faces, thin, in the outline of the block; the hole's axis stands upright."""
+    box = box[:, [0, 2, 1]]
+    faces = Poly3DCollection(triangles[..., [0, 2, 1]], linewidth=0.0, alpha=0.45, **look)
+    faces.set_array(time_ms)
+    axes.add_collection3d(faces, autolim=False)
+    pairs = itertools.combinations(itertools.product(*box.T), 2)
+    edges = [pair for pair in pairs if sum(a != b for a, b in zip(*pair)) == 1]
+    axes.add_collection3d(Line3DCollection(edges, color=GREY, linewidth=0.8), autolim=False)
+    axes.set(xlim=box[:, 0], ylim=box[:, 1], zlim=box[:, 2])
+    axes.set_box_aspect(np.ptp(box, axis=0))
+    axes.set(xlabel="x [m]", ylabel="z [m]", zlabel="y [m]")
+    axes.view_init(elev=22.0, azim=-55.0)
+    axes.locator_params(nbins=4)
+    if np.ptp(box[:, 1]) < 0.5 * np.ptp(box, axis=0).max():
+        axes.locator_params(axis="y", nbins=2)
+
+
+def run(options):
+    """Run, picture, print."""
+    scene = Scene(in_space_order(mesh_of(options)), CONCRETE, paper_effects())
+    print_quality(scene)
+    method = ImplicitDashpots(BLOCK_STEP)
+    result = simulate(scene, method=method, title="blasting", **run_options(options))
+    started, at = time.perf_counter(), study.output_paths(options.out)
+    report, fall = result.report, result.attenuation("hole", HOLE_RADIUS)
+    plot_deep_cracks(at("cracks.png"), result, HoleMonitor(result.model, "hole").axis_point)
+    result.plot.attenuation("hole", nearest=FROM_RADII, path=at("peaks.png"))
+    result.plot.energy(path=at("energy.png"))
+    peaks = {"distance_radii": fall.distance, "peak_speed_m_s": fall.speed}
+    write_csv(at("peaks.csv"), {**peaks, "nearer_to_hole": fall.inner.astype(int)})
+    drawing, step_ms = time.perf_counter() - started, 1e3 * report.run_cpu_seconds / report.substeps
+    moved = float(result.series["hole_radial_displacement_mm"][-1])
+    print(f"\n{report}\n")
+    figures = {
         "tetrahedra": (report.body_count, "1"),
         "broken_faces": (report.broken_faces, "1"),
-        "ppv_exponent": (exponent, "1"),
-        "hole_radial_displacement_mm": (float(history["hole_radial_displacement_mm"][-1]), "mm"),
+        "ppv_exponent": (fall.power_law(FROM_RADII)[0], "1"),
+        "hole_radial_displacement_mm": (moved, "mm"),
         "ms_a_step": (step_ms, "ms"),
         "seconds_per_simulated_ms": (1e-6 * step_ms / BLOCK_STEP, "s"),
         "memory_MB": (peak_memory_mb(), "MB"),
         "fields_MB": (1e-6 * field_bytes(), "MB"),
         "ledger_residual_fraction": (report.energy_residual_fraction, "1"),
         "linear_momentum_error": (report.linear_momentum_error, "1"),
+        "picture_seconds": (drawing, "s"),
     }
-
-
-class ProgressLines:
-    """Observer that prints a line every tenth of the way: time per step, time left, memory.
-
-    until: simulated time at the end of the run [s].
-    """
-
-    def __init__(self, until):
-        self.until, self.when = until, Every(time_s=until / 10)
-        self._before = 0, 0.0
-
-    def observe(self, view):
-        """Print the line; none at the start of the run."""
-        (step, seconds), self._before = self._before, (view.step, view.wall_seconds)
-        if view.step > step:
-            step_s = (view.wall_seconds - seconds) / (view.step - step)
-            left = time_left(step_s * max(0.0, self.until - view.time_s) / view.method.dt0)
-            words = f"t = {1e3 * view.time_s:.3f} ms, {1e3 * step_s:.3g} ms a step, {left}"
-            fields = f"{1e-6 * field_bytes():.0f} MB of fields"
-            print(f"{words}, {fields}, {peak_memory_mb():.0f} MB in all", flush=True)
-
-
-def run(options):
-    """Run, picture, print."""
-    scene = Scene(mesh_of(options), CONCRETE, paper_effects())
-    print_quality(scene)
-    looks = {"title": "blasting", "observers": [ProgressLines(options.until)]}
-    result = simulate(scene, method=ImplicitDashpots(BLOCK_STEP), **run_options(options), **looks)
-    started = time.perf_counter()
-    fall = result.attenuation("hole", HOLE_RADIUS)
-    draw(result, fall, study.output_paths(options.out))
-    figures = figures_of(result, fall.power_law(FROM_RADII)[0])
-    figures["picture_seconds"] = (time.perf_counter() - started, "s")
-    print(f"\n{result.report}\n")
-    study.finish(options, NAME, figures, [result.report], see="cracks.png")
-
-
-def draw(result, fall, at):
-    """Draw and write everything that is plotted."""
-    plot_deep_cracks(at("cracks.png"), result, HoleMonitor(result.model, "hole").axis_point)
-    result.plot.attenuation("hole", nearest=FROM_RADII, path=at("peaks.png"))
-    result.plot.energy(path=at("energy.png"))
-    peaks = {"distance_radii": fall.distance, "peak_speed_m_s": fall.speed}
-    write_csv(at("peaks.csv"), {**peaks, "nearer_to_hole": fall.inner.astype(int)})
+    study.finish(options, NAME, figures, [report], see="cracks.png")
 
 
 if __name__ == "__main__":

@@ -41,19 +41,11 @@ bonds.csv (when each bond broke), bodies.csv, the mesh used, summary.json and a 
 import sys
 from functools import partial
 
+import pandas as pd
+
+import taichi_dem as dem
 from _blast import EFFECTS, blast_parser, print_quality, run_options
 from _blast import METHODS as BLAST_METHODS
-from taichi_dem import (
-    CONCRETE,
-    InputError,
-    Scene,
-    SimulationDiverged,
-    estimated_effects,
-    goals,
-    read_mesh,
-    simulate,
-    solve,
-)
 from taichi_dem.demo import SETTINGS as DEMO_SETTINGS
 from taichi_dem.demo import figures_of, picture
 from taichi_dem.kit import study
@@ -78,13 +70,6 @@ METHODS = {
 PAPER_DT0, PAPER_L = 1e-8, 1e-7
 #: Contact of the paper, as of --with.
 SPHERES = "sphere_contact,friction"
-#: What is printed of runs with both contacts: header, figure and format.
-SHOWN = {
-    "contact": ("contact", ""),
-    "hole [mm]": ("hole_radial_displacement_mm", ".2f"),
-    "injected at breaks [kJ]": ("injected_kJ", ".1f"),
-    "CPU [s]": ("cpu_s", ".2f"),
-}
 SETTINGS = {
     "dt0": (None, None, study.number(0, 1), "largest step [s], by method"),
     "l": (None, None, study.number(0, 1), "the paper's way of a body in a step [m], 1e-7"),
@@ -111,19 +96,19 @@ def effects_named(text, known):
     names = [name for name in text.split(",") if name]
     for name in names:
         if name not in known:
-            raise InputError(f"effect must be one of {', '.join(known)}, got {name!r}")
+            raise dem.InputError(f"effect must be one of {', '.join(known)}, got {name!r}")
     return names
 
 
 def chosen_scene(options, added):
     """The block under gas, with the usual effects but for those of added and of options.without."""
-    mesh, names = read_mesh(options.mesh), ["gas_pressure", *effects_named(added, EFFECTS)]
+    mesh, names = dem.read_mesh(options.mesh), ["gas_pressure", *effects_named(added, EFFECTS)]
     given = [make() for name, make in EFFECTS.items() if name in names]
-    scene = Scene(mesh, CONCRETE, options.effects, loads=given)
+    scene = dem.Scene(mesh, dem.CONCRETE, options.effects, loads=given)
     without = effects_named(options.without, [effect.name for effect in scene.effects])
     if without:
         listed = [effect for effect in scene.effects if effect.name not in without]
-        scene = Scene(mesh, CONCRETE, listed)
+        scene = dem.Scene(mesh, dem.CONCRETE, listed)
     return scene
 
 
@@ -133,7 +118,8 @@ def chosen_method(name, dt0, distance):
         return PAPER_METHODS[name](dt0 or PAPER_DT0, distance or PAPER_L)
     if distance is not None:
         paper = ", ".join(PAPER_METHODS)
-        raise InputError(f"l must be left out unless method is one of {paper}, got {distance:g}")
+        words = f"must be left out unless method is one of {paper}, got {distance:g}"
+        raise dem.InputError(f"l {words}")
     make, step = METHODS[name]
     return make(dt0 or step)
 
@@ -142,15 +128,16 @@ def run(options):
     """Run, picture, print."""
     method = chosen_method(options.method, options.dt0, options.l)
     if options.compare and (options.added or options.without):
-        raise InputError("compare must be left out with --with and --without: it runs two lists")
+        words = "must be left out with --with and --without: it runs two lists"
+        raise dem.InputError(f"compare {words}")
     scene = chosen_scene(options, options.added)
     if options.accuracy is not None:
         return run_to_accuracy(scene, options)
     print_quality(scene)
-    print("", *estimated_effects(scene, options.until), "", sep="\n")
+    print("", *dem.estimated_effects(scene, options.until), "", sep="\n")
     try:
-        result = simulate(scene, method=method, title="blasting", **run_options(options))
-    except SimulationDiverged as error:
+        result = dem.simulate(scene, method=method, title="blasting", **run_options(options))
+    except dem.SimulationDiverged as error:
         if error.result.frames:
             picture(error.result, options)
         raise
@@ -169,22 +156,20 @@ def run_with_spheres(options, method):
     """Result of the same blast with the paper's contact, also where that diverges."""
     given = {name: getattr(options, name) for name in ("until", "driver", "samples")}
     scene = chosen_scene(options, SPHERES)
-    return result_of(simulate, scene, method=method, title="the paper's contact", **given)
+    return result_of(dem.simulate, scene, method=method, title="the paper's contact", **given)
 
 
 def show_both(bodies, spheres):
     """Print what the contacts of two runs differ in."""
     runs = {"whole bodies": bodies, "the paper's spheres": spheres}
-    rows = [
-        {
-            "contact": f"{name}, diverged" if run.diverged else name,
-            "cpu_s": run.report.run_cpu_seconds,
+    table = {
+        f"{name}, diverged" if run.diverged else name: {
             **{key: one[0] for key, one in figures_of(run).items()},
+            "cpu_s": run.report.run_cpu_seconds,
         }
         for name, run in runs.items()
-    ]
-    # A mesh without a hole has no displacement of it.
-    study.show_rows(rows, {header: one for header, one in SHOWN.items() if one[0] in rows[0]})
+    }
+    print(pd.DataFrame(table).to_string(float_format="{:.4g}".format), "\n")
 
 
 def run_to_accuracy(scene, options):
@@ -192,8 +177,8 @@ def run_to_accuracy(scene, options):
     study.check_accuracy(options, ("dt0", "l", "compare"))
     at = study.output_paths(options.out)
     in_a_hole = "hole" in scene.mesh.groups
-    goal = goals.hole_displacement() if in_a_hole else goals.kinetic_energy()
-    answer = solve(scene, until=options.until, goal=goal, tolerance=options.accuracy)
+    goal = dem.goals.hole_displacement() if in_a_hole else dem.goals.kinetic_energy()
+    answer = dem.solve(scene, until=options.until, goal=goal, tolerance=options.accuracy)
     study.show_answer(f"blast, {options.until:g} s", answer)
     study.write_accuracy(options.out, (), [((), answer)])
 

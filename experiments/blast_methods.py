@@ -24,24 +24,22 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from _blast import METHODS, blast_parser, paper_scene, run_options
-from _method_costs import RunCosts, plot_methods
+from _blast import METHODS, blast_parser, paper_scene, run_costs, run_options
+from _drawing import plot_methods
 from taichi_dem import ImplicitDashpots, ProgressBar, SimulationDiverged, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.validation import choice
 from taichi_dem.plot.series import level_shares, plot_levels
 
 NAME = "blast_methods"
 REFERENCE = "reference", partial(ImplicitDashpots, sweeps=(6, 40)), 2.5e-8
-named = partial(choice, "method", allowed=METHODS)
 #: Those of the quick job, long enough for faces to break: the paper's rule would take minutes.
 QUICK_METHODS = ["explicit_limited", "implicit"]
 SETTINGS = {
-    "methods": ([*METHODS], QUICK_METHODS, study.several(named), "by comma; all"),
+    "methods": ([*METHODS], QUICK_METHODS, study.several(study.one_of(METHODS)), "by comma; all"),
     "until": (5e-4, 6e-5, study.number(0, 1), "simulated time [s], 5e-4"),
     "stable_until": (1e-4, 6e-5, study.number(0, 1), "for the stable step [s], 1e-4"),
-    "samples": (100, 10, study.whole(1, 100000), "rows of the time series, 100"),
+    "samples": (100, 10),
     "doublings": (8, 0, study.whole(0, 20), "tried for the largest stable step, 8"),
 }
 #: Error of the displacement beyond which a run counts as unstable though no body ran away.
@@ -65,14 +63,14 @@ options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS)
 
 def follow(scene, name, make, step, options):
     """One run of a method with a step [s]; writes its time series."""
-    costs, method = RunCosts(), make(step)
+    costs, method = run_costs(), make(step)
     result = simulate(scene, method=method, title=name, observers=[costs], **run_options(options))
-    series = {**result.series, **costs.columns}
+    series = {**result.series, "cpu_s": costs["cpu_s"], "evaluations": costs["evaluations"]}
     write_csv(f"{options.out}/history_{name}.csv", series)
-    made = {"report": result.report, "series": series, "moved": float(series[MOVED][-1])}
     if not method.uniform:
-        shares, path = level_shares(costs.levels), f"{options.out}/levels_{name}.png"
+        shares, path = level_shares(costs.rows["level"]), f"{options.out}/levels_{name}.png"
         plot_levels(path, series["time_s"], shares, step)
+    made = {"report": result.report, "series": series, "moved": float(series[MOVED][-1])}
     return SimpleNamespace(name=name, make=make, step=step, **made)
 
 
@@ -87,13 +85,13 @@ def serves(scene, method, exact, options):
     return abs(found[MOVED][-1] / wanted - 1.0) < USABLE
 
 
-def largest_stable_step(scene, run, exact, options):
+def largest_stable_step(scene, one, exact, options):
     """Largest step [s], a power of two from that of a run, with which its method serves."""
-    step = run.step
+    step = one.step
     with ProgressBar("largest stable step") as bar:
         for tried in range(options.doublings):
             bar.count(tried, options.doublings)
-            if not serves(scene, run.make(2.0 * step), exact, options):
+            if not serves(scene, one.make(2.0 * step), exact, options):
                 break
             step *= 2.0
     return step
@@ -109,6 +107,7 @@ def run(options):
         one.stable = largest_stable_step(scene, one, reference.series, options)
     rows, best = TABLE.rows(runs), reference.report
     study.write_rows(at("methods.csv"), rows)
+    TABLE.show(rows)
     plot_methods(at("methods.png"), {r.name: r.series for r in (reference, *runs)}, MOVED)
     figures = {
         "reference_displacement_mm": (reference.moved, "mm"),
@@ -117,9 +116,6 @@ def run(options):
     }
     for row in rows:
         figures.update(TABLE.figures(row, "{key}_{method}"))
-    cost = f"{best.run_cpu_seconds:.3g} s of CPU: hole {reference.moved:.4f} mm"
-    print(f"Reference: {best.method} at {reference.step:g} s, {cost}, {best.broken_faces} faces\n")
-    TABLE.show(rows)
     study.finish(options, NAME, figures, [one.report for one in (reference, *runs)])
 
 

@@ -15,15 +15,13 @@ plotted and summary.json to results/blast_multirate/.
 
 import sys
 from functools import partial
-from types import SimpleNamespace
 
-from _blast import blast_parser, paper_scene, run_options
-from _method_costs import RunCosts, plot_methods
+from _blast import blast_parser, paper_scene, run_costs, run_options
+from _drawing import plot_methods
 from taichi_dem import At, InputError, Multirate, Uniform, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import styles_of
-from taichi_dem.kit.validation import told_apart
 from taichi_dem.output.hole_monitor import HoleMonitor
 from taichi_dem.plot.series import level_columns, level_shares, plot_levels
 
@@ -37,10 +35,9 @@ SETTINGS = {
     "methods": (tuple(METHODS), ("uniform", "multirate_held")),
     "l": (1e-7, 1e-7, study.number(0, 1), "largest way of a body in a step [m], 1e-7"),
     "dt0": (1e-8, 1e-8, study.number(0, 1), "largest step [s], 1e-8"),
-    "early": (None, None, study.number(0, 1), "first instant compared [s], 5e-5"),
+    "early": (5e-5, 2e-5, study.number(0, 1), "first instant compared [s], 5e-5"),
     "until": (5e-4, 6e-5, study.number(0, 1), "second instant compared [s], 5e-4"),
-    "samples": (100, 12, study.whole(1, 100000), "rows of the time series, 100"),
-    "repeats": (1, 1, study.whole(1, 100), "runs of every method, 1"),
+    "samples": (100, 12),
 }
 #: The paper's figures by method and instant [s]: its minutes, its displacement, what follows.
 PAPER = {
@@ -56,8 +53,7 @@ TABLE = study.Table(
     method=("name", "method"),
     instant=("instant",),
     time_s=("report.until_s", "time [s]", ".3g"),
-    cpu_s=("timing.median", "CPU [s]", ".3g", "s"),
-    cpu_spread=("timing.spread",),
+    cpu_s=("report.run_cpu_seconds", "CPU [s]", ".3g", "s"),
     substeps=("report.substeps",),
     evaluations=("report.contact_evaluations", "evaluations", ",", "1"),
     ideal_gain=("report.ideal_gain", "ideal", ".2f", "1"),
@@ -73,10 +69,10 @@ options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS)
 
 
 class Instant:
-    """Report and displacements [mm] at an instant [s]: of the hole, and of the body watched."""
+    """Report and displacements [mm] at an instant: of the hole, and of the body watched."""
 
-    def __init__(self, time_s):
-        self.when = At((time_s,))
+    def __init__(self, name, instant, time_s):
+        self.name, self.instant, self.when = name, instant, At((time_s,))
 
     def observe(self, view):
         """Look at the run."""
@@ -84,81 +80,54 @@ class Instant:
         self.report, self.radial_mm = view.report(), 1e3 * float(hole.radial_displacement(place))
         self.moved_mm = 1e3 * float(hole.monitored_displacement(place))
 
+    def compare(self, base):
+        """Compare with the first method at the same instant."""
+        spent = max(self.report.run_cpu_seconds, 1e-12)
+        self.gain = base.report.run_cpu_seconds / spent
+        self.difference = self.moved_mm / base.moved_mm - 1.0
+
 
 def follow(name, options, scene):
-    """One run of a method: what is measured early and late, its series, levels of its bodies."""
-    method, costs = METHODS[name](options.dt0, options.l), RunCosts()
-    made = {"early": Instant(options.early), "late": Instant(options.until)}
-    looks = {"title": styles_of([name])[name].label, "observers": [costs, *made.values()]}
-    try:
-        result = simulate(scene, method=method, **looks, **run_options(options))
-    finally:
-        # Also what a run that diverged, or was interrupted, had reached.
-        if costs.view is not None:
-            history = costs.view.history()
-            write_csv(f"{options.out}/history_{name}.csv", history)
-    return SimpleNamespace(**made, series={**result.series, **costs.columns}, levels=costs.levels)
+    """One run of a method, drawn: both instants and its series."""
+    costs, method = run_costs(), METHODS[name](options.dt0, options.l)
+    times = {"early": options.early, "late": options.until}
+    instants = [Instant(name, words, time_s) for words, time_s in times.items()]
+    looks = {"title": styles_of([name])[name].label, "observers": [costs, *instants]}
+    result = simulate(scene, method=method, **looks, **run_options(options))
+    series = {**result.series, "cpu_s": costs["cpu_s"], "evaluations": costs["evaluations"]}
+    shares = level_shares(costs.rows["level"])
+    write_csv(f"{options.out}/{name}.csv", {**series, **level_columns(shares)})
+    if not method.uniform:
+        plot_levels(f"{options.out}/levels_{name}.png", series["time_s"], shares, options.dt0)
+    return instants, series
 
 
 def run(options):
     """Run all methods, compare, picture."""
-    early = 2e-5 if options.quick else 5e-5
-    options.early = options.early or min(early, options.until)
     if options.early > options.until:
-        got, most = told_apart(options.early, options.until)
-        raise InputError(f"early must be at most until, {most} s, got {got}")
+        raise InputError(f"early must be at most until, {options.until} s, got {options.early}")
     scene, at = paper_scene(options.mesh), study.output_paths(options.out)
-    runs = {
-        name: [follow(name, options, scene) for _ in range(options.repeats)]
-        for name in options.methods
-    }
-    rows = TABLE.rows(compared(runs, "early") + compared(runs, "late"))
+    runs = {name: follow(name, options, scene) for name in options.methods}
+    instants = [one for pair in zip(*(both for both, _ in runs.values())) for one in pair]
+    for k, one in enumerate(instants):
+        one.compare(instants[k - k % len(runs)])
+    rows, figures = TABLE.rows(instants), {}
     study.write_rows(at("comparison.csv"), rows)
-    draw(at, {name: made[0] for name, made in runs.items()}, options.dt0)
+    series = {name: made for name, (_, made) in runs.items()}
+    plot_methods(at("methods.png"), series, "monitor_displacement_mm")
     print(f"One step for all against a step for each, all at l = {options.l:g} m\n")
     TABLE.show(rows)
-    if options.repeats > 1:
-        spread = max(row["cpu_spread"] for row in rows)
-        print(f"CPU times: medians of {options.repeats} runs, spread up to {spread:.0%}\n")
-    reports = [one.late.report for made in runs.values() for one in made]
-    study.finish(options, NAME, figures_of(rows), reports)
-
-
-def compared(runs, instant):
-    """A subject of ``TABLE`` for each method; the first run's counts, all runs' times."""
-    made = []
-    for name, repeats in runs.items():
-        instants = [getattr(one, instant) for one in repeats]
-        first = SimpleNamespace(**vars(instants[0]), name=name, instant=instant)
-        first.timing = study.Timing.of(one.report.run_cpu_seconds for one in instants)
-        made.append(first)
-        first.gain = made[0].timing.median / max(first.timing.median, 1e-12)
-        first.difference = first.moved_mm / made[0].moved_mm - 1.0
-    return made
-
-
-def figures_of(rows):
-    """Figures for summary.json: times, gains and displacements beside the paper's."""
-    figures = {}
     for row in rows:
         paper = PAPER.get((row["method"], f"{row['time_s']:.9g}"), {})
         made = TABLE.figures(row, "{method}_{instant}_{key}", paper)
         # One step for all gains nothing over itself.
-        compares = row["method"] != "uniform"
-        alone = (name for name in made if compares or not name.endswith(("gain", "difference")))
-        figures.update((name, made[name]) for name in alone)
-    return figures
-
-
-def draw(at, runs, dt0):
-    """Draw and write all that is plotted."""
-    for name, made in runs.items():
-        shares = level_shares(made.levels)
-        write_csv(at(f"{name}.csv"), {**made.series, **level_columns(shares)})
-        if name != "uniform":
-            plot_levels(at(f"levels_{name}.png"), made.series["time_s"], shares, dt0)
-    series = {name: made.series for name, made in runs.items()}
-    plot_methods(at("methods.png"), series, "monitor_displacement_mm")
+        alone = row["method"] == "uniform"
+        figures.update(
+            (name, one)
+            for name, one in made.items()
+            if not (alone and name.endswith(("gain", "difference")))
+        )
+    study.finish(options, NAME, figures, [late.report for (_, late), _ in runs.values()])
 
 
 if __name__ == "__main__":

@@ -26,13 +26,12 @@ from functools import partial
 import numpy as np
 
 from _blast import blast_parser, paper_scene
-from _scaling_threads import ROUNDS, thread_gains
-from _scaling_work import record_workload
-from _scaling_workers import WAYS, Workers, draw_acceleration, draw_cuts, draw_shares
-from taichi_dem import Multirate, ProgressBar
+from _scaling import Workers, record_workload
+from _threads import ROUNDS, thread_gains
+from taichi_dem import Multirate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import BLACK, PURPLE, RED, picture
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, PURPLE, RED, picture
 
 NAME = "blast_scaling"
 SETTINGS = {
@@ -54,6 +53,15 @@ PAPER_WORKERS, PAPER_SERIAL = 24, 0.05
 #: over those of 24 (4.3, 4.4).
 PAPER_IMBALANCE = {"static": 20381.0 / 3493.0, "rebalanced": 9787.0 / 9023.0}
 PAPER_SPEEDUP = {"static": 2702.0 / 541.0, "rebalanced": 2702.0 / 501.0}
+#: Way of sharing -> words. Those with cuts give every worker a run of bodies.
+WAYS = {
+    "static": "fixed shares, by N - i",
+    "polyline": "rebalanced by workers' times (the paper)",
+    "rebalanced": "rebalanced by bodies' costs",
+    "due": "equal parts of what is due",
+}
+#: Colour and line by way of sharing.
+LOOK = dict(zip(WAYS, ((RED, "-."), (PURPLE, "--"), (BLUE, "-"), (GREEN, (0, (8, 2))))))
 TABLE = study.Table(
     workers=("workers", "workers"),
     way=("way", "way of sharing"),
@@ -64,6 +72,57 @@ TABLE = study.Table(
 options_parser = partial(blast_parser, NAME, __doc__, (), settings=SETTINGS)
 
 
+def draw_acceleration(axes, shared, most=np.inf, serial=0.0):
+    """Acceleration over the number of workers by way of sharing, and the bound of all ways.
+
+    shared: by way and number of workers. serial: share of one worker's time that is not shared.
+    """
+    for way, by_count in shared.items():
+        counts = np.array([count for count in by_count if count <= most])
+        gains = [by_count[count].acceleration(serial) for count in counts]
+        colour, line = LOOK[way]
+        axes.plot(counts, gains, ls=line, color=colour, label=WAYS[way])
+    bound = counts / (1.0 + serial * (counts - 1.0))
+    axes.plot(counts, bound, ":", color=GREY, label="bound: nobody ever waits")
+    axes.set(xlabel="workers [1]", ylabel="acceleration [1]")
+
+
+def draw(path, shared, chosen, time_s, measured):
+    """Acceleration, shares and cuts, as the paper's Figs 14, 15 and 9; time_s: of the cuts."""
+    with picture(path, 2, 2, size=(9.2, 8.4)) as (figure, ((whole, contact), (shares, cuts))):
+        draw_acceleration(whole, shared, PAPER_WORKERS, PAPER_SERIAL)
+        for (way, gain), filled in zip(PAPER_SPEEDUP.items(), (RED, PURPLE)):
+            words = "measured in the paper, " + way.replace("static", "fixed")
+            whole.plot(PAPER_WORKERS, gain, "o", color=filled, label=words)
+        for (name, one), mark in zip(measured.items(), "*P"):
+            words = f"measured here, 2 threads, {name}"
+            whole.plot(2, one["gain"], mark, color=BLACK, ms=9, label=words)
+        words = f"Whole run, simulated workers, {100 * PAPER_SERIAL:g} % not shared (Fig 14)"
+        whole.set(xlim=(0, PAPER_WORKERS + 1), ylim=(0, None), title=words)
+        handles = whole.get_legend_handles_labels()
+        figure.legend(*handles, loc="outside lower center", ncols=3)
+        draw_acceleration(contact, shared)
+        words = "Contact calculation alone, many simulated workers"
+        contact.set(xscale="log", yscale="log", title=words)
+        for way, one in chosen.items():
+            if way != "due":
+                colour, line = LOOK[way]
+                look = {"color": colour, "ls": line, "label": f"{WAYS[way]}: {one.imbalance:.3g}"}
+                seconds = one.seconds / one.seconds.mean()
+                shares.step(np.arange(1, one.workers + 1), seconds, where="mid", **look)
+        shares.set(xlabel="number of the worker [1]", ylabel="time of its work / mean [1]")
+        shares.set(xlim=(0.5, PAPER_WORKERS + 0.5), ylim=(0.0, 1.4 * shares.get_ylim()[1]))
+        shares.set_title("Simulated workers: slowest over fastest in the run (Fig 15)")
+        shares.legend(loc="upper right")
+        places = chosen["rebalanced"].cuts
+        cuts.plot(1e3 * time_s, places[:, 1:-1], color=BLUE, linewidth=0.5)
+        cuts.set(xlabel="time [ms]", ylabel="number of the body [1]")
+        cuts.set(xlim=(0.0, 1e3 * time_s[-1]), ylim=(0, places[0, -1]))
+        cuts.set_title("Lines: where simulated workers' shares begin (Fig 9)")
+        words = "Lines: simulated workers that share the work of one recorded run"
+        figure.suptitle(f"{words};\npoints: measured times of processes or threads")
+
+
 def run(options):
     """Record, simulate, measure, picture."""
     scene, at = paper_scene(options.mesh), study.output_paths(options.out)
@@ -71,74 +130,31 @@ def run(options):
     workload, simulation = record_workload(scene, Multirate(DT0, options.l), *counting)
     workers = Workers(workload)
     shared = {way: {n: workers.share(way, n) for n in options.counts} for way in WAYS}
-    bar, block = gains = measured(options)
+    chosen = {way: by_count[PAPER_WORKERS] for way, by_count in shared.items()}
+    # Gains of a second thread on a bar, and on the paper's block.
+    jobs = {"bar": ("", options.cells, [METHOD], 10), "block": (options.mesh, None, [METHOD], 400)}
+    often = options.rounds, options.repeats
+    gains = {name: thread_gains(*job, *often)[METHOD] for name, job in jobs.items()}
     rows = TABLE.rows(one for by_count in shared.values() for one in by_count.values())
     study.write_rows(at("scaling.csv"), rows)
-    chosen = {way: by_count[PAPER_WORKERS] for way, by_count in shared.items()}
     each = {f"{way}_s": one.seconds for way, one in chosen.items()}
     write_csv(at("shares.csv"), {"worker": np.arange(1, PAPER_WORKERS + 1), **each})
-    draw(at("scaling.png"), shared, chosen, workload, {"bar": bar["gain"], "block": block["gain"]})
-    shown = [row for row in rows if row["workers"] in (2, 4, PAPER_WORKERS, 256)]
-    TABLE.show([{**row, "way": WAYS[row["way"]]} for row in shown])
-    figures = figures_of(chosen, workers.prices, *gains)
-    study.finish(options, NAME, figures, simulation.compile_seconds)
-
-
-def measured(options):
-    """Gains of a second thread on the bar, and on the paper's block."""
-    gains, often = [], (options.rounds, options.repeats)
-    with ProgressBar("two threads") as bar:
-        for mesh, cells, steps in (("", options.cells, 10), (options.mesh, None, 400)):
-            bar.count(len(gains), 2)
-            found = thread_gains(mesh, cells, [METHOD], steps, *often)
-            gains.append(found[METHOD])
-    return gains
-
-
-def figures_of(chosen, prices, bar, block):
-    """Figures for summary.json, beside the paper's."""
-    made = {}
+    draw(at("scaling.png"), shared, chosen, workload.time, gains)
+    TABLE.show([row for row in rows if row["workers"] in (2, 4, PAPER_WORKERS, 256)])
+    figures = {}
     for way, one in chosen.items():
         if way != "due":
-            made[f"imbalance_24_{way}"] = (one.imbalance, "1", PAPER_IMBALANCE.get(way))
-        made[f"contact_24_{way}"] = (one.acceleration(), "1")
+            figures[f"imbalance_24_{way}"] = one.imbalance, "1", PAPER_IMBALANCE.get(way)
+        figures[f"contact_24_{way}"] = one.acceleration(), "1"
         name = "speedup_24_simulated" if way == "rebalanced" else f"speedup_24_{way}"
-        made[name] = (one.acceleration(PAPER_SERIAL), "1", PAPER_SPEEDUP.get(way))
-    for name, row in (("", bar), ("_paper_block", block)):
-        made[f"speedup_2_threads{name}"] = (row["gain"], "1")
-        made[f"speedup_2_threads_busy{name}"] = (row["busy"], "1")
-    made["speedup_2_threads_bodies"] = (bar["bodies"], "1")
-    kinds = ("bond", "pair", "sphere_pair")
-    return {**made, **{f"ns_a_{kind}": (1e9 * float(s), "ns") for kind, s in zip(kinds, prices)}}
-
-
-def draw(path, shared, chosen, workload, measured):
-    """Acceleration and shares, as the paper's Figs 9, 14 and 15; see ``run``."""
-    names = [["whole", "contact"], ["shares", "cuts"]]
-    with picture(path, 0, size=(9.2, 8.4)) as (figure, _):
-        axes = figure.subplot_mosaic(names)
-        draw_acceleration(axes["whole"], shared, PAPER_WORKERS, PAPER_SERIAL)
-        look = {"ls": "none", "marker": "o"}
-        for (way, gain), filled in zip(PAPER_SPEEDUP.items(), (RED, PURPLE)):
-            words = "measured in the paper, " + way.replace("static", "fixed")
-            axes["whole"].plot(PAPER_WORKERS, gain, color=filled, label=words, **look)
-        look = {"ls": "none", "color": BLACK, "ms": 9}
-        for (name, gain), mark in zip(measured.items(), "*P"):
-            words = f"measured here, 2 threads, {name}"
-            axes["whole"].plot(2, gain, marker=mark, label=words, **look)
-        words = f"Whole run, simulated workers, {100 * PAPER_SERIAL:g} % not shared (Fig 14)"
-        axes["whole"].set(xlim=(0, PAPER_WORKERS + 1), ylim=(0, None), title=words)
-        handles = axes["whole"].get_legend_handles_labels()
-        figure.legend(*handles, loc="outside lower center", ncols=3)
-        draw_acceleration(axes["contact"], shared)
-        words = "Contact calculation alone, many simulated workers"
-        axes["contact"].set(xscale="log", yscale="log", title=words)
-        draw_shares(axes["shares"], chosen)
-        axes["shares"].set_title("Simulated workers: slowest over fastest in the run (Fig 15)")
-        draw_cuts(axes["cuts"], chosen["rebalanced"], workload.time)
-        axes["cuts"].set_title("Lines: where simulated workers' shares begin (Fig 9)")
-        words = "Lines: simulated workers that share the work of one recorded run"
-        figure.suptitle(f"{words};\npoints: measured times of processes or threads")
+        figures[name] = one.acceleration(PAPER_SERIAL), "1", PAPER_SPEEDUP.get(way)
+    for end, row in zip(("", "_paper_block"), gains.values()):
+        figures[f"speedup_2_threads{end}"] = row["gain"], "1"
+        figures[f"speedup_2_threads_busy{end}"] = row["busy"], "1"
+    figures["speedup_2_threads_bodies"] = gains["bar"]["bodies"], "1"
+    for kind, price in zip(("bond", "pair", "sphere_pair"), workers.prices):
+        figures[f"ns_a_{kind}"] = 1e9 * float(price), "ns"
+    study.finish(options, NAME, figures, simulation.compile_seconds)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,6 @@ import contextlib
 import math
 import sys
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import root
@@ -61,44 +60,18 @@ SETS = {
 #: Targets of the full and of the quick job where no option gives one.
 ELASTIC = {"young": 32e9, "poisson": 0.2}
 FULL = {**ELASTIC, "tension": 4e6, "brazilian": 7.6e6, "compression": 1.2e8}
-GIVEN = ("density", "fracture_energy", "friction_angle", "damping_ratio", "tensile_strength")
+GIVEN = ("density", "fracture_energy", "friction_angle", "damping_ratio")
+GIVEN += ("tensile_strength", "cohesion")
 #: Rounds of static solves and of tests at most; a constant changes by this factor at most.
 SOLVES, ROUNDS, FACTOR = 8, 6, 10.0
-TABLE = study.Table(
-    target=("name", "target"),
-    asked=("asked", "asked", ".5g"),
-    found=("found", "found", ".5g"),
-    misfit=("misfit", "misfit", "+.2%", "1"),
-)
+SHOWN = {
+    **{"target": ("target", ""), "asked": ("asked", ".5g"), "found": ("found", ".5g")},
+    "misfit": ("misfit", "+.2%"),
+}
 
 
 class Unbroken(Exception):
     """A specimen has not failed."""
-
-
-class Match(NamedTuple):
-    """A target and what was found; free: whether a constant of bonds was free to meet it."""
-
-    name: str
-    asked: float
-    found: float
-    free: bool = True
-
-    @property
-    def misfit(self):
-        """Deviation as a share of the target; of Poisson's ratio, as it is."""
-        apart = self.found - self.asked
-        return apart if self.name == "poisson" else apart / self.asked
-
-    def complaint(self, tolerance):
-        """A sentence where the target is not met, else ""."""
-        if abs(self.misfit) <= tolerance:
-            return ""
-        missed = f"{self.name} of {self.asked:.4g} is not met"
-        if math.isnan(self.found):
-            return f"{missed}: the specimen has not failed at four times this strength's strain"
-        why = "" if self.free else ", which no constant of the bonds was free to meet"
-        return f"{missed}{why}: the mesh shows {self.found:.4g}"
 
 
 def met(show, constants, wanted, close, rounds):
@@ -111,6 +84,7 @@ def met(show, constants, wanted, close, rounds):
     # Poisson's ratio may be zero or less.
     shift = np.array([float(name == "poisson") for name in names])
     start = np.array([constants[SETS[name]] for name in names]) + shift
+    asked = np.array([wanted[name] for name in names]) + shift
     low, high = start / FACTOR, start * FACTOR
     low[shift > 0.0], high[shift > 0.0] = 1.0 + np.array(POISSON)[:, None]
 
@@ -121,7 +95,6 @@ def met(show, constants, wanted, close, rounds):
         values = np.array([found[-1][name] for name in names]) + shift
         if not np.all(values > 0.0):
             raise Unbroken
-        asked = np.array([wanted[name] for name in names]) + shift
         return np.log(values / asked) + place - np.log(held)
 
     options = {"fatol": close, "maxiter": rounds, "line_search": None, "jac_options": {"alpha": -1}}
@@ -131,35 +104,51 @@ def met(show, constants, wanted, close, rounds):
 
 
 def calibrate(mesh, constants, targets, tolerance, test):
-    """Constants of ``Material.from_elastic``, what every round showed, and a Match a target.
+    """Constants of ``Material.from_elastic``, what every round showed, and what was found at last.
 
-    test: strength [Pa] of a specimen, by name of the test, constants and target.
+    test: strength [Pa] of a specimen, by name of the test, constants and target. The last also
+    holds targets that no constant was free to meet.
     """
 
-    def shown(made):
+    def elastic(made):
         stiffness = mesh_stiffness(mesh, Material.from_elastic(**made))
-        return {"young": stiffness.young, "poisson": stiffness.poisson}
+        return {name: getattr(stiffness, name) for name in ELASTIC if name in targets}
 
     def strengths(made):
         return {name: test(name, made, targets[name]) for name in free}
 
-    elastic = {name: targets[name] for name in ("young", "poisson") if name in targets}
+    # Where both are asked for, tension is met and the Brazilian strength compared.
     free = {name: targets[name] for name in TESTS if name in targets}
-    if "tension" in free:
-        free.pop("brazilian", None)
+    free = {name: one for name, one in free.items() if name != "brazilian" or "tension" not in free}
     history, found = [], {}
-    for show, wanted, close, most in (
-        (shown, elastic, 0.1 * tolerance, SOLVES),
+    for show, names, close, most in (
+        (elastic, ELASTIC, 0.1 * tolerance, SOLVES),
         (strengths, free, 0.5 * tolerance, ROUNDS),
     ):
+        wanted = {name: targets[name] for name in names if name in targets}
         if wanted:
             constants, rounds = met(show, dict(constants), wanted, close, most)
-            history.append([{name: row[name] for name in wanted} for row in rounds])
-            found.update(history[-1][-1])
+            history.append(rounds)
+            found.update(rounds[-1])
     others = [name for name in targets if name not in found]
-    found.update({name: test(name, constants, targets[name]) for name in others})
-    matches = [Match(name, targets[name], found[name], name not in others) for name in targets]
-    return constants, history, matches
+    return constants, history, {**found, **{k: test(k, constants, targets[k]) for k in others}}
+
+
+def misfit_of(name, asked, found):
+    """Deviation as a share of the target; of Poisson's ratio, as it is."""
+    return found - asked if name == "poisson" else (found - asked) / asked
+
+
+def complaint(row, history, tolerance):
+    """A sentence where a target is not met, else ""."""
+    if abs(row["misfit"]) <= tolerance:
+        return ""
+    missed = f"{row['target']} of {row['asked']:.4g} is not met"
+    if math.isnan(row["found"]):
+        return f"{missed}: the specimen has not failed at four times this strength's strain"
+    free = any(row["target"] in rounds[0] for rounds in history)
+    why = "" if free else ", which no constant of the bonds was free to meet"
+    return f"{missed}{why}: the mesh shows {row['found']:.4g}"
 
 
 def draw(path, history, targets, tolerance):
@@ -167,7 +156,7 @@ def draw(path, history, targets, tolerance):
     with picture(path, 1, 1, size=(5.2, 3.8)) as (_, axes):
         for rounds in history:
             for name in rounds[0]:
-                values = [abs(Match(name, targets[name], row[name]).misfit) for row in rounds]
+                values = [abs(misfit_of(name, targets[name], row[name])) for row in rounds]
                 axes.semilogy(range(1, len(rounds) + 1), values, "o-", label=name)
         axes.axhline(tolerance, color=GREY, ls="--", lw=1.0, label="tolerance")
         axes.set(xlabel="round of solves or of tests [1]", ylabel="misfit of the target [1]")
@@ -183,27 +172,29 @@ def run(options):
         options.slip_energy = options.slip_energy or 300.0
     if "compression" in targets and options.slip_energy is None:
         raise InputError("slip-energy must be a number where compression is asked for, got None")
-    folder = study.begin(options)
+    folder, tolerance = study.begin(options), options.tolerance
     mesh = bar(0.08, 0.02, (8, 2, 2)) if options.mesh is None else read_mesh(options.mesh)
-    own = {name: getattr(options, name) for name in (*GIVEN, "cohesion")}
-    start = {name: targets.get(name, value) for name, value in ELASTIC.items()} | own
+    start = {name: targets.get(name, value) for name, value in ELASTIC.items()}
+    start.update({name: getattr(options, name) for name in GIVEN})
     element, drawn = float(np.median(element_sizes(mesh))), (options.seed, options.slip_energy)
 
-    def test(name, constants, target):
-        """Strength [Pa] of a specimen in a test."""
+    def test(name, made, target):
         with ProgressBar(f"{name} at {target:.3g} Pa"):
-            material = Material.from_elastic(**constants)
+            material = Material.from_elastic(**made)
             return TESTS[name].strength(material, element, target, *drawn)
 
-    constants, history, matches = calibrate(mesh, start, targets, options.tolerance, test)
-    rows = TABLE.rows(matches)
-    TABLE.show(rows)
-    print(*filter(None, (match.complaint(options.tolerance) for match in matches)), sep="\n")
+    constants, history, found = calibrate(mesh, start, targets, tolerance, test)
+    rows = [
+        {"target": name, "asked": asked, "found": found[name]}
+        | {"misfit": float(misfit_of(name, asked, found[name]))}
+        for name, asked in targets.items()
+    ]
+    study.show_rows(rows, SHOWN)
+    print(*filter(None, (complaint(row, history, tolerance) for row in rows)), sep="\n")
     lines = [f"{name}={value!r}," for name, value in constants.items()]
-    text = "\n    ".join(["Material.from_elastic(", *lines]) + "\n)\n"
-    print(text)
+    print("\n    ".join(["Material.from_elastic(", *lines]) + "\n)\n")
     study.write_rows(folder / "targets.csv", rows)
-    draw(folder / "calibration.png", history, targets, options.tolerance)
+    draw(folder / "calibration.png", history, targets, tolerance)
     figures = {f"{row['target']}_misfit": (row["misfit"], "1") for row in rows}
     for name in dict.fromkeys(SETS.values()):
         figures[f"bond_{name}"] = constants[name], "1" if name == "poisson" else "Pa"

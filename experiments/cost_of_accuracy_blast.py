@@ -15,33 +15,24 @@ alone, without compiling.
 """
 
 import sys
-from dataclasses import asdict
 from functools import partial
 
 import numpy as np
 
-from _accuracy_steps import (
-    SPLIT,
-    Outcome,
-    StepStudy,
-    displacement_error,
-    energy_error,
-    faces_error,
-    outcome_of,
-)
 from _blast import blast_parser, paper_scene
-from taichi_dem import ImplicitDashpots, Multirate, ProgressBar, StepControl, Uniform
+from taichi_dem import ImplicitDashpots, Multirate, Simulation, StepControl, Uniform
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import power, seconds, styles_of
-from taichi_dem.kit.study.work_precision import percent
+from taichi_dem.kit.study.work_precision import Point, percent
 from taichi_dem.kit.study.work_precision_picture import picture_errors, picture_work_precision
+from taichi_dem.simulate import result_of, run_simulation
 
 NAME = "cost_of_accuracy_blast"
 TARGETS = (0.1, 0.01, 0.001)
 #: The paper's largest step [s], and its largest way in a step [m].
 PAPER_DT0, PAPER_L = 1e-8, 1e-8
-#: A run that took longer is not made a second time [s].
-ENOUGH = 4.0
+#: A run that took longer is not made a second time [s]; how far that one is disturbed [m].
+ENOUGH, DISTURBANCE = 4.0, 1e-12
 TIME = "CPU time of one thread [s], least of its runs"
 
 
@@ -51,101 +42,92 @@ def controlled(dt0):
     return Multirate(dt0, 1e-5, control=control, dashpot="limited")
 
 
-#: How each method is made of a step.
+drifted = partial(Multirate, PAPER_DT0, neighbour="drifted")
+#: How each method is made of a step, from coarse to fine; the first three of ways [m], not times.
 METHODS = {
-    "uniform": lambda way: Uniform(PAPER_DT0, way),
-    "multirate_held": lambda way: Multirate(PAPER_DT0, way),
-    "multirate_drifted": lambda way: Multirate(PAPER_DT0, way, "drifted"),
-    "controlled": controlled,
-    "limited": lambda dt: Uniform(dt, dashpot="limited"),
-    "implicit": ImplicitDashpots,
-    "fixed": Uniform,
+    "uniform": (partial(Uniform, PAPER_DT0), (1e-6, 3e-7, 1e-7, PAPER_L)),
+    "multirate_held": (partial(Multirate, PAPER_DT0), (1e-6, 3e-7, 1e-7, 3e-8, PAPER_L)),
+    "multirate_drifted": (drifted, (3e-7, 1e-7, 3e-8)),
+    "controlled": (controlled, (3.2e-7, 1.6e-7, 8e-8, 4e-8, 2e-8)),
+    "limited": (partial(Uniform, dashpot="limited"), (1e-7, 4e-8, 2e-8, 1e-8, 5e-9)),
+    "implicit": (ImplicitDashpots, (4e-6, 2e-6, 1e-6, 5e-7, 2.5e-7, 1e-7, 5e-8)),
+    "fixed": (Uniform, (1e-8, 4e-9, 2e-9, 1e-9)),
 }
-#: Their steps are ways [m], those of the others times [s]; all from coarse to fine.
-BY_WAY = ("uniform", "multirate_held", "multirate_drifted")
-STEPS = {
-    "uniform": (1e-6, 3e-7, 1e-7, PAPER_L),
-    "multirate_held": (1e-6, 3e-7, 1e-7, 3e-8, PAPER_L),
-    "multirate_drifted": (3e-7, 1e-7, 3e-8),
-    "controlled": (3.2e-7, 1.6e-7, 8e-8, 4e-8, 2e-8),
-    "limited": (1e-7, 4e-8, 2e-8, 1e-8, 5e-9),
-    "implicit": (4e-6, 2e-6, 1e-6, 5e-7, 2.5e-7, 1e-7, 5e-8),
-    "fixed": (1e-8, 4e-9, 2e-9, 1e-9),
-}
-QUICK_STEPS = {"multirate_held": (1e-7,), "implicit": (5e-7,)}
-CHECK = "multirate_held"
+BY_WAY, CHECK = (*METHODS,)[:3], "multirate_held"
 SETTINGS = {
     "until": (1e-4, 6e-5),
-    "steps": (STEPS, QUICK_STEPS),
+    "steps": (
+        {name: steps for name, (_, steps) in METHODS.items()},
+        {CHECK: (1e-7,), "implicit": (5e-7,)},
+    ),
     "reference": (1.25e-8, 5e-8),
     "twins": (tuple(METHODS), (CHECK,)),
 }
+#: Where the work of the gas goes.
+SPLIT = (
+    *("kinetic", "bond_strain", "sphere_strain", "bond_dashpot", "softening", "release"),
+    *("slip", "sphere_dashpot", "friction", "injected"),
+)
+#: Times are of one thread.
+options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS, threads=1)
+
+
+def outcome_of(scene, method, until, disturbance=0.0, **looks):
+    """Run a scene by a method to a time [s]: numbers that a JSON file holds, of its end.
+
+    moved: displacements [m], (n, 3). broken: bonds. energy: terms of the balance [J]. failure: the
+    sentence of a run that diverged, or nothing. disturbance: most that each coordinate is moved by
+    at the start [m]: runs that differ by round-off alone show how far a result can be trusted.
+    """
+    simulation = Simulation(scene, method, looks.pop("driver", "auto"))
+    if disturbance:
+        centre = simulation.model.centre
+        noise = np.random.default_rng(1).uniform(-disturbance, disturbance, centre.shape)
+        simulation.state.set_motion(centre + noise, **scene.initial_motion)
+    job = {"until": until, "samples": 1, "frames": 1, **looks}
+    result = result_of(run_simulation, simulation, **job)
+    report = result.report
+    return {
+        "moved": result.frames[-1].displacement.tolist(),
+        "broken": np.flatnonzero(~np.isnan(result.broken_time)).tolist(),
+        "energy": report.energy_balance,
+        "evaluations": report.contact_evaluations,
+        "cpu_s": report.run_cpu_seconds,
+        "compile_s": report.compile_seconds,
+        "residual": report.energy_residual_fraction,
+        "reached_s": report.until_s,
+        "failure": result.diverged,
+    }
+
+
+def displacement_error(run, reference):
+    """RMS over all bodies of the difference in displacement, as a share of the reference's RMS."""
+    true = np.array(reference["moved"])
+    apart, size = np.linalg.norm(np.array(run["moved"]) - true), np.linalg.norm(true)
+    return float(apart / size)
+
+
+def faces_error(run, reference):
+    """Faces broken in one of the two only, as a share of the reference's broken faces."""
+    odd = set(run["broken"]) ^ set(reference["broken"])
+    return len(odd) / max(1, len(reference["broken"]))
+
+
+def energy_error(run, reference):
+    """Half the sum over the terms of their differences, as a share of the loads' work.
+
+    Half, as what is missing in one term is too much in another.
+    """
+    apart = sum(abs(run["energy"][name] - reference["energy"][name]) for name in SPLIT)
+    return 0.5 * apart / abs(reference["energy"]["load_work"])
+
+
 #: Errors by the picture's words, the displacements' first.
 MEASURES = {
     "displacement field": displacement_error,
     "faces broken in one only": faces_error,
     "energy split / work of the gas": energy_error,
 }
-TERMS = (*SPLIT, "load_work")
-COLUMNS = (
-    "method step disturbed displacement_error faces_error energy_error broken_faces evaluations "
-    f"cpu_s wall_s compile_s residual reached_s {' '.join(f'{term}_J' for term in TERMS)} failure"
-)
-#: Times are of one thread.
-options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS, threads=1)
-
-
-def run(options):
-    """Run all methods, write pictures and tables, answer what an error costs."""
-    scene = paper_scene(options.mesh)
-    folder = study.begin(options)
-    reference, kept = reference_of(scene, options, folder)
-    studies = {name: study_of(name, steps, scene, options) for name, steps in options.steps.items()}
-    points = [point for one in studies.values() for point in one.points(reference)]
-    floors = {name: one.floor for name, one in studies.items() if one.twins}
-    titles = {name: style.label for name, style in styles_of(studies).items()}
-    check = displacement_error([*studies[CHECK].runs.values()][-1], reference)
-    study.give_answers(options.out, points, TARGETS, floors, titles)
-    rows = [row_of(("reference", np.nan, 0), reference, reference)]
-    for name, one in studies.items():
-        for disturbed, some in enumerate((one.runs, one.twins)):
-            rows += [row_of((name, step, disturbed), some[step], reference) for step in some]
-    study.write_rows(folder / "runs.csv", rows, COLUMNS)
-    picture_all(folder, options, studies, points, floors, reference, check, titles)
-    figures = {
-        **study.cheapest_figures(points, 0.01, floors, "cheapest_seconds"),
-        **study.cheapest_figures(points, 0.001, floors, "seconds"),
-        **figures_of(points, studies, reference),
-        "chaos_floor": (max(floors.values()), "1"),
-        "chaos_at_any_step": (max(max(studies[name].spread.values()) for name in floors), "1"),
-        "reference_check": (check, "1"),
-        **study.figures_by_method(points, 0.01, floors),
-    }
-    made = [run for one in studies.values() for run in one.outcomes] + [reference] * (not kept)
-    study.finish(options, NAME, figures, float(sum(one.compile_seconds for one in made)))
-
-
-def reference_of(scene, options, folder):
-    """(Outcome of the reference, whether it was kept from before)."""
-    # Swept until nothing changes by a thousandth, not a twentieth, of the largest speed.
-    method = ImplicitDashpots(options.reference, sweeps=(6, 50), tolerance=1e-3)
-    place = folder / "references", "implicit", (scene, method, options.until), ("taichi_dem",)
-    with ProgressBar("reference") as bar:
-        job = {"driver": options.driver, "progress": bar}
-        made = partial(outcome_of, scene, method, options.until, **job)
-        found, kept = study.cached(*place, lambda: asdict(made()))
-    return Outcome(**found), kept
-
-
-def study_of(name, steps, scene, options):
-    """Runs of a method at all steps, with their disturbed twins."""
-    job = {"driver": options.driver, "label": partial(label_of, name)}
-    made = StepStudy(name, METHODS[name], scene, options.until, **job)
-    for step in steps:
-        # The coarsest of several is too coarse for its spread to matter.
-        again = name in options.twins and (step != steps[0] or len(steps) == 1)
-        made.run(step, ENOUGH if again else 0.0)
-    return made
 
 
 def label_of(name, step):
@@ -153,20 +135,83 @@ def label_of(name, step):
     return f"l = {1e6 * step:g} µm" if name in BY_WAY else seconds(step)
 
 
-def row_of(key, run, reference):
-    """Row of runs.csv: all errors of a run, its cost and its energy split."""
-    errors = [np.nan if run.failure else error(run, reference) for error in MEASURES.values()]
-    cost = run.evaluations, run.cpu_s, run.wall_s, run.compile_seconds, run.residual, run.reached_s
-    energy = [run.energy[term] for term in TERMS]
-    # A comma would end the cell.
-    return (*key, *errors, len(run.broken), *cost, *energy, run.failure.replace(",", ";"))
+def runs_of(name, steps, scene, options):
+    """Outcomes of a method by step, and those of its disturbed twins."""
+    runs, twins = {}, {}
+    for step in steps:
+        job = scene, METHODS[name][0](step), options.until
+        shown = {"driver": options.driver, "title": f"{name}, {label_of(name, step)}"}
+        made = runs[step] = outcome_of(*job, **shown)
+        # The coarsest of several is too coarse for its spread to matter.
+        again = name in options.twins and (step != steps[0] or len(steps) == 1)
+        if again and not made["failure"] and made["cpu_s"] < ENOUGH:
+            twins[step] = outcome_of(*job, DISTURBANCE, **shown)
+    return runs, twins
 
 
-def picture_all(folder, options, studies, points, floors, reference, check, titles):
+def points_of(name, runs, twins, reference):
+    """Points of the work-precision diagram of a method."""
+    done = [step for step, run in runs.items() if not run["failure"]]
+    found = []
+    for step, run in runs.items():
+        work, label = run["evaluations"], label_of(name, step)
+        if run["failure"]:
+            # To the end it would take what the next finer one takes, by steps.
+            work = runs[max(done)]["evaluations"] * max(done) / step if done else work
+            words = f"diverged at {1e6 * run['reached_s']:.0f} µs"
+            found.append(Point(name, step, label, work, failure=words))
+        else:
+            spent = study.Timing.of([run["cpu_s"], twins.get(step, run)["cpu_s"]])
+            error = displacement_error(run, reference)
+            found.append(Point(name, step, label, work, error, spent, run["residual"]))
+    return found
+
+
+def run(options):
+    """Run all methods, write pictures and tables, answer what an error costs."""
+    scene, folder = paper_scene(options.mesh), study.begin(options)
+    # Swept until nothing changes by a thousandth, not a twentieth, of the largest speed.
+    method = ImplicitDashpots(options.reference, sweeps=(6, 50), tolerance=1e-3)
+    place = folder / "references", "implicit", (scene, method, options.until), ("taichi_dem",)
+    job = {"driver": options.driver, "title": "reference"}
+    made = partial(outcome_of, scene, method, options.until, **job)
+    reference, kept = study.cached(*place, made)
+    all_runs = {name: runs_of(name, *one, scene, options) for name, *one in options.steps.items()}
+    points = [p for name, both in all_runs.items() for p in points_of(name, *both, reference)]
+    spreads = {
+        name: [displacement_error(twins[step], runs[step]) for step in twins]
+        for name, (runs, twins) in all_runs.items()
+        if twins
+    }
+    floors = {name: spread[-1] for name, spread in spreads.items()}
+    titles = {name: style.label for name, style in styles_of(all_runs).items()}
+    check = displacement_error([*all_runs[CHECK][0].values()][-1], reference)
+    study.give_answers(options.out, points, TARGETS, floors, titles)
+    draw(folder, options, all_runs, points, floors, reference, check, titles)
+    figures = {
+        **study.cheapest_figures(points, 0.01, floors, "cheapest_seconds"),
+        **study.cheapest_figures(points, 0.001, floors, "seconds"),
+        "chaos_floor": (max(floors.values()), "1"),
+        "chaos_at_any_step": (max(max(spread) for spread in spreads.values()), "1"),
+        "reference_check": (check, "1"),
+        **study.figures_by_method(points, 0.01, floors),
+    }
+    if paper := all_runs.get("uniform", ({}, {}))[0].get(PAPER_L):
+        figures["paper_rule_seconds"] = paper["cpu_s"], "s"
+        figures["paper_rule_error"] = displacement_error(paper, reference), "1"
+    if fixed := [point for point in points if point.method == "fixed"]:
+        longest = max((point.step for point in fixed if not point.failure), default=None)
+        figures["longest_fixed_step_full_dashpots"] = longest, "s"
+    outcomes = [one for both in all_runs.values() for some in both for one in some.values()]
+    compiling = sum(one["compile_s"] for one in outcomes + [reference] * (not kept))
+    study.finish(options, NAME, figures, float(compiling))
+
+
+def draw(folder, options, all_runs, points, floors, reference, check, titles):
     """The work-precision diagram, and the same for broken faces and energy."""
     scene = (
-        f"Paper's block, {len(reference.moved)} bodies to {1e6 * options.until:.0f} µs, "
-        f"{len(reference.broken)} faces broken"
+        f"Paper's block, {len(reference['moved'])} bodies to {1e6 * options.until:.0f} µs, "
+        f"{len(reference['broken'])} faces broken"
     )
     against = f"Reference: solved dashpots at {seconds(options.reference)}"
     # Floors far below all errors would only squeeze the picture.
@@ -189,27 +234,13 @@ def picture_all(folder, options, studies, points, floors, reference, check, titl
     own = {name: [p for p in points if p.method == name and not p.failure] for name in titles}
     errors = {
         words: {
-            name: [(p.low, error(studies[name].runs[p.step], reference)) for p in good]
+            name: [(p.low, error(all_runs[name][0][p.step], reference)) for p in good]
             for name, good in own.items()
         }
         for words, error in MEASURES.items()
     }
     caption = f"{scene}. {against}. Points at the bottom edge have no error at all."
     picture_errors(folder / "errors.png", errors, titles, time_name=TIME, caption=caption)
-
-
-def figures_of(points, studies, reference):
-    """Price of the paper's rule, and the longest step that full dashpots bear."""
-    figures = {}
-    paper = studies["uniform"].runs.get(PAPER_L) if "uniform" in studies else None
-    if paper:
-        error = displacement_error(paper, reference)
-        figures = {"paper_rule_seconds": (paper.cpu_s, "s"), "paper_rule_error": (error, "1")}
-    fixed = [point for point in points if point.method == "fixed"]
-    if fixed:
-        longest = max((point.step for point in fixed if not point.failure), default=None)
-        figures["longest_fixed_step_full_dashpots"] = (longest, "s")
-    return figures
 
 
 if __name__ == "__main__":

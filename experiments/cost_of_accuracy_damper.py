@@ -26,7 +26,7 @@ from ca_damper.plot import picture_compared
 from ca_damper.report.measures import curve_distance
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import power, seconds, styles_of
-from taichi_dem.kit.study.work_precision import Point, answers, write_points
+from taichi_dem.kit.study.work_precision import Point, answers
 from taichi_dem.kit.study.work_precision_picture import picture_work_precision
 
 NAME = "cost_of_accuracy_damper"
@@ -68,30 +68,6 @@ SAMPLES = 8
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
 
-def run(options):
-    """Measure all methods, write pictures and tables, find the cheapest method for an error."""
-    folder = study.begin(options)
-    with ProgressBar("sweep") as bar:
-        names = [name for name, one in METHODS.items() if one[2] or not options.quick]
-        made = {name: sweep_of(name, options, bar) for name in names}
-    frequency = np.array(options.ratios) * OSCILLATOR.natural_frequency
-    empty, compiling = rk45_points(frequency, options.repeats, options.quick)
-    compiling += sum(sweep.compile_s for sweep in made.values())
-    truth = made[SPHERES].mean
-    own = [point for sweep in made.values() for point in sweep.points(sweep.mean)]
-    toward = [point for sweep in made.values() for point in sweep.points(truth)]
-    floors = {name: sweep.floor for name, sweep in made.items()}
-    titles = {name: style.label for name, style in styles_of(made).items()}
-    study.give_answers(options.out, own, TARGETS, floors, titles)
-    write_points(folder / "points_against_spheres.csv", toward, floors)
-    write_points(folder / "points_empty.csv", empty, {})
-    rows = [row for sweep in made.values() for row in sweep.rows()]
-    study.write_rows(folder / "curves.csv", rows, "method ratio step_s seed rms_m reference")
-    shared = {"titles": titles, "floors": floors, "work_name": "particle steps [1]"}
-    draw_all(folder, options, made, own, toward, empty, shared)
-    study.finish(options, NAME, figures_of(made, own, toward, empty, floors), compiling)
-
-
 def sweep_of(name, options, bar):
     """All runs of a method: a ``StepStudy``."""
     filling, steps, quick, finest, count = METHODS[name]
@@ -113,35 +89,26 @@ def sweep_of(name, options, bar):
 
 def rk45_points(frequency, repeats, quick):
     """(Points of all ways, seconds of compiling) at frequencies [Hz]; quick: every other point."""
-    every = 2 if quick else 1
-    jobs = [
-        ("rk45_tolerance", rtol, power(rtol), RK45_STEPS[0], rtol) for rtol in TOLERANCES[::every]
-    ]
-    jobs += [("rk45_step", dt, f"{1e3 * dt:g} ms", dt, 1e-2) for dt in RK45_STEPS[::every]]
-    points, compiling = [], 0.0
-    for method, swept, label, dt, rtol in jobs:
-        found, seconds = rk45_in_kernel(frequency, repeats, dt, rtol)
+    every, points, compiling = 2 if quick else 1, [], 0.0
+    jobs = [("rk45_tolerance", rtol, RK45_STEPS[0], rtol) for rtol in TOLERANCES[::every]]
+    jobs += [("rk45_step", dt, dt, 1e-2) for dt in RK45_STEPS[::every]]
+    for method, swept, dt, rtol in jobs:
+        table = SceneTable(0, 1, dt, frequency, OSCILLATOR.base_amplitude)
+        batch, spent = Batch(Empty(), table, measured_cycles=1, rtol=rtol, atol=1e-3 * rtol), []
+        # The first run compiles.
+        for _ in range(1 + repeats):
+            started = time.perf_counter()
+            batch.start("empty")
+            rms = batch.run(RK45_CYCLES - 1, 1).rms
+            spent.append(time.perf_counter() - started)
+        error = curve_distance(rms, OSCILLATOR.rms(frequency))
+        found = 6 * int(batch.attempts().sum()), error, study.Timing.of(spent[1:])
+        label = power(swept) if swept == rtol else f"{1e3 * dt:g} ms"
         points.append(Point(method, swept, label, *found))
-        compiling += seconds
+        compiling += batch.compile_seconds
     for rtol in PYTHON_TOLERANCES[::every]:
         points.append(Point("rk45_python", rtol, power(rtol), *rk45_in_python(frequency, rtol)))
     return points, compiling
-
-
-def rk45_in_kernel(frequency, repeats, dt, rtol):
-    """(Evaluations, error, timing) of a Batch, and its seconds of compiling."""
-    table = SceneTable(0, 1, dt, frequency, OSCILLATOR.base_amplitude)
-    batch = Batch(Empty(), table, measured_cycles=1, rtol=rtol, atol=1e-3 * rtol)
-    seconds = []
-    # The first run compiles.
-    for _ in range(1 + repeats):
-        started = time.perf_counter()
-        batch.start("empty")
-        rms = batch.run(RK45_CYCLES - 1, 1).rms
-        seconds.append(time.perf_counter() - started)
-    evaluations = 6 * int(batch.attempts().sum())
-    error = curve_distance(rms, OSCILLATOR.rms(frequency))
-    return (evaluations, error, study.Timing.of(seconds[1:])), batch.compile_seconds
 
 
 def rk45_in_python(frequency, rtol):
@@ -153,45 +120,44 @@ def rk45_in_python(frequency, rtol):
         solution = rk45.solve(*job, rtol=rtol, atol=1e-3 * rtol, at=at)
         x.append(solution.y[:SAMPLES, 0])
         evaluations += solution.evaluations
-    rms = np.sqrt(np.square(x).mean(axis=1) - np.mean(x, axis=1) ** 2)
     spent = study.Timing.of([time.perf_counter() - started])
-    return evaluations, curve_distance(rms, OSCILLATOR.rms(frequency)), spent
+    return evaluations, curve_distance(np.std(x, axis=1), OSCILLATOR.rms(frequency)), spent
 
 
-def draw_all(folder, options, made, own, toward, empty, shared):
+def draw(folder, options, made, own, toward, empty, floors):
     """Work-precision diagrams: by method, toward the spheres, of the empty container; curves."""
     ratios, (transient, measured) = options.ratios, options.cycles
+    titles = {name: style.label for name, style in styles_of(made).items()}
+    shared = {"titles": titles, "floors": floors, "work_name": "particle steps [1]"}
     shorter = max(sweep.reference["step"] / min(sweep.runs) for sweep in made.values())
     scenes = (
         f"{PARTICLES} particles, f/f0 = {', '.join(f'{r:g}' for r in ratios)}, "
         f"{len(options.seeds)} seeds, {transient} + {measured} cycles. Error: RMS over the "
         "frequencies of (response - reference), mean over seeds, as a share of the peak.\n"
     )
-    balance = "mean force on the container: missing share of the weight [1]"
     picture_work_precision(
-        folder / "work_precision.png",
-        own,
+        *(folder / "work_precision.png", own),
         error_name="error of the response curve / its peak [1]",
-        residual_names=("step [µs]", balance),
+        residual_names=(
+            "step [µs]",
+            "mean force on the container: missing share of the weight [1]",
+        ),
         step_unit=1e-6,
         caption=f"{scenes}Reference of each method: itself with other seeds, at {shorter:.2g} of "
         "its finest step or less. Dotted: what seeds alone make of it.",
         **shared,
     )
     picture_work_precision(
-        folder / "against_spheres.png",
-        toward,
+        *(folder / "against_spheres.png", toward),
         error_name="difference to the spheres' curve / its peak [1]",
         caption=f"{scenes}Reference of all: spheres, p = 1/4, at "
         f"{seconds(made[SPHERES].reference['step'])}.",
         **shared,
     )
     picture_work_precision(
-        folder / "rk45.png",
-        empty,
+        *(folder / "rk45.png", empty),
         {name: style.label for name, style in styles_of(p.method for p in empty).items()},
-        floors={},
-        order=5,
+        **{"floors": {}, "order": 5},
         error_name="error of the response curve / its peak [1]",
         work_name="evaluations of the right-hand side [1]",
         caption="Empty container. Error: RMS over the frequencies of (response - transfer "
@@ -202,30 +168,43 @@ def draw_all(folder, options, made, own, toward, empty, shared):
     picture_compared(folder / "curves.png", curves, OSCILLATOR)
 
 
-def figures_of(made, own, toward, empty, floors):
-    """Cheapest ways to an error, floors, checks of the references, distances of the models."""
+def run(options):
+    """Measure all methods, write pictures and tables, find the cheapest method for an error."""
+    folder = study.begin(options)
+    with ProgressBar("sweep") as bar:
+        names = [name for name, one in METHODS.items() if one[2] or not options.quick]
+        made = {name: sweep_of(name, options, bar) for name in names}
+    frequency = np.array(options.ratios) * OSCILLATOR.natural_frequency
+    empty, compiling = rk45_points(frequency, options.repeats, options.quick)
+    truth = made[SPHERES].mean
+    own = [point for sweep in made.values() for point in sweep.points(sweep.mean)]
+    toward = [point for sweep in made.values() for point in sweep.points(truth)]
+    floors = {name: sweep.floor for name, sweep in made.items()}
+    titles = {name: style.label for name, style in styles_of(made).items()}
+    study.give_answers(options.out, own, TARGETS, floors, titles)
+    draw(folder, options, made, own, toward, empty, floors)
+    near = "cheapest_seconds", "to_spheres_within_2_percent"
     figures = {
         **study.cheapest_figures(own, 0.01, floors, "cheapest_seconds"),
         **study.cheapest_figures(own, 0.001, floors, "seconds"),
-        **study.cheapest_figures(
-            toward, 0.02, floors, "cheapest_seconds", "to_spheres_within_2_percent"
-        ),
+        **study.cheapest_figures(toward, 0.02, floors, *near),
         **study.figures_by_method(own, 0.01, floors),
         "chaos_floor": (min(floors.values()), "1"),
+        "rk45_evaluations_at_1e-6": (answers(empty, 1e-6, {})[0].point.evaluations, "1"),
     }
     for label, sweep in made.items():
+        compiling += sweep.compile_s
         values = {
             "chaos_floor": sweep.floor,
             "roundoff_spread": sweep.roundoff,
             "seed_spread": sweep.seed_spread,
             "check_step": curve_distance(sweep.curve(), sweep.mean),
             "check_force": sweep.reference["force_check"],
-            "distance_to_spheres": curve_distance(sweep.mean, made[SPHERES].mean),
+            "distance_to_spheres": curve_distance(sweep.mean, truth),
         }
-        known = {name: value for name, value in values.items() if value is not None}
-        figures.update({f"{name}_{label}": (value, "1") for name, value in known.items()})
-    evaluations = answers(empty, 1e-6, {})[0].point.evaluations
-    return {**figures, "rk45_evaluations_at_1e-6": (evaluations, "1")}
+        known = {f"{name}_{label}": one for name, one in values.items() if one is not None}
+        figures.update({name: (one, "1") for name, one in known.items()})
+    study.finish(options, NAME, figures, compiling)
 
 
 if __name__ == "__main__":

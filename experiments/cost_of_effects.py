@@ -3,8 +3,8 @@
     python experiments/cost_of_effects.py          # about four minutes on two cores
     python experiments/cost_of_effects.py --quick
 
-The paper's block is blasted with its effects added one by one, and left out one by one; so is a
-response curve of the damper, by spheres and by the automaton.
+The paper's block is blasted with its effects left out one by one; so is a response curve of the
+damper computed, by spheres and by the automaton.
 
 - What an effect costs: CPU seconds of a step with and without it from the same states. States of
   the run with all effects are put into every other scene; all scenes take turns in one process, in
@@ -20,37 +20,35 @@ An effect that is left out of a scene must cost nothing: an elastic block is tim
 stripped by hand. And of some scenes the shortest list of effects that serves is known: what all
 effects cost there is listed too.
 
-Writes effects.png, blast.csv, damper.csv, lists.csv and summary.json to results/cost_of_effects/.
+Writes effects.png, blast.csv, spheres.csv, automaton.csv, lists.csv and summary.json to
+results/cost_of_effects/.
 """
 
-import os
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
-from _effects_costs import KNOWN_LISTS, ORDER, costs_of_blast
-from _effects_damper import damper_costs
-from _effects_pictures import picture_effects
-from _effects_runs import absent, blast, damper
-from _effects_tables import (
-    CONTACTS,
-    LAST_BIT,
-    figures_of,
-    list_rows,
-    overhead_of_auto,
-    row_of,
-    show,
-    show_lists,
-)
+import numpy as np
+import pandas as pd
+
+from _effects import KNOWN_LISTS, ORDER, absent, blast, costs_of_blast, costs_of_damper, damper
+from ca_damper.report.measures import curve_distance
 from taichi_dem.kit import study
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, SKY, area_key, line_key, picture
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study.timing import median_interval
 
 NAME = "cost_of_effects"
-#: What cannot stay without it.
+ALL, LAST_BIT = "all effects", "all effects, last bit of the load changed"
+#: What cannot stay without an effect.
 ALONG = {"body_contact": ("sticking_friction",)}
+#: Contact and friction in the place of those of bodies, by row: the paper's, then on all faces.
+CONTACTS = {
+    "contact of spheres": ("sphere_contact", "friction"),
+    "spheres on all faces": ("surface_contact", "friction"),
+}
+ADDED = ("rotation", *CONTACTS)
 SETTINGS = {
     "until": (2.5e-4, 1e-4, study.number(0, 1), "simulated time of the blast [s], 2.5e-4"),
-    "repeats": (1, 1, study.whole(1, 100), "of every run in a process of its own, 1"),
     "rounds": (60, 10, study.whole(1, 10_000), "most rounds of turns from the same states, 60"),
     "half_width": (0.01, 0.02, study.number(0, 1), "of the 95 % interval of a cost, 0.01"),
     "states": (8, 4),
@@ -61,13 +59,14 @@ SETTINGS = {
     "ratios": ((0.88, 0.91, 0.94, 0.96, 0.98, 1.0, 1.03), (0.92, 0.98)),
     "cycles": ((60, 20), (10, 4)),
     "left_out": (ORDER, ("body_contact",)),
-    "added": (ORDER, ()),
     "again": (100, 20),
     "contacts": (CONTACTS, {}),
+    # In the quick job every scene compiles in a process of its own.
+    "fillings": (("spheres", "automaton"), ("spheres",)),
+    "options": (4, 2),
 }
 #: Substeps that the elastic block is timed over at a time, and fewest rounds of turns.
 SUBSTEPS, FEWEST = 150, 8
-ALL = "all effects"
 STEPS = {"blast": 4e-7, "spheres": 3e-5, "automaton": 1e-4}
 #: Steps of a damper from a state, about a tenth of a cycle.
 TENTH = {"spheres": 600, "automaton": 180}
@@ -85,129 +84,216 @@ FILLINGS = {
         "ejection and static contact": {"accounting": "landing"},
     },
 }
-#: Of these in the quick job, where every scene compiles in a process of its own.
-QUICK_FILLINGS = {"spheres": ("spheres as they are", "friction of spheres")}
-SEEDS, PARTICLES = (1, 2), 30
+TITLES = {
+    "blast": "Blast of the paper's block",
+    "spheres": "Damper, spheres",
+    "automaton": "Damper, automaton",
+}
 #: Threads are processes side by side.
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 
 
-def run(options):
-    """Measure, then write and print."""
-    folder = study.begin(options)
-    calls = {**blasts(options), **dampers(options)}
-    workers = options.threads or min(2, os.cpu_count() or 1)
-    with ProgressBar("compiling, measuring") as bar:
-        results = study.call_rounds(calls, options.repeats, workers, bar.count)
-    with ProgressBar("comparing") as bar:
-        known = costs_of(cost_jobs(options, calls, results), workers, bar.count)
-    elastic = study.call_in_process(absent, substeps=SUBSTEPS, repeats=options.again)
-    tables = tables_of(calls, results, known)
-    rows = [row for filling in fillings(options) for row in tables[filling]]
-    study.write_rows(folder / "blast.csv", tables["blast"])
-    study.write_rows(folder / "damper.csv", rows)
-    picture_effects(folder / "effects.png", tables)
-    show(
-        tables["blast"],
-        "The blast: cost of a step, what leaving effects out spares, and what it changes",
-    )
-    show(rows, "The damper: peak of the response [mm]; first rows: what two seeds may differ by")
-    listed = list_rows(known["lists"])
-    study.write_rows(folder / "lists.csv", listed)
-    show_lists(listed)
-    compiling = sum(found[0].get("compile_s", 0.0) for found in results.values())
-    figures = {**figures_of(tables, elastic), **overhead_of_auto(listed)}
-    # What comes from another process has lists for tuples.
-    figures.update({key: tuple(found) for key, found in known["certificate"].items()})
-    study.finish(options, NAME, figures, compiling)
-
-
-def blasts(options):
-    """All effects, without each, and from the load alone up to all; none of them twice."""
-    scenes = {ORDER: ALL}
+def calls_of(options):
+    """Runs in processes of their own by group and scene: function and arguments."""
+    scenes = {ALL: ORDER}
     for name in options.left_out:
         gone = (name, *ALONG.get(name, ()))
-        scenes[tuple(e for e in ORDER if e not in gone)] = f"without {' and '.join(gone)}"
-    scenes[()] = "gas pressure alone"
-    for k, name in enumerate(options.added):
-        scenes.setdefault(ORDER[: k + 1], f"up to {name}")
-    shared = {"until": options.until, "step": STEPS["blast"], "ulps": 0}
-    calls = {
-        scene: (blast, {**shared, "names": ["gas_pressure", *names]})
-        for names, scene in scenes.items()
-    }
-    for scene, contact in options.contacts.items():
-        calls[scene] = blast, {**shared, "names": ["gas_pressure", *ORDER[:3], *contact]}
+        scenes[f"without {' and '.join(gone)}"] = [e for e in ORDER if e not in gone]
+    scenes.update({scene: (*ORDER[:3], *both) for scene, both in options.contacts.items()})
+    given = {"until": options.until, "step": STEPS["blast"], "ulps": 0}
+    found = {("blast", scene): (blast, {**given, "names": n}) for scene, n in scenes.items()}
     if options.chance:
-        calls[LAST_BIT] = blast, {**calls[ALL][1], "ulps": 1}
-    return calls
+        found["blast", LAST_BIT] = blast, {**given, "names": ORDER, "ulps": 1}
+    for filling in options.fillings:
+        table = {"particles": 30, "seeds": (1, 2), "ratios": options.ratios}
+        table.update(step=STEPS[filling], measured_cycles=options.cycles[1])
+        given = {"filling": filling, "table": table, "transient": options.cycles[0]}
+        for scene, chosen in [*FILLINGS[filling].items()][: options.options]:
+            found[filling, scene] = damper, {**given, "options": chosen}
+    return found
 
 
-def fillings(options):
-    """Scenes of FILLINGS that are asked for."""
-    chosen = QUICK_FILLINGS if options.quick else FILLINGS
-    return {name: {scene: FILLINGS[name][scene] for scene in chosen[name]} for name in chosen}
-
-
-def dampers(options):
-    """Each filling as it is, and with each effect left out or added."""
-    shared = {"particles": PARTICLES, "seeds": SEEDS}
-    shared.update(ratios=options.ratios, cycles=options.cycles)
-    return {
-        scene: (damper, {"filling": filling, "step": STEPS[filling], "options": chosen, **shared})
-        for filling, scenes in fillings(options).items()
-        for scene, chosen in scenes.items()
-    }
-
-
-def cost_jobs(options, calls, results):
-    """Functions and arguments that give costs of a step: of the blast and its lists, the fillings.
-
-    Scenes whose own run failed are left out.
-    """
-    good = {scene: calls[scene] for scene, runs in results.items() if "failed" not in runs[0]}
-    blown = {
-        scene: call["names"][1:]
-        for scene, (work, call) in good.items()
-        if work is blast and scene != LAST_BIT
-    }
+def costs_of(options, calls, results):
+    """Costs of a step by group and scene, of the scenes whose own run ended well."""
     shared = {"half_width": options.half_width, "states": options.states}
     shared["rounds"] = FEWEST, options.rounds
-    stepped = {"until": options.until, "step": STEPS["blast"], "substeps": options.substeps}
-    asked = {"scenes": blown, "lists": options.lists, "certified": options.certified}
-    jobs = {"blast": (costs_of_blast, {**asked, **stepped, **shared})}
-    for filling, scenes in fillings(options).items():
-        asked = {"filling": filling, "cycles": options.cycles, "substeps": TENTH[filling], **shared}
-        asked["scenes"] = {scene: chosen for scene, chosen in scenes.items() if scene in good}
-        table = {"particles": PARTICLES, "seeds": SEEDS, "ratios": options.ratios}
-        asked["table"] = {**table, "step": STEPS[filling], "measured_cycles": options.cycles[1]}
-        jobs[filling] = damper_costs, asked
-    return jobs
-
-
-def costs_of(jobs, workers, progress):
-    """Costs by group and scene, each job in a process of its own; of the blast also its lists."""
+    good = [key for key in calls if "failed" not in results[key] and key[1] != LAST_BIT]
     found = {}
-    with ThreadPoolExecutor(workers) as pool:
-        turns = {
-            name: pool.submit(study.call_in_process, work, **arguments)
-            for name, (work, arguments) in jobs.items()
-        }
-        for done, (name, turn) in enumerate(turns.items(), start=1):
-            found[name] = turn.result()
-            progress(done, len(jobs))
-    return {**found, **found["blast"]}
+    with ProgressBar("comparing") as bar:
+        for k, group in enumerate(("blast", *options.fillings)):
+            own = {scene: calls[of, scene][1] for of, scene in good if of == group}
+            if group == "blast":
+                job = {name: getattr(options, name) for name in ("until", "lists", "certified")}
+                job.update(step=STEPS["blast"], substeps=options.substeps)
+                job["scenes"] = {scene: call["names"] for scene, call in own.items()}
+            else:
+                first = next(iter(own.values()))
+                job = {name: first[name] for name in ("filling", "table", "transient")}
+                job.update(substeps=TENTH[group])
+                job["scenes"] = {scene: call["options"] for scene, call in own.items()}
+            work = costs_of_blast if group == "blast" else costs_of_damper
+            found.update(study.call_in_process(work, **job, **shared))
+            bar.count(k + 1, 1 + len(options.fillings))
+    return found
 
 
-def tables_of(calls, results, known):
-    """Rows of each group, the first of them complete."""
-    tables, complete = {}, {}
-    for scene, repeats in results.items():
-        group = calls[scene][1].get("filling", "blast")
-        complete.setdefault(group, (scene, repeats))
-        row = row_of(group, scene, repeats, complete[group], known[group])
-        tables.setdefault(group, []).append(row)
-    return tables
+def row_of(group, scene, found, complete, costs):
+    """Row of a table; complete: result of the first scene. sign: -1 of what was added."""
+    name = scene.removeprefix("without ")
+    row = {"group": group, "scene": scene, "failed": found.get("failed", "")}
+    key = CONTACTS.get(name, name.split())[0] if group == "blast" else name
+    row["effect"] = name if group != "blast" or name != scene or name in ADDED else ""
+    row["key"], row["sign"] = f"{group}_{key}".removeprefix("blast_").replace(" ", "_"), 1.0
+    row["sign"] = -1.0 if name in ADDED else 1.0
+    if row["failed"]:
+        return row
+    if scene in costs:
+        # By ratio and not by seconds, which differ from round to round with the machine's load.
+        base, cost = next(iter(costs.values()))["seconds"], costs[scene]
+        spared = [1.0 - cost[end] for end in ("ratio", "low", "high")]
+        ends = sorted(row["sign"] * 100.0 * one for one in spared)
+        row.update(step_ms=1e3 * base * cost["ratio"], step_percent=ends[1])
+        row.update(step_low_percent=ends[0], step_high_percent=ends[2])
+        row["seconds"] = row["sign"] * spared[0] * base * found["steps"]
+    row.update({name: found[name] for name in ("before_first_step_s", "memory_MB", "compiled_kB")})
+    if group == "blast":
+        hole, wanted = found["hole_mm"], complete["hole_mm"]
+        row.update(hole_mm=hole, broken_faces=found["broken_faces"])
+        return {**row, "change_percent": 100.0 * abs(hole - wanted) / abs(wanted)}
+    # Of the complete filling half of the distance of two seeds: what the mean may owe to chance.
+    curve, (one, other) = np.mean(found["rms_mm"], axis=0), complete["rms_mm"]
+    change = 100.0 * curve_distance(curve, np.mean(complete["rms_mm"], axis=0))
+    chance = 50.0 * curve_distance(one, other)
+    return {
+        **row,
+        "peak_mm": curve.max(),
+        "change_percent": chance if found is complete else change,
+    }
+
+
+def figures_of(table):
+    """What each effect adds to a run and to a step, and what its absence changes."""
+    figures, first = {}, table.iloc[0]
+    for _, row in effects_in(table).iterrows():
+        for column, unit in {"memory_MB": "MB", "compiled_kB": "kB"}.items():
+            figures[f"{row.key}_{column}"] = row.sign * (first[column] - row[column]), unit
+        units = {"seconds": "s", **dict.fromkeys(STEP, "%")}
+        figures.update({f"{row.key}_{name}": (row[name], unit) for name, unit in units.items()})
+        what = "displacement" if row.group == "blast" else "response"
+        figures[f"{row.key}_{what}_change_percent"] = row.change_percent, "%"
+        if row.group == "blast":
+            more = row.broken_faces - first.broken_faces
+            figures[f"{row.key}_broken_faces_change"] = more if pd.isna(more) else int(more), "1"
+    return figures
+
+
+STEP = ("step_percent", "step_low_percent", "step_high_percent")
+
+
+def effects_in(table):
+    """Rows of effects that were left out alone, or added; not the complete scene."""
+    return table.iloc[1:][table.effect.iloc[1:] != ""]
+
+
+def draw(path, tables):
+    """Bars, a row of panels for each table: what an effect costs, what changes without it."""
+    shown = [effects_in(one)[lambda rows: rows.failed == ""] for one in tables.values()]
+    heights = [max(1, len(rows)) for rows in shown]
+    size = (9.2, 1.6 + 0.42 * sum(heights) + 0.7 * len(heights))
+    ratios = {"height_ratios": heights, "width_ratios": [1, 1.25]}
+    with picture(path, len(heights), 2, size, squeeze=False, gridspec_kw=ratios) as (figure, axes):
+        for (left, right), (group, table), rows in zip(axes, tables.items(), shown):
+            left.set_title(TITLES[group], fontweight="bold")
+            left.sharex(axes[0, 0])
+            chance = table[table.scene == (LAST_BIT if group == "blast" else table.scene[0])]
+            draw_costs(left, rows)
+            draw_changes(right, rows.change_percent, max([0.01, *chance.change_percent]))
+        marks = [
+            line_key("95 % interval, from the same states", color=BLACK, lw=1.0),
+            area_key("not resolved: that interval holds 0", fc=SKY),
+            area_key("change by chance alone (round-off, seeds)", fc=GREY, alpha=0.3),
+        ]
+        figure.legend(handles=marks, loc="outside lower right", ncols=3)
+        figure.suptitle("What does an effect cost, and what is it good for?")
+
+
+def draw_costs(axes, rows):
+    """Bars with the interval; pale where that holds 0, so that the cost is not resolved."""
+    words = {name: "instead" if name in CONTACTS else "added" for name in ADDED}
+    names = [f"{one}\n({words[one]})" if one in words else one for one in rows.effect]
+    for place, (cost, least, most) in enumerate(rows[[*STEP]].to_numpy()):
+        hidden = bool(least <= 0.0 <= most)
+        axes.barh(place, cost, color=SKY if hidden else BLUE, height=0.6)
+        axes.plot([least, most], [place, place], color=BLACK, linewidth=1.0, marker="|")
+        digits = int(abs(cost) < 10.0)
+        # A zero has no sign.
+        text = f"  {round(cost, digits) + 0.0:.{digits}f} %" + ", not resolved" * hidden
+        axes.text(max(most, 0.0), place, text.replace("-", "−"), va="center", fontsize=8.5)
+    names = [name.replace("_", " ").replace(" and ", "\nand ") for name in names]
+    axes.set(yticks=range(len(names)), yticklabels=names)
+    axes.set_xlabel("cost: share of a step's time [%], below 0: slower without it")
+    axes.axvline(0.0, color=GREY, linewidth=0.8)
+    axes.margins(x=0.3)
+    axes.invert_yaxis()
+    axes.grid(axis="y", visible=False)
+
+
+def draw_changes(axes, changes, chance):
+    """Bars on a logarithmic scale, over a stripe of what chance changes."""
+    ticks = (0.01, 0.1, 1.0, 10.0, 100.0)
+    axes.axvspan(ticks[0], chance, color=GREY, alpha=0.3, linewidth=0)
+    bars = axes.barh(range(len(changes)), np.maximum(changes, ticks[0]), color=RED, height=0.6)
+    words = [f"{value:.0f} %" if value >= 10.0 else f"{value:.2g} %" for value in changes]
+    axes.bar_label(bars, words, padding=3, fontsize=8.5)
+    axes.set(xscale="log", xlim=(ticks[0], 2e3), yticks=[])
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.set_xticks([], minor=True)
+    axes.invert_yaxis()
+    axes.set_xlabel("use: change of the result without it [%]")
+
+
+def run(options):
+    """Measure, then write and print."""
+    folder, calls, rows, figures = study.begin(options), calls_of(options), [], {}
+    with ProgressBar("compiling, measuring") as bar:
+        results = study.call_rounds(calls, 1, options.threads or 1, bar.count)
+    results = {key: found for key, (found,) in results.items()}
+    costs = costs_of(options, calls, results)
+    elastic = study.call_in_process(absent, substeps=SUBSTEPS, repeats=options.again)
+    # Each against its neighbour in time: a machine is never equally fast for long.
+    ratio = np.array(elastic["composed"]) / np.array(elastic["by_hand"])
+    for end, value in zip(("", "_low", "_high"), (np.median(ratio), *median_interval(ratio))):
+        figures[f"overhead_absent{end}_percent"] = 100.0 * (value - 1.0), "%"
+    complete = {}
+    for (group, scene), found in results.items():
+        rows.append(row_of(group, scene, found, complete.setdefault(group, found), costs[group]))
+    figures["blast_seconds"] = complete["blast"]["run_s"], "s"
+    tables = dict([*pd.DataFrame(rows).groupby("group", sort=False)])
+    if options.chance:
+        last = tables["blast"].set_index("scene").change_percent[LAST_BIT]
+        figures["blast_chance_percent"] = last, "%"
+    for group, table in tables.items():
+        tables[group] = table = table.reset_index(drop=True).dropna(axis=1, how="all")
+        table.to_csv(folder / f"{group}.csv", index=False)
+        print(f"\n{TITLES[group]}: cost of a step, what leaving an effect out spares and changes")
+        hidden = ["group", "failed", "key", "sign", "effect"]
+        print(table.drop(columns=hidden).to_string(float_format="{:.4g}".format))
+        print(*(f"{one.scene}: {one.failed}" for one in table.itertuples() if one.failed), sep="\n")
+        figures.update(figures_of(table))
+    draw(folder / "effects.png", tables)
+    listed = pd.DataFrame(
+        {(scene, name): cost for scene, by in costs["lists"].items() for name, cost in by.items()}
+    ).T
+    listed.to_csv(folder / "lists.csv", index_label=["scene", "list"])
+    over = 100.0 * (listed.ratio.xs("auto", level=1) - 1.0)
+    figures["auto_overhead_percent"] = over.max(), "%"
+    for scene, value in over.items():
+        key = scene.replace(",", "").replace(" ", "_")
+        figures[f"auto_overhead_{key}_percent"] = value, "%"
+    # What comes from another process has lists for tuples.
+    figures.update({key: tuple(found) for key, found in costs["certificate"].items()})
+    compiling = sum(found.get("before_first_step_s", 0.0) for found in results.values())
+    study.finish(options, NAME, figures, compiling)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from dataclasses import replace
 from functools import partial
 from statistics import median
 
-import numpy as np
+import pandas as pd
 
 import ca_damper
 from ca_damper import Automaton, Batch, Combined, InputError, SceneTable, Spheres
@@ -61,47 +61,18 @@ OUTCOMES = {"runs": "o", "diverges": "X", "refused": "|"}
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
 
-def run(options):
-    """Time all variants, find their longest steps, write tables and pictures."""
-    folder = study.begin(options)
-    with ca_damper.ProgressBar("timing") as bar:
-        costs, compiling = {}, 0.0
-        for k, label in enumerate(options.variants):
-            costs[label], seconds = cost_of(label, options)
-            compiling += seconds
-            bar.count(k + 1, len(options.variants))
-    automata = [replace(PAPER, accounting=word) for word in options.accountings]
-    borne = {
-        one.label: [(dt, outcome(one, dt, options.cycles)) for dt in options.steps]
-        for one in (Spheres(), *automata)
-    }
-    study.write_rows(folder / "cost.csv", [row for rows in costs.values() for row in rows])
-    tried = [(label, *found) for label, rows in borne.items() for found in rows]
-    study.write_rows(folder / "steps.csv", tried, "filling dt_s outcome")
-    picture_cost(folder / "cost.png", costs)
-    picture_steps(folder / "steps.png", borne)
-    print("CPU milliseconds a cycle")
-    rows = [[f"{1e3 * row['cpu_s']:.3g}" for row in some] for some in zip(*costs.values())]
-    study.print_table([(n, *row) for n, row in zip(options.particles, rows)], ["N", *costs])
-    print()
-    study.finish(options, NAME, figures_of(costs, borne), compiling)
-
-
 def cost_of(label, options):
     """CPU seconds a cycle of a variant, a row for each number of particles; those of compiling."""
     filling, dt, *_ = VARIANTS[label]
-    batch = scenes(filling, options.particles, dt)
+    batch, rows = scenes(filling, options.particles, dt), []
     steps = int(batch.steps_per_cycle[0])
     batch.advance(steps)
-    rows = []
     for k, particles in enumerate(options.particles):
         # At a time as many cycles as fill a moment.
         cycles = 1 + int(options.seconds / max(cycle_seconds(batch, k, 1), 1e-6))
         repeats = [cycle_seconds(batch, k, cycles) / cycles for _ in range(options.repeats)]
-        row = {"variant": label, "particles": particles, "steps": steps}
-        rows.append(
-            {**row, "cpu_s": median(repeats), "low_s": min(repeats), "high_s": max(repeats)}
-        )
+        row = {"variant": label, "particles": particles, "steps": steps, "cpu_s": median(repeats)}
+        rows.append({**row, "low_s": min(repeats), "high_s": max(repeats)})
     return rows, batch.compile_seconds
 
 
@@ -130,33 +101,17 @@ def outcome(filling, dt, cycles):
     return "runs"
 
 
-def figures_of(costs, borne):
-    """Seconds a cycle at 50 particles, rates, growth from fewest to most, longest steps."""
-    figures = {}
-    for label, rows in costs.items():
-        at = min(rows, key=lambda row: abs(row["particles"] - SOME))
-        some, seconds = at["particles"], at["cpu_s"]
-        rate = 1e-6 * some * at["steps"] / seconds
-        figures[f"cycle_ms_{label}_N{some}"] = study.figure(1e3 * seconds, "ms")
-        figures[f"particle_steps_{label}_N{some}"] = study.figure(rate, "million/s")
-        figures[f"growth_{label}"] = study.figure(rows[-1]["cpu_s"] / rows[0]["cpu_s"], "1")
-    for label, found in borne.items():
-        running = [dt for dt, word in found if word == "runs"]
-        figures[f"longest_step_{label}"] = study.figure(max(running, default=None), "s")
-    return figures
-
-
 def picture_cost(path, costs):
     """CPU time of a cycle over the number of particles, linear and logarithmic."""
     with picture(path, 1, 2, (9.2, 5.2)) as (figure, axes):
-        for label, rows in costs.items():
+        for label, rows in costs.groupby("variant", sort=False):
             filling, _, words, mark, line = VARIANTS[label]
-            style, table = STYLES[filling.label], study.columns_of(rows)
+            style, middle = STYLES[filling.label], 1e3 * rows.cpu_s
             look = {"color": style.colour, "marker": mark, "ms": 4, "ls": line, "lw": 1.2}
-            look["label"] = f"{style.label}, {words}"
-            low, middle, high = (1e3 * np.array(table[key]) for key in ("low_s", "cpu_s", "high_s"))
+            bars = middle - 1e3 * rows.low_s, 1e3 * rows.high_s - middle
             for axis in axes:
-                axis.errorbar(table["particles"], middle, [middle - low, high - middle], **look)
+                words_of = {"label": f"{style.label}, {words}", **look}
+                axis.errorbar(rows.particles, middle, bars, **words_of)
         axes[0].set(title="bars: range of the repeats", ylim=(0, None))
         axes[1].set(title="the same, logarithmic", yscale="log")
         for axis in axes:
@@ -165,18 +120,53 @@ def picture_cost(path, costs):
 
 
 def picture_steps(path, borne):
-    """Outcome of a run at each step: a row a filling. borne: {name: [(dt [s], outcome)]}."""
-    styles = styles_of(borne)
-    with picture(path, 1, 1, (7.0, 1.2 + 0.5 * len(borne))) as (_, axis):
+    """Outcome of a run at each step: a row a filling."""
+    names = [*borne.filling.unique()]
+    styles = styles_of(names)
+    with picture(path, 1, 1, (7.0, 1.2 + 0.5 * len(names))) as (_, axis):
         for word, mark in OUTCOMES.items():
             label = word.replace("refused", "refused before the first step")
             axis.plot([], [], mark, color=BLACK, label=label, ms=7)
-            for row, (name, found) in enumerate(borne.items()):
-                steps = [1e6 * dt for dt, end in found if end == word]
-                axis.plot(steps, [row] * len(steps), mark, color=styles[name].colour, ms=7)
-        axis.set(xscale="log", xlabel="step [µs]", ylim=(-0.6, len(borne) - 0.4))
-        axis.set_yticks(range(len(borne)), [style.label for style in styles.values()])
+        for filling, dt, word in borne.itertuples(index=False):
+            look = {"color": styles[filling].colour, "ms": 7}
+            axis.plot(1e6 * dt, names.index(filling), OUTCOMES[word], **look)
+        axis.set(xscale="log", xlabel="step [µs]", ylim=(-0.6, len(names) - 0.4))
+        axis.set_yticks(range(len(names)), [style.label for style in styles.values()])
         axis.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+
+
+def run(options):
+    """Time all variants, find their longest steps, write tables and pictures."""
+    folder, rows, compiling, figures = study.begin(options), [], 0.0, {}
+    with ca_damper.ProgressBar("timing") as bar:
+        for k, label in enumerate(options.variants):
+            own, seconds = cost_of(label, options)
+            rows, compiling = rows + own, compiling + seconds
+            bar.count(k + 1, len(options.variants))
+    automata = [replace(PAPER, accounting=word) for word in options.accountings]
+    tried = [
+        {"filling": one.label, "dt_s": dt, "outcome": outcome(one, dt, options.cycles)}
+        for one in (Spheres(), *automata)
+        for dt in options.steps
+    ]
+    costs, borne = pd.DataFrame(rows), pd.DataFrame(tried)
+    costs.to_csv(folder / "cost.csv", index=False)
+    borne.to_csv(folder / "steps.csv", index=False)
+    picture_cost(folder / "cost.png", costs)
+    picture_steps(folder / "steps.png", borne)
+    print("CPU milliseconds a cycle")
+    table = 1e3 * costs.pivot(index="particles", columns="variant", values="cpu_s")
+    print(table[[*options.variants]].to_string(float_format="{:.3g}".format), "\n")
+    for label, own in costs.groupby("variant", sort=False):
+        at = own.loc[(own.particles - SOME).abs().idxmin()]
+        end, rate = f"{label}_N{at.particles}", 1e-6 * at.particles * at.steps / at.cpu_s
+        figures[f"cycle_ms_{end}"] = 1e3 * at.cpu_s, "ms"
+        figures[f"particle_steps_{end}"] = rate, "million/s"
+        figures[f"growth_{label}"] = own.cpu_s.iloc[-1] / own.cpu_s.iloc[0], "1"
+    for label, own in borne.groupby("filling", sort=False):
+        running = own.dt_s[own.outcome == "runs"]
+        figures[f"longest_step_{label}"] = running.max() if len(running) else None, "s"
+    study.finish(options, NAME, figures, compiling)
 
 
 if __name__ == "__main__":

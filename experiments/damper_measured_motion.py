@@ -17,16 +17,19 @@ results/damper_measured_motion/.
 
 import sys
 from functools import partial
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
-from _measured_motion import RECORD, picture_damping, picture_motion
 from ca_damper import Automaton, Empty, Spheres, excitation, shake
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "damper_measured_motion"
+RECORD = Path(__file__).with_name("base_motion.csv")
 SETTINGS = {
     "record": (str(RECORD), str(RECORD), str, "CSV file of the base's motion"),
     "scale": (1.0, 1.0, study.number(0, 1e6), "factor of the motion, 1"),
@@ -42,6 +45,47 @@ FILLINGS = (Spheres(), Automaton())
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 
 
+def picture_motion(path, made, shown):
+    """Acceleration of the base, and motion of the container with and without grains."""
+    empty, filled = made["empty"], {k: v for k, v in made.items() if k != "empty"}
+    with picture(path, 3, 1, size=(8.6, 7.2), sharex=True) as (_, axes):
+        base, time = empty.excitation.base, empty.time_s
+        axes[0].plot(time, base.at(np.minimum(time, base.duration))[2], color=BLACK, lw=0.8)
+        axes[0].set(ylabel="acceleration\nof the base [m/s²]")
+        bare = {"color": STYLES["empty"].colour, "lw": 0.9, "label": STYLES["empty"].label}
+        for axis, (label, history) in zip(axes[1:], filled.items()):
+            style, k = styles_of(filled)[label], history.particles.index(shown)
+            axis.plot(time, 1e3 * empty.relative[:, 0, 0], **bare)
+            own = {"color": style.colour, "lw": 0.9, "label": f"{style.label}, {shown} particles"}
+            axis.plot(time, 1e3 * history.relative[:, k, 0], **own)
+            axis.set(ylabel="displacement from\nthe base [mm]")
+            axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+        axes[-1].set(xlabel="time [s]", xlim=(0.0, time[-1]))
+
+
+def picture_damping(path, made):
+    """RMS, peak and damping ratio over the number of particles; bars: range over the seeds."""
+    empty, filled = made["empty"], {k: v for k, v in made.items() if k != "empty"}
+    drawn = (
+        ("RMS displacement from the base [mm]", lambda one: 1e3 * one.relative_rms),
+        ("largest displacement from the base [mm]", lambda one: 1e3 * one.relative_peak),
+        ("damping ratio [%]", lambda one: 1e2 * one.damping_ratio),
+    )
+    with picture(path, 1, 3, size=(9.2, 3.6)) as (figure, axes):
+        for axis, (words, measure) in zip(axes, drawn):
+            level = measure(empty)[0, 0]
+            axis.axhline(level, color=STYLES["empty"].colour, ls=":", label=STYLES["empty"].label)
+            for label, history in filled.items():
+                style, values = styles_of(filled)[label], measure(history)
+                middle = values.mean(axis=1)
+                bars = [middle - values.min(axis=1), values.max(axis=1) - middle]
+                look = {"color": style.colour, "marker": style.marker, "ms": 4, "lw": 1.2}
+                axis.errorbar(history.particles, middle, yerr=bars, label=style.label, **look)
+            axis.set(xlabel="particles [1]", ylabel=words, ylim=(0.0, None))
+        keys = axes[0].get_legend_handles_labels()
+        figure.legend(*keys, loc="outside upper left", ncols=3)
+
+
 def run(options):
     """Shake all fillings, compare, picture."""
     motion = excitation.from_csv(options.record, correct_baseline=True).scaled(options.scale)
@@ -52,41 +96,29 @@ def run(options):
             few = {"particles": options.particles, "seeds": options.seeds, "progress": progress}
             made[filling.label] = shake(filling, motion, **few)
     shown = min(options.particles, key=lambda number: abs(number - SHOWN))
-    write_tables(folder, made, shown)
+    empty, figures, tables = made["empty"], {}, []
+    columns = {"time_s": empty.time_s, "base_m": empty.base}
+    for label, history in made.items():
+        number = 0 if label == "empty" else shown
+        end, k = f"{label}_N{number}".removesuffix("_N0"), history.particles.index(number)
+        columns[f"x_m_{end}"] = history.x[:, k, 0]
+        values = {
+            "rms_mm": 1e3 * history.relative_rms,
+            "peak_mm": 1e3 * history.relative_peak,
+            "damping_ratio": history.damping_ratio,
+        }
+        for name, one in values.items():
+            unit = "1" if name == "damping_ratio" else "mm"
+            figures[f"{name}_{end}"] = float(one[k].mean()), unit
+        scenes = pd.MultiIndex.from_product([[label], history.particles, history.seeds])
+        tables.append(pd.DataFrame({key: one.ravel() for key, one in values.items()}, scenes))
+    write_csv(folder / "motion.csv", columns)
+    names = ["filling", "particles", "seed"]
+    pd.concat(tables).to_csv(folder / "damping.csv", index_label=names)
     picture_motion(folder / "motion.png", made, shown)
     picture_damping(folder / "damping.png", made)
     reports = [history.report for history in made.values()]
-    study.finish(options, NAME, figures_of(made, shown), reports, see="damping.png")
-
-
-def figures_of(made, shown):
-    """RMS, peak and damping ratio: empty, and mean over the seeds at the number shown."""
-    figures = {}
-    for label, history in made.items():
-        k = 0 if label == "empty" else history.particles.index(shown)
-        end = label if label == "empty" else f"{label}_N{shown}"
-        figures[f"rms_mm_{end}"] = (1e3 * float(history.relative_rms[k].mean()), "mm")
-        figures[f"peak_mm_{end}"] = (1e3 * float(history.relative_peak[k].mean()), "mm")
-        figures[f"damping_ratio_{end}"] = (float(history.damping_ratio[k].mean()), "1")
-    return figures
-
-
-def write_tables(folder, made, shown):
-    """The motions of the first seed at the number shown, and a row a scene."""
-    empty = made["empty"]
-    columns = {"time_s": empty.time_s, "base_m": empty.base, "x_m_empty": empty.x[:, 0, 0]}
-    rows = []
-    for label, history in made.items():
-        if label != "empty":
-            k = history.particles.index(shown)
-            columns[f"x_m_{label}_N{shown}"] = history.x[:, k, 0]
-        ratios = history.damping_ratio
-        for place in np.ndindex(history.rms.shape):
-            number, seed = history.particles[place[0]], history.seeds[place[1]]
-            values = history.relative_rms[place], history.relative_peak[place], ratios[place]
-            rows.append((label, number, seed, *map(float, values)))
-    write_csv(folder / "motion.csv", columns)
-    study.write_rows(folder / "damping.csv", rows, "filling particles seed rms_m peak_m ratio")
+    study.finish(options, NAME, figures, reports, see="damping.png")
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import pandas as pd
 
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film
 from ca_damper.automaton.transport import READINGS
@@ -76,7 +77,6 @@ def run(options):
     errors = {title: 1e3 * np.array(made.errors(COUNTED)) for title, made in runs.items()}
     picture_rebound(folder / "rebound.png", runs, errors)
     write_tables(folder, runs)
-    print_errors(errors)
     study.finish(options, NAME, figures_of(errors), [batch for batch, _ in jobs.values()])
 
 
@@ -152,29 +152,15 @@ def picture_rebound(path, runs, errors):
 
 def plot_errors(axes, errors):
     """Bars by impact; errors: of the times of impact [ms], by filling."""
-    values = list(errors.values())
-    for k in range(max(map(len, values))):
-        rows = [row for row, own in enumerate(values) if k < len(own)]
-        places = [row + 0.19 * (k - 0.5 * (COUNTED - 1)) for row in rows]
-        widths = [max(SHORTEST, values[row][k]) for row in rows]
-        axes.barh(places, widths, 0.17, color=SHADES[k], label=f"impact {k + 1}")
+    rows = [pd.Series(own, [f"impact {k + 1}" for k in range(len(own))]) for own in errors.values()]
+    table = pd.DataFrame(rows, [TITLES[title] for title in errors]).clip(lower=SHORTEST)
     words = f"most that passes, {ALLOWED_MS:g} ms"
     axes.axvline(ALLOWED_MS, color=VIOLET, linewidth=1.0, linestyle="--", label=words)
-    axes.set_yticks(range(len(errors)), [TITLES[title] for title in errors])
-    axes.set(xscale="log", xlabel="error of the time of impact [ms]", xlim=(SHORTEST, None))
+    table.plot.barh(ax=axes, width=0.76, color=SHADES, logx=True)
+    axes.set(xlabel="error of the time of impact [ms]", xlim=(SHORTEST, None))
     axes.invert_yaxis()
     axes.grid(False, axis="y")
     axes.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=2, columnspacing=1.2)
-
-
-def print_errors(errors):
-    """Print the errors of every impact."""
-    print("Error of impact [ms] and of the apex after it [mm], by impact")
-    rows = []
-    for title, own in errors.items():
-        cells = [f"{late:+.3f} / {high:+.3f}" for late, high in own.T]
-        rows.append((title, *cells, *["at rest"] * (COUNTED - len(cells))))
-    study.print_table(rows, ["filling", *(str(k + 1) for k in range(COUNTED))])
 
 
 if __name__ == "__main__":

@@ -23,17 +23,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
-from ca_damper import (
-    Automaton,
-    InputError,
-    ProgressBar,
-    Spheres,
-    frequency_response,
-    goals,
-    solve_response,
-    sweep_up_and_down,
-)
+import ca_damper as ca
 from ca_damper.plot import picture_hysteresis, picture_measures, picture_responses
 from ca_damper.runs.response import OUTSIDE, Grid
 from taichi_dem.kit import study
@@ -44,12 +36,12 @@ NAME = "damper_response"
 COARSE = ([0.80, 0.84, 0.87, 0.89], [1.04, 1.06, 1.09, 1.12])
 RATIOS = np.round(np.concatenate([COARSE[0], np.arange(0.90, 1.0201, 0.005), COARSE[1]]), 4)
 #: Of both fillings [kg].
-PARTICLE_MASS = Spheres().particle_mass
+PARTICLE_MASS = ca.Spheres().particle_mass
 #: Those of the paper.
 ACCOUNTINGS = ("landing", "landing+ejection", "all")
-AUTOMATA = [Automaton(rules="paper", accounting=word) for word in ACCOUNTINGS]
+AUTOMATA = [ca.Automaton(rules="paper", accounting=word) for word in ACCOUNTINGS]
 #: The fillings compared, by label.
-FILLINGS = {filling.label: filling for filling in (Spheres(), *AUTOMATA)}
+FILLINGS = {filling.label: filling for filling in (ca.Spheres(), *AUTOMATA)}
 NUMBERS = several(whole(0, 160))
 SETTINGS = {
     "fillings": (list(FILLINGS), ["dem", "ca_static"], several(str), ", ".join(FILLINGS)),
@@ -78,22 +70,24 @@ def run(options):
     """Measure all fillings, write tables and pictures."""
     for label in options.fillings:
         if label not in FILLINGS:
-            raise InputError(f"fillings must be some of {', '.join(FILLINGS)}, got {label!r}")
+            raise ca.InputError(f"fillings must be some of {', '.join(FILLINGS)}, got {label!r}")
     if options.accuracy is not None:
         return run_to_accuracy(options)
     if options.resume and not any(Path(options.out).glob("checkpoint_*.npz")):
-        raise InputError(f"resume must be left out: there is no checkpoint in {options.out}")
+        raise ca.InputError(f"resume must be left out: there is no checkpoint in {options.out}")
     jobs = {label: jobs_of(FILLINGS[label], options) for label in options.fillings}
     folder = study.begin(options)
     responses, sweeps = {}, {}
     for label, (response, sweep) in jobs.items():
-        responses[label] = made(frequency_response, response, f"{label}_response", options)
-        sweeps[label] = made(sweep_up_and_down, sweep, f"{label}_sweep", options)
+        responses[label] = made(ca.frequency_response, response, f"{label}_response", options)
+        sweeps[label] = made(ca.sweep_up_and_down, sweep, f"{label}_sweep", options)
     write_tables(responses, sweeps, folder)
     picture_responses(folder / "response.png", responses, PARTICLE_MASS)
     picture_measures(folder / "measures.png", responses, PARTICLE_MASS)
     picture_hysteresis(folder / "hysteresis.png", sweeps)
-    figures = {**show_peaks(responses), **figures_of(responses, sweeps)}
+    peaks = peaks_of(responses)
+    print(peaks.to_string(index=False, float_format="{:.4g}".format, na_rep=OUTSIDE), "\n")
+    figures = figures_of(peaks, responses, sweeps)
     reports = [one.report for one in (*responses.values(), *sweeps.values())]
     study.finish(options, NAME, figures, reports)
 
@@ -102,29 +96,23 @@ def run_to_accuracy(options):
     """Find the peaks to an accuracy; print and write the answers."""
     study.check_accuracy(options)
     folder, rows, figures = study.begin(options), [], {}
-    asked = [goals.peak_ratio(), goals.peak_rms()]
+    asked = [ca.goals.peak_ratio(), ca.goals.peak_rms()]
     for label in options.fillings:
         for n in options.particles:
             job = {"particles": n, "goal": asked, "tolerance": options.accuracy}
-            with ProgressBar(f"{label}, {n} particles") as bar:
-                answers = solve_response(FILLINGS[label], **job, progress=bar)
+            with ca.ProgressBar(f"{label}, {n} particles") as bar:
+                answers = ca.solve_response(FILLINGS[label], **job, progress=bar)
             for answer in answers:
                 study.show_answer(f"{label}, {n} particles", answer)
                 rows.append(((label, n), answer))
-            figures.update(figures_of_answers(f"{label}_N{n}", *answers))
+            end, (ratio, rms) = f"{label}_N{n}", answers
+            figures[f"peak_ratio_{end}"] = ratio.value, "1"
+            figures[f"peak_ratio_error_{end}"] = ratio.error, "1"
+            figures[f"peak_rms_mm_{end}"] = 1e3 * rms.value, "mm"
+            figures[f"peak_rms_error_mm_{end}"] = 1e3 * rms.error, "mm"
+            figures[f"cpu_seconds_{end}"] = rms.plan.seconds, "s"
     study.write_accuracy(folder, ("filling", "particles"), rows)
     study.finish(options, NAME, figures, 0.0)
-
-
-def figures_of_answers(end, ratio, rms):
-    """Values and half-widths of their bars, and the CPU seconds that they took together."""
-    return {
-        f"peak_ratio_{end}": study.figure(ratio.value, "1"),
-        f"peak_ratio_error_{end}": study.figure(ratio.error, "1"),
-        f"peak_rms_mm_{end}": study.figure(1e3 * rms.value, "mm"),
-        f"peak_rms_error_mm_{end}": study.figure(1e3 * rms.error, "mm"),
-        f"cpu_seconds_{end}": study.figure(rms.plan.seconds, "s"),
-    }
 
 
 def jobs_of(filling, options):
@@ -144,7 +132,7 @@ def jobs_of(filling, options):
 def made(work, arguments, name, options):
     """What work(**arguments) gives, under a progress bar, with a checkpoint of its own."""
     kept = study.checkpoint_of(options, f"checkpoint_{name}", may_be_new=True)
-    with ProgressBar(name.replace("_", " ")) as bar:
+    with ca.ProgressBar(name.replace("_", " ")) as bar:
         return work(**arguments, **kept, progress=bar)
 
 
@@ -161,35 +149,32 @@ def write_tables(responses, sweeps, folder):
     study.write_rows(folder / "peaks.csv", rows, "filling particles seed peak_ratio peak_rms_mm")
 
 
-def show_peaks(responses):
-    """Print the peaks beside those of a rigid mass; returns their figures, medians over seeds."""
-    figures, rows = {}, []
+def peaks_of(responses):
+    """Table of the peaks beside those of a rigid mass, medians over seeds."""
+    rows = []
     for label, response in responses.items():
         for n, ratios, rms in zip(response.particles, *response.peaks()):
             rigid_ratio, rigid = response.oscillator.peak(n * PARTICLE_MASS)
-            ratio, middle = float(np.median(ratios)), 1e3 * float(np.median(rms))
-            spread = f"{1e3 * rms.min():.2f} .. {1e3 * rms.max():.2f}"
-            shown = f"{ratio:.4f}", f"{middle:.2f}", spread
-            found, height, spread = shown if np.isfinite(ratio) else (OUTSIDE,) * 3
-            place = found, f"{rigid_ratio:.4f}"
-            rows.append((label, n, *place, height, spread, f"{1e3 * rigid:.2f}"))
-            figures[f"peak_ratio_{label}_N{n}"] = study.figure(ratio, "1")
-            figures[f"peak_rms_mm_{label}_N{n}"] = study.figure(middle, "mm")
-    header = ["filling", "N", "peak f/f0", "rigid", "peak RMS [mm]", "seeds", "rigid [mm]"]
-    study.print_table(rows, header)
-    print()
-    return figures
+            found = {"peak_ratio": np.median(ratios), "rigid_ratio": rigid_ratio}
+            found.update(peak_rms_mm=1e3 * np.median(rms), rigid_rms_mm=1e3 * rigid)
+            found.update(lowest_mm=1e3 * rms.min(), highest_mm=1e3 * rms.max())
+            rows.append({"filling": label, "particles": n, **found})
+    return pd.DataFrame(rows)
 
 
-def figures_of(responses, sweeps):
-    """Largest hysteresis of each filling beyond chance, and the seconds of its runs."""
+def figures_of(peaks, responses, sweeps):
+    """Peaks, largest hysteresis of each filling beyond chance, and the seconds of its runs."""
     figures = {}
+    for row in peaks.itertuples():
+        end = f"{row.filling}_N{row.particles}"
+        figures[f"peak_ratio_{end}"] = row.peak_ratio, "1"
+        figures[f"peak_rms_mm_{end}"] = row.peak_rms_mm, "mm"
     for label, sweep in sweeps.items():
         seen = np.where(sweep.shows_hysteresis, np.abs(sweep.hysteresis.mean(axis=2)), 0.0)
         for n, most in zip(sweep.up.particles, seen.max(axis=1)):
-            figures[f"hysteresis_{label}_N{n}"] = study.figure(float(most), "1")
+            figures[f"hysteresis_{label}_N{n}"] = float(most), "1"
         spent = responses[label].report.run_seconds + sweep.report.run_seconds
-        figures[f"run_seconds_{label}"] = study.figure(spent, "s")
+        figures[f"run_seconds_{label}"] = spent, "s"
     return figures
 
 

@@ -13,25 +13,33 @@ Writes blow.gif, blow.png, blow.csv, levels_*.csv and summary.json to results/de
 
 import sys
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 
 import taichi_dem as dem
-from _blast import BLAST_DRIVERS
-from _multirate import TABLE, Impact, caption, figures_of, write
+from _blast import BLAST_DRIVERS, run_costs
+from _drawing import FilmedRun, film_runs
 from taichi_dem.kit import study
-from taichi_dem.kit.plot_style import styles_of
-from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.validation import told_apart
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.plot_style import GREY, line_key, picture, styles_of
 from taichi_dem.mesh.shapes import bar, placed_together
+from taichi_dem.mesh.topology import faces_of_group
+from taichi_dem.plot.series import (
+    draw_level_shares,
+    level_columns,
+    level_look,
+    level_names,
+    level_shares,
+)
 from taichi_dem.simulate import run_simulation
 
 NAME = "demo_multirate"
-#: All methods, made in one place; the first is what the others are compared with.
+#: All methods; the first is what the others are compared with.
 METHODS = {
     "uniform": dem.Uniform,
     "held": dem.Multirate,
-    "drifted": lambda dt0, distance: dem.Multirate(dt0, distance, "drifted"),
+    "drifted": partial(dem.Multirate, neighbour="drifted"),
 }
 SETTINGS = {
     "speed": (20.0, 20.0, study.number(0, 50), "of the fragment [m/s], 20"),
@@ -45,49 +53,119 @@ DT0, DISTANCE = 4e-8, 5e-8
 LENGTH, WIDTH, CELLS = 0.9, 0.1, (18, 2, 2)
 FRAGMENT, GAP = 0.1, 2e-5
 SAMPLES = 80
+TABLE = study.Table(
+    method=("name", "method"),
+    evaluations=(lambda made: int(made.evaluations[-1]), "evaluations", ",", "1"),
+    fewer_evaluations=("fewer", "fewer by", ".2f", "1"),
+    struck_um=(lambda made: 1e6 * float(made.struck[-1]), "struck end [um]", ".2f", "um"),
+    difference=("difference", "difference", ".3f%", "1"),
+    broken_faces=("result.report.broken_faces", "broken", "", "1"),
+    residual=("result.report.energy_residual_fraction", "residual", ".2g%", "1"),
+    cpu_s=("result.report.run_cpu_seconds", "CPU [s]", ".2f"),
+)
 
 
-def built_scene():
-    """The bar, and a fragment off its right end."""
+def hit(name, options):
+    """Let the fragment hit the bar, with a method; returns what is measured, an entry a frame.
+
+    struck, far: mean way of the bar's ends away from the fragment [m].
+    """
     parts = {
         "bar": (bar(LENGTH, WIDTH, CELLS), (0.0, 0.0, 0.0)),
         "fragment": (bar(FRAGMENT, WIDTH, (2, 2, 2)), (LENGTH + GAP, 0.0, 0.0)),
     }
     bonds = [dem.effects.BondDamping(), dem.effects.Softening(), dem.effects.ShearSlip()]
     acting = [*bonds, dem.effects.BodyContact(), dem.effects.StickingFriction()]
-    return dem.Scene(placed_together(parts), dem.CONCRETE, acting)
+    scene = dem.Scene(placed_together(parts), dem.CONCRETE, acting)
+    made = dem.Simulation(scene, METHODS[name](DT0, DISTANCE), options.driver)
+    place, model = made.model.centre, made.model
+    speed = np.outer(place[:, 0] > LENGTH, (-options.speed, 0.0, 0.0))
+    made.state.set_motion(place, velocity=speed)
+    cost, style = run_costs(), styles_of([name])[name]
+    looks = {"samples": SAMPLES, "frames": SAMPLES, "observers": [cost], "title": style.label}
+    result = run_simulation(made, until=options.until, **looks)
+    struck, far = (
+        -np.array([frame.displacement[bodies, 0].mean() for frame in result.frames])
+        for bodies, _ in (
+            faces_of_group(model.mesh, model.topology, group) for group in ("bar_right", "bar_left")
+        )
+    )
+    return SimpleNamespace(
+        **{"name": name, "style": style, "result": result, "struck": struck, "far": far},
+        levels=np.array([frame.level for frame in result.frames]),
+        evaluations=cost["evaluations"],
+    )
 
 
-def hit(name, options):
-    """Let the fragment hit the bar, with a method; returns Impact."""
-    cost = dem.Collector(dem.Every(samples=1), evaluations=lambda view: view.evaluations)
-    with ProgressBar(styles_of([name])[name].label) as shown:
-        made = dem.Simulation(built_scene(), METHODS[name](DT0, DISTANCE), options.driver)
-        place = made.model.centre
-        speed = np.outer(place[:, 0] > LENGTH, (-options.speed, 0.0, 0.0))
-        made.state.set_motion(place, velocity=speed)
-        looks = {"samples": SAMPLES, "frames": SAMPLES, "observers": [cost], "progress": shown}
-        return Impact(name, run_simulation(made, until=options.until, **looks), cost["evaluations"])
+def picture_blow(path, impacts, time):
+    """Motion of the ends, evaluations, and share of bodies on each level of the second method."""
+    other = impacts[1]
+    with picture(path, 2, 2, size=(9.0, 6.0), sharex=True) as (_, ((way, work), (share, words))):
+        for impact in impacts:
+            look = {"color": impact.style.colour, "ls": impact.style.line}
+            way.plot(time, 1e6 * impact.struck, **look)
+            way.plot(time, 1e6 * impact.far, lw=0.8, **look)
+            work.plot(time, 1e-6 * impact.evaluations, label=impact.style.label, **look)
+        way.set(xlabel="time [µs]", ylabel="displacement [µm]", title="the answer")
+        work.set(xlabel="time [µs]", ylabel="evaluations of bonds and pairs [10⁶]")
+        work.set(title="the price", xlim=(0.0, time[-1]))
+        words.set_axis_off()
+        # There are no numbers below the right one, as words has no axes.
+        for axes in (way, work):
+            axes.tick_params(labelbottom=True)
+        ends = {"struck end (thick)": 1.5, "far end (thin)": 0.8}
+        way.legend(handles=[line_key(words, color=GREY, lw=width) for words, width in ends.items()])
+        key = words.legend(*work.get_legend_handles_labels(), loc="upper left", handlelength=4.0)
+        draw_level_shares(words, share, time, level_shares(other.levels), DT0, "lower left")
+        words.add_artist(key)
+        share.set(xlabel="time [µs]", title=f"steps: {other.style.label}")
+
+
+def film(path, impacts, time, count):
+    """Both bars by their bodies' steps, and how far the struck end moves. count: of pictures."""
+    top, runs = int(max(impact.levels.max() for impact in impacts)) + 1, []
+    for impact in impacts:
+        name, done = impact.style.label, zip(1e-6 * impact.evaluations, time)
+        titles = [f"{name}:\n{n:.1f} million evaluations after {t:.0f} µs" for n, t in done]
+        shown = impact.result, impact.result.frames, impact.levels.astype(float), titles
+        runs.append(FilmedRun(*shown, 1e6 * impact.struck, name, impact.style.colour))
+    film_runs(
+        *(path, runs, 1e-6 * time[np.linspace(0, len(time) - 1, count).round().astype(int)]),
+        words="step of a body",
+        ticks=(np.arange(top), level_names(DT0, top)),
+        curve={"ylabel": "displacement of\nthe struck end [µm]"},
+        magnify=40.0,
+        **level_look(top),
+    )
 
 
 def run(options):
     """Hit the bar with every method, compare, picture."""
     slowest = 2.0 * GAP / options.until
     if options.speed < slowest:
-        got, least = told_apart(options.speed, slowest)
-        raise dem.InputError(
-            f"speed must be at least {least} m/s, for {1e6 * GAP:g} um by half of until, got {got}"
-        )
+        words = f"{slowest:.4g} m/s, for {1e6 * GAP:g} um by half of until"
+        raise dem.InputError(f"speed must be at least {words}, got {options.speed:.4g}")
     at = study.output_paths(options.out)
     impacts = [hit(name, options) for name in options.methods]
-    for impact in impacts:
-        impact.compare(impacts[0])
+    base, time_s, columns = impacts[0], impacts[0].result.series["time_s"], {}
+    for one in impacts:
+        one.fewer = float(base.evaluations[-1] / one.evaluations[-1])
+        one.difference = float(np.abs(one.struck - base.struck).max() / np.abs(base.struck).max())
+        columns.update({f"struck_{one.name}_m": one.struck, f"far_{one.name}_m": one.far})
+        columns[f"evaluations_{one.name}"] = one.evaluations
+        shares = level_columns(level_shares(one.levels))
+        write_csv(at(f"levels_{one.name}.csv"), {"time_s": time_s, **shares})
+    write_csv(at("blow.csv"), {"time_s": time_s, **columns})
     rows = TABLE.rows(impacts)
     TABLE.show(rows)
-    write(impacts, DT0, at, options.pictures)
-    reports = [impact.result.report for impact in impacts]
-    words = caption(rows, impacts[1], LENGTH)
-    study.finish(options, NAME, figures_of(rows), reports, caption=words)
+    picture_blow(at("blow.png"), impacts, 1e6 * time_s)
+    film(at("blow.gif"), impacts[:2], 1e6 * time_s, options.pictures)
+    figures = {}
+    for row in rows:
+        figures.update(TABLE.figures(row, "{method}_{key}"))
+    for key in ("fewer_evaluations", "difference"):
+        del figures[f"{base.name}_{key}"]
+    study.finish(options, NAME, figures, [impact.result.report for impact in impacts])
 
 
 if __name__ == "__main__":

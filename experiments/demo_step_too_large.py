@@ -14,14 +14,20 @@ summary.json to results/demo_step_too_large/.
 """
 
 import sys
+import textwrap
 from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
 
 import taichi_dem as dem
-from _step_too_large import TABLE, Struck, caption, corner_speed, write
+from _drawing import FilmedRun, film_runs
 from taichi_dem.kit import study
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.plot_style import BLACK, GREEN, GREY, ORANGE, RED, picture, seconds
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.observers import macro_steps
+from taichi_dem.plot.series import positive
 from taichi_dem.simulate import result_of
 
 NAME = "demo_step_too_large"
@@ -39,28 +45,54 @@ UNTIL, SAMPLES = {"dashpots": 4e-5, "springs": 2e-4}, 200
 BAR = bar(0.4, 0.1, (8, 2, 2))
 #: Steps before the first look: until then the blow has given too little for the account to close.
 UNHEEDED = 5
-
-
-def struck_bar(limit, peak):
-    """The scene: a bar under a short blow on its left end, with or without dashpots."""
-    blow = dem.effects.GasPressure("left", peak=peak, rise=5e-6, decay_ratio=2.0)
-    damping = [dem.effects.BondDamping()] if limit == "dashpots" else []
-    return dem.Scene(BAR, dem.CONCRETE, [blow, *damping])
+TABLE = study.Table(
+    limited_by=("limit", "limited by"),
+    share_of_limit=("share", "step / limit", "g"),
+    step_s=("step", "step [s]", ".3g"),
+    diverged=(lambda made: int(bool(made.sentence)), "", "", "1"),
+    reached_s=(lambda made: float(made.time[-1]), "reached [s]", ".3g", "s"),
+    unexplained=(lambda made: float(made.residual[-1]), "unexplained / put in", ".2g", "1"),
+    end=(lambda made: "diverged" if made.sentence else "done", "end"),
+    sentence=("sentence",),
+)
+#: Looks of the runs of a limit; axes of the unexplained energy.
+LOOKS = ((GREEN, "-"), (ORANGE, "--"), (RED, "-."))
+UNEXPLAINED = {"yscale": "log", "ylim": (1e-5, 1e4)}
 
 
 def strike(limit, share, peak):
-    """Run the bar with a share of the limit as its step, to its end or as far as it goes."""
+    """Strike the bar on its left end, with a share of the limit as the step, as far as it goes.
+
+    With an entry a look: speeds, bounds of the speed of every body's corners [m/s], and residual,
+    energy that the account cannot explain over that put in by then.
+    """
+    blow = dem.effects.GasPressure("left", peak=peak, rise=5e-6, decay_ratio=2.0)
+    damping = [dem.effects.BondDamping()] if limit == "dashpots" else []
     step, until = share * longest_step(limit), UNTIL[limit]
-    when = dem.At([step * mark for mark in marks(macro_steps(until, step))])
-    energy = {"energy": dem.RunView.energy_balance, "frame": dem.RunView.frame}
-    seen = dem.Collector(when, time=lambda view: view.time_s, speed=corner_speed, **energy)
-    with ProgressBar(f"{share:g} x the limit of {limit}") as bar_shown:
-        looks = {"samples": 1, "progress": bar_shown, "observers": [seen]}
-        method, scene = dem.Uniform(step), struck_bar(limit, peak)
-        result = result_of(dem.simulate, scene, method=method, until=until, **looks)
+    evenly = {round(macro_steps(until, step) * k / SAMPLES) for k in range(1, SAMPLES + 1)}
+    when = dem.At([step * mark for mark in sorted({0, *(s for s in evenly if s >= UNHEEDED)})])
+    views = {"energy": dem.RunView.energy_balance, "frame": dem.RunView.frame}
+    seen = dem.Collector(when, time=lambda view: view.time_s, speed=corner_speed, **views)
+    looks = {"samples": 1, "title": f"{share:g} x the limit of {limit}", "observers": [seen]}
+    scene = dem.Scene(BAR, dem.CONCRETE, [blow, *damping])
+    result = result_of(dem.simulate, scene, method=dem.Uniform(step), until=until, **looks)
     if result.diverged:
         seen.observe(seen.view)
-    return Struck(limit, share, step, seen, result)
+    terms = [[row["load_work"], row["residual"]] for row in seen.rows["energy"]]
+    given, found = np.abs(terms).T
+    return SimpleNamespace(
+        **{"limit": limit, "share": share, "step": step, "name": f"{share:g} × limit"},
+        **{"result": result, "sentence": result.diverged, "frames": seen.rows["frame"]},
+        **{"time": seen["time"], "speeds": seen["speed"]},
+        residual=found / np.where(given > 0.0, given, np.inf),
+    )
+
+
+def corner_speed(view):
+    """Bound of the speed of every body's corners [m/s]."""
+    motion = view.motion()
+    spin = view.model.body_radius * np.linalg.norm(motion["spin"], axis=1)
+    return np.linalg.norm(motion["velocity"], axis=1) + spin
 
 
 def longest_step(limit):
@@ -69,10 +101,47 @@ def longest_step(limit):
     return float(limits["bond_dashpot" if limit == "dashpots" else "bond_stiffness"].min())
 
 
-def marks(last):
-    """Steps at which a run of so many is sampled, and looked at by the program."""
-    evenly = {round(last * k / SAMPLES) for k in range(1, SAMPLES + 1)}
-    return sorted({0, *(step for step in evenly if step >= UNHEEDED)})
+def picture_energy(path, runs, said):
+    """Energy that the account cannot explain over time, a panel a limit; the sentences below."""
+    limits = list(dict.fromkeys(made.limit for made in runs))
+    size = (4.3 * len(limits) + 0.6, 3.4 + 0.55 * len(said))
+    shape = {"squeeze": False, "sharey": True}
+    with picture(path, 1, len(limits), size, **shape) as (figure, panels):
+        for axes, limit in zip(panels[0], limits):
+            own = [made for made in runs if made.limit == limit]
+            for made, (colour, dashes) in zip(own, LOOKS):
+                time, label = 1e6 * made.time, f"{made.name} = {seconds(made.step)}"
+                axes.plot(time, positive(made.residual), color=colour, ls=dashes, label=label)
+                if made.sentence:
+                    axes.plot(time[-1], made.residual[-1], "X", color=colour, ms=7, clip_on=False)
+            axes.axhline(1.0, color=GREY, ls=":", lw=1.0, label="all that was put in")
+            axes.plot([], [], "X", color=BLACK, ms=7, ls="none", label="ended by the program")
+            axes.set(title=f"limited by its {limit}", xlabel="time [µs]", **UNEXPLAINED)
+            axes.legend(loc="upper right", title="step")
+        panels[0, 0].set_ylabel("unexplained energy / energy put in [1]")
+        words = "\n".join(textwrap.fill(text, 60 * len(limits)) for text in said)
+        figure.supxlabel(words, x=0.02, ha="left", fontsize=8.5)
+
+
+def film(path, safe, bad, count=40, held=8):
+    """A safe run and a diverging one; count: of pictures, the last ones of which are held."""
+    end, fastest, runs = float(bad.time[-1]), float(safe.speeds.max()), []
+    for made, (colour, _) in zip((safe, bad), LOOKS):
+        titles = [f"{made.name}, t = {1e6 * time:.1f} µs" for time in made.time]
+        shown = made.result, made.frames, made.speeds, titles
+        runs.append(FilmedRun(*shown, positive(made.residual), made.name, colour))
+    # Closer together towards the end, where all happens at once.
+    moving = end * (1.0 - np.linspace(1.0, 0.0, count - held) ** 1.5)
+    film_runs(
+        *(path, runs, [*moving, *[end] * held]),
+        words="speed of a body [m/s]",
+        curve={"ylabel": "unexplained\nenergy /\nput in [1]", **UNEXPLAINED},
+        magnify=6000.0,
+        # Oblique enough to show two sides and the struck end.
+        axis=(-0.35, 0.45, 1.0),
+        footers=[""] * (count - held - 1) + [textwrap.fill(bad.sentence, 66)] * (held + 1),
+        **{"cmap": "YlOrRd", "norm": "log", "clim": (1e-4 * fastest, 1e2 * fastest)},
+    )
 
 
 def run(options):
@@ -81,14 +150,18 @@ def run(options):
     runs = [strike(limit, share, options.peak) for limit, shares in cases for share in shares]
     rows = TABLE.rows(runs)
     TABLE.show(rows)
-    said = [f"  {made.limit}, {made.share:g}: {made.sentence}" for made in runs if made.sentence]
+    said = [f"{made.limit}, {made.name}: “{made.sentence}”" for made in runs if made.sentence]
     print("What the program said:", *said, "", sep="\n")
-    write(runs, rows, at)
+    for made in runs:
+        columns = {"time_s": made.time, "unexplained_over_put_in": made.residual}
+        write_csv(at(f"history_{made.limit}_{made.share:g}.csv"), columns)
+    study.write_rows(at("steps.csv"), rows)
+    picture_energy(at("energy.png"), runs, said)
+    film(at("shaken.gif"), *runs[:2])
     figures = {f"limit_{limit}_s": (longest_step(limit), "s") for limit in UNTIL}
     for row in rows:
         figures.update(TABLE.figures(row, "{limited_by}_{share_of_limit:g}_{key}"))
-    reports = [made.result.report for made in runs]
-    study.finish(options, NAME, figures, reports, caption=caption(runs))
+    study.finish(options, NAME, figures, [made.result.report for made in runs])
 
 
 if __name__ == "__main__":

@@ -17,13 +17,17 @@ wave.png, spall.png, wave.csv, spall.csv and summary.json to results/demo_wave_a
 import sys
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 
 import taichi_dem as dem
-from _wave_and_spall import CELL, LENGTH, STEP, TABLE, Bars, caption, figures_of, write
+from _drawing import FilmedRun, film_runs
 from taichi_dem.kit import study
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, RED, picture
 from taichi_dem.mesh.shapes import bar, placed_together
+from taichi_dem.simulate import run_simulation
 
 NAME, LAW = "demo_wave_and_spall", dem.CONCRETE
 SETTINGS = {
@@ -31,61 +35,190 @@ SETTINGS = {
     "ratios": ((1.25, 1.5, 1.75, 2.0), (1.5, 2.0)),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
-#: Width of a bar, tail and front of the pulse [m], share of dashpots left.
-WIDTH, TAIL, FRONT, DAMPING = 0.1, 2.4, 0.4, 0.05
+#: Length and width of a bar, tail and front of the pulse [m], share of dashpots left.
+LENGTH, WIDTH, TAIL, FRONT, DAMPING = 4.0, 0.1, 2.4, 0.4, 0.05
+#: Bodies of a cell, time step [s], steps between looks.
+CELL, STEP, LOOK = 6, 1e-6, 20
+#: Places where the wave's passing is timed, as shares of the bar.
+GATES = (0.25, 0.625)
+TABLE = study.Table(
+    ratio=("ratio", "s0 / sigma_t", "g"),
+    arrived_MPa=("arrived_MPa", "arrived [MPa]", ".2f"),
+    depth_m=("depth_m", "depth [m]", ".3f", "m"),
+    formula_m=("formula_m", "formula [m]", ".3f", "m"),
+    error_cells=(lambda one: float(one.depth_m - one.formula_m) / one.cell, "", "", "1"),
+    spall_speed_m_s=("speed", "end flies at [m/s]", ".2f"),
+)
+#: Below zero, at zero, above: pressed, at rest, pulled.
+COLOURS = "RdBu_r"
+
+
+def follow(simulation, bars, until, title):
+    """Step to the last look before a time [s]; returns the Result, and what is seen of the cells.
+
+    moved, speed: mean displacement [m] and velocity [m/s], (looks, bars, cells). joints: whether
+    all bonds between a cell and the next have broken, (looks, bars, cells - 1).
+    """
+    looks = round(until / STEP) // LOOK
+    shown = {"samples": 1, "frames": looks, "title": title}
+    result = run_simulation(simulation, until=looks * LOOK * STEP, **shown)
+    frames, top = result.frames, result.model.topology
+    place = np.array([frame.position[:, 0] for frame in frames]) - result.model.centre[:, 0]
+    speed = np.array([frame.velocity[:, 0] for frame in frames])
+    time = np.array([frame.time_s for frame in frames])
+    moved, speed = (x.reshape(len(frames), bars, -1, CELL).mean(axis=-1) for x in (place, speed))
+    ends = np.sort([top.master // CELL, top.slave // CELL], axis=0)
+    between, broke = ends[0] != ends[1], np.full(moved[0].size, -np.inf)
+    last = np.nan_to_num(result.broken_time[between], nan=np.inf)
+    np.maximum.at(broke, ends[0, between], last)
+    joints = broke.reshape(moved[0].shape)[:, :-1] <= time[:, None, None]
+    return result, SimpleNamespace(time=time, moved=moved, speed=speed, joints=joints)
 
 
 def push(cells):
-    """Push on the left end of an elastic bar, weakly; returns Bars over time, and the Report."""
+    """Push on the left end of an elastic bar, weakly; as ``follow``."""
     load = dem.effects.GasPressure("left", peak=1e4, rise=2e-4, decay_ratio=1.0)
-    elastic, seen = dem.Scene(bar(LENGTH, WIDTH, (cells, 1, 1)), LAW, [load]), Bars(1, cells)
-    return seen, seen.follow(dem.Simulation(elastic, dem.Uniform(STEP)), 2.6e-3, "wave")
+    elastic = dem.Scene(bar(LENGTH, WIDTH, (cells, 1, 1)), LAW, [load])
+    return follow(dem.Simulation(elastic, dem.Uniform(STEP)), 1, 2.6e-3, "wave")
 
 
 def spall(cells, ratios, speed):
-    """The same of bars with a pulse of each strength under way; speed: of waves [m/s]."""
+    """The same of bars with a pulse of each strength under way; speed: of waves [m/s].
+
+    The front stands at the free end. In a wave to the right the velocity is v(x), the strain -v/c.
+    """
     damping = {k: DAMPING * getattr(LAW, k) for k in ("normal_damping", "shear_damping")}
     one, places = bar(LENGTH, WIDTH, (cells, 1, 1)), range(len(ratios))
-    mesh = placed_together({f"bar{k}": (one, (0.0, 0.0, 3 * WIDTH * k)) for k in places})
+    mesh = placed_together({f"bar{k}": (one, (0.0, 3 * WIDTH * k, 0.0)) for k in places})
     acting = [dem.effects.Softening(), dem.effects.BondDamping()]
-    scene, seen = dem.Scene(mesh, replace(LAW, **damping), acting), Bars(len(ratios), cells)
+    scene = dem.Scene(mesh, replace(LAW, **damping), acting)
     simulation = dem.Simulation(scene, dem.Uniform(STEP))
-    lay_pulse(simulation, np.repeat(ratios, CELL * cells), speed)
-    return seen, seen.follow(simulation, 1.9 * (FRONT + TAIL / 2.0) / speed, "spall")
-
-
-def lay_pulse(simulation, ratio, speed):
-    """Set the bars moving as a pulse does whose front stands at the free end.
-
-    ratio: of every body's pulse to the strength. speed: of the wave [m/s]. In a wave to the right
-    the velocity is v(x) and the strain -v / c.
-    """
     centre = simulation.model.centre
-    peak = ratio * LAW.tensile_strength / (LAW.density * speed)
+    peak = np.repeat(ratios, CELL * cells) * LAW.tensile_strength / (LAW.density * speed)
     depth, grid = LENGTH - centre[:, 0], np.linspace(0.0, LENGTH, 4001)
     shape = np.interp(grid, [0.0, FRONT, FRONT + TAIL], [0.0, 1.0, 0.0])
     velocity = peak * np.interp(depth, grid, shape)
     moved = peak / speed * np.interp(depth, grid, np.cumsum(shape) * grid[1])
     place, velocity = centre + np.outer(moved, (1, 0, 0)), np.outer(velocity, (1, 0, 0))
     simulation.state.set_motion(place, velocity=velocity)
+    return follow(simulation, len(ratios), 1.9 * (FRONT + TAIL / 2.0) / speed, "spall")
 
 
-def first_break(arrived):
-    """Depth of the first break [m] by the formula; arrived: peak of the pulse [Pa]."""
-    return TAIL * LAW.tensile_strength / (2.0 * arrived)
+def wave_speed(wave, gates, cell):
+    """Speed [m/s] at which a push passes the gates: where both records agree best."""
+    fine = np.arange(0.0, wave.time[-1], STEP)
+    early, late = (np.interp(fine, wave.time, wave.speed[:, 0, gate]) for gate in gates)
+    passing = np.correlate(late, early, mode="full")[len(fine) - 1 :].argmax() * STEP
+    return float((gates[1] - gates[0]) * cell / passing)
+
+
+def spalled(made, k, ratio, speed, cell):
+    """Subject of TABLE: the stress that arrived, depth of the first break, the formula's."""
+    joints, velocity = made.joints[:, k], made.speed[:, k, -1]
+    row = int(joints.any(axis=1).argmax())
+    first = np.flatnonzero(joints[row])
+    arrived = 0.5 * LAW.density * speed * velocity[: row + 1].max()
+    return SimpleNamespace(
+        **{"ratio": ratio, "cell": cell, "arrived_MPa": 1e-6 * arrived, "speed": velocity[-1]},
+        depth_m=LENGTH - cell * (first.mean() + 1.0) if len(first) else np.nan,
+        formula_m=TAIL * LAW.tensile_strength / (2.0 * arrived),
+    )
+
+
+def space_time(axes, place, time, values, top):
+    """Draw values over place and time: red above zero, blue below."""
+    look = {"cmap": COLOURS, "vmin": -top, "vmax": top, "shading": "auto", "rasterized": True}
+    axes.set(xlabel="place [m]", ylabel="time [ms]")
+    return axes.pcolormesh(place, 1e3 * time, values, **look)
+
+
+def picture_wave(path, wave, place, cells):
+    """Velocity over place and time, and over time in some cells, by their words."""
+    velocity, label, time = 1e3 * wave.speed[:, 0], "velocity [mm/s]", wave.time
+    with picture(path, 1, 2, size=(9.0, 3.8)) as (figure, (along, over)):
+        drawn = space_time(along, place, time, velocity, np.abs(velocity).max())
+        figure.colorbar(drawn, ax=along, label=label)
+        looks = zip((BLUE, GREEN, RED), ("-", "--", "-."))
+        for (words, cell), (colour, dashes) in zip(cells.items(), looks):
+            look = {"color": colour, "ls": dashes, "label": words}
+            over.plot(1e3 * time, velocity[:, cell], **look)
+            along.axvline(place[cell], lw=1.2, **look)
+        along.set_title("it runs, comes back, runs again")
+        along.legend(loc="lower left", bbox_to_anchor=(0.0, 1.08), ncols=4, columnspacing=1.0)
+        top = 2.0 * velocity[:, [*cells.values()][1]].max()
+        over.axhline(top, color=GREY, ls=":", label="twice the wave's peak")
+        over.set(xlabel="time [ms]", ylabel=label, title="the free end doubles it")
+        over.legend(loc="upper left")
+
+
+def picture_spall(path, made, stress, rows, joint, cell):
+    """Stress [MPa] over place and time in the first bars, and depths beside the formula's."""
+    count, time = min(2, len(rows)), made.time
+    top = np.abs(stress[:, :count]).max()
+    with picture(path, 1, 1 + count, size=(3.05 * (1 + count), 3.6)) as (figure, (*panels, last)):
+        for k, (row, axes) in enumerate(zip(rows, panels)):
+            drawn = space_time(axes, joint, time, stress[:, k], top)
+            when, where = np.nonzero(np.diff(made.joints[:, k].astype(int), axis=0, prepend=0))
+            axes.plot(joint[where], 1e3 * time[when], "x", color=BLACK, ms=6, label="breaks")
+            look = {"color": BLACK, "ls": ":", "lw": 1.0, "label": "first break by the formula"}
+            axes.axvline(LENGTH - row["formula_m"], **look)
+            axes.set_title(f"pulse of {row['ratio']:g} × strength")
+        figure.colorbar(drawn, ax=axes, label="stress, tension positive [MPa]")
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=2)
+        arrived, depth = ([row[key] for row in rows] for key in ("arrived_MPa", "depth_m"))
+        line = np.linspace(0.8 * min(arrived), 1.1 * max(arrived), 100)
+        formula = rows[0]["formula_m"] * rows[0]["arrived_MPa"] / line
+        last.plot(line, formula, color=GREY, label="pulse length × strength / (2 s$_0$)")
+        look = {"fmt": "o", "color": RED, "ms": 5, "label": "broke, ± one cell"}
+        last.errorbar(arrived, depth, yerr=cell, **look)
+        last.set(xlabel="pulse s$_0$ that arrived [MPa]", ylabel="depth of the first break [m]")
+        last.set(ylim=(0.0, None), title="the stronger, the thinner")
+        last.legend(loc="lower right", bbox_to_anchor=(1.0, 1.08))
+
+
+def film(path, result, made, stress, k, count=40):
+    """All bars by their stress [MPa], and the velocity of the free end of one."""
+    cells = np.pad(stress, ((0, 0), (0, 0), (0, 1))).reshape(len(made.time), -1)
+    titles = [f"t = {1e3 * time:.2f} ms" for time in made.time]
+    shown = np.repeat(cells, CELL, axis=1), titles, made.speed[:, k, -1], "free end", GREEN
+    top = np.abs(stress).max()
+    film_runs(
+        *(path, [FilmedRun(result, result.frames, *shown)]),
+        made.time[np.linspace(0, len(made.time) - 1, count).round().astype(int)],
+        words="stress, tension positive [MPa]",
+        curve={"ylabel": "velocity [m/s]"},
+        magnify=150.0,
+        **{"cmap": COLOURS, "clim": (-top, top), "linewidth": 0.0},
+    )
 
 
 def run(options):
     """Push, measure, spall, picture."""
-    at = study.output_paths(options.out)
-    wave, first = push(options.cells)
-    speed = wave.speed
-    made, second = spall(options.cells, options.ratios, speed)
-    rows = [made.spalled(k, one, speed, first_break) for k, one in enumerate(options.ratios)]
-    study.show_rows(rows, TABLE)
-    shown = write(wave, made, rows, at)
-    figures, words = figures_of(wave, rows), caption(rows[shown], wave)
-    study.finish(options, NAME, figures, [first, second], caption=words)
+    at, cells, cell = study.output_paths(options.out), options.cells, LENGTH / options.cells
+    place, joint = cell * (np.arange(cells) + 0.5), cell * np.arange(1, cells)
+    gates = [round(share * cells) for share in GATES]
+    first, wave = push(cells)
+    speed = wave_speed(wave, gates, cell)
+    second, made = spall(cells, options.ratios, speed)
+    bars = [spalled(made, k, one, speed, cell) for k, one in enumerate(options.ratios)]
+    rows = TABLE.rows(bars)
+    TABLE.show(rows)
+    study.write_rows(at("spall.csv"), rows)
+    cells = {**{f"at {place[k]:.2f} m": k for k in gates}, "free end": -1}
+    columns = {words.replace(" ", "_"): wave.speed[:, 0, k] for words, k in cells.items()}
+    write_csv(at("wave.csv"), {"time_s": wave.time, **columns})
+    picture_wave(at("wave.png"), wave, place, cells)
+    strain = np.where(made.joints, 0.0, np.diff(made.moved, axis=-1) / cell)
+    stress = 1e-6 * LAW.density * speed**2 * strain
+    picture_spall(at("spall.png"), made, stress, rows, joint, cell)
+    shown = int(np.argmin([abs(row["ratio"] - 1.5) for row in rows]))
+    film(at("spall.gif"), second, made, stress, shown)
+    end, gate = wave.speed[:, 0, [-1, gates[1]]].max(axis=0)
+    figures = {"wave_speed_m_s": (speed, "m/s"), "free_end_over_wave": (float(end / gate), "1")}
+    figures["cell_m"] = cell, "m"
+    for row in rows:
+        figures.update(TABLE.figures(row, "spall_{ratio:g}_{key}"))
+    study.finish(options, NAME, figures, [first.report, second.report])
 
 
 if __name__ == "__main__":

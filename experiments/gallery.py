@@ -11,18 +11,24 @@ then renews the table of README.md. --pictures takes small pictures and figures 
 docs; --readme writes these figures into the sentences of the pages.
 """
 
+import json
 import os
 import re
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
-from _figures_in_text import fill_figures, keep_figures
 from taichi_dem import InputError
 from taichi_dem.kit.files import output_folder, write_text
 from taichi_dem.kit.study import bare_parser, main_of_tool, several
 from taichi_dem.kit.study.entries import ENTRIES, read_entries
-from taichi_dem.kit.study.results_page import markdown_table, shrink_picture, write_page
-from taichi_dem.kit.study.results_run import run_entries
+from taichi_dem.kit.study.results_page import (
+    markdown_table,
+    read_json,
+    run_entries,
+    shrink_picture,
+    write_page,
+)
 
 HERE = Path(__file__).resolve().parent
 PAGES = read_entries(HERE / ENTRIES)
@@ -34,6 +40,9 @@ TOOLS = {
 }
 #: Small pictures for the repository: widest side [pixels] and colours.
 SMALL_PICTURES, SMALL = "docs/pictures", (960, 256)
+#: Figures by experiment, with the command, the machine and the versions of its run.
+KEPT = "docs/figures.json"
+_MARK = re.compile(r"(<!-- figure: ([^>]+?), (\d) digits -->)(.*?)(<!-- end -->)", re.DOTALL)
 FLAGS = {
     "quick": "run smaller jobs of under a minute",
     "reuse": "run only what has no result yet",
@@ -91,6 +100,43 @@ def without_entry():
     """Names of experiments that the page would not show."""
     names = {path.stem for path in HERE.glob("*.py") if not path.stem.startswith("_")}
     return sorted(names - set(TOOLS) - {page.name for page in pages()})
+
+
+def keep_figures(out, root, names):
+    """Keep the figures of full runs in out/NAME for the pages."""
+    path = Path(root, KEPT)
+    kept = read_json(path)
+    for name in names:
+        summary = read_json(Path(out, name, "summary.json"))
+        if summary and not summary["quick"]:
+            values = {key: one["value"] for key, one in summary["figures"].items()}
+            made_by = {key: summary[key] for key in ("command", "machine", "versions")}
+            # Where its files lay is of no use to a reader.
+            made_by["command"] = made_by["command"].partition(" --out ")[0]
+            kept[name] = {"figures": values, **made_by}
+    write_text(path, json.dumps(kept, indent=1, sort_keys=True) + "\n")
+
+
+def fill_figures(text, root):
+    """A page's text with the kept figures between its marks.
+
+    Raises InputError where a mark names a figure that is not kept.
+    """
+    kept = read_json(Path(root, KEPT))
+    names = {name: SimpleNamespace(**one["figures"]) for name, one in kept.items()}
+
+    def fill(mark):
+        begin, formula, digits, _, end = mark.groups()
+        try:
+            value = eval(formula, {"__builtins__": {}}, names)
+        except (NameError, AttributeError) as error:
+            raise InputError(f"figure {formula!r} must be one kept in {KEPT}: {error}") from None
+        # So many significant digits, whole numbers by groups of three.
+        rounded = float(f"{value:.{digits}g}")
+        whole = rounded >= 10 ** (int(digits) - 1)
+        return f"{begin}{rounded:,.0f}{end}" if whole else f"{begin}{rounded:.{digits}g}{end}"
+
+    return _MARK.sub(fill, text)
 
 
 def shrink_pictures(out, folder):

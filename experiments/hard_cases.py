@@ -7,7 +7,7 @@
 A case is a scene at the edge of what can be computed, with figures that physics bounds: the formula
 stands in the table. A method that claims the case passes with all figures within their bounds; the
 margin is bound over figure, of the worst of them. A method that cannot handle it has to refuse in
-words: numbers in their place count as a failure.
+words: numbers in their place count as a failure. The cases are tests, in tests/hard_cases.
 
 Writes hard_cases.csv, a picture of each case, hard_cases_blast.png, hard_cases_damper.png,
 hard_cases.png and summary.json to results/hard_cases/.
@@ -17,12 +17,14 @@ import math
 import sys
 from collections import Counter, defaultdict
 from functools import partial
+from pathlib import Path
 
-from _hard_cases import registry
+import pytest
+
+from _hard_cases_pictures import picture_cases, picture_margins
 from taichi_dem.kit import study
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study.cases import FAILED, PASSED, REFUSED, assess, cases_named
-from taichi_dem.kit.study.cases_picture import picture_cases, picture_margins
 
 NAME = "hard_cases"
 #: Of a quick run, which compile little; the tests ask all, at quick size.
@@ -31,60 +33,101 @@ SETTINGS = {
     "only": (None, OF_QUICK, study.several(str), "cases by name, all by default"),
     "columns": (3, 3, study.whole(1, 8), "of the sheet, 3"),
 }
-#: A uniform step of a hard case is fixed: the paper's rule does not shorten it.
-STYLES = {"uniform": "fixed"}
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
+TESTS = Path(__file__).parents[1] / "tests" / "hard_cases" / "test_hard_cases.py"
+#: Nothing of what the other tests need, and nothing said but by this program.
+PYTEST = "-s --noconftest -o addopts= --import-mode=importlib -p no:terminal -p no:cacheprovider"
 
 
-def worst(member):
-    """Function of a trial: a member of its worst figure, an empty cell without one."""
-    return lambda trial: getattr(trial.worst, member, "")
+class Asked:
+    """A plugin of pytest that chooses cases and their size, and keeps what they gave."""
+
+    def __init__(self, only, quick, bar):
+        self.only, self.quick, self.bar = only, quick, bar
+        self.trials, self.count, self.interrupted = [], 0, False
+
+    def pytest_configure(self, config):
+        """Tell the test that it is asked."""
+        config.option.hard_cases = self
+
+    def pytest_collection_modifyitems(self, items):
+        """Keep the cases of these names."""
+        given = [getattr(item, "callspec", None) for item in items]
+        cases = [one and one.params.get("case") for one in given]
+        chosen = self.only or {case.name for case in cases if case}
+        items[:] = [item for item, case in zip(items, cases) if case and case.name in chosen]
+        self.count = len(items)
+
+    def pytest_keyboard_interrupt(self):
+        """Pytest keeps Ctrl-C to itself."""
+        self.interrupted = True
+
+    def take(self, trial):
+        """Keep the trial of a test."""
+        self.trials.append(trial)
+        self.bar.count(len(self.trials), self.count)
 
 
-TABLE = study.Table(
-    case=("case.name", "case"),
-    package=("case.package",),
-    method=("method", "method"),
-    status=("status", "status"),
-    figure=(worst("name"),),
-    value=(worst("value"),),
-    bound=(worst("bound"),),
-    formula=(worst("formula"),),
-    margin=(worst("margin"), "margin", ".3g"),
-    seconds=(lambda trial: f"{trial.seconds:.3g}",),
-    words=("words", "worst figure, or what it said"),
-)
+def trials_of(options):
+    """Run the tests; returns their trials."""
+    with ProgressBar("hard cases") as bar:
+        asked = Asked(options.only, options.quick, bar)
+        pytest.main([str(TESTS), *PYTEST.split()], plugins=[asked])
+    if asked.interrupted:
+        raise KeyboardInterrupt
+    named = {trial.case.name for trial in asked.trials}
+    for name in options.only or ():
+        if name not in named:
+            raise InputError(f"only must name hard cases of {TESTS.parent}, got {name!r}")
+    if not asked.trials or len(asked.trials) < asked.count:
+        raise RuntimeError(f"tests of hard cases broke: see pytest {TESTS}")
+    return asked.trials
+
+
+def row_of(trial):
+    """A trial as a row of the table."""
+    worst = trial.worst and {**trial.worst._asdict(), "margin": trial.worst.margin}
+    figure = worst or dict.fromkeys(("name", "value", "bound", "formula", "margin"), "")
+    return {
+        "case": trial.case.name,
+        "package": trial.case.package,
+        "method": trial.method,
+        "status": trial.status,
+        "figure": figure.pop("name"),
+        **figure,
+        "seconds": f"{trial.seconds:.3g}",
+        "words": trial.words,
+    }
 
 
 def run(options):
     """Ask every method of every case, write table, pictures and the sheet of all."""
-    cases = cases_named(registry(), options.only) if options.only else registry()
-    folder, trials, sheets = study.begin(options), [], defaultdict(list)
-    jobs = [(case, method) for case in cases for method in case.asked]
-    with ProgressBar("hard cases") as bar:
-        for case, method in jobs:
-            trials.append(assess(case, method, options.quick))
-            bar.count(len(trials), len(jobs))
-    rows = TABLE.rows(trials)
+    folder, sheets = study.begin(options), defaultdict(list)
+    trials = trials_of(options)
+    rows = [row_of(trial) for trial in trials]
     study.write_rows(folder / "hard_cases.csv", rows)
     for trial in trials:
         sheets[trial.case.name].append(trial)
         sheets[f"hard_cases_{trial.case.package}"].append(trial)
     for name, own in sheets.items():
-        picture_cases(folder / f"{name}.png", own, options.columns, STYLES)
-    picture_margins(folder / "hard_cases.png", trials, STYLES)
-    for row in rows:
-        row["margin"] = None if row["margin"] == "" else row["margin"]
-        row["words"] = row["words"] if len(row["words"]) < 90 else row["words"][:87] + "..."
-    TABLE.show(rows)
+        picture_cases(folder / f"{name}.png", own, options.columns)
+    picture_margins(folder / "hard_cases.png", trials)
+    shown = ("case", "method", "status", "margin", "words")
+    study.print_table([[cell_of(row[key]) for key in shown] for row in rows], shown)
     ends = Counter(trial.status for trial in trials)
-    counts = {"cases": len(cases), "askings": len(trials)}
-    counts.update({status: ends[status] for status in (PASSED, REFUSED, FAILED)})
-    least = min((trial.margin for trial in trials if trial.worst), default=math.inf)
+    counts = {"cases": len({trial.case.name for trial in trials}), "askings": len(trials)}
+    counts.update({status: ends[status] for status in ("passed", "refused", "failed")})
+    least = min((trial.worst.margin for trial in trials if trial.worst), default=math.inf)
     if math.isfinite(least):
         counts["least_margin"] = least
     figures = {name: (count, "1") for name, count in counts.items()}
     study.finish(options, NAME, figures, sum(trial.compile_s for trial in trials))
+
+
+def cell_of(value):
+    """A value as it is printed."""
+    text = value if isinstance(value, str) else f"{value:.3g}"
+    return text if len(text) < 90 else f"{text[:87]}..."
 
 
 if __name__ == "__main__":

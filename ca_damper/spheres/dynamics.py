@@ -27,7 +27,7 @@ from ca_damper.spheres.forces import PairForces, WallForces
 from ca_damper.spheres.friction_history import FrictionHistory
 from ca_damper.spheres.rotation import Rotation
 from taichi_dem.kit.allocation import values
-from taichi_dem.kit.audit import Audit
+from taichi_dem.kit.certificate import Audit
 from taichi_dem.kit.effect_usage import EffectUse
 
 # Codes of divergence; a speed is a runaway's when it crosses more than a radius in a step.

@@ -20,8 +20,8 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.engine.event_counts import EventCounts
-from ca_damper.report.certificate import Estimate
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.certificate import Estimate
 from taichi_dem.kit.effect_usage import EffectUse
 
 vec2 = ti.types.vector(2, ti.f64)
@@ -43,6 +43,8 @@ _UNSEEN = "touches between two looks leave no trace"
 # Blows that may all turn a sphere the same way.
 _BLOWS = 1000
 _AIR_DENSITY = 1.2
+# Shares below which an effect is negligible, and from which on it is needed.
+_LIMITS = (1e-3, 1e-2)
 
 
 @ti.data_oriented
@@ -112,21 +114,20 @@ def rotation_estimate(spheres: Any, particles: int) -> Estimate:
     meets = spheres.wall_friction > 0.0 or (particles > 1 and spheres.friction > 0.0)
     if not meets or particles == 0:
         why = "no friction turns a sphere" if particles else "there is no sphere"
-        return Estimate("rotation", 0.0, "the energy in motion", why)
+        return Estimate("rotation", 0.0, f"share of the energy in motion, as {why}:", _LIMITS)
     friction = max(spheres.friction, spheres.wall_friction)
     restitution = max(spheres.restitution, spheres.wall_restitution)
     slides, sticks = friction * (1.0 + restitution), 2.0 / 7.0
     change = math.sqrt(0.5) * min(_BLOWS * slides, sticks)
-    return Estimate(
-        "rotation",
-        2.5 * change * change,
-        "the energy in motion",
-        f"blows at 45 degrees, friction {friction:g}, {_BLOWS} of them turning the same way",
+    words = (
+        f"share of the energy in motion after {_BLOWS} blows at 45 degrees that all turn a sphere "
+        f"the same way, friction {friction:g}, at most"
     )
+    return Estimate("rotation", 2.5 * change * change, words, _LIMITS)
 
 
 def air_estimate(spheres: Any) -> Estimate:
     """Share of its energy that a sphere loses to the air from floor to lid; never computed."""
     air = _AIR_DENSITY * math.pi * min(spheres.radii) ** 2 * spheres.height
-    why = "drag coefficient 1; this filling has no air"
-    return Estimate("air drag", min(1.0, air / min(spheres.masses)), "the energy of a flight", why)
+    words = "share of the energy of a flight at a drag coefficient of 1, at most"
+    return Estimate("air drag", min(1.0, air / min(spheres.masses)), words, _LIMITS)

@@ -6,10 +6,10 @@ import numpy as np
 
 from _blast import BLOCK_STEP, FROM_RADII, HOLE_RADIUS, paper_effects
 from _meshes import mirrored_copies, with_moved_nodes
-from _trust.number import Number
+from _trust.common import Number
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.kit.plot_style import BLACK, GREY, RED
-from taichi_dem.mesh.joined import in_space_order
+from taichi_dem.mesh.shapes import in_space_order
 from taichi_dem.mesh.tetrahedra import all_faces, outer_rows
 
 #: Copies of the paper's block, one behind the other; end of a run [s].
@@ -28,20 +28,14 @@ def blast(effort):
     field = "field blasts: AS 2187.2, range of Bureau of Mines Bulletin 656"
     rock = "rock, Cunningham (2005), 0.8 to 1.5"
     quarries = "quarries, Ouchterlony (2005), 1.5 to 3.5"
+    falls = "blast_exponent", "exponent of peak velocity over distance", -1.6
+    first = "blast_rosin_rammler", "exponent of Rosin and Rammler's law of sizes", 1.15
+    other = "blast_swebrec", "exponent of the Swebrec law of sizes", 2.5
+    whole = "1 ms after the blow most of the block is still one piece"
     numbers = (
-        Number(
-            *("blast_exponent", "exponent of peak velocity over distance", "1", field),
-            *(-1.6, exponent, -2.4, -1.1),
-        ),
-        Number(
-            *("blast_rosin_rammler", "exponent of Rosin and Rammler's law of sizes", "1", rock),
-            *(1.15, rosin, 0.8, 1.5),
-        ),
-        Number(
-            *("blast_swebrec", "exponent of the Swebrec law of sizes", "1", quarries),
-            *(2.5, swebrec, 1.5, 3.5),
-            note="1 ms after the blow most of the block is still one piece",
-        ),
+        Number(*falls, exponent, -2.4, -1.1, source=field),
+        Number(*first, rosin, 0.8, 1.5, source=rock),
+        Number(*other, swebrec, 1.5, 3.5, source=quarries, note=whole),
     )
     return numbers, partial(draw, sieved=sieved)
 

@@ -17,7 +17,9 @@ LENGTH, WIDTH, CELLS = 0.4, 0.05, (12, 1, 1)
 UNTIL = 1.2e-4
 #: Tolerances to choose from [%], and the first.
 TOLERANCES, FIRST = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03, 0.01), 3.0
-CHOICES = {"tolerance": (TOLERANCES, FIRST, "largest error that you allow [%]")}
+PAGE, WAIT = "what_an_answer_costs", "Asking."
+ALT = "Answers with their bars, bars and true errors, and CPU time over the error allowed"
+CONTROLS = {"tolerance": (TOLERANCES, FIRST, "largest error that you allow [%]")}
 #: Step of the truth [s], a tenth or less of those of answers to 0.03 %.
 FINEST = 1e-8
 GOAL = dem.goals.displacement("right")

@@ -5,7 +5,7 @@ The grains are those of the automaton by rules of place. All runs on the thread 
 
 import numpy as np
 
-from _page import png_like_the_first
+from _page import percent, png_like_the_first
 from ca_damper import Automaton, Batch, Oscillator, SceneTable
 from ca_damper.plot import Box, DrawnBox, frame_panel
 from ca_damper.report.record import frames_of
@@ -15,8 +15,8 @@ from taichi_dem.kit.session_thread import session
 #: Frequencies by the natural one of the empty box, and the cycles before and while measuring.
 RATIOS = (0.88, 0.9, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.99, 1.0, 1.02, 1.05)
 TRANSIENT, MEASURED = 60, 15
-#: Sliders of the page: steps, the first, label.
-CHOICES = {
+PAGE, WAIT, ALT = "why_a_box_of_grains_damps", "Shaking.", "Response, energy a cycle, box"
+CONTROLS = {
     "base": ((0.05, 0.1, 0.2, 0.4, 0.6, 1.0, 1.5, 2.0), 0.6, "base moves by [mm]"),
     "ratio": (RATIOS, 0.97, "frequency / own frequency"),
     "grains": ((5, 10, 20, 30, 40, 60), 30, "grains (160 fill the box)"),
@@ -54,6 +54,22 @@ class Answer:
         return float(values[RATIOS.index(self.ratio)])
 
 
+def answer(base, ratio, grains, share):
+    """The Answer to a choice of the CONTROLS."""
+    return Answer(grains, 0.01 * share, 1e-3 * base, ratio)
+
+
+def words(answer):
+    """The swing, and what the grains take, in sentences."""
+    taken = percent(max(0.0, answer.energy["filling"] / answer.energy["base"]))
+    return (
+        f"The box swings by **{1e3 * answer.swing:.2g} mm** and is accelerated by up to "
+        f"**{answer.throw:.2g} g**. The grains take **{taken}** of the energy that the base gives; "
+        f"the damping ratio is {answer.damping_ratio:.2g} instead of "
+        f"{answer.oscillator.damping_ratio:.2g}."
+    )
+
+
 def structure(grains, share, base):
     """The box and spring for a share of mass: the paper's frequency and damping ratio are kept.
 
@@ -67,7 +83,7 @@ def structure(grains, share, base):
 def compile_all():
     """The batch, a scene a ratio."""
     frequency = np.array(RATIOS) * PAPER.natural_frequency
-    table = SceneTable(CHOICES["grains"][1], 1, FILLING.default_dt, frequency)
+    table = SceneTable(CONTROLS["grains"][1], 1, FILLING.default_dt, frequency)
     return Batch(FILLING, table, measured_cycles=MEASURED)
 
 

@@ -37,6 +37,10 @@ EFFECTS = {
     "sticking_friction": (dem.effects.StickingFriction, "friction of fragments"),
 }
 ALL = tuple(EFFECTS)
+PAGE, WAIT = "which_effects_a_scene_needs", "Pulling."
+ALT = "Bar with all effects and with those chosen, cost of a step"
+CONTROLS = {name: (bool, True, words) for name, (_, words) in EFFECTS.items()}
+CONTROLS["speed"] = (SPEEDS, 2.0, "the right end starts with [m/s]")
 #: The programs that answer, each with all that can be silent.
 PROGRAMS = ALL[:3], ALL[:4], ALL
 
@@ -61,13 +65,6 @@ class Answer:
             self.change = float(apart / way)
 
 
-def allowed(names):
-    """The effects that can be listed out of names, in order: friction acts in contacts only."""
-    kept = set(names)
-    kept -= set() if "body_contact" in kept else {"sticking_friction"}
-    return tuple(name for name in ALL if name in kept)
-
-
 def scene(names, program, speed):
     """The bar, held on the left and moved on the right; effects not named are silent."""
     moved = dem.effects.PrescribedMotion("right", (speed, SIDEWAYS * speed, 0.0), FREQUENCY)
@@ -76,7 +73,7 @@ def scene(names, program, speed):
     return dem.Scene(BAR, dem.CONCRETE, [*listed, dem.effects.Fixed("left"), moved])
 
 
-def measured(names, speed, program=None):
+def ran(names, speed, program=None):
     """Result with these effects, also of a run that diverged; program: of theirs alone, if None."""
     looks = {"until": UNTIL, "samples": LOOKS, "frames": LOOKS, "progress": None}
     pulled = scene(names, program or names, speed)
@@ -87,7 +84,7 @@ def measured(names, speed, program=None):
 def outcome(names, speed):
     """The same by a program that is there already, in which other effects stand silent by."""
     program = next(program for program in PROGRAMS if {*names} <= {*program})
-    return measured(names, speed, program)
+    return ran(names, speed, program)
 
 
 @session.remember
@@ -96,15 +93,19 @@ def advice(names, speed):
     return dem.needed_effects(outcome(names, speed))
 
 
-def answer(names, speed):
-    """The Answer to a choice: effects by name, as ``allowed`` gives them, and one of SPEEDS."""
+def answer(speed, measured=False, **listed):
+    """The Answer to one of SPEEDS and a choice of effects; friction acts in contacts only."""
+    without = set() if listed.get("body_contact") else {"sticking_friction"}
+    names = tuple(name for name in ALL if listed.get(name) and name not in without)
+    if measured:
+        return price(names, speed)
     return Answer(speed, outcome(names, speed), outcome(ALL, speed), advice(names, speed))
 
 
 def price(names, speed):
     """The Answer with costs: both programs in turn, the shortest run of each."""
     dem.Simulation(scene(names, names, speed), METHOD).start()
-    both = [[measured(listed, speed) for listed in (names, ALL)] for _ in range(TURNS)]
+    both = [[ran(listed, speed) for listed in (names, ALL)] for _ in range(TURNS)]
     reports = [[result.report for result in pair] for pair in both]
     spent = [[one.run_cpu_seconds / max(1, one.substeps) for one in pair] for pair in reports]
     return Answer(speed, *both[0], advice(names, speed), np.min(spent, axis=0))
@@ -128,7 +129,7 @@ def verdicts(answer):
 
 
 def words(answer):
-    """The outcome in sentences, with what the program said."""
+    """The outcome in sentences, with what the program said of each effect."""
     spares = "is not measured"
     if answer.step_s is not None:
         spared = 1.0 - answer.step_s[0] / answer.step_s[1]
@@ -138,7 +139,11 @@ def words(answer):
     said = [f"The program says: *{chosen.diverged}.*"] if chosen.diverged else []
     said += [f"It warns: *{warning}.*" for warning in chosen.report.unresolved]
     first = f"The end is pulled out by **{1e3 * answer.stroke:.2g} mm**. Your choice {spares}; "
-    return " ".join([f"{first}bodies end elsewhere by **{change}**.", *said])
+    rows = ["| effect | listed | what it did | the program says |", "|---|---|---|---|"]
+    for words, on, did, says in verdicts(answer):
+        rows.append(f"| {words} | {'yes' if on else 'no'} | {did} | **{says}** |")
+    sentences = " ".join([f"{first}bodies end elsewhere by **{change}**.", *said])
+    return "\n".join([sentences, "", *rows])
 
 
 def picture(answer):

@@ -1,5 +1,11 @@
-"""Parts of a page: sliders, an answer with its picture, and questions to guess at."""
+"""Parts of a page: its controls, an answer with its picture, and questions to guess at.
 
+A lesson is a module with PAGE, the name of its text; CONTROLS, name -> (values, first, label);
+WAIT, what one waits for; ALT, what the picture shows; and functions: ``answer(**values)``,
+``words(answer)`` and ``picture(answer)`` of it, and ``compile_all()``.
+"""
+
+from pathlib import Path
 from typing import NamedTuple
 
 from taichi_dem import InputError, SimulationDiverged
@@ -8,45 +14,60 @@ from taichi_dem.kit.session_thread import session
 
 #: A scene of a lesson is too small for two threads: they wait for each other longer than they work.
 session.threads = 1
+#: Between the opening of a page and its questions.
+HEADING = "## Guess first"
 
 
-def sliders(mo, choices):
-    """Sliders by name, which answer when let go; choices: name -> (steps, first, label)."""
-    shown = {"show_value": True, "debounce": True}
-    return mo.ui.dictionary(
-        {
-            name: mo.ui.slider(steps=list(steps), value=first, label=label, **shown)
-            for name, (steps, first, label) in choices.items()
-        }
-    )
+def parts_of(lesson):
+    """Opening and questions of the text of a lesson, Markdown."""
+    text = Path(__file__).with_name(f"{lesson.PAGE}.md").read_text(encoding="utf-8")
+    return text.split(HEADING)
 
 
-def is_served(mo):
-    """Whether somebody sees the page."""
-    return mo.app_meta().mode in ("run", "edit")
+def controls(mo, lesson):
+    """Sliders, switches and choices of a lesson by name; sliders answer when let go."""
+    given = lesson.CONTROLS.items()
+    return mo.ui.dictionary({name: _control(mo, *one) for name, one in given})
 
 
-def ask(mo, words, lesson, work, *choice):
-    """Answer of a lesson to a choice, and the picture of it; words: while one waits.
+def _control(mo, values, first, label):
+    """A switch for a bool, a choice of the keys of a dict, a slider for steps."""
+    if isinstance(values, dict):
+        return mo.ui.radio(options=values, value=first, label=label)
+    if values is bool:
+        return mo.ui.switch(value=first, label=label)
+    look = {"show_value": True, "debounce": True}
+    return mo.ui.slider(steps=list(values), value=first, label=label, **look)
+
+
+def opening(mo, lesson, chosen, *more, **facts):
+    """The first words, with facts in their braces, and the controls in two columns."""
+    shown = [*chosen.elements.values(), *more]
+    half = -(-len(shown) // 2)
+    columns = [mo.vstack(shown[:half]), mo.vstack(shown[half:])]
+    words = mo.md(parts_of(lesson)[0].format(**facts))
+    return mo.vstack([words, mo.hstack(columns, justify="start", gap=3)], gap=1)
+
+
+def answered(mo, lesson, values):
+    """Picture and words of the answer to a choice; printed where nobody sees the page.
 
     On a page that is served all is compiled first, so that no later answer has to wait for it.
     Where the program ends the run, its sentence stands in the place of both.
     """
-    with mo.status.spinner(f"{words} When a lesson is first opened it compiles, some seconds."):
-        if is_served(mo):
-            session.ask(session.kept, ("compiled", lesson.__name__), lesson.compile_all)
+    served = mo.app_meta().mode in ("run", "edit")
+    wait = f"{lesson.WAIT} When a lesson is first opened it compiles, some seconds."
+    with mo.status.spinner(wait):
+        if served:
+            session.ask(session.kept, ("compiled", lesson.PAGE), lesson.compile_all)
         try:
-            answer = session.ask(work, *choice)
+            answer = session.ask(lambda: lesson.answer(**values))
         except SimulationDiverged as told:
-            mo.stop(True, mo.callout(mo.md(f"The program says: *{told}.*"), kind="warn"))
-        return answer, session.ask(lesson.picture, answer)
-
-
-def tell(mo, picture, alt, words, *more):
-    """Picture with words, printed where nobody sees the page; more: Markdown below them."""
-    if not is_served(mo):
+            return mo.callout(mo.md(f"The program says: *{told}.*"), kind="warn")
+        picture, words = session.ask(lesson.picture, answer), lesson.words(answer)
+    if not served:
         print(words)
-    return mo.vstack([mo.image(picture, alt=alt), *map(mo.md, (words, *more))])
+    return mo.vstack([mo.image(picture, alt=lesson.ALT), mo.md(words)])
 
 
 def png_like_the_first(figure, name):
@@ -80,8 +101,7 @@ class Question(NamedTuple):
 def questions(text):
     """Read Questions off a text; raises InputError where a paragraph is malformed.
 
-    text: paragraphs "Question? :: guess | *right guess | guess :: Answer"; two to four guesses, one
-    of them starred.
+    text: paragraphs "Question? :: guess | *right guess | guess :: Answer"; one guess is starred.
     """
     return [_question(" ".join(part.split())) for part in text.strip().split("\n\n")]
 
@@ -93,23 +113,22 @@ def _question(text):
         raise InputError(f'a question must read "Question? :: guesses :: Answer", got {text!r}')
     words, choices, answer = parts
     given = [one.strip() for one in choices.split("|")]
-    plain = tuple(one.removeprefix("*").strip() for one in given)
-    right = [guess for guess, one in zip(plain, given) if guess != one]
-    if not 2 <= len(set(plain)) == len(plain) <= 4 or not all(plain):
-        raise InputError(f"{words!r} must have two to four different guesses, got {choices!r}")
+    right = [one.removeprefix("*") for one in given if one.startswith("*")]
     if len(right) != 1:
         raise InputError(f"{words!r} must have one right guess, with a star, got {len(right)}")
-    return Question(words, plain, right[0], answer)
+    return Question(words, tuple(one.removeprefix("*") for one in given), right[0], answer)
 
 
-def guesses(mo, asked):
-    """Radio buttons of each Question, none of them chosen."""
+def guesses(mo, lesson):
+    """Radio buttons of each question of a lesson, none of them chosen."""
+    asked = questions(parts_of(lesson)[1])
     return mo.ui.array([mo.ui.radio(one.guesses, label=f"**{one.words}**") for one in asked])
 
 
-def replies(mo, asked, chosen):
-    """Each Question with its buttons, and below them the answer once there is a guess."""
-    rows = [mo.md("## Guess first")]
+def replies(mo, lesson, chosen):
+    """Each question with its buttons, and below them the answer once there is a guess."""
+    rows = [mo.md(HEADING)]
+    asked = questions(parts_of(lesson)[1])
     for question, buttons, guess in zip(asked, chosen.elements, chosen.value):
         rows += [buttons, *([mo.callout(mo.md(reply(question, guess)))] if guess else [])]
     return mo.vstack(rows, gap=1)

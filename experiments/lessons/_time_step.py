@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 import taichi_dem as dem
-from _page import png_like_the_first
+from _page import percent, png_like_the_first
 from taichi_dem.kit.plot_style import BLACK, GREY, RED, seconds, styled, styles_of
 from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
@@ -29,17 +29,21 @@ UNTIL = SAMPLES * 3 * STEPS[-1]
 TIME_MS = 1e3 * np.linspace(0.0, UNTIL, SAMPLES + 1)
 #: Times to the peak of the blow [s], and the peak [Pa].
 RISES, PEAK = (1e-5, 2e-5, 5e-5), 1e6
-#: Sliders of the page: steps [ns], rises [us]; the first, label.
-CHOICES = {
-    "step": ([round(1e9 * one) for one in STEPS], 80, "step [ns]"),
-    "rise": ([round(1e6 * one) for one in RISES], 20, "the blow rises in [µs]"),
-}
+PAGE, WAIT = "what_a_time_step_costs", "Striking."
+ALT = "Bar, far end, error over cost"
 METHODS = {
     "explicit": dem.Uniform,
     "limited": partial(dem.Uniform, dashpot="limited"),
     "solved": partial(dem.ImplicitDashpots, tolerance=1e-3),
 }
 STYLES = styles_of(METHODS)
+LABELS = {style.label: name for name, style in STYLES.items()}
+#: Steps in ns, rises in us.
+CONTROLS = {
+    "method": (LABELS, next(iter(LABELS)), "method"),
+    "step": ([round(1e9 * one) for one in STEPS], 80, "step [ns]"),
+    "rise": ([round(1e6 * one) for one in RISES], 20, "the blow rises in [µs]"),
+}
 #: Of the displacement of the drawn bar.
 MAGNIFY = 1500.0
 
@@ -54,12 +58,8 @@ class Strike:
     """
 
     def __init__(self, step, result):
-        self.step, self.result, self.seconds, self.sentence = (
-            step,
-            result,
-            math.nan,
-            result.diverged,
-        )
+        self.step, self.result, self.seconds = step, result, math.nan
+        self.sentence = result.diverged
         end, frames = result.model.centre[:, 0] > LENGTH * (1.0 - 1.0 / CELLS[0]), result.frames
         self.moved = np.full(SAMPLES + 1, np.nan)
         self.moved[: len(frames)] = [frame.displacement[end, 0].mean() for frame in frames]
@@ -86,9 +86,10 @@ def scene(rise=RISES[0]):
 
 
 def limits():
-    """Longest stable explicit step of the worst body [s]: by its dashpots, and by its springs."""
+    """Longest stable explicit step of the worst body, in words."""
     own = dem.step_report(scene()).limits
-    return float(own["bond_dashpot"].min()), float(own["bond_stiffness"].min())
+    names = {"dashpots": "bond_dashpot", "springs": "bond_stiffness"}
+    return {words: seconds(float(own[name].min())) for words, name in names.items()}
 
 
 #: One scene a rise, so that another step finds the limits of its bodies there.
@@ -139,8 +140,8 @@ def truth(rise):
 
 
 def answer(method, step, rise):
-    """The Answer to a choice: method by name, step and rise nearest to these [s]."""
-    step, rise = nearest(STEPS, step), nearest(RISES, rise)
+    """The Answer to a choice: method by name, step [ns] and rise [us] nearest to these."""
+    step, rise = nearest(STEPS, 1e-9 * step), nearest(RISES, 1e-6 * rise)
     tried = session.kept(("ladders", rise), dict)
     own = tried[method] = [timed(method, one, rise) for one in STEPS]
     ladders = {name: tried[name] for name in METHODS if name in tried}
@@ -150,6 +151,18 @@ def answer(method, step, rise):
 def nearest(values, value):
     """The one of some values that lies nearest to a value, as sliders round."""
     return min(values, key=lambda one: abs(one - value))
+
+
+def words(answer):
+    """Error and cost of the chosen run, or what the program said, in a sentence."""
+    strike = answer.chosen
+    if strike.sentence:
+        return f"The program says: *{strike.sentence}.*"
+    return (
+        f"With {seconds(strike.step)} a step the far end is wrong by "
+        f"**{percent(strike.error(answer.truth))}** at most, for **{seconds(strike.seconds)}** of "
+        "one core."
+    )
 
 
 def compile_all():

@@ -7,14 +7,7 @@ import pytest
 
 from _closed_forms import _carried
 from _meshes import with_moved_nodes
-from taichi_dem import (
-    CONCRETE,
-    ImplicitDashpots,
-    Scene,
-    Simulation,
-    Uniform,
-    effects,
-)
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
 from taichi_dem.elasticity.rates import wave_moduli
 from taichi_dem.mesh.shapes import bar, single
 

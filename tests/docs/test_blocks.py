@@ -9,8 +9,8 @@ import pytest
 
 from ca_damper.automaton.accounting import ACCOUNTINGS
 from taichi_dem import runtime
-from taichi_dem.kit.study.cases import assess
 from tests.docs.pages import PAGES, blocks
+from tests.hard_cases.cases import assess
 from tests.processes import users_environment
 
 pytestmark = pytest.mark.experiment

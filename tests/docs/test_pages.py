@@ -9,9 +9,8 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
-from _figures_in_text import fill_figures
 from docs.site.conf import CONTENTS
-from gallery import SMALL_PICTURES, pages
+from gallery import SMALL_PICTURES, fill_figures, pages
 from taichi_dem import InputError
 from taichi_dem.kit.study.results_page import markdown_table
 from tests.docs.pages import FOLDER, PAGES, anchors, headings, links, text_of, tokens, words

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-import _effects_costs
-from _effects_damper import FrozenBatch
-from _effects_frozen import WARM, FrozenScene, states_of_run
+from _effects import KNOWN_LISTS, WARM, FrozenBatch, FrozenScene, scene_of
 from ca_damper.automaton.lattice import DIRECTIONS, HELD
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
 from taichi_dem.mesh.shapes import bar
@@ -18,7 +16,7 @@ TABLE = {"particles": 30, "ratios": (0.96, 1.0), "seeds": (1, 2), "measured_cycl
 def batches(filling, step, *options):
     """Frozen batches by their options, and states of the first."""
     made = [FrozenBatch(filling, one, {**TABLE, "step": step}) for one in options]
-    return made, made[0].states_of_run(3, (4, 3))
+    return made, made[0].states_of_run(3, 4, 3)
 
 
 def test_a_frozen_batch_goes_on_with_the_bits_of_its_run():
@@ -51,8 +49,8 @@ def kinds(frozen, state):
 
 def test_a_known_list_leaves_out_nothing():
     """Runs of the best list miss no effect, up to the time of the blast."""
-    material, peak, best = _effects_costs.KNOWN_LISTS["weak pulse"]
-    scene = _effects_costs.scene_of(material, peak, best)
+    material, peak, best = KNOWN_LISTS["weak pulse"]
+    scene = scene_of(best, material, peak)
     report = simulate(scene, method=ImplicitDashpots(4e-7), until=2.5e-4, samples=25).report
     assert report.needs == () and report.broken_faces == 0
     assert len(report.effects) == 1 + len(best)
@@ -64,7 +62,7 @@ def test_a_frozen_scene_goes_on_with_the_bits_of_its_run_as_often_as_it_is_asked
     laws = effects.Softening(), effects.ShearSlip(), effects.BondDamping()
     scene = Scene(bar(0.2, 0.1, (2, 1, 1)), CONCRETE, [*laws, effects.Fixed("left"), drive])
     method, starts = Uniform(1e-7), (500, 3000)
-    states = states_of_run(scene, method, [n * method.dt0 for n in starts])
+    states = FrozenScene(scene, method).states_of_run([n * method.dt0 for n in starts])
     frozen = FrozenScene(scene, method, states, substeps=5)
     run = Simulation(scene, method)
     for k, start in enumerate(starts):

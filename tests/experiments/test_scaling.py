@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from _scaling_work import Workload
-from _scaling_workers import Workers, even_cuts, share_costs
+from _scaling import Workers, Workload, even_cuts, share_costs
 
 # Whole numbers: their sums have no rounding, so bounds hold to the last bit.
 COSTS = arrays(float, st.integers(1, 60), elements=st.integers(0, 1000).map(float))

@@ -81,7 +81,7 @@ def test_what_the_base_gives_is_what_dashpot_and_grains_take(engine):
 @pytest.mark.slow
 def test_a_hard_pull_misses_what_is_left_out(engine):
     """The end is pulled out by v / (2 pi f); what would break says so, and what it did counts."""
-    answer = engine.ask(_needs.answer, ("bond_damping",), 2.0)
+    answer = engine.ask(lambda: _needs.answer(2.0, bond_damping=True))
     moved = answer.chosen.frames[_needs.SHOWN["pulled open"]].displacement
     when = _needs.UNTIL * _needs.SHOWN["pulled open"] / _needs.LOOKS
     place = 2.0 * math.pi * _needs.FREQUENCY * when
@@ -109,8 +109,8 @@ def test_answers_hold_the_truth_and_narrower_ones_cost_more_runs(engine):
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_every_lesson_asks_and_its_right_guesses_have_no_common_place(path):
-    text = path.read_text(encoding="utf-8").split('asked = questions("""')[1].split('"""')[0]
-    asked = _page.questions(text)
+    text = path.with_suffix(".md").read_text(encoding="utf-8")
+    asked = _page.questions(text.split(_page.HEADING)[1])
     assert len(asked) >= 5
     assert len({question.guesses.index(question.right) for question in asked}) > 1
 

@@ -7,7 +7,7 @@ which it was last renewed, and a twentieth more.
 
 import pytest
 
-from _bench_start import sizes_of_kernels
+from _bench_waits import sizes_of_kernels
 from taichi_dem.kit.study import call_in_process
 
 #: Nodes on 27 November 2026 by kernel, of those with more than a thousand; of all others together.

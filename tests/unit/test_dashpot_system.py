@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from _dashpot_system import DashpotSystem
+from blast_sweeps import DashpotSystem
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.mesh.shapes import bar
 

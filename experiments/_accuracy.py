@@ -1,0 +1,197 @@
+"""How answers are judged: their price over single runs, and their bars by finer runs."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+
+import ca_damper as ca
+import taichi_dem as dem
+from taichi_dem.accuracy.runs import Job, Runs
+from taichi_dem.kit import study
+from taichi_dem.kit.bars.chance import t_quantile
+from taichi_dem.simulate import result_of
+
+#: A reference: first seed, cycles; its step is so much shorter, less so at a peak of spheres.
+FIRST_SEED, TRANSIENT, MEASURED, QUARTER, PEAK_OF_SPHERES = 1001, 120, 80, 4, 2
+#: Seeds of a round of it, as many as come to so many steps, between these; rounds at most, and
+#: standard error by half the bar at which they end.
+STEPS, FEWEST, MOST, ROUNDS, SHARP = 8_000_000, 3, 12, 3, 0.3
+#: The reference has a step so many halvings below that of the answer: 16 times finer.
+FINER = 4
+#: Steps of the scan: the longest stable one, over 2^k; a method whose steps are longer than that by
+#: more than this has no chance.
+SCANNED, HOPELESS = range(6), 100
+
+
+def reference_values(question, answer):
+    """Independent values whose mean is what the bar should hold, one a seed.
+
+    Exact for a filling that is a mass and nothing else. Else at a finer step, with other seeds, an
+    automaton's peak at half the spacing; of several motions those nearest to the answer.
+    """
+    filling, o, goal = question.filling, question.oscillator, question.goal
+    if isinstance(filling, (ca.Empty, ca.RigidMass)):
+        mass = question.particles * filling.particle_mass
+        if goal.kind == "extreme":
+            return np.array([o.peak(mass)[goal.unit == "m"]])
+        return np.array([float(o.rms(goal.ratios[0] * o.natural_frequency, mass))])
+    ratios, finer = answer.result.ratios, QUARTER
+    if goal.kind == "extreme" and isinstance(filling, ca.Spheres):
+        finer = PEAK_OF_SPHERES
+    elif goal.kind == "extreme":
+        step = np.diff(ratios).min() / 2.0
+        ratios = np.arange(ratios[0], ratios[-1] + 0.5 * step, step)
+    job = {"particles": question.particles, "ratios": ratios, "oscillator": o, "progress": None}
+    job.update(dt=float(answer.result.dt.max()) / finer)
+    job.update(transient_cycles=TRANSIENT, measured_cycles=MEASURED)
+    steps = len(ratios) * (TRANSIENT + MEASURED) * finer
+    steps *= float(answer.result.steps_per_cycle.max())
+    count, values = min(MOST, max(FEWEST, round(STEPS / steps))), np.empty(0)
+    for first in range(FIRST_SEED, FIRST_SEED + ROUNDS * count, count):
+        found = ca.frequency_response(filling, seeds=range(first, first + count), **job)
+        values = np.concatenate([values, _values_of(found, goal, answer)])
+        if values.std() <= SHARP * answer.error * math.sqrt(len(values)):
+            break
+    return values
+
+
+def _values_of(found, goal, answer):
+    """Values of a goal, one a seed; of several motions those of the answer's, if there are any."""
+    branches = answer.branches
+    if goal.kind == "extreme" and not branches:
+        # Jackknife of the peak of the mean curve.
+        curves = found.rms[0].T
+        count, whole = len(curves), _top(found.ratios, curves.mean(axis=0), goal)
+        less = [
+            _top(found.ratios, np.delete(curves, k, 0).mean(axis=0), goal) for k in range(count)
+        ]
+        return count * whole - (count - 1) * np.array(less)
+    values = goal.values(found)[:, 0]
+    values = values[np.isfinite(values)]
+    centres = [branch.value for branch in branches] or [answer.value]
+    own = np.abs(values[:, None] - centres).argmin(axis=1) == 0
+    return values[own] if own.any() else values
+
+
+def _top(ratios, curve, goal):
+    """Place or height of the peak of a curve, smoothed by a polynomial of 1 / RMS^2."""
+    square = ratios**2
+    x = (square - square.mean()) / np.ptp(square)
+    fit = np.polynomial.Polynomial.fit(x, curve**-2.0, min(4, len(x) // 2 + 1))
+    place = np.linspace(x[0], x[-1], 4001)
+    low = fit(place)
+    k = int(low.argmin())
+    at_peak = math.sqrt(square.mean() + np.ptp(square) * place[k]), low[k] ** -0.5
+    return at_peak[goal.unit == "m"]
+
+
+def job_of(question):
+    """The question as ``solve`` has it."""
+    return Job(question.scene, question.until, question.goal, question.tolerance, 0.95)
+
+
+def answered(question, repeats=2):
+    """Answer to a question to the blast, and its least CPU time [s]: the first may compile."""
+    spent = []
+    for _ in range(repeats):
+        begun = study.clock()
+        given = {"until": question.until, "goal": question.goal, "progress": None}
+        answer = dem.solve(question.scene, tolerance=question.tolerance, **given)
+        spent.append(study.clock() - begun)
+    return answer, min(spent)
+
+
+def judged_blast(question):
+    """A question to the blast answered, beside the value at a step 16 times finer.
+
+    None where one of them is refused: a bar that is crushed to rubble fills its lists.
+    """
+    try:
+        answer, seconds = answered(question)
+        true = Runs(job_of(question), None).value(answer.plan.begin + 1 + FINER)
+    except dem.InputError as refused:
+        return print(f"left out: {question}: {refused}")
+    return judged("blast", question, answer, seconds, math.nan if true is None else true)
+
+
+def judged_damper(question):
+    """A question to the damper answered, beside the mean of finer runs with other seeds.
+
+    None where its budget ends before there is anything to tell.
+    """
+    try:
+        answer = ca.solve_response(**question.arguments())
+    except dem.InputError:
+        return None
+    true, doubt = reference_values(question, answer), 0.0
+    if len(true) > 1:
+        doubt = t_quantile(0.95, len(true) - 1) * float(true.std(ddof=1)) / math.sqrt(len(true))
+    return judged("damper", question, answer, answer.plan.seconds, float(true.mean()), doubt)
+
+
+def judged(kind, question, answer, seconds, true, doubt=0.0):
+    """An answer beside the true value; doubt: half-width at 95 % of the bar of that.
+
+    deviation: how far it is off, in half-widths of its bar. single: whether it is one number.
+    """
+    off, width = float(answer.value) - true, math.hypot(answer.error, doubt)
+    far = off / width if width else (math.copysign(math.inf, off) if off else 0.0)
+    return SimpleNamespace(
+        **{"kind": kind, "seed": question.seed, "question": str(question), "cpu_s": seconds},
+        **{"value": float(answer.value), "error": float(answer.error), "true": true},
+        **{"holds": int(abs(off) <= width), "reached": int(answer.reached), "deviation": far},
+        **{"tolerance_percent": 100.0 * question.tolerance, "answer": answer},
+        single=not answer.branches,
+    )
+
+
+def fixed_runs(question, others):
+    """All runs of the scan that end well: words, value of the goal and CPU seconds of each.
+
+    others: methods beside the answer's.
+    """
+    job = job_of(question)
+    make, longest = type(job.method(0)), job.method(0).dt0
+    methods = [(job.in_words(k), make(longest / 2**k)) for k in SCANNED]
+    if others and job.solves:
+        report = dem.step_report(question.scene)
+        full, limited = (float(report.borne(kind).min()) for kind in ("full", "limited"))
+        methods += [(f"explicit, {dt:.2g} s", dem.Uniform(dt)) for dt in (full, 0.5 * full)]
+        methods.append(
+            (f"limited dashpots, {limited:.2g} s", dem.Uniform(limited, dashpot="limited"))
+        )
+    rows = 100 if question.goal.kind == "extreme" else 1
+    looks = {"until": question.until, "samples": rows, "frames": 1, "progress": None}
+    found = []
+    for words, method in methods:
+        if HOPELESS * method.dt0 <= longest:
+            continue
+        spent = []
+        try:
+            for _ in range(2):
+                begun = study.clock()
+                result = result_of(dem.simulate, question.scene, method=method, **looks)
+                spent.append(study.clock() - begun)
+        except dem.InputError:
+            continue
+        if not result.diverged:
+            found.append((words, question.goal.value(result), min(spent)))
+    return found
+
+
+def twins_of(question, count):
+    """Runs that differ by one rounding: times [ms], mean ways [mm], and how far they are apart.
+
+    (frames,), (count, frames) and (count - 1, frames), the last as a share of a usual way.
+    """
+    runs = Runs(job_of(question), None)
+    level = next(k for k in SCANNED if runs.value(k) is not None)
+    frames = [runs.frames(level, twin) for twin in range(count)]
+    moved = np.array([[frame.displacement for frame in some] for some in frames])
+    far = np.linalg.norm(moved[0, -1], axis=1)
+    moved = moved[:, :, far > np.median(far)]
+    ways = np.linalg.norm(moved, axis=3)
+    apart = np.linalg.norm(moved[1:] - moved[0], axis=3).mean(axis=2)
+    time_ms = 1e3 * np.array([frame.time_s for frame in frames[0]])
+    return time_ms, 1e3 * ways.mean(axis=2), apart / np.maximum(ways[0].mean(axis=1), 1e-300)

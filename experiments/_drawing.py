@@ -1,0 +1,156 @@
+"""Films of runs, cracks of a block in sections, and costs of methods, which several pages draw."""
+
+import contextlib
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from taichi_dem.kit.plot_style import STYLE, filming, picture, styles_of, write_gif
+from taichi_dem.kit.progress.progress import drawing
+from taichi_dem.plot.view import ALONG_Z, View, draw_bodies, frame_block, move_bodies
+
+#: Pixels an inch that are drawn; the GIF has half as many each way.
+_DPI = 200
+_SMALL = {
+    **STYLE,
+    **dict.fromkeys(("font.size", "axes.titlesize", "axes.labelsize"), 7.5),
+    **dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "legend.fontsize"), 6.5),
+    "lines.linewidth": 1.2,
+}
+#: Displacements that methods may be compared by, and how they are called.
+_COMPARED = {"hole_radial_displacement_mm": "hole", "monitor_displacement_mm": "body watched"}
+
+
+@contextlib.contextmanager
+def moving_picture(path, size, milliseconds):
+    """A figure, and a function that takes it as the next frame; a GIF when the block ends well.
+
+    size: in inches, at most 4 each way for a GIF of 400 pixels. milliseconds: a frame.
+    """
+    drawing(path)
+    with filming(size, _DPI, _SMALL) as (figure, shoot, images):
+        yield figure, shoot
+    write_gif(path, [image.reduce(2) for image in images], milliseconds, 48)
+
+
+class FilmedRun(NamedTuple):
+    """A run in a film, with an entry a frame.
+
+    values: numbers by which bodies are coloured, (frames, bodies). titles: words above the bodies.
+    curve: what is drawn over time, with its label and colour.
+    """
+
+    result: object
+    frames: list
+    values: np.ndarray
+    titles: list
+    curve: np.ndarray
+    label: str
+    colour: str
+
+
+def film_runs(path, runs, times, *, words, curve, magnify, ticks=None, footers=(), **look):
+    """Write a GIF of runs over the same time.
+
+    runs: FilmedRuns. times: of the pictures [s]; each run shows its frame at or before. words: of
+    the colour bar; ticks: its places and their names. curve: options of ``Axes.set`` for the curves
+    over time [µs]. magnify: of the displacement. footers: text below each picture. look: of the
+    bodies, as in ``draw_bodies``.
+    """
+    seen = {"magnify": magnify, "axis": look.pop("axis", ALONG_Z)}
+    with moving_picture(path, (4.0, 4.0), 125) as (figure, shoot):
+        ratios = (*np.ones(len(runs)), 1.25)
+        *panels, below = figure.subplots(len(runs) + 1, 1, height_ratios=ratios)
+        bodies = [_first_picture(*pair, **seen, **look) for pair in zip(panels, runs)]
+        words = f"{words}; displacement × {magnify:g}"
+        bar = figure.colorbar(bodies[0], ax=panels, location="bottom", aspect=40, label=words)
+        if ticks is not None:
+            bar.ax.set_xticks(*ticks)
+            bar.ax.minorticks_off()
+        lines = []
+        for run, dashes in zip(runs, itertools.cycle(("-", "--", ":"))):
+            # The whole curve first: its extent is that of the axes.
+            time = [1e6 * frame.time_s for frame in run.frames]
+            lines += below.plot(time, run.curve, ls=dashes, color=run.colour, label=run.label)
+        below.set(xlabel="time [µs]", xlim=(0.0, 1.03e6 * max(times)), **curve)
+        below.legend(loc="upper left")
+        # The first picture keeps room for the longest footer.
+        room = " \n" * max(text.count("\n") + 1 for text in footers or [""])
+        footer = figure.supxlabel(room, x=0.02, ha="left", fontsize=6.5, family="monospace")
+        for number, now in enumerate(times):
+            for axes, run, drawn, line in zip(panels, runs, bodies, lines):
+                _show(axes, run, drawn, line, now, **seen)
+            if number and footers:
+                footer.set_text(footers[number])
+            shoot()
+
+
+def _first_picture(axes, run, axis, **look):
+    model = run.result.model
+    drawn = draw_bodies(axes, model, run.frames[0], run.values[0], axis=axis, **look)
+    frame_block(axes, View(axis), model, 0.06)
+    axes.set_axis_off()
+    return drawn
+
+
+def _show(axes, run, drawn, line, now, **seen):
+    time = np.array([frame.time_s for frame in run.frames])
+    row = int(np.searchsorted(time, now * (1.0 + 1e-9), side="right")) - 1
+    move_bodies(drawn, run.result.model, run.frames[row], run.values[row], **seen)
+    axes.set_title(run.titles[row], loc="center")
+    line.set_data(1e6 * time[: row + 1], run.curve[: row + 1])
+
+
+def crossings(triangles, normal, place):
+    """Where triangles (n, 3, 3) [m] cross the plane at a place on an axis.
+
+    Returns the ends of the lines (m, 2, 3) [m] and which triangle each belongs to (m,). One with a
+    corner in the plane counts as lying above it.
+    """
+    above = triangles[..., normal] >= place
+    which = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
+    crossed, above = triangles[which], above[which]
+    # The corner that lies alone on its side: both lines that cross start there.
+    alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
+    rows, ends = np.arange(len(which)), []
+    first = crossed[rows, alone]
+    for k in (1, 2):
+        end = crossed[rows, (alone + k) % 3]
+        share = (place - first[:, normal]) / (end[:, normal] - first[:, normal])
+        ends.append(first + share[:, None] * (end - first))
+    return np.stack(ends, axis=1), which
+
+
+def plot_methods(path, series, column):
+    """What methods cost over time, and how far their displacement lies apart.
+
+    series: method -> columns time_s, cpu_s, evaluations and the one compared, of ``_COMPARED``; the
+    first is the one the others are compared with.
+    """
+    with picture(path, 2, 2, size=(9.0, 6.4)) as (_, ((cost, work), (moved, words))):
+        first, styles = next(iter(series.values())), styles_of(series)
+        for name, made in series.items():
+            style = styles[name]
+            look = {"color": style.colour, "linestyle": style.line, "label": style.label}
+            time = 1e3 * np.asarray(made["time_s"])
+            cost.plot(time, made["cpu_s"], **look)
+            work.plot(time, 1e-6 * np.asarray(made["evaluations"]), **look)
+            # Largest steps differ, and with them the times of the samples.
+            there = np.interp(time, 1e3 * first["time_s"], first[column])
+            there = np.where(there > 1e-3 * there.max(), there, np.nan)
+            moved.plot(time, 100.0 * (np.asarray(made[column]) / there - 1.0), **look)
+        cost.set(ylabel="CPU time of stepping [s]")
+        work.set(ylabel="evaluations of bonds\nand contact pairs [10⁶]")
+        for axes, name, unit in ((cost, "cpu_s", 1.0), (work, "evaluations", 1e6)):
+            last = [made[name][-1] / unit for made in series.values()]
+            # A run begins with nothing done, where a logarithm has no end.
+            log = max(last) > 20.0 * min(last)
+            axes.set_yscale("log" if log else "linear")
+            axes.set_ylim(0.01 * min(last) if log else 0.0, None)
+        base = next(iter(styles.values())).label
+        moved.set(ylabel=f"displacement of the {_COMPARED[column]},\ndifference from\n{base} [%]")
+        for axes in (cost, work, moved):
+            axes.set(xlabel="time [ms]", xlim=(0.0, time[-1] or 1.0))
+        words.set_axis_off()
+        words.legend(*moved.get_legend_handles_labels(), loc="center left", handlelength=4.0)

@@ -1,0 +1,147 @@
+"""Pictures of hard cases: curves of every case, and how far methods stay within their bounds."""
+
+import math
+import re
+import textwrap
+
+from taichi_dem.kit.plot_style import BLACK, GREY, RED, line_key, picture, power, styles_of
+
+#: Margins from which on more means nothing; where those stand that refuse, and those that fail.
+MOST, PLACES = 1e4, {"refused": 0.05, "failed": 0.4}
+TICKS = {0.05: "refused", 1.0: "1", 10.0: "10", 100.0: "100", MOST: "≥ 10⁴"}
+
+
+def with_powers(words):
+    """Words with powers of ten for numbers as a program prints them: 1e4 -> 10⁴."""
+    return re.sub(r"\d+(?:\.\d+)?e[-+]?\d+", lambda found: power(float(found[0])), words)
+
+
+def title_of(case):
+    """Name of a case in words: fragment_at_1_km_s -> fragment at 1 km/s."""
+    words = re.sub(r"(\d+_k?m)_s(?![a-z])", r"\1/s", case.name)
+    return with_powers(words.replace("_", " "))
+
+
+def by_name(trials):
+    """Trials of each case, by its name."""
+    found = {}
+    for trial in trials:
+        found.setdefault(trial.case.name, []).append(trial)
+    return found
+
+
+def looks_of(trials):
+    """Label, colour, mark and dashes of every method."""
+    methods = dict.fromkeys(trial.method for trial in trials)
+    # A uniform step of a hard case is fixed: the paper's rule does not shorten it.
+    styles = styles_of("fixed" if method == "uniform" else method for method in methods)
+    return {
+        m: {"label": s.label, "color": s.colour, "marker": s.marker, "ls": s.line}
+        for m, s in zip(methods, styles.values())
+    }
+
+
+def picture_cases(path, trials, columns):
+    """A panel a case with the curves of its methods; one case alone with its question."""
+    cases, looks = by_name(trials), looks_of(trials)
+    # The first are thick, so that all are seen.
+    for k, look in enumerate(looks.values()):
+        look["lw"] = max(0.8, 3.0 - 0.45 * k)
+    alone = len(cases) == 1
+    columns = 1 if alone else columns
+    rows = -(-len(cases) // columns)
+    size = (7.0, 4.6) if alone else (3.06 * columns, 0.6 + 2.6 * rows)
+    with picture(path, rows, columns, size, squeeze=False) as (figure, axes):
+        for axis in axes.ravel()[len(cases) :]:
+            axis.set_axis_off()
+        for axis, own in zip(axes.ravel(), cases.values()):
+            draw_case(axis, own, looks)
+        shown = dict.fromkeys(trial.method for trial in trials if trial.curve)
+        keys = [line_key(**{**looks[method], "marker": None}) for method in shown]
+        place = "lower center" if alone else "upper left"
+        figure.legend(handles=keys, loc=f"outside {place}", ncols=2)
+        if alone:
+            question = textwrap.fill(with_powers(trials[0].case.question), 100)
+            figure.suptitle(question, fontsize=9.0, x=0.02, ha="left")
+
+
+def draw_case(axis, own, looks):
+    """Curves of the methods of a case, and how they fared in the title."""
+    shown = [trial for trial in own if trial.curve]
+    for trial in shown:
+        xlabel, x, ylabel, lines, dots = trial.curve
+        look = {**looks[trial.method]}
+        if dots:
+            look.update(ls="none", ms=1.6 * look["lw"] + 1.0, mfc="none", lw=1.0)
+        else:
+            look.update(marker=None)
+        for y in lines:
+            axis.plot(x, y, **look)
+        axis.set(xlabel=xlabel, ylabel=ylabel)
+    if shown:
+        axis.locator_params(axis="x", nbins=5)
+    else:
+        said = textwrap.fill(f"“{own[0].words}”", 32)
+        axis.set(xticks=[], yticks=[])
+        axis.text(0.03, 0.92, said, fontsize=8.5, va="top", transform=axis.transAxes)
+    lowest, highest = axis.get_ylim()
+    if 0.0 < lowest < 0.95 * highest:
+        axis.set_ylim(0.0, 1.05 * highest)
+    failed = any(trial.status == "failed" for trial in own)
+    title = textwrap.fill(f"{title_of(own[0].case)}: {verdict(own)}", 32)
+    axis.set_title(title, fontsize=9.0, color=RED if failed else BLACK)
+
+
+def verdict(own):
+    """How the methods of a case fared, in words."""
+    ends = [trial.status for trial in own]
+    words = {"passed": "passed", "refused": "refused", "failed": "FAILED"}
+    said = [f"{ends.count(end)} {word}" for end, word in words.items() if end in ends]
+    least = min((trial.worst.margin for trial in own if trial.worst), default=math.inf)
+    if math.isfinite(least):
+        # A line of the title shall not end within it.
+        number = power(least) if least >= 100.0 else f"{least:.2g}"
+        said.append(f"margin {number}".replace(" ", "\N{NO-BREAK SPACE}"))
+    return ", ".join(said)
+
+
+def picture_margins(path, trials):
+    """A panel a package, a row a case, a mark a method: its margin, or that it refuses."""
+    packages = dict.fromkeys(trial.case.package for trial in trials)
+    panels = {name: [one for one in trials if one.case.package == name] for name in packages}
+    longest = max(len(by_name(own)) for own in panels.values())
+    size = 4.6 * len(panels), 2.2 + 0.155 * longest
+    with picture(path, 1, len(panels), size, squeeze=False) as (_, axes):
+        for axis, (package, own) in zip(axes[0], panels.items()):
+            draw_margins(axis, own)
+            look = {"title_fontsize": 9.5, "alignment": "left", "loc": "lower left"}
+            look.update(bbox_to_anchor=(-0.3, 1.0), borderpad=0.0)
+            axis.legend(title=f"{package}: {len(own)} runs", **look)
+
+
+def draw_margins(axis, own):
+    """Marks of all methods, those that fail as stars."""
+    cases, looks = by_name(own), looks_of(own)
+    names = list(cases)
+    failed = [trial for trial in own if trial.status == "failed"]
+    for k, (method, look) in enumerate(looks.items()):
+        spread = 0.5 * (k / max(1, len(looks) - 1) - 0.5)
+        look = {**look, "ls": "none", "mew": 0.0, "ms": 5.0}
+        for some, more in ((own, {}), (failed, {"marker": "*", "ms": 11.0, "label": None})):
+            mine = [trial for trial in some if trial.method == method]
+            places = [place_of(trial) for trial in mine]
+            level = [names.index(trial.case.name) + spread for trial in mine]
+            axis.plot(places, level, **{**look, **more})
+    if failed:
+        axis.plot([], [], "*", ms=11.0, color=BLACK, label="failed")
+    axis.axvline(1.0, color=GREY, lw=1.0, label="at the bound")
+    axis.set(xscale="log", xlim=(0.02, 2.5 * MOST), ylim=(len(cases) - 0.3, -0.7))
+    axis.set_yticks(range(len(cases)), [title_of(trials[0].case) for trials in cases.values()])
+    axis.set_xticks(list(TICKS), list(TICKS.values()))
+    axis.set_xticks([], minor=True)
+    axis.set_xlabel("margin: bound / worst figure [1]")
+
+
+def place_of(trial):
+    """Place of a trial on the axis of margins."""
+    return PLACES.get(trial.status) or min(trial.worst.margin, MOST)

@@ -1,0 +1,202 @@
+"""Questions with a tolerance, drawn at random by seeds.
+
+To the blast they ask about bars under gas pressure; to the damper about small scenes with short
+transients, so that a reference at a quarter of the step is affordable.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+import ca_damper as ca
+import taichi_dem as dem
+from ca_damper import goals as damper_goals
+from taichi_dem import effects, goals
+from taichi_dem.kit.display import counted
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar, placed_together, single
+
+#: Fewest and most boxes along x, y and z, and bodies of a bar.
+BOXES, BODIES = ((2, 12), (1, 5), (1, 5)), (12, 1500)
+#: Powers of ten between which are drawn: edge of a box [m], stiffness and damping over those of
+#: concrete, peak of the pressure [Pa]; end of the run and rise of the pressure over the time of a
+#: wave along the bar; tolerances.
+EDGE, STIFFNESS, DAMPING, PEAK = (-2, -1), (-0.3, 0.5), (-1.5, 0.3), (6.5, 8.7)
+LASTS, RISES, TOLERANCE = (0.0, 1.3), (-1.0, 0.5), (-2.5, -1.0)
+#: Shares of the bars that have dashpots, that may break, and that are fixed at one end.
+DAMPED, BREAKING, FIXED = 0.85, 0.6, 0.4
+#: Room in the lists of contacts: a bar that is crushed needs more than a block that is blasted.
+LISTS = {"pairs_per_body": 200, "neighbours_per_body": 500}
+PAPER = ca.Automaton(rules="paper")
+#: Fillings by how often they are drawn, in tenths.
+FILLINGS = (
+    *((ca.Empty(), 1), (ca.RigidMass(), 1), (ca.Spheres(), 2), (PAPER, 3)),
+    *((replace(PAPER, accounting=word), 1.5) for word in ("landing", "landing+ejection")),
+)
+#: CPU seconds that an answer may take, and a peak of spheres, which are dearer.
+BUDGET_S, PEAK_OF_SPHERES_S = 4.0, 12.0
+
+
+@dataclass(frozen=True)
+class BlastQuestion:
+    """A question about a scene: the value of a goal at a time [s], to a tolerance."""
+
+    seed: int
+    scene: dem.Scene
+    until: float
+    goal: goals.Goal
+    tolerance: float
+
+    def __str__(self):
+        bodies = counted(self.scene.mesh.body_count, "body")
+        names = " ".join(effect.name for effect in self.scene.effects if effect.name)
+        return f"bar of {bodies} to {self.until:.3g} s: {self.goal.name}; {names}"
+
+
+def blast_question(seed):
+    """The question to the blast with a number."""
+    random = np.random.default_rng(seed)
+    mesh, edge = _bar(random)
+    stiffer, damped = _power(random, STIFFNESS), _power(random, DAMPING)
+    springs, dashpots = (
+        [f"{k}_{end}" for k in ("normal", "shear")] for end in ("stiffness", "damping")
+    )
+    constants = {name: stiffer * getattr(dem.CONCRETE, name) for name in springs}
+    constants.update({name: damped * getattr(dem.CONCRETE, name) for name in dashpots})
+    material = replace(dem.CONCRETE, **constants)
+    wave = np.sqrt(material.normal_stiffness * edge / material.density)
+    travel = float(np.ptp(mesh.points[:, 0]) / wave)
+    until = travel * _power(random, LASTS)
+    scene = dem.Scene(mesh, material, _effects(random, travel))
+    goal = _goal(random, scene)
+    return BlastQuestion(seed, scene, until, goal, _power(random, TOLERANCE))
+
+
+def paper_question(until, tolerance):
+    """How far the hole of the paper's block opens until a time [s]."""
+    scene = dem.Scene(
+        dem.read_mesh(dem.PAPER_BLOCK), dem.CONCRETE, "auto", loads=[effects.GasPressure()]
+    )
+    return BlastQuestion(0, scene, until, goals.hole_displacement(), tolerance)
+
+
+def dropped_question(until):
+    """How far three stiff tetrahedra go that fall on a slab: each bounce magnifies what differs.
+
+    Under 3,000 times the weight of the earth, without friction and bonds of their own.
+    """
+    random = np.random.default_rng(1)
+    parts = {"floor": (bar(0.05, 0.6, (1, 4, 4)), (0.0, 0.0, 0.0))}
+    for k in range(3):
+        body = single(0.05)
+        turn, _ = np.linalg.qr(random.standard_normal((3, 3)))
+        turn *= np.sign(np.linalg.det(turn))
+        turned = (body.points - body.points.mean(axis=0)) @ turn
+        place = 0.12 + 0.04 * k, 0.3, 0.3
+        parts[f"body{k}"] = checked_mesh(turned, body.tetrahedra, body.groups), place
+    chosen = [
+        effects.Gravity((-3e4, 0, 0)),
+        effects.BodyContact(),
+        effects.Fixed("floor_left"),
+    ]
+    scene = dem.Scene(placed_together(parts), dem.CONCRETE, chosen)
+    return BlastQuestion(0, scene, until, goals.displacement("base"), 0.01)
+
+
+def _power(random, between):
+    return float(10.0 ** random.uniform(*between))
+
+
+def _bar(random):
+    """A bar whose inner points are moved at random, and the edge of its boxes [m]."""
+    bodies, boxes = 0, np.ones(3, dtype=int)
+    while not BODIES[0] <= bodies <= BODIES[1]:
+        boxes = np.array([round(_power(random, np.log10(ends))) for ends in BOXES])
+        bodies = 6 * int(boxes.prod())
+    edge = _power(random, EDGE)
+    mesh = bar(edge * boxes[0], edge * boxes[1:].max(), boxes.tolist())
+    size = mesh.points.max(axis=0)
+    inner = (mesh.points > 1e-9) & (mesh.points < size - 1e-9)
+    moved = random.uniform(-1.0, 1.0, mesh.points.shape) * 0.15 * random.random() * size / boxes
+    return checked_mesh(mesh.points + inner * moved, mesh.tetrahedra, mesh.groups), edge
+
+
+def _effects(random, travel):
+    """Gas pressure on the left end, and what else was drawn; travel: time of a wave [s]."""
+    rise, decay = travel * _power(random, RISES), random.uniform(1.5, 4.0)
+    gas = effects.GasPressure("left", peak=_power(random, PEAK), rise=rise, decay_ratio=decay)
+    found = [gas]
+    if random.random() < DAMPED:
+        found.append(effects.BondDamping())
+    if random.random() < BREAKING:
+        found += [effects.Softening(), effects.ShearSlip()]
+        found += [effects.BodyContact(**LISTS), effects.StickingFriction()]
+    if random.random() < FIXED:
+        found.append(effects.Fixed("right"))
+    return found
+
+
+def _goal(random, scene):
+    """One of the goals that the scene has."""
+    body = int(random.integers(scene.mesh.body_count))
+    choices = [
+        goals.displacement("left"),
+        goals.body_displacement(body),
+        goals.kinetic_energy(),
+    ]
+    choices += [goals.peak_speed(body), goals.largest_fragment()]
+    if scene.effect("dashpot") is not None:
+        choices.append(goals.energy_share("bond_dashpot"))
+    if scene.effect("contact") is not None:
+        choices.append(goals.broken_faces())
+    return choices[random.integers(len(choices))]
+
+
+@dataclass(frozen=True)
+class DamperQuestion:
+    """A question to ``solve_response``: goal at a tolerance, of a filling on an oscillator."""
+
+    seed: int
+    filling: Any
+    particles: int
+    oscillator: ca.Oscillator
+    goal: damper_goals.Goal
+    tolerance: float
+
+    def arguments(self):
+        """Arguments of ``solve_response``."""
+        given = {name: value for name, value in vars(self).items() if name != "seed"}
+        dear = isinstance(self.filling, ca.Spheres) and self.goal.kind == "extreme"
+        return {**given, "budget_s": PEAK_OF_SPHERES_S if dear else BUDGET_S, "progress": None}
+
+    def __str__(self):
+        o, share = self.oscillator, 100.0 * self.tolerance
+        places = f"{o.natural_frequency:.1f} Hz, damping {o.damping_ratio:.3f}"
+        return (
+            f"{self.seed}: {self.filling.label} x {self.particles}, {self.goal.name} to "
+            f"{share:.2g} %, {places}, mass {o.mass:.3f} kg, y0 {1e3 * o.base_amplitude:.2f} mm"
+        )
+
+
+def damper_question(seed):
+    """The question to the damper with a number."""
+    rng = np.random.default_rng([2604, seed])
+    weights = np.array([weight for _, weight in FILLINGS], dtype=float)
+    filling = FILLINGS[rng.choice(len(FILLINGS), p=weights / weights.sum())][0]
+    most = 20 if isinstance(filling, ca.Spheres) else 40
+    particles = 0 if isinstance(filling, ca.Empty) else int(rng.integers(3, most + 1))
+    mass = 0.086 * 2.0 ** rng.uniform(-1.0, 1.0)
+    omega = 2.0 * math.pi * rng.uniform(7.0, 12.0)
+    damping = 2.0 * rng.uniform(0.02, 0.06) * mass * omega
+    # Of the paper's acceleration of the base, 0.7 to 6 times, as there is more damping.
+    base = 0.6e-3 * (37.9 / omega) ** 2 * 2.0 ** rng.uniform(-0.5, 2.5)
+    oscillator = ca.Oscillator(mass, mass * omega**2, damping, base)
+    tolerance = float(10.0 ** rng.uniform(math.log10(0.003), -1.0))
+    ratio = round(float(rng.uniform(0.88, 1.06)), 3)
+    asked = [damper_goals.peak_rms(), damper_goals.peak_ratio(), damper_goals.rms_at(ratio)]
+    if not isinstance(filling, (ca.Empty, ca.RigidMass)):
+        asked += [damper_goals.loss_factor_at(ratio), damper_goals.apparent_mass_at(ratio)]
+    goal = asked[int(rng.integers(len(asked)))]
+    return DamperQuestion(seed, filling, particles, oscillator, goal, tolerance)

@@ -1,0 +1,142 @@
+"""Bonds that part: both strengths of a rock and their ratio, and a joint in mixed modes."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from _strength_tests import TESTS
+from _strength_tests import disc as disc_mesh
+from _trust.common import Number, dots
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREY
+from taichi_dem.materials import Material
+from taichi_dem.mesh.mesh import checked_mesh, with_inner_group
+from taichi_dem.mesh.shapes import bar
+
+GRANITE = "Lac du Bonnet granite, Potyondy and Cundall, IJRMMS 41 (2004) 1329"
+#: Strength in the Brazilian test over that in direct tension, and what counts as agreement.
+RATIO, ALLOWED = 1.28, 0.15
+#: Half of the angle of the arcs that load a disc [degrees]: between curved jaws, and twice as wide.
+ARCS = 5.0, 10.0
+#: Edge of an element [m]; E [Pa], nu, rho [kg/m3], strength [Pa] and fracture energy [J/m2] of a
+#: bond, friction [degrees], cohesion [Pa], share of critical damping.
+EDGE, STRENGTH = 5e-3, 8e6
+ROCK = {
+    **{"young": 69e9, "poisson": 0.2, "density": 2630.0, "tensile_strength": STRENGTH},
+    **{"fracture_energy": 30.0, "friction_angle": 30.0, "cohesion": 40e6, "damping_ratio": 0.1},
+}
+
+
+def disc(effort):
+    """Ratio of both strengths for two widths of the load, and direct tension over a bond's."""
+    loaded = [replace(TESTS["brazilian"], specimen=partial(disc_mesh, arc=arc)) for arc in ARCS]
+    tension, *brazilian = (
+        np.array([strength(test, seed) for seed in effort.seeds])
+        for test in (TESTS["tension"], *loaded)
+    )
+    note = "a wide load holds the disc together beside the split"
+    row = partial(Number, source=GRANITE, note=note, allowed=ALLOWED)
+    words = "Brazilian strength over direct tension, arcs of {:g} degrees"
+    numbers = [
+        row(f"disc_ratio_{2 * arc:g}", words.format(2 * arc), RATIO, found / tension)
+        for arc, found in zip(ARCS, brazilian)
+    ]
+    words = "direct tension over the strength of a bond"
+    numbers.append(Number("disc_tension", words, 1.0, tension / STRENGTH, source="one bond"))
+    return numbers, partial(draw_ratio, tension=tension / 1e6, brazilian=brazilian[0] / 1e6)
+
+
+def strength(test, seed):
+    """Strength of a random specimen [Pa]."""
+    return test.strength(Material.from_elastic(**ROCK), EDGE, STRENGTH, seed, None)
+
+
+def draw_ratio(axes, tension, brazilian):
+    """Both strengths of every mesh, and the ratio of granite."""
+    ends = np.array([0.0, 1.15 * tension.max()])
+    near = (RATIO * (1.0 + way) * ends for way in (-ALLOWED, ALLOWED))
+    axes.fill_between(ends, *near, color=GREY, alpha=0.25, label=f"within {100 * ALLOWED:.0f} %")
+    axes.plot(ends, RATIO * ends, color=BLACK, lw=0.8, label="ratio of granite")
+    dots(axes, tension, [brazilian])
+    axes.set(xlabel="direct tension [MPa]", xlim=ends)
+    axes.set_ylabel("Brazilian test, arcs of 10 degrees [MPa]")
+    axes.legend(loc="lower right")
+
+
+MIXED = "Benzeggagh and Kenane, Compos. Sci. Technol. 56 (1996) 439"
+#: Fracture energies of opening and sliding [J/m2], exponent of mixed modes.
+OPENED, SLID, EXPONENT = CONCRETE.fracture_energy, 3.0 * CONCRETE.fracture_energy, 1.75
+#: Length, width of the plate [m], its cells, and how far random inner points are moved, of a cell.
+LENGTH, WIDTH, CELLS, JITTER = 0.1, 0.05, (4, 3, 3), 0.15
+#: Share of the joint that is bonded: what lies beside it stays whole.
+BONDED = 0.01
+#: Speed at which the surface of a half is pulled from the other [m/s], and when it has parted [s].
+SPEED, TIME, STEP = 0.5, 2.6e-4, 1e-6
+#: Angles of the pull against the joint's normal [degrees].
+ANGLES = 0, 30, 45, 60, 90
+
+
+def joint(effort):
+    """Energy that the joint took, by the law of mixed modes, at several angles."""
+    spent = np.array([[taken(seed, angle) for angle in ANGLES] for seed in effort.seeds])
+    shares = spent / np.array([energy_of(angle) for angle in ANGLES])
+    row, words = (
+        partial(Number, source=MIXED),
+        "energy of a joint that {}, by the law of mixed modes",
+    )
+    ways = {0: "is opened", 45: "is moved at 45 degrees", 90: "is slid"}
+    numbers = [
+        row(f"joint_{angle}", words.format(way), 1.0, shares[:, ANGLES.index(angle)])
+        for angle, way in ways.items()
+    ]
+    return numbers, partial(draw_joint, spent=spent)
+
+
+def energy_of(angle):
+    """Fracture energy [J/m2] of a way at an angle [degrees]."""
+    turn = np.radians(angle)
+    opened = CONCRETE.normal_stiffness * np.cos(turn) ** 2
+    slid = CONCRETE.shear_stiffness * np.sin(turn) ** 2
+    return OPENED + (SLID - OPENED) * (slid / (opened + slid)) ** EXPONENT
+
+
+def taken(seed, angle):
+    """Energy [J/m2] that the bonds of the joint have taken once it has parted."""
+    mesh, turn = jointed(seed), np.radians(angle)
+    pull = SPEED * np.array([np.cos(turn), np.sin(turn), 0.0])
+    held = [effects.Fixed("behind"), effects.PrescribedMotion("before", tuple(pull))]
+    law = effects.MixedMode(SLID, EXPONENT)
+    scene = Scene(mesh, CONCRETE, [law, effects.BondDamping(), *held], weaker={"joint": BONDED})
+    simulation = Simulation(scene, ImplicitDashpots(STEP))
+    simulation.advance_to(round(TIME / STEP))
+    centre = mesh.points[simulation.model.topology.vertices].mean(axis=1)
+    of_joint = np.abs(centre[:, 0] - 0.5 * LENGTH) < 1e-9
+    table, area = simulation.readings.bonds(), 3.0 * simulation.model.bonds["area"]
+    if table[~of_joint, 4].any():
+        raise RuntimeError("the plate was damaged beside its joint")
+    return float(table[of_joint, 3:5].sum() / area[of_joint].sum())
+
+
+def jointed(seed):
+    """A plate whose inner points are moved at random, but for those of the joint in its middle."""
+    mesh = bar(LENGTH, WIDTH, CELLS)
+    points = mesh.points.copy()
+    low, high = points.min(axis=0), points.max(axis=0)
+    free = (points > low + 1e-9) & (points < high - 1e-9)
+    free[np.abs(points[:, 0] - 0.5 * LENGTH) < 1e-9, 0] = False
+    cell = (high - low) / np.array(CELLS)
+    points += free * JITTER * cell * np.random.default_rng(seed).uniform(-1.0, 1.0, points.shape)
+    moved = checked_mesh(points, mesh.tetrahedra, mesh.groups)
+    halves = moved.group("behind", lambda x: x[:, 0] < 0.5 * LENGTH)
+    halves = halves.group("before", lambda x: x[:, 0] > 0.5 * LENGTH)
+    return with_inner_group(halves, "joint", lambda x: np.abs(x[:, 0] - 0.5 * LENGTH) < 1e-9)
+
+
+def draw_joint(axes, spent):
+    """Energies over the angle beside the law."""
+    angles = np.linspace(0.0, 90.0, 91)
+    axes.plot(angles, [energy_of(angle) for angle in angles], color=BLACK, lw=0.8, label="law")
+    dots(axes, ANGLES, spent, "plates", BLUE)
+    axes.set(xlabel="pull against the joint's normal [degrees]", ylabel="energy [J/m2]")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)

@@ -1,0 +1,221 @@
+"""Cracks in notched plates: energy and roughness of one that divides a plate, and one that forks.
+
+The latter after Borden and others (2012).
+"""
+
+import itertools
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from _trust.common import Number, dots, material_of, plate, springs_step
+from taichi_dem import ImplicitDashpots, Scene, Simulation, effects, simulate
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED
+from taichi_dem.mesh.mesh import with_cut
+from taichi_dem.output.cracks import crack_areas
+
+#: E [Pa], nu and density [kg/m3] of both plates.
+YOUNG, POISSON, DENSITY = 32e9, 0.2, 2450.0
+#: Plate that is divided and depth of its notch [m], edges of elements [m].
+SIZE, DEPTH, EDGES = (0.1, 0.05), 0.015, (10e-3, 7e-3, 5e-3)
+#: Speed of its ends [m/s], and the time in which they take it up [s].
+SPEED, RAMP = 0.05, 1e-4
+#: Fracture energy [J/m2] of its bonds, and what else they have.
+TOUGH = 20.0
+BONDS = {"tensile_strength": 3e6, "fracture_energy": TOUGH, "cohesion": 1e8, "damping_ratio": 0.1}
+#: Largest opening of the ends over that at which a bond has failed, and looks on the way there.
+OPEN, LOOKS = 12.0, 48
+
+
+def crack(effort):
+    """What the account leaves open; energy in broken faces and beside them; area of the faces."""
+    edges = EDGES[: effort.sizes]
+    found = np.array([[divided(edge, seed) for edge in edges] for seed in effort.seeds])
+    left_open, energy, beside, area = found.transpose(2, 0, 1)
+    row = partial(Number, source="a crack in one plane")
+    first = "a face goes with the first of its three units that fails"
+    around = "faces around a crack soften and hold again when it has passed"
+    words = {
+        "account": "energy that the account of a crack leaves open",
+        "energy": "energy spent in broken faces, by their area and fracture energy",
+        "beside": "share of the energy that is spent in faces beside the crack",
+    }
+    account = "crack_account", words["account"], 0.0, np.abs(left_open), 0.0, 0.001
+    numbers = [
+        Number(*account, source="energy is kept"),
+        row("crack_energy", words["energy"], 1.0, energy, 0.999, 1.001, note=first),
+        row("crack_beside", words["beside"], 0.0, beside, 0.0, 0.001, note=around),
+    ]
+    rough = "a crack follows faces, whatever their size"
+    for k, edge in enumerate(edges):
+        size = f"broken area over that of the plane, elements of {1e3 * edge:g} mm"
+        numbers.append(row(f"crack_area_{1e3 * edge:g}_mm", size, 1.0, area[:, k], note=rough))
+    return numbers, partial(draw_areas, edges=edges, area=area)
+
+
+def divided(edge, seed):
+    """What ``measured`` tells of a plate on a random mesh."""
+    mesh = plate(*SIZE, edge, seed)
+    mesh = with_cut(mesh, "notch", (0.5 * SIZE[0], 0, 0), (1, 0, 0), lambda x: x[:, 1] < DEPTH)
+    options = {"density": DENSITY, "friction_angle": 30.0, **BONDS}
+    material = material_of(mesh, YOUNG, POISSON, **options)
+    pull = [
+        effects.PrescribedMotion(group, (way * SPEED, 0, 0), ramp=RAMP)
+        for group, way in (("left", -1), ("right", 1))
+    ]
+    laws = [effects.BondDamping(), effects.Softening()]
+    scene = Scene(mesh, material, [*laws, *pull], unbonded=["notch"])
+    simulation = Simulation(scene, ImplicitDashpots(springs_step(scene)))
+    time_s = 0.5 * OPEN * material.failure_opening / SPEED + RAMP
+    every = round(time_s / simulation.method.dt0 / LOOKS)
+    x = simulation.model.centre[:, 0]
+    for look in range(1, LOOKS + 1):
+        simulation.advance_to(look * every)
+        piece = simulation.model.pieces(simulation.state.broken())
+        if piece[x.argmin()] != piece[x.argmax()]:
+            return measured(simulation, edge)
+    raise InputError(f"the plate of seed {seed} did not come apart at {OPEN:g} times its opening")
+
+
+def measured(simulation, edge):
+    """Of a plate that came apart: the three shares of energy, and area over the plane's."""
+    broken = simulation.state.broken()
+    bond = simulation.energy_balance.tables()[1]
+    spent = bond[:, 3] + bond[:, 4]
+    area = crack_areas(simulation.model)[broken].sum()
+    left_open = simulation.energy_balance.account()["residual"] / spent.sum()
+    beside = spent[~broken].sum() / spent.sum()
+    faces = spent[broken].sum() / (TOUGH * area)
+    return left_open, faces, beside, area / ((SIZE[1] - DEPTH) * edge)
+
+
+def draw_areas(axes, edges, area):
+    """Broken area over that of the plane, over the size of the elements."""
+    dots(axes, 1e3 * np.array(edges), area)
+    axes.axhline(1.0, color=BLACK, lw=0.8, label="a plane")
+    axes.set(xlabel="edge of an element [mm]", xscale="log")
+    axes.set_ylabel("broken area / area of the plane [1]")
+    axes.legend()
+
+
+SOURCE = "Borden et al., CMAME 217 (2012) 77"
+#: Plate whose crack forks: length, height, notch [m], and pull on both long edges [Pa]. From 2 MPa
+#: on both edges on, their waves meet beyond the strength, and it opens along its middle at once.
+LENGTH, HEIGHT, NOTCH, PULL, LOW_PULL = 0.1, 0.04, 0.05, 1e6, 0.5e6
+#: Fracture energy of its bonds [J/m2]: a crack takes twice as much over its plane (see ``crack``).
+#: Strength [Pa], of which the publication has none.
+ENERGY, STRENGTH = 1.5, 3e6
+#: Time [s], and the limit of the speed of cracks, 0.6 of Rayleigh's waves [m/s].
+TIME, LIMIT = 80e-6, 1275.0
+#: Edges of elements [m], coarse first.
+FINE_EDGES = 2.8e-3, 2e-3, 1.4e-3
+LIMITED = "elements are not small against the zone in which bonds soften, a few millimetres"
+#: Way over which a speed is measured, and distance of two branches, both in edges.
+WAY, APART = 10.0, 3.0
+
+
+class Crack(NamedTuple):
+    """Bonds that broke ahead of the notch: places (n, 2) [m] and times (n,) [s], in order of time.
+
+    start, branch: times at which it sets off and becomes two [s], NaN for never. fastest [m/s].
+    """
+
+    place: np.ndarray
+    time: np.ndarray
+    start: float
+    branch: float
+    fastest: float
+
+
+def branching(effort):
+    """Times at which the crack sets off and branches, and its speed, by size of the elements."""
+    edges = FINE_EDGES[: effort.sizes]
+    found = [[forking(edge, seed) for seed in effort.seeds] for edge in edges]
+    numbers = [number for edge, cracks in zip(edges, found) for number in of_size(edge, cracks)]
+    slow = np.array([forking(edges[0], seed, LOW_PULL).fastest for seed in effort.seeds])
+    words = f"largest speed at {1e-6 * LOW_PULL:g} MPa, elements of {1e3 * edges[0]:g} mm"
+    row = "branching_speed_at_half_the_load", words, LIMIT, slow, 0.0, LIMIT, "m/s", SOURCE
+    return [*numbers, Number(*row, LIMITED)], partial(draw_cracks, cracks=found[-1])
+
+
+def of_size(edge, cracks):
+    """What the cracks in meshes of one size show; times of branching, if any branches."""
+    start, branch, fastest = np.array([one[2:] for one in cracks]).T
+    branched = ~np.isnan(branch)
+    share = branched.astype(float)
+    rows = [
+        ("start", "crack sets off", 10.0, 1e6 * start, 7.0, 13.0, "us", ""),
+        ("share", "meshes in which it branches", 1.0, share, 1.0, 1.0, "1", LIMITED),
+        ("time", "it branches", 35.5, 1e6 * branch[branched], 31.0, 40.0, "us", ""),
+        ("speed", "its largest speed", LIMIT, fastest, 0.0, LIMIT, "m/s", LIMITED),
+    ]
+    tag, size = f"{1e3 * edge:g}_mm", f"elements of {1e3 * edge:g} mm"
+    return [
+        Number(f"branching_{key}_{tag}", f"{words}, {size}", *values, SOURCE, note)
+        for key, words, *values, note in rows
+        if len(values[1])
+    ]
+
+
+def forking(edge, seed, pull=PULL):
+    """The crack in a random mesh."""
+    mesh = plate(LENGTH, HEIGHT, edge, seed, in_rows=False)
+    middle = (0.5 * LENGTH, 0.5 * HEIGHT, 0.0)
+    mesh = with_cut(mesh, "notch", middle, (0, 1, 0), lambda x: x[:, 0] < NOTCH)
+    options = {"density": DENSITY, "tensile_strength": STRENGTH, "fracture_energy": ENERGY}
+    more = {"friction_angle": 30.0, "cohesion": 2.0 * STRENGTH, "damping_ratio": 0.02}
+    material = material_of(mesh, YOUNG, POISSON, **options, **more)
+    laws = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
+    rollers = [effects.Roller(side, (0.0, 0.0, 1.0)) for side in ("back", "front")]
+    pulls = [effects.Pressure(side, -pull) for side in ("top", "bottom")]
+    scene = Scene(mesh, material, [*laws, *rollers, *pulls], unbonded=["notch"])
+    method = ImplicitDashpots(springs_step(scene))
+    return seen(simulate(scene, method=method, until=TIME, samples=1, progress=None), edge)
+
+
+def seen(result, edge):
+    """What the bonds that broke tell of the crack."""
+    model, when = result.model, result.broken_time
+    place = model.mesh.points[model.topology.vertices].mean(axis=1)[:, :2]
+    # Beside the loaded edges waves may break the plate by themselves.
+    inside = np.abs(place[:, 1] - 0.5 * HEIGHT) < 0.45 * HEIGHT
+    broke = np.flatnonzero(~np.isnan(when) & (place[:, 0] > NOTCH) & inside)
+    broke = broke[np.argsort(when[broke], kind="stable")]
+    place, when = place[broke], when[broke]
+    if not len(when):
+        return Crack(place, when, np.nan, np.nan, np.nan)
+    fastest = speed(place[:, 0], when, WAY * edge / LIMIT)
+    return Crack(place, when, when[0], forked(place, when, edge), fastest)
+
+
+def speed(x, when, window):
+    """Largest speed of the foremost place over a window of time [m/s]."""
+    tip, times = np.maximum.accumulate(x), np.arange(when[0], when[-1] - window, 0.25 * window)
+    ends = [tip[np.searchsorted(when, times + gone, side="right") - 1] for gone in (0.0, window)]
+    return float(np.max((ends[1] - ends[0]) / window, initial=0.0))
+
+
+def forked(place, when, edge):
+    """Time at which broken faces of one slice first lie apart, in the next slice too [s]."""
+    slices = np.floor((place[:, 0] - NOTCH) / (2.0 * edge)).astype(int)
+    apart = [
+        np.max(np.diff(np.sort(place[slices == k, 1])), initial=0.0) > APART * edge
+        for k in range(slices.max() + 2)
+    ]
+    both = np.flatnonzero(np.array(apart[:-1]) & np.array(apart[1:]))
+    return float(when[slices == both[0]].min()) if len(both) else np.nan
+
+
+def draw_cracks(axes, cracks):
+    """Broken faces ahead of the notch, a colour and a mark for each mesh."""
+    axes.plot([0.0, 1e3 * NOTCH], [0.0, 0.0], color=BLACK, lw=1.5, label="notch")
+    looks = zip((RED, BLUE, GREEN, ORANGE, GREY), "osD^v")
+    for k, (one, (colour, mark)) in enumerate(zip(cracks, itertools.cycle(looks)), 1):
+        look = {"color": colour, "marker": mark, "ms": 2.5, "ls": "none", "label": f"mesh {k}"}
+        axes.plot(*1e3 * (one.place - [0.0, 0.5 * HEIGHT]).T, **look)
+    reach = 500.0 * HEIGHT
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", xlim=(40.0, 1e3 * LENGTH), ylim=(-reach, reach))
+    axes.set_aspect("equal")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, markerscale=2.0)

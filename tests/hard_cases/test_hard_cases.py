@@ -1,0 +1,89 @@
+"""The hard cases: what is claimed holds, what is not is refused in words.
+
+At quick size, or as ``experiments/hard_cases.py`` asks, which draws what they give. Of the blast
+the two methods that share least code take turns in the fast tests; all others are slow.
+"""
+
+import math
+from importlib import import_module
+
+import pytest
+
+from ca_damper import InputError
+from tests.hard_cases.cases import Case, assess
+
+pytestmark = pytest.mark.experiment
+
+FILES = "blast_bonds blast_contacts blast_extremes blast_piles damper damper_limits".split()
+CASES = [case for name in FILES for case in import_module(f"tests.hard_cases.{name}").CASES]
+LEAST_ALIKE = ("multirate_drifted", "implicit")
+#: They differ from others by one law or account, which other tests are about.
+VARIANTS = ("spheres_printed", "automaton_ejection")
+#: Cases that compile an engine of their own; the pyramid is large.
+OF_ITS_OWN = """jump_of_ten_levels stiffness_ratio_1e4 many_steps_at_rest step_beyond_all_limits
+    sudden_pressure_on_sleepers step_ratio_resonance step_ratio_beyond_resonance funnel pyramid_100
+    levels_that_flip vertices_at_coarse_faces vertices_between_spheres grains_of_two_sizes
+    grains_by_place_full drop_with_full_restitution box_upside_down zeno_ball
+    mass_on_a_floor_below_1_g""".split()
+
+
+def is_fast(number, case, method):
+    able = [one for one in LEAST_ALIKE if one in case.asked]
+    in_turn = case.package == "damper" or (able and method == able[number % len(able)])
+    return in_turn and method not in VARIANTS and case.name not in OF_ITS_OWN
+
+
+ASKED = [
+    pytest.param(
+        *(case, method),
+        id=f"{case.name}-{method}",
+        marks=() if is_fast(number, case, method) else pytest.mark.slow,
+    )
+    for number, case in enumerate(CASES)
+    for method in case.asked
+]
+
+
+@pytest.mark.parametrize(("case", "method"), ASKED)
+def test_method_bears_the_case_or_refuses_it_in_words(case, method, pytestconfig):
+    asked = getattr(pytestconfig.option, "hard_cases", None)
+    trial = assess(case, method, quick=asked is None or asked.quick)
+    if asked:
+        asked.take(trial)
+    assert trial.status == ("refused" if method in case.refused else "passed"), trial.words
+
+
+def status(method, value=0.5, raises=None, warnings=(), refused=None):
+    """Status of a case made up for a method, of a figure that may be 1."""
+
+    def run(trial):
+        if raises is not None:
+            raise InputError(raises)
+        trial.limit("asked", [0.0, value], 1.0, "one")
+        trial.warnings += warnings
+
+    case = Case("made_up", "damper", "Nothing.", run, (), ("able",), refused or {})
+    return assess(case, method, True).status
+
+
+def test_a_figure_within_its_bound_passes_and_no_other():
+    assert status("able", 0.5) == "passed"
+    assert {status("able", value) for value in (1.001, math.inf, math.nan)} == {"failed"}
+
+
+def test_a_method_that_claims_a_case_may_not_refuse_it():
+    assert status("able", raises="dt must be short") == "failed"
+
+
+@pytest.mark.parametrize(
+    ("how", "found"),
+    [
+        ({"raises": "dt must be short"}, "refused"),
+        ({"raises": "no"}, "failed"),
+        ({"warnings": ("first", "the dt must be short")}, "refused"),
+        ({"warnings": ("first",)}, "failed"),
+        ({}, "failed"),
+    ],
+)
+def test_a_method_that_refuses_a_case_says_the_words_that_are_due(how, found):
+    assert status("unable", refused={"unable": "dt must"}, **how) == found
