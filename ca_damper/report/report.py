@@ -152,6 +152,13 @@ class Report:
         """
         write_text(path, json.dumps(self.as_dict(), indent=1))
 
+    def _certified(self):
+        """Lines of the certificate."""
+        found = self.certificate
+        if found is None:
+            return []
+        return [*(f"acted: {line}" for line in found.acted()), *found.left_out_lines()]
+
     def _diverged_rows(self):
         """Number of scenes that diverged, and the first of them."""
         if not self.diverged:
@@ -180,7 +187,7 @@ class Report:
             *self._further_excitations(),
             ("effects", ", ".join(self.effects) or "none"),
             *(("", f"{use.effect}: {use}") for use in self.effect_activity),
-            *(self.certificate.rows() if self.certificate is not None else ()),
+            *(("", line) for line in self._certified()),
             ("scenes", f"{self.scenes:,} with {_range(self.particles)} particles"),
             ("simulated", f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s"),
             *self._diverged_rows(),
@@ -198,6 +205,11 @@ class Report:
             ),
         ]
         return "\n".join(f"{name:18s} {text}" for name, text in rows)
+
+
+def _range(pair):
+    low, high = (f"{value:.3g}" for value in pair)
+    return low if low == high else f"{low} to {high}"
 
 
 def needed_effects(result: object, tolerance: float = 1e-3) -> Advice:
@@ -235,8 +247,3 @@ def needed_effects(result: object, tolerance: float = 1e-3) -> Advice:
         kind = type(result).__name__
         raise InputError(f"result must be a Response or the Report of a Batch, got {kind}")
     return Advice(report.effect_activity, (), fraction("tolerance", tolerance))
-
-
-def _range(pair):
-    low, high = (f"{value:.3g}" for value in pair)
-    return low if low == high else f"{low} to {high}"
