@@ -30,7 +30,7 @@ from taichi_dem.kit.bars.answer import Answer, Branch
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.sweeps.sweep import sweep
-from taichi_dem.kit.sweeps.table import SweepTable, parameter_grid
+from taichi_dem.kit.sweeps.table import parameter_grid
 from taichi_dem.kit.version import __version__
 
 __all__ = [
@@ -60,7 +60,6 @@ __all__ = [
     "Spheres",
     "StructureHistory",
     "Sweep",
-    "SweepTable",
     "TimeHistory",
     "__version__",
     "collect_and_collide",

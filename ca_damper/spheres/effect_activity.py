@@ -19,17 +19,23 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
+from ca_damper.engine.event_counts import EventCounts
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.certificate import Estimate
 from taichi_dem.kit.effect_usage import EffectUse
 
 vec2 = ti.types.vector(2, ti.f64)
 
-#: What is noted when it happens first: two spheres touch, one touches a wall, friction acts.
-PAIRS, WALLS, FRICTION = range(3)
+#: What is noted when it happens first: two spheres touch, one touches a wall, friction acts; and
+#: how often all of them fly through a whole step.
+PAIRS, WALLS, FRICTION, FLIGHTS = range(4)
 #: Those by which each effect acts.
-_BY = {"normal contact": (PAIRS, WALLS), "friction": (FRICTION,), "rotation": (FRICTION,)}
-_NEVER = -1
+_BY = {
+    "normal contact": (PAIRS, WALLS),
+    "friction": (FRICTION,),
+    "rotation": (FRICTION,),
+    "long flights": (FLIGHTS,),
+}
 
 #: Reason why an unseen effect may have acted: an impact is shorter than the time between checks.
 _UNSEEN = "touches between two looks leave no trace"
@@ -42,37 +48,24 @@ _LIMITS = (1e-3, 1e-2)
 
 
 @ti.data_oriented
-class EffectActivity:
+class EffectActivity(EventCounts):
     """Sums over the checks since the reset, by scene.
 
     touches: of two spheres, or of a sphere and a wall. power: into dashpots and into friction of
-    sphere on sphere [W]. motion: energy of going and of turning [J]. first: step in which each of
-    PAIRS, WALLS and FRICTION first happened, or -1. step: the present one.
+    sphere on sphere [W]. motion: energy of going and of turning [J].
     """
 
     def __init__(self, table: SceneFields):
-        self.table, self.touches = table, table.field(ti.i64)
+        super().__init__(table, len(_BY), _BY)
+        self.touches = table.field(ti.i64)
         self.power, self.motion = table.vector(2, ti.f64), table.vector(2, ti.f64)
-        self.first, self.step = table.field(ti.i32, FRICTION + 1), table.field(ti.i32)
 
     @ti.func
-    def clear(self, s):
+    def reset(self, s):
         """Nothing has been seen yet."""
+        self.clear(s)
         self.touches[s] = ti.cast(0, ti.i64)
         self.power[s], self.motion[s] = vec2(0.0), vec2(0.0)
-        for kind in range(FRICTION + 1):
-            self.first[s, kind] = _NEVER
-
-    @ti.func
-    def is_new(self, s, kind):
-        """Whether something has not happened yet."""
-        return self.first[s, kind] == _NEVER
-
-    @ti.func
-    def note(self, s, kind, happens):
-        """Note whether something happens in the present step."""
-        if happens and self.is_new(s, kind):
-            self.first[s, kind] = self.step[s]
 
     @ti.func
     def note_contact(self, s, dragged, rubbed):
@@ -86,12 +79,6 @@ class EffectActivity:
         """Note a sphere: whether it is at a wall, and the energy of its motion [J]."""
         self.touches[s] = self.touches[s] + at_wall
         self.motion[s] = self.motion[s] + vec2(going, turning)
-
-    def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
-        """Step in which each of the named effects first acted, infinite if never, (scenes,)."""
-        first = self.table.in_use(self.first).astype(np.float64)
-        first[first == _NEVER] = np.inf
-        return {name: first[:, list(_BY[name])].min(axis=1) for name in effects if name in _BY}
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """An EffectUse for each of the named effects, over all scenes."""
@@ -112,6 +99,7 @@ class EffectActivity:
                 whole="the energy of motion",
                 kept=unseen if turn else "",
             ),
+            EffectUse("long flights", "flights", self.total(FLIGHTS)),
         )
         return tuple(use for name in effects for use in found if use.effect == name)
 
