@@ -118,16 +118,6 @@ class StepStudy:
             found.append(point)
         return found
 
-    def rows(self) -> list[tuple]:
-        """Rows (name, ratio, step, seed, rms, whether of the reference) of all curves."""
-        runs = [(dt, repeats[0].rms[0], 0, 1) for dt, repeats in self.runs.items()]
-        runs.append((self.reference["step"], self.rms, 1, FIRST_SEED))
-        return [
-            (self.name, self.job["ratios"][k], dt, first + j, value, is_reference)
-            for dt, rms, is_reference, first in runs
-            for (k, j), value in np.ndenumerate(rms)
-        ]
-
     @property
     def floor(self) -> float:
         """Error expected from seeds alone, of a run against a reference of the same method.
