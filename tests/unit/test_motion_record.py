@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from _motion_record import MotionRecord
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform
 from taichi_dem.mesh.shapes import placed_together, single
 from taichi_dem.simulate import run_simulation
+from tests.motion_record import MotionRecord
 
 
 def test_two_free_bodies_are_recorded_as_they_move_and_turn():
