@@ -30,9 +30,8 @@ from ca_damper.theory.impact_damper import ImpactDamper
 from taichi_dem.kit.bars.answer import Answer, Branch
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.sweeps.rows import parameter_grid
 from taichi_dem.kit.sweeps.sweep import sweep
-from taichi_dem.kit.sweeps.table import SweepTable
+from taichi_dem.kit.sweeps.table import SweepTable, parameter_grid
 from taichi_dem.kit.version import __version__
 
 __all__ = [

@@ -12,25 +12,30 @@ from typing import Any
 import numpy as np
 
 from ca_damper.engine.activation import activated, certificate_of, periods_of
+from ca_damper.engine.damper_engine import borrow
 from ca_damper.engine.launches import Launches
 from ca_damper.engine.loaded_scenes import LoadedScenes
-from ca_damper.engine.modal_mount import ModalMount
+from ca_damper.engine.modal_mount import ModalMount, checked_mount
 from ca_damper.engine.recorder import ROOM
 from ca_damper.excitation.excitation import Excitation
-from ca_damper.filling import Filling
+from ca_damper.filling import Filling, check_filling
 from ca_damper.report import measures
-from ca_damper.report.certificate import EFFECTS, Certificate, Periods
+from ca_damper.report.certificate import EFFECTS, Certificate
 from ca_damper.report.checked_range import checked_range, warn_outside
 from ca_damper.report.progress import BatchProgress
 from ca_damper.report.report import RK45_STAGES, Report
 from ca_damper.scenes.checks import (
     MOST_CYCLES,
     check_finite_start,
+    check_record_fits,
     check_single_sine,
     check_within,
+    checked_excitation,
+    checked_samples,
     for_all,
     starts_of,
 )
+from ca_damper.scenes.scene_numbers import SceneNumbers
 from ca_damper.scenes.table import SceneTable, dealt
 from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import identity_of, version_text
@@ -39,7 +44,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import claiming
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
-from taichi_dem.kit.validation import choice, shown, whole
+from taichi_dem.kit.validation import choice, instance, positive, shown, whole
 
 _MOST_STEPS = 2**31 - 1
 
@@ -123,14 +128,46 @@ class Batch(LoadedScenes):
         if_diverged: str = "nan",
     ):
         self.asked_effects = choice("effects", effects, EFFECTS)
-        filling, self.estimates = activated(filling, table, effects)
-        many = measured_cycles, rtol, atol, excitation, recorded_samples, structure, if_diverged
-        super().__init__(filling, table, mount, *many)
-        self.periods: Periods | None = None
+        self.filling, self.estimates = activated(filling, table, effects)
+        runtime.session()
+        self.if_diverged = choice("if_diverged", if_diverged, ("nan", "raise"))
+        check_filling(self.filling)
+        self.count = instance("table", table, SceneTable).count
+        self.mount, self.modal = checked_mount(mount, structure)
+        self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
+        check_record_fits(self.count, self.measured_cycles)
+        tolerances = positive("rtol", rtol, zero_allowed=True), positive("atol", atol)
+        has_box = None if self.modal is None else self.modal.has_box(self.count)
+        self.numbers = self._checked(SceneNumbers(self.filling, table, has_box))
+        self.excitation = checked_excitation(excitation, mount)
+        self.recorded_samples = checked_samples(recorded_samples, self.count)
+        self._more_sizes = self.excitation.sizes(self.count)
+        self.time_origin, self.periods = np.zeros(self.count), None
         self.launches, self.compile_seconds = Launches(self.count), 0.0
         # Whether the present run goes on from a checkpoint.
         self.going_on = False
         self.writer: CheckpointWriter | NoCheckpointWriter = NoCheckpointWriter()
+        self._take_engine(*tolerances)
+
+    def _take_engine(self, rtol: float, atol: float) -> None:
+        """Borrow an engine and write the numbers of the batch to it."""
+        counts = self.count, self.measured_cycles, self.recorded_samples
+        kind = self.mount if self.modal is None else self.modal.kind
+        asked = self.filling, kind, self.excitation.kind, counts, self._more_sizes
+        self._engine = borrow(*asked, owner=self)
+        self._tell_compiling("set-up", 1)
+        engine = self.engine
+        engine.clear()
+        engine.load(self.filling, self.table, rtol, atol, self.excitation)
+        if self.modal is not None:
+            engine.container.hang(self.modal)
+        self._load_pace()
+
+    def _checked(self, numbers: SceneNumbers) -> SceneNumbers:
+        """The numbers; InputError where they do not fit the structure."""
+        if self.modal is not None:
+            self.modal.check(numbers.table)
+        return numbers
 
     def __repr__(self) -> str:
         return in_brief(self, self.filling.label, f"{self.count:,} scenes", f"on the {self.mount}")
@@ -543,25 +580,16 @@ class Batch(LoadedScenes):
 
     def _launch_until_done(self, steps: np.ndarray, progress: Any) -> None:
         """Launch, report and save; one saved at its end is reported and saved once more."""
-        launches, total, done = self.launches, max(1, int(steps.sum())), -1.0
+        launches, coupling = self.launches, self.engine.coupling
+        total, done = max(1, int(steps.sum())), -1.0
         while done < 1.0:
             done = launches.done
-            launches.launch(total, self._advance, self._check_divergence)
+            launches.launch(total, coupling.advance, self._check_divergence)
             if done < 1.0 == launches.done:
-                launches.count(self._steps_taken(), self.table.column("particles"))
+                begin, end = map(self.engine.table.in_use, (coupling.begin, coupling.step))
+                launches.count((end - begin).astype(np.int64), self.table.column("particles"))
             if progress is not None:
                 scene_steps = round(launches.done * total)
                 progress(BatchProgress(launches.done, launches.seconds, steps=scene_steps))
             self.writer.save_if_needed()
             done = launches.done
-
-    def _steps_taken(self) -> np.ndarray:
-        """Steps of the present run so far, (scenes,)."""
-        engine = self.engine
-        taken: np.ndarray = engine.table.in_use(engine.coupling.step) - engine.table.in_use(
-            engine.coupling.begin
-        )
-        return taken.astype(np.int64)
-
-    def _advance(self, share: float) -> None:
-        self.engine.coupling.advance(share)

@@ -10,7 +10,7 @@ import numpy as np
 from ca_damper.oscillator import Oscillator
 from ca_damper.runs.film import Film
 from ca_damper.theory.decay import logarithmic_decrement
-from taichi_dem.kit.display import in_brief, listed
+from taichi_dem.kit.display import counted, in_brief, listed
 from taichi_dem.kit.files import write_csv
 
 #: Cycles are counted down to this amplitude; decrements are means above and below two [mm].
@@ -18,8 +18,14 @@ LEVEL, _ABOVE, _BELOW = 10.0, 12.0, 6.0
 #: Peak acceleration at which particles begin to leave the floor [m/s^2].
 _G = 9.81
 #: What an independent check of the programs found, let go at 30 mm, by spheres and place alike.
-_CYCLES_EXPECTED = {10: 8, 30: 5, 50: 4}
-_RIGID_EXPECTED, _DECREMENTS_EXPECTED = 16, (0.22, 0.075)
+_EXPECTED = {
+    "cycles_rigid_N30_expected": 16,
+    "cycles_N10_expected": 8,
+    "cycles_N30_expected": 5,
+    "cycles_N50_expected": 4,
+    "decrement_above_12mm_N30_expected": 0.22,
+    "decrement_below_6mm_N30_expected": 0.075,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,15 +83,8 @@ def figures_of(decays: Mapping[str, Decay], options: Namespace) -> dict[str, tup
         ends = decay.decrements(options.particles)
         for side, value in zip(("above_12mm", "below_6mm"), ends):
             figures[f"decrement_{side}_{label}_N{options.particles}"] = (value, "1")
-    return {**figures, **(_expected() if options.amplitude == 30.0 else {})}
-
-
-def _expected():
-    """Figures of an independent check, under the names of those measured."""
-    grains = {f"cycles_N{count}_expected": (n, "1") for count, n in _CYCLES_EXPECTED.items()}
-    names = "decrement_above_12mm_N30_expected", "decrement_below_6mm_N30_expected"
-    decrements = {name: (n, "1") for name, n in zip(names, _DECREMENTS_EXPECTED)}
-    return {"cycles_rigid_N30_expected": (_RIGID_EXPECTED, "1"), **grains, **decrements}
+    expected = _EXPECTED if options.amplitude == 30.0 else {}
+    return figures | {name: (value, "1") for name, value in expected.items()}
 
 
 def write_decays(path: str, decays: Mapping[str, Decay]) -> None:
@@ -124,11 +123,6 @@ def draw_films(path: str, page: str | None, films: tuple[Film, Film], options: N
         show_containers(pair, page, open_browser=False)
 
 
-def counted(particles: int) -> str:
-    """Number of particles in words."""
-    return f"{particles} particle{'' if particles == 1 else 's'}"
-
-
 def _stacked(frame, box):
     """The frame of a rigid mass with its particles in rows on the floor of the box."""
     row, column = np.divmod(np.arange(len(frame.position)), round(box.width / box.diameter))
@@ -145,9 +139,10 @@ def plot_decay(path: str, decays: Mapping[str, Decay], count: int, top: float) -
         axes.axhline(threshold_mm(), color=BLACK, linewidth=1.2, **dotted)
         for label, style in styles_of(decays).items():
             sizes, ends = decays[label].amplitudes(count), decays[label].cycles(count)
-            name, colour = f"{counted(count)}, {style.label}", style.colour
+            words, colour = style.label, style.colour
             if label == "rigid":
-                name, colour = f"{counted(count)}, fixed", GREY
+                words, colour = "fixed", GREY
+            name = f"{counted(count, 'particle')}, {words}"
             look = {"marker": style.marker, "markersize": 4, "linewidth": 1.0, "label": name}
             axes.plot(np.arange(len(sizes)) + 0.5, sizes, color=colour, **look)
             if ends is not None:
@@ -168,11 +163,12 @@ def sentences(decays: Mapping[str, Decay], filling: Any, options: Namespace) -> 
     """The comparison in words."""
     count, oscillator = options.particles, Oscillator()
     load, mass = 1e3 * count * filling.particle_mass, 1e3 * oscillator.mass
+    share = f"{load:g} g, {100.0 * load / mass:.0f} % of its mass"
     decay, rigid = decays[filling.label], decays["rigid"]
     return (
         f"The container weighs {mass:g} g, swings by itself at {oscillator.natural_frequency:.2f} "
         f"Hz and is let go at {options.amplitude:g} mm.",
-        f"With {counted(count)} ({load:g} g, {100.0 * load / mass:.0f} % of its mass) fixed in it, "
+        f"With {counted(count, 'particle')} ({share}) fixed in it, "
         f"{_until(rigid.cycles(count))}; with free ones, {_until(decay.cycles(count))}.",
         *_lost(decay.decrements(count), rigid.decrements(count)),
     )
@@ -182,7 +178,7 @@ def _until(cycles):
     """When the amplitude fell below the level."""
     if cycles is None:
         return f"it still swings by more than {LEVEL:g} mm at the end"
-    return f"it swings by less than {LEVEL:g} mm after {cycles} cycle{'' if cycles == 1 else 's'}"
+    return f"it swings by less than {LEVEL:g} mm after {counted(cycles, 'cycle')}"
 
 
 def _lost(ends, rigid):

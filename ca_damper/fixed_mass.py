@@ -14,15 +14,33 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import plain_fields, positive, shown, whole
 
 
+class _Fixed:
+    """What both have in common: nothing moves in the container."""
+
+    step_bound: ClassVar[None] = None
+    order: ClassVar[int] = 1
+    default_dt: ClassVar[float] = 1e-4
+
+    def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
+        """Nothing that could diverge; required by the protocol."""
+        return "is fixed", dt
+
+    @property
+    def structure(self) -> Structure:
+        """Nothing but the class: mass and gravity are numbers."""
+        return Structure(())
+
+    def bind(self, table: SceneFields) -> "FixedMass":
+        """The mass of a particle on the device."""
+        return FixedMass(table)
+
+
 @dataclass(frozen=True)
-class Empty:
+class Empty(_Fixed):
     """A container without particles."""
 
     label: ClassVar[str] = "empty"
     effects: ClassVar[tuple] = ()
-    step_bound: ClassVar[None] = None
-    order: ClassVar[int] = 1
-    default_dt: ClassVar[float] = 1e-4
     capacity: ClassVar[int] = 0
     particle_mass: ClassVar[float] = 0.0
     gravity: ClassVar[float] = 9.8
@@ -32,22 +50,9 @@ class Empty:
         if particles != 0:
             raise InputError(f"particles must be 0 in an empty container, got {shown(particles)}")
 
-    def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
-        """Nothing that could diverge; required by the protocol."""
-        return "is empty", dt
-
-    @property
-    def structure(self) -> Structure:
-        """Nothing but the class."""
-        return Structure(())
-
-    def bind(self, table: SceneFields) -> "FixedMass":
-        """Nothing on the device but the table."""
-        return FixedMass(table)
-
 
 @dataclass(frozen=True)
-class RigidMass:
+class RigidMass(_Fixed):
     """Particles glued to the container: N m more mass and nothing else, exactly.
 
     Parameters
@@ -68,9 +73,6 @@ class RigidMass:
 
     label: ClassVar[str] = "rigid"
     effects: ClassVar[tuple] = ("fixed mass",)
-    step_bound: ClassVar[None] = None
-    order: ClassVar[int] = 1
-    default_dt: ClassVar[float] = 1e-4
     capacity: ClassVar[int] = 1_000_000
 
     def __post_init__(self) -> None:
@@ -81,19 +83,6 @@ class RigidMass:
     def check(self, particles: int, dt: float) -> None:
         """InputError for more than a million particles."""
         whole("particles", particles, 0, self.capacity)
-
-    def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
-        """A fixed mass has no state that could diverge; required by the protocol."""
-        return "is rigid", dt
-
-    @property
-    def structure(self) -> Structure:
-        """Nothing but the class: mass and gravity are numbers."""
-        return Structure(())
-
-    def bind(self, table: SceneFields) -> "FixedMass":
-        """The mass of a particle on the device."""
-        return FixedMass(table)
 
 
 @ti.data_oriented

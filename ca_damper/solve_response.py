@@ -37,7 +37,7 @@ from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, between, finite, instance, positive, shown
+from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive, several, shown
 
 # A run that diverges is repeated at a shorter step so often.
 _MOST_SHORTENED = 6
@@ -95,7 +95,7 @@ def solve_response(
     Returns
     -------
     Answer or tuple of Answer
-        The tuple for several goals. It has branches where seeds come to several steady motions.
+        A tuple for several goals. It has branches where seeds come to several steady motions.
 
     Raises
     ------
@@ -123,8 +123,8 @@ def solve_response(
         filling,
         one.particles[0],
         oscillator,
-        goals=_goals_of(goal),
-        tolerance=_share("tolerance", tolerance),
+        goals=several("goal", goal, lambda name, one: instance(name, one, Goal)),
+        tolerance=between("tolerance", tolerance, SMALLEST, 1.0),
         confidence=between("confidence", confidence, 0.5, 0.9999),
         budget_s=math.inf if budget_s is None else positive("budget_s", budget_s),
         span=_range(ratios),
@@ -140,37 +140,15 @@ def solve_response(
     return answers if isinstance(goal, (list, tuple)) else answers[0]
 
 
-def _goals_of(goal):
-    goals = tuple(goal) if isinstance(goal, (list, tuple)) else (goal,)
-    for one in goals:
-        if not isinstance(one, Goal):
-            raise InputError(
-                f"goal must be a Goal such as goals.peak_rms(), or a list of them, got {shown(one)}"
-            )
-    if not goals:
-        raise InputError("goal must be a Goal or a list of at least one, got none")
-    return goals
-
-
-def _share(name, value):
-    if not finite(value) or not 0.0 < value <= 1.0:
-        raise InputError(
-            f"{name} must be a share in (0, 1], such as 0.01 for 1 %, got {shown(value)}"
-        )
-    return float(value)
-
-
 def _stage_of(plan, filling, particles):
     """Stage at which a plan ended, None for none; InputError for a plan of something else."""
     if plan is None:
         return None
     stage = getattr(plan, "begin", None)
-    if not isinstance(stage, Stage):
-        raise InputError(f"plan must be that of an answer of solve_response, got {shown(plan)}")
-    if (stage.filling, stage.particles) != (filling, particles):
+    if not isinstance(stage, Stage) or (stage.filling, stage.particles) != (filling, particles):
         raise InputError(
-            "plan must be of the same filling and particles, "
-            f"{shown(filling)} and {particles}, got {shown(stage.filling)} and {stage.particles}"
+            f"plan must be that of an answer of solve_response for {shown(filling)} and "
+            f"{particles} particles, got {shown(plan)}"
         )
     return stage
 
@@ -179,14 +157,13 @@ def _range(ratios):
     """(lowest, highest) of a range, or None."""
     if ratios is None:
         return None
-    listed = isinstance(ratios, (list, tuple, np.ndarray)) and getattr(ratios, "ndim", 1) == 1
-    two = listed and len(ratios) == 2
-    if not two or not all(map(finite, ratios)) or not 0.0 < ratios[0] < ratios[1]:
+    ends = several("ratios", ratios, positive)
+    if len(ends) != 2 or ends[0] >= ends[1]:
         raise InputError(
             "ratios must be None or two numbers (lowest, highest) with 0 < lowest < highest, "
             f"got {shown(ratios)}"
         )
-    return float(ratios[0]), float(ratios[1])
+    return ends
 
 
 def _answered(job: Job) -> tuple[Search, list[Estimate]]:

@@ -25,14 +25,13 @@ from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.sweeps.rows import parameter_grid
 from taichi_dem.kit.sweeps.sweep import sweep
-from taichi_dem.kit.sweeps.table import SweepTable
+from taichi_dem.kit.sweeps.table import SweepTable, parameter_grid
 from taichi_dem.kit.version import __version__
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh.files import read_mesh
-from taichi_dem.mesh.joined import in_space_order, join
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
+from taichi_dem.mesh.shapes import in_space_order, join
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from taichi_dem.kit.data_table import locked
-from taichi_dem.kit.display import by_fields, in_brief
+from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.uncopied import Uncopied
@@ -258,9 +258,6 @@ class Collector:
         self.rows: dict[str, list] = {name: [] for name in read}
         self.view: RunView | None = None
 
-    def __repr__(self) -> str:
-        return in_brief(self, ", ".join(self.rows))
-
     def observe(self, view: "RunView") -> None:
         """Keep a value of every function.
 
@@ -301,9 +298,6 @@ class RunView(Uncopied):
 
     def __init__(self, simulation: Simulation, recorder: Recorder):
         self._simulation, self._recorder = simulation, recorder
-
-    def __repr__(self):
-        return in_brief(self, repr(self._simulation))
 
     time_s: float = _read("time_s", "Present time [s].")
     step: int = _read("macro_step", "Number of largest steps done.")
@@ -429,11 +423,7 @@ class Receivers:
     {'far': (1.9, 1.0, 0.1)}
     """
 
-    def __init__(
-        self,
-        points: Mapping[str, Sequence[float]],
-        when: Every | At | None = None,
-    ):
+    def __init__(self, points: Mapping[str, Sequence[float]], when: Every | At | None = None):
         if not isinstance(points, Mapping) or not points:
             raise InputError(f"points must be a dict of name to (x, y, z), got {shown(points)}")
         self.points = {
@@ -443,9 +433,6 @@ class Receivers:
         self.when = Every(samples=1) if when is None else instance("when", when, (Every, At))
         self._bodies = np.zeros(0, dtype=np.int64)
         self._rows: list[tuple[float, np.ndarray]] = []
-
-    def __repr__(self) -> str:
-        return in_brief(self, ", ".join(self.points), repr(self.when))
 
     def check_scene(self, scene: Scene) -> None:
         """Find the bodies that hold the points, and forget an earlier run.

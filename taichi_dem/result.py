@@ -24,13 +24,7 @@ from taichi_dem.output.cracks import cracks_of, rose_of
 from taichi_dem.output.export import write_gltf, write_particles, write_vtkhdf
 from taichi_dem.output.fragments import fragment_of_body, fragments_of
 from taichi_dem.output.hole_monitor import Attenuation, attenuation_of, watched_groups
-from taichi_dem.output.record import (
-    Frame,
-    remove_series,
-    series_name,
-    write_bonds,
-    write_paraview,
-)
+from taichi_dem.output.record import Frame, remove_series, series_name, write_bonds, write_paraview
 from taichi_dem.report.effects import Certificate
 from taichi_dem.report.energy_balance import GIVEN, HELD, TERMS
 from taichi_dem.report.report import Report

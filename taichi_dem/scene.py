@@ -349,7 +349,7 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     A solid in one piece meets nothing until it breaks, which is detected in the run. Scenes with
     contact are expected to have meeting bodies: any with several parts is reported. Scenes without
     contact may hold independent solids: they are not reported where they stay at rest, fall alike,
-    or are too far from each other (``parts.may_meet``). Faces that lie on each other without a bond
+    or are too far from each other (``may_meet``). Faces that lie on each other without a bond
     (``Mesh.keep_coincident``, ``Scene.unbonded``) meet in a solid of one piece too; unbonded ones
     touch with any contact.
     """

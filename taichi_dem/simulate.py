@@ -1,25 +1,36 @@
-"""The loop of a run: step, sample, keep frames, and return all as one result."""
+"""The loop of a run: step, sample, keep frames, return all as one result; what is saved of it."""
 
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from taichi_dem.kit.allocation import values
-from taichi_dem.kit.checkpoint import Checkpoint
+from taichi_dem.kit.checkpoint import Checkpoint, digest, identity_of, version_text
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.files import claiming, output_folder
 from taichi_dem.kit.progress.progress import Listener, Pace, Progress, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.restart import NoCheckpointWriter
-from taichi_dem.kit.validation import AUTO, FileName, instance, progress_option, shown, whole, word
+from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, Owner, RunSnapshot, opened
+from taichi_dem.kit.validation import (
+    AUTO,
+    FileName,
+    instance,
+    progress_option,
+    shown,
+    told_apart,
+    whole,
+    word,
+)
 from taichi_dem.loads.history import unresolved_histories
 from taichi_dem.methods import Method
 from taichi_dem.observers import MOST_CALLS, At, Every, Observer, Receivers, RunView, macro_steps
 from taichi_dem.output.hole_monitor import watched_groups
 from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
-from taichi_dem.saving import arrays_of, writer_of
 from taichi_dem.scene import Scene, scene_warnings
 from taichi_dem.simulation import PARTS, Simulation
 from taichi_dem.state.timeline import MACRO_TICKS
@@ -325,3 +336,77 @@ def _run(simulation, recorder, writer, plan, calls):
         if step == 0:
             between()
     writer.save()
+
+
+def arrays_of(
+    scene: Scene, method: Method, checkpoint: Any, resume: Any, last: int
+) -> dict[str, np.ndarray] | None:
+    """Arrays by name to resume from, or None; last: number of largest steps of the run.
+
+    Raises InputError for an unusable checkpoint.
+    """
+    if isinstance(checkpoint, Checkpoint):
+        # Refuses too many of them, before anything is done.
+        checkpoint.marks(last, method.dt0)
+    arrays = opened(checkpoint, resume, lambda: run_identity(scene, method))
+    begin = int(np.asarray(arrays.get("field/state.tick", 0)).max(initial=0)) if arrays else 0
+    if begin > last * MACRO_TICKS:
+        got, least = told_apart(last * method.dt0, begin * (method.dt0 / MACRO_TICKS))
+        raise InputError(f"until must be at least {least} s, where {resume} begins, got {got}")
+    return arrays
+
+
+def writer_of(
+    simulation: Simulation, recorder: Recorder, checkpoint: Any, resume: Any, arrays: Any
+) -> CheckpointWriter | NoCheckpointWriter:
+    """Writer of checkpoints, after a resumed run has been restored."""
+    if arrays:
+        saved_run(simulation, recorder).restore(arrays, resume)
+    if checkpoint is None:
+        return NoCheckpointWriter()
+    run = saved_run(simulation, recorder)
+    return CheckpointWriter(checkpoint, run, lambda: (simulation.macro_step, simulation.time_s))
+
+
+def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
+    """All that a checkpoint holds of a started simulation, a ``restart.RunSnapshot``."""
+    parts: dict[str, Owner] = {"simulation": simulation, **simulation.followed}
+    parts["recorder"] = recorder
+    return RunSnapshot(
+        run_identity(simulation.scene, simulation.method), FieldMemory(simulation.engine), parts
+    )
+
+
+def run_identity(scene: Scene, method: Method) -> dict[str, str]:
+    """Properties that a resumed run must share with the saved one, in words by name.
+
+    Driver, threads, and how long a run goes and what it records may differ.
+    """
+    mesh = scene.mesh
+    groups = [array for name in sorted(mesh.groups) for array in (list(name), mesh.groups[name])]
+    content = digest(mesh.points, mesh.tetrahedra, *groups)
+    return {
+        "version": version_text(),
+        "mesh": f"{mesh.body_count} tetrahedra ({content})",
+        "bonded shares": identity_of(mesh.bonded_shares),
+        "material": _material_identity(scene),
+        "effects": ", ".join(
+            f"{effect.name} {identity_of(vars(effect))}" for effect in scene.effects
+        ),
+        "max_speed": identity_of(scene.max_speed),
+        "initial motion": identity_of(scene.initial_motion) if scene.initial_motion else "nothing",
+        "on demand": identity_of((scene.on_demand, scene.sleep)),
+        "method": identity_of(method),
+    }
+
+
+def _material_identity(scene):
+    """Materials of a scene in words, and which body has which."""
+    laid = scene.body_materials
+    if laid.is_one:
+        return identity_of(laid.materials[0])
+    names = [identity_of(material) for material in laid.materials]
+    # In an order of their own, not that of the groups.
+    order = sorted(range(len(names)), key=names.__getitem__)
+    place = np.argsort(order)[laid.of_body]
+    return f"{'; '.join(names[k] for k in order)} ({digest(place)})"

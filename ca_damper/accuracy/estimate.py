@@ -208,7 +208,7 @@ class Readings:
         values = values - (BATCHES - 1) * (left.mean(axis=1) - values)
         begins = self.steady.begins()
         keys = [SceneKey(ratio, seed, dt) for ratio in ratios for seed in seeds]
-        more = np.mean([_correlated(self.runs.series(key)[0][begins[key] :]) for key in keys])
+        more = np.mean([_correlated(self.runs.by_cycle(key)["rms"][begins[key] :]) for key in keys])
         drift = max(_share(self.steady.parts[key]) for key in keys) * np.abs(values.mean(axis=0))
         return SeedValues(values, more * variance, len(seeds) * (BATCHES - 1), drift)
 

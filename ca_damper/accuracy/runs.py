@@ -152,11 +152,6 @@ class SceneRuns:
             for key, s in rows.items():
                 self._records[key] = np.concatenate([self._records[key], records[s]])
 
-    def series(self, key: SceneKey) -> np.ndarray:
-        """RMS and amplitude of every cycle of a scene [m], (2, cycles)."""
-        cycles = self._cycles(key, self._records[key][:, None])
-        return np.stack([cycles.rms, cycles.amplitude])
-
     def by_cycle(self, key: SceneKey) -> dict[str, np.ndarray]:
         """Measures of every cycle of a scene, each (cycles,), by name."""
         return measures_of(self.oscillator, self._cycles(key, self._records[key][:, None]))
@@ -257,7 +252,8 @@ class SteadyRuns:
 
     def _check(self, group, drift):
         shortest = min(map(self.runs.cycles, group))
-        series = [(*self.runs.series(key), *self.further(key)) for key in group]
+        by_cycle = [(key, self.runs.by_cycle(key)) for key in group]
+        series = [(one["rms"], one["amplitude"], *self.further(key)) for key, one in by_cycle]
         rows = [np.stack([one[:shortest] for one in seeds]) for seeds in zip(*series)]
         part = _steady(rows, drift)
         self.parts.update(dict.fromkeys(group, part))

@@ -11,10 +11,11 @@ from typing import Any
 import taichi as ti
 
 from ca_damper.automaton.conflict_resolution import rank
-from ca_damper.automaton.device import HOLDS, PAIRS, WALLS, Rule
+from ca_damper.automaton.device import HOLDS, PAIRS, WALLS
 from ca_damper.automaton.lattice import DIRECTIONS, EMPTY, WALL, mirrored, turned_back
 from ca_damper.engine.random_numbers import DEFLECT, EVENT, bits, unit
 from ca_damper.filling import Recoil
+from ca_damper.scenes.scene_fields import Part
 
 NOTHING, JOIN, FLOOR, SIDE, PAIR = range(5)
 _CELL_BITS = 16
@@ -48,7 +49,7 @@ def deflected(direction, draw):
 
 
 @ti.data_oriented
-class Collisions(Rule):
+class Collisions(Part):
     """Judge and carry out the events of a step.
 
     Of shape (scenes, cells), events: cell and event in one number; other: speed of what is met,

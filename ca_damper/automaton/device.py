@@ -94,13 +94,6 @@ class EventCounts:
         return tuple(EffectUse(name, what, int(total[k]), steers=True) for name, k, what in found)
 
 
-class Rule:
-    """Base of a rule: the parts that an automaton has so far are its own too."""
-
-    def __init__(self, automaton: Any):
-        vars(self).update(vars(automaton))
-
-
 @ti.data_oriented
 class LatticeDevice:
     """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``.

@@ -12,9 +12,10 @@ from typing import Any
 import taichi as ti
 
 from ca_damper.automaton.conflict_resolution import rank
-from ca_damper.automaton.device import PUSHES, Rule
+from ca_damper.automaton.device import PUSHES
 from ca_damper.automaton.lattice import DIRECTIONS, DOWN, EMPTY, HELD, UP, Lattice
 from ca_damper.engine.random_numbers import MOVE
+from ca_damper.scenes.scene_fields import Part
 
 #: Effects of a turn on the distance travelled.
 READINGS = ("signed", "signed_through_walls", "reset", "kept")
@@ -76,7 +77,7 @@ class Accumulator:
 
 
 @ti.data_oriented
-class Transport(Rule):
+class Transport(Part):
     """Flight of the particles, and how they follow the lattice.
 
     Of shape (scenes, cells), touching: cells of particles that meet an obstacle; crossing: of those

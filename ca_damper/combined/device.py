@@ -1,4 +1,4 @@
-"""One step of the combined filling: a flight of all grains, or short steps of spheres.
+"""The combined filling and its step: a flight of all grains, or short steps of spheres.
 
 Both are steps of one leapfrog, whose velocities belong to the times between steps and whose
 positions run half a step ahead. Another length of step shifts the positions along the velocities,
@@ -7,18 +7,21 @@ In short steps the container is foreseen from its motion at the beginning and it
 structure moves it at the end of the whole step only.
 """
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import taichi as ti
 
-from ca_damper.filling import Action, Motion
+from ca_damper.filling import Action, Motion, Structure
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import vec2
 from ca_damper.spheres.dynamics import DeviceSpheres
+from ca_damper.spheres.options import Spheres
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.audit import Audit
 from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import whole
 
 # Steps that a flight must be clear of contacts: itself, and half of one, by which positions lead.
 _CLEAR = 1.5
@@ -26,35 +29,35 @@ FLIGHTS = "long flights"
 
 
 @ti.data_oriented
-class DeviceCombined:
+class DeviceCombined(DeviceSpheres):
     """The grains of all scenes of a table; see ``ca_damper.filling``.
 
-    spheres: all grains, and what moves them. substeps: short steps of a step, shape (). step: short
-    steps and flights since the reset. flights: of them; first: step of the first, or -1.
+    substeps: short steps of a step, shape (). substep: short steps and flights since the reset.
+    flights: of them; first: step of the first, or -1.
     """
 
     def __init__(self, options: Any, table: SceneFields):
-        self.table, self.spheres = table, DeviceSpheres(options, table)
+        super().__init__(options, table)
         self.substeps = ti.field(ti.i32, shape=())
-        self.step, self.flights, self.first = (table.field(ti.i32) for _ in range(3))
+        self.substep, self.flights, self.first = (table.field(ti.i32) for _ in range(3))
 
     def load(self, options: Any) -> None:
         """Take over the numbers of grains of the same structure."""
-        self.spheres.load(options)
+        super().load(options)
         assign(self.substeps, options.substeps)
 
     @ti.func
     def reset(self, s):
         """Place the grains of scene s, at rest."""
-        self.spheres.reset(s)
-        self.step[s], self.flights[s], self.first[s] = 0, 0, -1
+        self.place(s)
+        self.substep[s], self.flights[s], self.first[s] = 0, 0, -1
 
     @ti.func
     def advance(self, s, step, motion):
         """Advance the grains by a step; returns the impulse of their impacts on the container."""
         dt, impulse = self.table.dt[s], 0.0
         if step == 0:
-            self.spheres.board(s, motion)
+            self.board(s, motion)
         if self._is_clear(s, dt, motion):
             self._fly(s, dt, motion)
             self.flights[s] = self.flights[s] + 1
@@ -67,7 +70,7 @@ class DeviceCombined:
     @ti.func
     def _is_clear(self, s, dt, motion):
         """Whether nothing can touch in a step; never before the first one."""
-        bodies, search = self.spheres.bodies, self.spheres.search
+        bodies, search = self.bodies, self.search
         lead, clear = bodies.lead[s], False
         if lead > 0.0:
             low, high = bodies.reach_of_walls(motion.x + lead * (motion.v + 0.5 * lead * motion.a))
@@ -89,7 +92,7 @@ class DeviceCombined:
     @ti.func
     def _shift(self, s, lead):
         """Have positions run another time [s] ahead of the velocities."""
-        bodies, search = self.spheres.bodies, self.spheres.search
+        bodies, search = self.bodies, self.search
         by = lead - bodies.lead[s]
         if bodies.lead[s] > 0.0:
             search.shifted(s, by)
@@ -101,65 +104,93 @@ class DeviceCombined:
     @ti.func
     def _fly(self, s, dt, motion):
         """Take all grains over a step in which none of them touches anything."""
-        bodies, search = self.spheres.bodies, self.spheres.search
+        bodies, search = self.bodies, self.search
         self._shift(s, 0.5 * dt)
         back, fore = search.least[s], search.most[s]
-        self.spheres.move(s, dt)
-        self.spheres.history.reset(s)
+        self.move(s, dt)
+        self.history.reset(s)
         search.note_motion(s, search.least[s] + back, search.most[s] + fore)
         bodies.floor[s] = motion.x + dt * (motion.v + 0.5 * dt * motion.a)
-        self.spheres.speed[s] = motion.v + dt * motion.a
-        self.step[s] = self.step[s] + 1
+        self.speed[s] = motion.v + dt * motion.a
+        self.substep[s] = self.substep[s] + 1
 
     @ti.func
-    def _take_short_steps(self, s, step, whole, motion):
+    def _take_short_steps(self, s, step, full, motion):
         """Take the grains over a step by short ones; returns the impulse of all [N s]."""
         count, total = self.substeps[None], 0.0
-        dt = whole / count
+        dt = full / count
         since = dt + self._shift(s, 0.5 * dt)
         x, v = motion.x, motion.v
         for _ in range(count):
             now = Motion(x, v, motion.a)
-            numbers = step, self.step[s]
-            impulse = self.spheres.step(s, numbers, dt, since, now)
+            numbers = step, self.substep[s]
+            impulse = self.step(s, numbers, dt, since, now)
             gain = dt * motion.a + impulse * self.table.recoil[s]
             x, v, total = x + dt * (v + 0.5 * gain), v + gain, total + impulse
-            self.step[s], since = self.step[s] + 1, dt
+            self.substep[s], since = self.substep[s] + 1, dt
         return total
-
-    @ti.func
-    def energy(self, s):
-        """Kinetic and potential energy and that of the contacts [J]."""
-        return self.spheres.energy(s)
-
-    @ti.func
-    def momentum(self, s):
-        """Momentum along x [kg m/s]."""
-        return self.spheres.momentum(s)
-
-    @ti.func
-    def divergence_code(self, s):
-        """As that of the spheres."""
-        return self.spheres.divergence_code(s)
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """Activity of each of the named effects."""
-        flights = int(self.table.in_use(self.flights).sum())
-        flown = EffectUse(FLIGHTS, "flights", flights)
-        rest = tuple(name for name in effects if name != FLIGHTS)
-        return (*self.spheres.uses(rest), *((flown,) if FLIGHTS in effects else ()))
+        flown = EffectUse(FLIGHTS, "flights", int(self.table.in_use(self.flights).sum()))
+        return (*super().uses(effects), *((flown,) if FLIGHTS in effects else ()))
 
     def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
         """Step in which each of the named effects first acted, infinite if never, (scenes,)."""
         first = self.table.in_use(self.first).astype(np.float64)
         first[first < 0] = np.inf
-        rest = tuple(name for name in effects if name != FLIGHTS)
-        return {**self.spheres.first_steps(rest), FLIGHTS: first}
+        return {**super().first_steps(effects), FLIGHTS: first}
 
-    def audit(self) -> Audit | None:
-        """Audit of the contact tests that short steps skipped."""
-        return self.spheres.audit()
 
-    def snapshot(self, s: int) -> dict[str, np.ndarray]:
-        """Places and velocities of the grains of scene s."""
-        return self.spheres.snapshot(s)
+@dataclass(frozen=True)
+class Combined(Spheres):
+    """Spheres that take short steps where contacts last, and long ones while all of them fly.
+
+    A step is as long as one of the automaton. Where no contact is possible in it, by bounds of all
+    speeds, the grains fly through it at once; else they take ``substeps`` steps of spheres. The
+    impulse of a step on the container is the sum of both. All other parameters are those of
+    ``Spheres``.
+
+    Parameters
+    ----------
+    substeps : int, default 5
+        Steps of spheres in a step with contacts, from 1 to 1000.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range, or ``search`` is not ``"cells"``.
+    """
+
+    substeps: int = 5
+
+    label: ClassVar[str] = "combined"
+    default_dt: ClassVar[float] = 1e-4
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        whole("substeps", self.substeps, 1, 1000)
+        if self.search != "cells":
+            raise InputError(
+                "search must be 'cells' where grains fly in long steps, which its lists allow, "
+                f"got {self.search!r}"
+            )
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects that are computed, in words for the report."""
+        return (*super().effects, FLIGHTS)
+
+    def safe_step(self) -> float:
+        """Step [s] whose short ones resolve the contact of spheres that fell through the box."""
+        return self.substeps * super().safe_step()
+
+    @property
+    def structure(self) -> Structure:
+        """As that of the spheres; substeps is a number."""
+        same = super().structure
+        return Structure(("combined", same.key), same.sizes)
+
+    def bind(self, table: SceneFields) -> DeviceCombined:
+        """The grains on the device, for all scenes of a table."""
+        return DeviceCombined(self, table)

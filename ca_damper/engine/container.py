@@ -1,15 +1,19 @@
 """Motion of the container: on its spring, driven by base and filling, or fixed to the base.
 
-Both have ``load`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``, ``motion(s)`` at
-the beginning of a step, with ``base(s)``, the base's displacement [m], ``recoil(s)``, the speed
-that a unit impulse gives it [1/kg], and ``advance(s, action)`` over the step, which returns the
-attempts of the integration, or -1. Those under any other excitation than a single sine of the base
-are in ``excited_container.py``.
+All have ``load`` and ``excite`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``,
+``motion(s)`` at the beginning of a step, with ``base(s)``, the base's displacement [m],
+``recoil(s)``, the speed that a unit impulse gives it [1/kg], ``renew(s)`` where the base has
+changed its motion, between two frequencies of a sweep, and ``advance(s, action)`` over the step,
+which returns the attempts of the integration, or -1.
 """
+
+from typing import Any
 
 import taichi as ti
 
 from ca_damper.engine import rk45
+from ca_damper.engine.signals import BASES, FORCES
+from ca_damper.excitation.excitation import Excitation, ExcitationKind
 from ca_damper.filling import Action, Motion
 from ca_damper.oscillator import Forcing, sine_and_cosine, slope, slope_at_phase
 from ca_damper.scenes.clock import Clock
@@ -23,7 +27,22 @@ _STAGES = (1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0)
 
 
 @ti.data_oriented
-class IntegratedContainer:
+class Container:
+    """Base of all containers; by itself it takes over nothing."""
+
+    def load(self, gravity: float, rtol: float, atol: float) -> None:
+        """Take over the numbers of a batch."""
+
+    def excite(self, excitation: Excitation, scenes: int) -> None:
+        """Take over the excitation of a batch, where it is no single sine of the base."""
+
+    @ti.func
+    def renew(self, s):
+        """Nothing to do."""
+
+
+@ti.data_oriented
+class IntegratedContainer(Container):
     """Base of containers that RK45 moves on under the action of the filling.
 
     impulse [N s] and carried [kg] in the present step. gravity [m/s^2]. tolerance: local error
@@ -33,8 +52,7 @@ class IntegratedContainer:
     def __init__(self, table: SceneFields):
         self.table = table
         self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
-        self.gravity = ti.field(ti.f64, shape=())
-        self.tolerance = ti.field(ti.f64, shape=2)
+        self.gravity, self.tolerance = ti.field(ti.f64, shape=()), ti.field(ti.f64, shape=2)
 
     def load(self, gravity: float, rtol: float, atol: float) -> None:
         """Take over the numbers of a batch."""
@@ -46,6 +64,9 @@ class IntegratedContainer:
 class SpringContainer(IntegratedContainer):
     """Base of integrated containers with one spring and dashpot each.
 
+    They have ``_begin(s)``, ``_load(s, action)`` over a step, ``_slope(s, load)`` at its beginning
+    and ``_integrated(s, load)``: state and slope at its end, and attempts.
+
     state, slope: displacement and speed, and their change. impulse_velocity: share of the present
     acceleration that is due to impacts [m/s^2].
     """
@@ -54,6 +75,13 @@ class SpringContainer(IntegratedContainer):
         super().__init__(table)
         self.state, self.slope = table.vector(2, ti.f64), table.vector(2, ti.f64)
         self.impulse_velocity = table.field(ti.f64)
+
+    @ti.func
+    def start(self, s, x, v):
+        """Place the container; nothing acts on it but spring, dashpot and excitation."""
+        self.state[s], self.impulse_velocity[s] = ti.Vector([x, v]), 0.0
+        self._begin(s)
+        self._set_action(s, Action(0.0, 0.0))
 
     @ti.func
     def recoil(self, s):
@@ -67,26 +95,34 @@ class SpringContainer(IntegratedContainer):
             self.state[s][0], self.state[s][1], self.slope[s][1] - self.impulse_velocity[s]
         )
 
+    @ti.func
+    def _set_action(self, s, action):
+        """Take over what acts from now on."""
+        self.impulse[s], self.carried[s] = action.impulse, action.carried
+        self.slope[s] = self._slope(s, self._load(s, action))
+
+    @ti.func
+    def advance(self, s, action):
+        """Take the container over the step; the last slope serves again unless the load changed."""
+        if action.impulse != self.impulse[s] or action.carried != self.carried[s]:
+            self._set_action(s, action)
+        y, change, attempts = self._integrated(s, self._load(s, action))
+        self.state[s], self.slope[s] = y, change
+        mass = self.table.mass[s] + action.carried
+        self.impulse_velocity[s] = action.impulse / (self.table.dt[s] * mass)
+        return attempts
+
 
 @ti.data_oriented
 class SprungContainer(SpringContainer):
-    """The container on its spring, integrated by RK45 within every step of the filling.
+    """The container on its spring, its base moving by a single sine.
 
     phase: sine and cosine of the base's turn up to each stage of a step, the same in all steps.
     """
 
     def __init__(self, table: SceneFields, clock: Clock):
         super().__init__(table)
-        self.clock = clock
-        self.phase = table.vector(2, ti.f64, len(_STAGES))
-
-    @ti.func
-    def start(self, s, x, v):
-        """Place the container; nothing acts on it but spring, dashpot and base."""
-        self.state[s] = ti.Vector([x, v])
-        self.impulse_velocity[s] = 0.0
-        self._set_phases(s)
-        self._set_action(s, Action(0.0, 0.0))
+        self.clock, self.phase = clock, table.vector(2, ti.f64, len(_STAGES))
 
     @ti.func
     def base(self, s):
@@ -95,26 +131,24 @@ class SprungContainer(SpringContainer):
 
     @ti.func
     def renew(self, s):
-        """Note that the base has changed its motion, between two frequencies of a sweep."""
-        self._set_phases(s)
+        """Take over the turn of the base at another frequency."""
+        self._begin(s)
         self._set_action(s, Action(self.impulse[s], self.carried[s]))
 
     @ti.func
-    def _set_phases(self, s):
+    def _begin(self, s):
         omega = 2.0 * ti.math.pi * self.table.frequency[s]
         for k in ti.static(range(len(_STAGES))):
             sine, cosine = sine_and_cosine(omega * (self.table.dt[s] * _STAGES[k]))
             self.phase[s, k] = ti.Vector([sine, cosine])
 
     @ti.func
-    def _set_action(self, s, action):
-        """Take over what acts from now on; at this moment the turn of the base is none."""
-        self.impulse[s], self.carried[s] = action.impulse, action.carried
-        forcing = self._forcing(s, action)
-        self.slope[s] = slope_at_phase(forcing, ti.Vector([0.0, 1.0]), self.state[s])
+    def _slope(self, s, forcing):
+        """At the beginning of a step, where the turn of the base is none."""
+        return slope_at_phase(forcing, ti.Vector([0.0, 1.0]), self.state[s])
 
     @ti.func
-    def _forcing(self, s, action):
+    def _load(self, s, action):
         """Forcing over the step that begins now; (K + i w C) y0 turned by the present phase."""
         table, circle = self.table, self.clock.circle[s]
         per_mass = 1.0 / (table.mass[s] + action.carried)
@@ -133,41 +167,112 @@ class SprungContainer(SpringContainer):
         )
 
     @ti.func
-    def advance(self, s, action):
-        """Take the container over the step; the last slope serves again unless the load changed."""
-        if action.impulse != self.impulse[s] or action.carried != self.carried[s]:
-            self._set_action(s, action)
-        forcing, dt = self._forcing(s, action), self.table.dt[s]
-        bounds = self.tolerance[0], self.tolerance[1], MOST_ATTEMPTS
-        y, change, error = self._whole_step(s, forcing)
-        attempts = 1
-        if not error <= 1.0:
-            y, change, attempts = rk45.integrate(
-                slope, forcing, 0.0, dt, self.state[s], self.slope[s], dt, *bounds
-            )
-        self.state[s], self.slope[s] = y, change
-        self.impulse_velocity[s] = action.impulse / (dt * (self.table.mass[s] + action.carried))
-        return attempts
-
-    @ti.func
-    def _whole_step(self, s, forcing):
-        """The first attempt of RK45, by the phases of its stages: the same bits, half the time."""
+    def _integrated(self, s, forcing):
+        """By the phases of the stages in a first attempt: the same bits, half the time."""
         phase = [self.phase[s, k] for k in ti.static(range(len(_STAGES)))]
-        y, dt = self.state[s], self.table.dt[s]
-        y_new, change, gap = rk45.stages(
+        before, dt, attempts = self.state[s], self.table.dt[s], 1
+        y, change, gap = rk45.stages(
             slope_at_phase,
-            *(forcing, phase[0], phase[1], phase[2], phase[3], phase[4], y, self.slope[s], dt),
+            *(forcing, phase[0], phase[1], phase[2], phase[3], phase[4], before, self.slope[s], dt),
         )
-        error = rk45.scaled_norm(gap, y, y_new, self.tolerance[0], self.tolerance[1])
-        return y_new, change, error
+        error = rk45.scaled_norm(gap, before, y, self.tolerance[0], self.tolerance[1])
+        if not error <= 1.0:
+            bounds = self.tolerance[0], self.tolerance[1], MOST_ATTEMPTS
+            y, change, attempts = rk45.integrate(
+                slope, forcing, 0.0, dt, before, self.slope[s], dt, *bounds
+            )
+        return y, change, attempts
+
+
+@ti.dataclass
+class Load:
+    """Numbers of scene s over a step that begins at ``start`` [s], per mass [1/kg] of all it moves.
+
+    stiffness [1/s^2], damping [1/s]; constant [m/s^2]: by impacts and the weight carried.
+    """
+
+    scene: ti.i32
+    start: ti.f64
+    stiffness: ti.f64
+    damping: ti.f64
+    per_mass: ti.f64
+    constant: ti.f64
 
 
 @ti.data_oriented
-class PrescribedContainer:
-    """Base of containers fixed to the base, whose motion is prescribed, whatever fills them."""
+class ExcitedContainer(SpringContainer):
+    """The container on its spring, its base and a force moving as an Excitation says.
 
-    def load(self, gravity: float, rtol: float, atol: float) -> None:
-        """Nothing to load: nothing is integrated."""
+    elapsed: steps since the start, as an excitation is a function of time. lifts: whether it lies
+    on the base by its weight, and spring and dashpot push but never pull; x = 0 is where it just
+    touches a base at rest.
+    """
+
+    def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind, lifts: bool):
+        super().__init__(table)
+        self.lifts, self.elapsed = lifts, table.field(ti.i32)
+        self.excited_base, self.force = BASES[kind.base](table, clock), FORCES[kind.force](table)
+
+    def excite(self, excitation: Excitation, scenes: int) -> None:
+        """Take over the excitation of a batch."""
+        self.excited_base.load(excitation, scenes)
+        self.force.load(excitation, scenes)
+
+    @ti.func
+    def base(self, s):
+        """Displacement of the base at the beginning of the step [m]."""
+        return self.excited_base.at(s, self.elapsed[s] * self.table.dt[s], 0.0)[0]
+
+    @ti.func
+    def _begin(self, s):
+        self.elapsed[s] = 0
+
+    @ti.func
+    def _slope(self, s, load):
+        return self._change(load, 0.0, self.state[s])
+
+    @ti.func
+    def _load(self, s, action):
+        """Load over the step that begins now."""
+        per_mass = 1.0 / (self.table.mass[s] + action.carried)
+        heavy = action.carried
+        if ti.static(self.lifts):
+            # On a spring the weight of the container itself is in x = 0.
+            heavy += self.table.mass[s]
+        force = action.impulse / self.table.dt[s] - heavy * self.gravity[None]
+        return Load(
+            scene=s,
+            start=self.elapsed[s] * self.table.dt[s],
+            stiffness=self.table.stiffness[s] * per_mass,
+            damping=self.table.damping[s] * per_mass,
+            per_mass=per_mass,
+            constant=force * per_mass,
+        )
+
+    @ti.func
+    def _change(self, load, t, y):
+        """d(x, v)/dt for y = (x, v): the right-hand side that RK45 integrates."""
+        base = self.excited_base.at(load.scene, load.start, t)
+        pull = load.stiffness * (base[0] - y[0]) + load.damping * (base[1] - y[1])
+        if ti.static(self.lifts):
+            # Nothing at a distance, where a dashpot alone would already act.
+            pull = ti.select(y[0] < base[0], ti.max(0.0, pull), 0.0)
+        push = self.force.at(load.scene, load.start, t) * load.per_mass
+        return ti.Vector([y[1], pull + push + load.constant])
+
+    @ti.func
+    def _integrated(self, s, load):
+        dt, bounds = self.table.dt[s], (self.tolerance[0], self.tolerance[1], MOST_ATTEMPTS)
+        y, change, attempts = rk45.integrate(
+            self._change, load, 0.0, dt, self.state[s], self.slope[s], dt, *bounds
+        )
+        self.elapsed[s] = self.elapsed[s] + 1
+        return y, change, attempts
+
+
+@ti.data_oriented
+class PrescribedContainer(Container):
+    """Base of containers fixed to the base, whose motion is prescribed, whatever fills them."""
 
     @ti.func
     def recoil(self, s):
@@ -175,8 +280,9 @@ class PrescribedContainer:
         return 0.0
 
     @ti.func
-    def renew(self, s):
-        """Nothing to do: the motion is prescribed."""
+    def base(self, s):
+        """Displacement of the base at the beginning of the step [m]."""
+        return self.motion(s).x
 
 
 @ti.data_oriented
@@ -191,11 +297,6 @@ class DrivenContainer(PrescribedContainer):
         """Position of the base; x and v are not used."""
 
     @ti.func
-    def base(self, s):
-        """Displacement of the base [m]."""
-        return self.table.base_amplitude[s] * self.clock.circle[s][0]
-
-    @ti.func
     def motion(self, s):
         """Of the base."""
         omega = 2.0 * ti.math.pi * self.table.frequency[s]
@@ -208,5 +309,41 @@ class DrivenContainer(PrescribedContainer):
         return 1
 
 
-#: Containers under a single sine of the base, by the word for their mount.
-CONTAINERS = {"spring": SprungContainer, "base": DrivenContainer}
+@ti.data_oriented
+class ShakenContainer(PrescribedContainer):
+    """The container fixed to a base that moves as an Excitation says."""
+
+    def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind):
+        self.table, self.excited_base = table, BASES[kind.base](table, clock)
+        self.elapsed = table.field(ti.i32)
+
+    def excite(self, excitation: Excitation, scenes: int) -> None:
+        """Take over the base motions of a batch."""
+        self.excited_base.load(excitation, scenes)
+
+    @ti.func
+    def start(self, s, x, v):
+        """Time zero; x and v are not used."""
+        self.elapsed[s] = 0
+
+    @ti.func
+    def motion(self, s):
+        """Of the base."""
+        at = self.excited_base.at(s, self.elapsed[s] * self.table.dt[s], 0.0)
+        return Motion(at[0], at[1], at[2])
+
+    @ti.func
+    def advance(self, s, action):
+        """Nothing to integrate: time moves the base."""
+        self.elapsed[s] = self.elapsed[s] + 1
+        return 1
+
+
+def container_of(mount: str, table: SceneFields, clock: Clock, kind: ExcitationKind) -> Any:
+    """Container on a mount under an excitation of some kind."""
+    single = kind == ExcitationKind()
+    if mount == "base":
+        return DrivenContainer(table, clock) if single else ShakenContainer(table, clock, kind)
+    if mount == "spring" and single:
+        return SprungContainer(table, clock)
+    return ExcitedContainer(table, clock, kind, lifts=mount == "floor")

@@ -6,10 +6,8 @@ from typing import Any
 
 from taichi.lang import impl
 
-from ca_damper.engine.account import MomentumAccount
-from ca_damper.engine.container import CONTAINERS
-from ca_damper.engine.coupling import Coupling
-from ca_damper.engine.excited_container import excited_container
+from ca_damper.engine.container import container_of
+from ca_damper.engine.coupling import Coupling, MomentumAccount
 from ca_damper.engine.group_coupling import GroupCoupling
 from ca_damper.engine.modal_container import ModalContainer
 from ca_damper.engine.modal_mount import ModalKind
@@ -20,12 +18,12 @@ from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.gravity import gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.scenes.table import SceneTable
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.engine_pool import Engine, EnginePool
 from taichi_dem.kit.errors import InputError
 
 #: Least room for scenes, measured cycles, samples, and places of a scene: below, nothing is saved.
 _LEAST = (64, 32, ROOM, *(LEAST_PLACES,) * 32)
-_SINE = Excitation()
 
 
 @dataclass(frozen=True)
@@ -59,23 +57,18 @@ class DamperEngine(Engine):
         sizes = dict(zip(self.structure.sizes, places))
         self.table = SceneFields(scenes, {"cycles": cycles, "samples": samples, **sizes})
         self.clock = Clock(self.table)
-        self.container = self._container()
+        self.account, self.recorder = MomentumAccount(self.table), Recorder(self.table)
+        mount: Any = self.structure.mount
+        kind, coupling = self.structure.excitation, Coupling
+        if isinstance(mount, ModalKind):
+            self.container = ModalContainer(self.table, self.clock, kind, mount.modes)
+            coupling = GroupCoupling
+        else:
+            self.container = container_of(mount, self.table, self.clock, kind)
         self.device = self._bound()
-        self.account = MomentumAccount(self.table)
-        self.recorder = Recorder(self.table)
         parts = self.container, self.device, self.account, self.recorder
-        coupling = GroupCoupling if isinstance(self.structure.mount, ModalKind) else Coupling
         self.coupling = coupling(self.table, self.clock, *parts)
         self.is_compiled = False
-
-    def _container(self) -> Any:
-        mount: Any = self.structure.mount
-        kind = self.structure.excitation
-        if isinstance(mount, ModalKind):
-            return ModalContainer(self.table, self.clock, kind, mount.modes)
-        if kind == ExcitationKind() and mount in CONTAINERS:
-            return CONTAINERS[mount](self.table, self.clock)
-        return excited_container(mount, self.table, self.clock, kind)
 
     def _bound(self) -> Any:
         filling, builder = self.structure.filling, impl._root_fb
@@ -90,21 +83,15 @@ class DamperEngine(Engine):
                 )
 
     def load(
-        self,
-        filling: Any,
-        table: SceneTable,
-        rtol: float,
-        atol: float,
-        excitation: Excitation = _SINE,
+        self, filling: Any, table: SceneTable, rtol: float, atol: float, excitation: Excitation
     ) -> None:
         """Take over the numbers of a batch; the state follows with ``coupling.start``."""
         self.table.load(table)
         gravity = gravity_along(filling)
         self.container.load(gravity, rtol, atol)
-        if hasattr(self.container, "excite"):
-            self.container.excite(excitation, table.count)
-        self.coupling.load(gravity)
-        self.account.load(filling.particle_mass * gravity)
+        self.container.excite(excitation, table.count)
+        assign(self.coupling.gravity, gravity)
+        assign(self.account.weight, filling.particle_mass * gravity)
         if hasattr(filling, "structure"):
             self.device.load(filling)
 

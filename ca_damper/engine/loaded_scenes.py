@@ -9,91 +9,46 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.engine.damper_engine import DamperEngine, borrow
-from ca_damper.engine.divergence import divergence
-from ca_damper.engine.modal_mount import ModalMount, checked_mount
+from ca_damper.engine.coupling import LOST
+from ca_damper.engine.damper_engine import DamperEngine
+from ca_damper.engine.modal_mount import ModalMount
 from ca_damper.errors import SimulationDiverged
-from ca_damper.filling import Filling, check_filling, structure_of
+from ca_damper.filling import Filling, structure_of
 from ca_damper.report import measures
-from ca_damper.scenes.checks import (
-    check_record_fits,
-    checked_excitation,
-    checked_samples,
-)
-from ca_damper.scenes.scene_memory import SceneMemory
+from ca_damper.scenes.scene_fields import SceneMemory
 from ca_damper.scenes.scene_numbers import SceneNumbers
 from ca_damper.scenes.table import SceneTable
-from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
-from taichi_dem.kit.validation import choice, instance, positive, whole
+from taichi_dem.kit.validation import whole
 
 #: Parts in which the kernels of a batch are compiled.
 _PARTS = 3
+_LOST_IN_WORDS = "lost its container, whose motion is no finite number"
 
 
 class LoadedScenes(Uncopied):
-    """A filling and a table of scenes on an engine; the arguments are those of a Batch.
+    """A filling and a table of scenes on an engine, put there by a Batch.
 
     numbers: of the scenes, as SceneNumbers. time_origin: when step 0 would have been at the present
-    step [s], (scenes,).
+    step [s], (scenes,). _told: scenes of which a warning has told that they diverged. _recording:
+    steps of the last run if it was recorded, those between samples, and number of samples.
     """
 
-    def __init__(
-        self,
-        filling: Filling,
-        table: SceneTable,
-        mount: str,
-        measured_cycles: int,
-        rtol: float,
-        atol: float,
-        excitation: Any = None,
-        recorded_samples: int = 0,
-        structure: ModalMount | None = None,
-        if_diverged: str = "nan",
-    ):
-        runtime.session()
-        self.if_diverged = choice("if_diverged", if_diverged, ("nan", "raise"))
-        self.filling = check_filling(filling)
-        self.count = instance("table", table, SceneTable).count
-        self.mount, self.modal = checked_mount(mount, structure)
-        self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
-        check_record_fits(self.count, self.measured_cycles)
-        rtol = positive("rtol", rtol, zero_allowed=True)
-        atol = positive("atol", atol)
-        self.numbers = self._checked(SceneNumbers(self.filling, table, self._has_box))
-        self.excitation = checked_excitation(excitation, mount)
-        self.recorded_samples = checked_samples(recorded_samples, self.count)
-        self._more_sizes = self.excitation.sizes(self.count)
-        counts = self.count, self.measured_cycles, self.recorded_samples
-        kind = self.mount if self.modal is None else self.modal.kind
-        asked = self.filling, kind, self.excitation.kind, counts, self._more_sizes
-        self._engine = borrow(*asked, owner=self)
-        engine = self.engine
-        self._tell_compiling("set-up", 1)
-        engine.clear()
-        engine.load(self.filling, self.table, rtol, atol, self.excitation)
-        if self.modal is not None:
-            engine.container.hang(self.modal)
-        self._load_pace()
-        self.time_origin = np.zeros(self.count)
-        self._started = False
-        # Scenes of which a warning has told that they diverged.
-        self._told = 0
-        # Steps of the last run if it was recorded, those between samples, and number of samples.
-        self._recording: tuple[int, int, int] | None = None
-
-    @property
-    def _has_box(self) -> np.ndarray | None:
-        """Scenes with a box, (scenes,); None for all."""
-        return None if self.modal is None else self.modal.has_box(self.count)
-
-    def _checked(self, numbers: SceneNumbers) -> SceneNumbers:
-        """The numbers; InputError where they do not fit the structure."""
-        if self.modal is not None:
-            self.modal.check(numbers.table)
-        return numbers
+    filling: Filling
+    count: int
+    if_diverged: str
+    modal: ModalMount | None
+    measured_cycles: int
+    recorded_samples: int
+    numbers: SceneNumbers
+    time_origin: np.ndarray
+    _engine: DamperEngine
+    _more_sizes: dict[str, int]
+    _started: bool = False
+    _told: int = 0
+    _recording: tuple[int, int, int] | None = None
 
     @property
     def diverged(self) -> np.ndarray:
@@ -308,3 +263,24 @@ class LoadedScenes(Uncopied):
                 stacklevel=4,
             )
         self._told = lost
+
+
+def divergence(
+    filling: Any, row: dict[str, Any], code: int, step: int, time_s: float
+) -> SimulationDiverged:
+    """Exception for a scene, a row of the table, that diverged with a code by a step."""
+    dt = row["dt"]
+    words, allowed = filling.divergence(max(code, 1), row["particles"], dt)
+    if code == LOST:
+        # The longest step of the filling is still the best advice.
+        words, allowed = _LOST_IN_WORDS, min(allowed, 0.5 * dt)
+    return SimulationDiverged(
+        f"the scene of particles = {row['particles']} and seed {row['seed']} at "
+        f"{row['frequency']:.5g} Hz diverged by step {step}, t = {time_s:.4g} s: it {words}; "
+        f"dt must be at most {allowed:.3g} s, was {dt:.3g} s",
+        scene=row,
+        step=step,
+        time_s=time_s,
+        dt=dt,
+        dt_allowed=allowed,
+    )

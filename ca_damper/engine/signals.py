@@ -57,20 +57,16 @@ class SignalTable:
 
 
 @ti.data_oriented
-class SignalBase:
+class SignalBase(SignalTable):
     """A base that moves by a Signal."""
 
     def __init__(self, table: SceneFields, clock: Clock):
-        self.signals = SignalTable(table, "base")
-
-    def load(self, excitation: Excitation, scenes: int) -> None:
-        """Take over the motions of a batch."""
-        self.signals.load(excitation, scenes)
+        super().__init__(table, "base")
 
     @ti.func
     def at(self, s, start, t):
         """Of the Signal."""
-        return self.signals.spline(s, start + t)
+        return self.spline(s, start + t)
 
 
 @ti.data_oriented
@@ -109,20 +105,16 @@ class NoForce:
 
 
 @ti.data_oriented
-class SignalForce:
+class SignalForce(SignalTable):
     """A force by a Signal."""
 
     def __init__(self, table: SceneFields):
-        self.signals = SignalTable(table, "force")
-
-    def load(self, excitation: Excitation, scenes: int) -> None:
-        """Take over the forces of a batch."""
-        self.signals.load(excitation, scenes)
+        super().__init__(table, "force")
 
     @ti.func
     def at(self, s, start, t):
         """Of the Signal."""
-        return self.signals.spline(s, start + t)[0]
+        return self.spline(s, start + t)[0]
 
 
 @ti.data_oriented

@@ -10,12 +10,10 @@ complex power F conj(V) / 2 holds both. A mass fixed to the container has c = 0 
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_dem.kit.data_table import dataset, unit_of
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.types import FloatOrArray
@@ -80,22 +78,6 @@ class Cycles:
 
     def __repr__(self):
         return by_fields(self)
-
-    def to_xarray(self) -> Any:
-        """Measures that need no structure as an xarray Dataset over scene and cycle.
-
-        Returns
-        -------
-        xarray.Dataset
-            Units in the attributes of each variable.
-        """
-        names = [n for n in MEASURE_UNITS if n not in ("loss_factor", "damping_ratio")]
-        found: dict[str, Any] = {
-            name: (("scene",), getattr(self, name), unit_of(column_of(name))) for name in names
-        }
-        found["rms_by_cycle"] = ("scene", "cycle"), self.rms_by_cycle, "m"
-        found["frequency"] = ("scene",), self.frequency, "Hz"
-        return dataset(found, {})
 
     def mean_of(self, name: str) -> np.ndarray:
         """Mean of a column over cycles.

@@ -44,48 +44,34 @@ class Stages:
         """
         if not isinstance(progress, BatchProgress):
             return self._pass_on(progress)
-        begin, end = self.before.share, self.ends[self.stage]
+        begin, end = self.before.share, self._end()
         share = end if progress.share == 1.0 else begin + (end - begin) * progress.share
         seconds = self.before.seconds + progress.seconds
         steps = self.before.steps + progress.steps
         whole = BatchProgress(float(share), seconds, steps=steps)
         if progress.share == 1.0:
             self.stage, self.before = self.stage + 1, whole
-        if self.pace.should_report(self.stage == len(self.ends)):
+        if self.pace.should_report(share == 1.0):
             self._pass_on(whole)
+
+    def _end(self):
+        """Share at which the present stage ends."""
+        return self.ends[self.stage]
 
     def _pass_on(self, progress):
         if self.progress is not None:
             self.progress(progress)
 
 
-class OpenEnded:
-    """Passes the progress of runs on whose number is not known: the share grows ever slower.
-
-    progress: called with a BatchProgress, or None for nobody.
-    """
+class OpenEnded(Stages):
+    """The same of runs whose number is not known: the share grows ever slower."""
 
     def __init__(self, progress: Listener | None):
-        self.progress, self.runs, self.before = progress, 0, BatchProgress(0.0, 0.0)
-        self.pace = Pace(_LEAST_SECONDS)
+        super().__init__(progress, ())
 
-    def __call__(self, progress: Progress) -> None:
-        """Take note of the present run's progress; the run ends with a share of 1."""
-        if self.progress is None:
-            return
-        if not isinstance(progress, BatchProgress):
-            self.progress(progress)
-            return
-        share = 1.0 - 1.0 / (1.0 + _GROWTH * (self.runs + progress.share))
-        seconds = self.before.seconds + progress.seconds
-        steps = self.before.steps + progress.steps
-        whole = BatchProgress(share, seconds, steps=steps)
-        if progress.share == 1.0:
-            self.runs, self.before = self.runs + 1, whole
-        if self.pace.should_report():
-            self.progress(whole)
+    def _end(self):
+        return 1.0 - 1.0 / (1.0 + _GROWTH * (self.stage + 1.0))
 
     def end(self) -> None:
         """Report that all is done."""
-        if self.progress is not None:
-            self.progress(BatchProgress(1.0, self.before.seconds, steps=self.before.steps))
+        self._pass_on(BatchProgress(1.0, self.before.seconds, steps=self.before.steps))

@@ -4,6 +4,7 @@ Fields are allocated once, with a capacity. How many scenes are in use, and how 
 read from fields at run time, so that a batch of another size compiles nothing.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ import taichi as ti
 
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.field_memory import fields_of
 
 #: Length of an axis of a field: a number, or the name of one of the sizes.
 Length = int | str
@@ -28,6 +30,13 @@ class SceneField:
     field: ti.Field
     lengths: tuple[Length, ...]
     flat: bool
+
+
+class Part:
+    """Base of a part of a filling on the device: all that its owner has so far is its own too."""
+
+    def __init__(self, owner: Any):
+        vars(self).update(vars(owner))
 
 
 @ti.data_oriented
@@ -55,24 +64,21 @@ class SceneFields:
 
     def field(self, dtype: Any, *lengths: Length, flat: bool = False) -> ti.Field:
         """Declare a field of the scenes; lengths: of its axes after that of the scenes."""
-        return self._noted(ti.field(dtype, shape=self._shape(lengths, flat)), lengths, flat)
+        return self._made(lambda shape: ti.field(dtype, shape=shape), lengths, flat)
 
     def vector(self, n: int, dtype: Any, *lengths: Length, flat: bool = False) -> ti.Field:
         """Declare a field of vectors with n components; else as ``field``."""
-        shape = self._shape(lengths, flat)
-        return self._noted(ti.Vector.field(n, dtype, shape=shape), lengths, flat)
+        return self._made(lambda shape: ti.Vector.field(n, dtype, shape=shape), lengths, flat)
 
-    def _shape(self, lengths: tuple[Length, ...], flat: bool) -> tuple[int, ...]:
+    def _made(self, make: Any, lengths: tuple[Length, ...], flat: bool) -> ti.Field:
         shape = (self.capacity, *(self.length(length) for length in lengths))
-        return (shape[0] * shape[1], *shape[2:]) if flat else shape
+        field = make((shape[0] * shape[1], *shape[2:]) if flat else shape)
+        self.made.append(SceneField(field, lengths, flat))
+        return field
 
     def length(self, length: Length) -> int:
         """Number of places of a scene along an axis."""
         return self.sizes[length] if isinstance(length, str) else length
-
-    def _noted(self, field: ti.Field, lengths: tuple[Length, ...], flat: bool) -> ti.Field:
-        self.made.append(SceneField(field, lengths, flat))
-        return field
 
     def load(self, table: SceneTable) -> None:
         """Take over the rows of a table that fits."""
@@ -97,3 +103,54 @@ class SceneFields:
         """Change frequency [Hz] and step [s] of all scenes: pair[0] and pair[1], (scenes,) each."""
         assign(self.frequency, pair[0])
         assign(self.dt, pair[1])
+
+
+class SceneMemory:
+    """Reads and writes the state of a batch, for checkpoints that another session can go on from.
+
+    engine: of the batch. sizes: places that a scene of it uses, by name. Arrays of the scenes are
+    cut to what is in use, as engines differ in capacity.
+    """
+
+    def __init__(self, engine: Any, sizes: dict[str, int]):
+        self.engine, self.sizes = engine, sizes
+
+    def read(self) -> dict[str, np.ndarray]:
+        """Copies of all that changes in a run, by name."""
+        scenes = {f"scenes/{k}": self._cut(one) for k, one in enumerate(self.engine.table.made)}
+        return {**scenes, **{name: values(field) for name, field in self._others().items()}}
+
+    def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
+        """Name of a field that the arrays of ``read`` lack or do not fit; else ""."""
+        for name, mine in self.read().items():
+            array = arrays.get(name)
+            if array is None or array.dtype != mine.dtype or array.shape != mine.shape:
+                return name
+        return ""
+
+    def write(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Restore the fields from arrays that ``read`` returned and ``misfit`` accepts."""
+        for k, one in enumerate(self.engine.table.made):
+            whole = values(one.field)
+            self._window(one, whole)[...] = arrays[f"scenes/{k}"]
+            assign(one.field, whole)
+        for name, field in self._others().items():
+            assign(field, arrays[name])
+
+    def _others(self) -> dict[str, ti.Field]:
+        """Fields that are not of the scenes: those of fillings that declare them by themselves."""
+        scenes = {id(one.field) for one in self.engine.table.made}
+        found = [one for one in fields_of(self.engine) if one.kind == "saved"]
+        return {f"others/{one.name}": one.field for one in found if id(one.field) not in scenes}
+
+    def _cut(self, one: SceneField) -> np.ndarray:
+        return self._window(one, values(one.field)).copy()
+
+    def _window(self, one: SceneField, whole: np.ndarray) -> np.ndarray:
+        """Part of an array of a field that the batch uses."""
+        table = self.engine.table
+        if one.flat:
+            entry = whole.shape[1:]
+            whole = whole.reshape(table.capacity, table.length(one.lengths[0]), *entry)
+        used = [self.sizes.get(n, n) if isinstance(n, str) else n for n in one.lengths]
+        return whole[tuple(slice(n) for n in (table.scene_count, *used))]

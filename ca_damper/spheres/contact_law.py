@@ -1,18 +1,22 @@
-"""Contact forces between two spheres, or a sphere and a wall (paper, eqs 3 to 6)."""
+"""Contact forces between two spheres, or a sphere and a wall (paper, eqs 3 to 6).
+
+The dashpot follows from the wanted restitution. Two spheres meet head on: m d'' = -max(0, k d^(3/2)
++ c d^p d'); d: overlap, m: effective mass. In units of the overlap D = (m v^2 / k)^(2/5) and of the
+impact speed v, c becomes the number alpha = c D^(p+1) / (m v): independent of v for p = 1/4, so
+that restitution is one number, and growing with v for p = 1/2, so that it holds at one speed only.
+The contact ends where the force has fallen to zero, before the overlap has: spheres do not pull.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import taichi as ti
 
-from ca_damper.spheres.restitution import damping
 from taichi_dem.kit.allocation import assign_members
 from taichi_dem.kit.elementary import fifth_root
-
-if TYPE_CHECKING:
-    from ca_damper.spheres.options import Spheres
 
 # Exponents p of the dashpot k d^(3/2) + c d^p d', by the name of the law.
 POWERS = {"tsuji": 0.25, "printed": 0.5}
@@ -26,6 +30,11 @@ _HERTZ = 2.0 * math.sqrt(math.pi) * math.gamma(1.4) / math.gamma(0.9)
 # Part of a contact's slip that friction may take away in one step. Up to six contacts of a sphere
 # act at once; at a quarter each they slow it down and never turn it round, so nothing chatters.
 SLIP_SHARE = 0.25
+
+
+# Step in the solver's variable: fourth order, errors of restitution below 1e-7.
+_STEP = 1.0 / 256.0
+_BISECTIONS = 40
 
 
 @ti.dataclass
@@ -82,22 +91,14 @@ def contact_duration(mass: float, stiffness: float, speed: float) -> float:
     return _HERTZ * root * root / speed
 
 
-def pair_numbers(options: "Spheres", one: int = 0, other: int = 0) -> dict[str, float]:
+def pair_numbers(options: Any, one: int = 0, other: int = 0) -> dict[str, float]:
     """Numbers of a contact of two spheres, of these of the sizes.
 
     Dict of stiffness, shear_ratio, damping, friction, mass, reach.
     """
-    moduli = (options.young, options.poisson, options.young, options.poisson)
-    stiffness = hertz_stiffness(_reduced(options.radii, one, other), *moduli)
-    return _numbers(
-        options,
-        options.restitution,
-        options.friction,
-        stiffness=stiffness,
-        shear_ratio=shear_ratio(*moduli),
-        mass=_reduced(options.masses, one, other),
-        reach=options.radii[one] + options.radii[other],
-    )
+    radius, mass = (_reduced(of, one, other) for of in (options.radii, options.masses))
+    partner = options.young, options.poisson, options.restitution, options.friction
+    return _numbers(options, partner, radius, mass, options.radii[one] + options.radii[other])
 
 
 def _reduced(values: tuple[float, ...], one: int, other: int) -> float:
@@ -106,26 +107,95 @@ def _reduced(values: tuple[float, ...], one: int, other: int) -> float:
     return 0.5 * first if first == second else first * second / (first + second)
 
 
-def wall_numbers(options: "Spheres", kind: int = 0) -> dict[str, float]:
+def wall_numbers(options: Any, kind: int = 0) -> dict[str, float]:
     """Numbers of a contact of a sphere of a size with the container: as of ``pair_numbers``."""
-    moduli = (options.young, options.poisson, options.wall_young, options.wall_poisson)
-    stiffness = hertz_stiffness(options.radii[kind], *moduli)
-    return _numbers(
-        options,
-        options.wall_restitution,
-        options.wall_friction,
-        stiffness=stiffness,
-        shear_ratio=shear_ratio(*moduli),
-        mass=options.masses[kind],
-        reach=options.radii[kind],
+    moduli, radius = (options.wall_young, options.wall_poisson), options.radii[kind]
+    partner = (*moduli, options.wall_restitution, options.wall_friction)
+    return _numbers(options, partner, radius, options.masses[kind], radius)
+
+
+def _numbers(options, partner, radius, mass, reach):
+    """Numbers of a contact with a partner: its modulus and Poisson's ratio, restitution, friction.
+
+    radius, mass: effective ones.
+    """
+    *moduli, restitution, friction = partner
+    stiffness = hertz_stiffness(radius, options.young, options.poisson, *moduli)
+    power, speed = POWERS[options.damping], options.reference_speed
+    return {
+        "stiffness": stiffness,
+        "shear_ratio": shear_ratio(options.young, options.poisson, *moduli),
+        "damping": damping(restitution, power, mass, stiffness, speed),
+        "friction": friction,
+        "mass": mass,
+        "reach": reach,
+    }
+
+
+@lru_cache(maxsize=64)
+def damping_number(restitution: float, power: float) -> float:
+    """Number alpha of a dashpot d^power that lets spheres part at ``restitution`` times the speed.
+
+    restitution lies in (0, 1]; power is 1/4 or 1/2.
+    """
+    low, high = 0.0, 1.0
+    while restitution_of(high, power) > restitution:
+        low, high = high, 2.0 * high
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if restitution_of(middle, power) > restitution:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def restitution_of(alpha: float, power: float) -> float:
+    """Speed of parting over speed of impact for a dashpot of number alpha.
+
+    Overlap y^4 instead of d, and a time in which y' is the speed u: then all terms are smooth,
+    where d^(1/4) is not. Integrated by the classical Runge-Kutta method.
+    """
+    y, u = 0.0, 1.0
+    while True:
+        rate = _rate(y, u, alpha, power)
+        y_new, u_new = _runge_kutta(y, u, alpha, power)
+        rate_new = _rate(y_new, u_new, alpha, power)
+        if u_new < 0.0 <= rate_new:
+            # The force falls to zero within this step, and with it the rate, about linearly.
+            share = rate / (rate - rate_new) if rate < 0.0 else 0.0
+            return -(u + 0.5 * share * _STEP * rate)
+        y, u = y_new, u_new
+
+
+def damping(restitution: float, power: float, mass: float, stiffness: float, speed: float) -> float:
+    """Coefficient c [N s/m^(1+power)] that gives ``restitution`` at an impact speed [m/s].
+
+    mass: effective mass [kg]. stiffness: k [N/m^(3/2)]. For power = 1/4 the speed cancels.
+    """
+    root = fifth_root(mass * speed * speed / stiffness)
+    depth = root * root
+    more = math.sqrt(depth) if power == 0.5 else math.sqrt(math.sqrt(depth))
+    return damping_number(restitution, power) * mass * speed / (depth * more)
+
+
+def _rate(y, u, alpha, power):
+    """Change of the speed u: -4 y^3 (d^(3/2) + alpha d^p u), d = y^4."""
+    damped = y * u if power == 0.25 else y * y * u
+    cube = y * y * y
+    return -4.0 * cube * (cube * cube + alpha * damped)
+
+
+def _runge_kutta(y, u, alpha, power):
+    h = _STEP
+    y1, u1 = u, _rate(y, u, alpha, power)
+    y2, u2 = u + 0.5 * h * u1, _rate(y + 0.5 * h * y1, u + 0.5 * h * u1, alpha, power)
+    y3, u3 = u + 0.5 * h * u2, _rate(y + 0.5 * h * y2, u + 0.5 * h * u2, alpha, power)
+    y4, u4 = u + h * u3, _rate(y + h * y3, u + h * u3, alpha, power)
+    return (
+        y + h / 6.0 * (y1 + 2.0 * y2 + 2.0 * y3 + y4),
+        u + h / 6.0 * (u1 + 2.0 * u2 + 2.0 * u3 + u4),
     )
-
-
-def _numbers(options, restitution, friction, *, stiffness, shear_ratio, mass, reach):
-    power = POWERS[options.damping]
-    c = damping(restitution, power, mass, stiffness, options.reference_speed)
-    numbers = {"stiffness": stiffness, "damping": c, "friction": friction}
-    return {**numbers, "shear_ratio": shear_ratio, "mass": mass, "reach": reach}
 
 
 @ti.data_oriented
@@ -142,7 +212,7 @@ class ContactLaw:
     def damping_ratio(self, share):
         """Ratio of damping for the same restitution with a share of the effective mass.
 
-        The damping grows with the power 1 - 2 (1 + p) / 5 of the mass (see ``restitution``).
+        The damping grows with the power 1 - 2 (1 + p) / 5 of the mass (see above).
         """
         ratio = ti.sqrt(share)
         if ti.static(self.printed):

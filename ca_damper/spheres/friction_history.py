@@ -14,9 +14,8 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import Part
 from ca_damper.spheres.bodies import vec2
-from ca_damper.spheres.contact_law import ContactLaw
 
 #: Walls of a box: two axes, two sides.
 _WALLS = 4
@@ -24,45 +23,34 @@ _LONG_AGO = -2
 
 
 @ti.data_oriented
-class NoHistory:
-    """Friction that depends on the present slip only, or none."""
-
-    remembers = False
-
-    @ti.func
-    def reset(self, s):
-        """Nothing to forget."""
-
-
-@ti.data_oriented
-class FrictionHistory:
+class FrictionHistory(Part):
     """Springs of the contacts of the last step: force [N] and root of the overlap [m^(1/2)].
 
+    remembers: whether there are any; else friction depends on the present slip only.
     pair, pair_spring, pair_count: pairs that touched, in the order of the search. recalled: of the
     pairs of the present step, zero for new ones. wall_spring: of a sphere at each wall, 2 axis +
     side. wall_step: step in which a sphere last touched a wall. step, speed: the last one, and the
     container's speed at its beginning, then at its end [m/s].
     """
 
-    remembers = True
-
-    def __init__(self, table: SceneFields, bodies: Any, law: ContactLaw, rotation: Any):
-        self.bodies, self.law, self.rotation = bodies, law, rotation
-        self.table = table
-        self.pair = table.vector(2, ti.i32, "pairs")
-        self.pair_spring = table.vector(2, ti.f64, "pairs")
-        self.recalled = table.vector(2, ti.f64, "pairs")
-        self.pair_count = table.field(ti.i32)
-        self.wall_spring = table.vector(2, ti.f64, "spheres", _WALLS, flat=True)
-        self.wall_step = table.field(ti.i32, "spheres", flat=True)
-        self.step, self.speed = table.field(ti.i32), table.field(ti.f64)
+    def __init__(self, spheres: Any, remembers: bool):
+        super().__init__(spheres)
+        self.remembers, table = remembers, self.table
+        if remembers:
+            self.pair, self.pair_count = table.vector(2, ti.i32, "pairs"), table.field(ti.i32)
+            self.pair_spring = table.vector(2, ti.f64, "pairs")
+            self.recalled = table.vector(2, ti.f64, "pairs")
+            self.wall_spring = table.vector(2, ti.f64, "spheres", _WALLS, flat=True)
+            self.wall_step = table.field(ti.i32, "spheres", flat=True)
+            self.step, self.speed = table.field(ti.i32), table.field(ti.f64)
 
     @ti.func
     def reset(self, s):
         """Forget all springs of scene s."""
-        self.pair_count[s], self.step[s], self.speed[s] = 0, _LONG_AGO, 0.0
-        for i in range(self.bodies.first(s), self.bodies.last(s)):
-            self.wall_step[i] = _LONG_AGO - 1
+        if ti.static(self.remembers):
+            self.pair_count[s], self.step[s], self.speed[s] = 0, _LONG_AGO, 0.0
+            for i in range(self.bodies.first(s), self.bodies.last(s)):
+                self.wall_step[i] = _LONG_AGO - 1
 
     @ti.func
     def recall(self, s, listed: ti.template(), which, count):
@@ -86,16 +74,6 @@ class FrictionHistory:
             k = self.pair_count[s]
             self.pair[s, k], self.pair_spring[s, k] = pair, spring
             self.pair_count[s] = k + 1
-
-    @ti.func
-    def begin(self, s, step, speed):
-        """Begin a step of scene s; speed: of the container [m/s]."""
-        self.step[s], self.speed[s] = step, speed
-
-    @ti.func
-    def end(self, s, speed):
-        """Note the speed of the container at the end of a step [m/s]."""
-        self.speed[s] = speed
 
     @ti.func
     def at_walls(self, s, i):
@@ -154,45 +132,36 @@ class FrictionHistory:
         return energy, force
 
     @ti.func
-    def of_pair(self, s, k, contacts: ti.template()):
-        """Energy of the spring of the k-th pair [J], and the power that it takes [W].
+    def of_pairs(self, s):
+        """Energy of the springs of all pairs [J], and the power that they take [W].
 
         At the time of the velocities, half a step after the force.
         """
-        i, j = self.pair[s, k][0], self.pair[s, k][1]
-        contact = contacts.at_rest(i, j)
-        branch = self.bodies.position_in_box(s, j) - self.bodies.position_in_box(s, i)
-        distance, relative = branch.norm(), self.bodies.velocity[i] - self.bodies.velocity[j]
-        across = (relative[1] * branch[0] - relative[0] * branch[1]) / distance
-        slip = self.rotation.slip_of_pair(i, j, distance, across)
-        overlap, way = contact.reach - distance, self.bodies.lead[s] * slip
-        energy, force = self._stored(contact, overlap, way, self.pair_spring[s, k])
-        return energy, ti.max(0.0, force * slip)
-
-    @ti.func
-    def of_pairs(self, s, contacts: ti.template()):
-        """Energy of the springs of all pairs [J], and the power that they take [W].
-
-        contacts: a PairContacts.
-        """
         total, power = 0.0, 0.0
         for k in range(self.pair_count[s]):
-            energy, taken = self.of_pair(s, k, contacts)
-            total, power = total + energy, power + taken
+            i, j = self.pair[s, k][0], self.pair[s, k][1]
+            contact = self.pair_contacts.at_rest(i, j)
+            branch = self.bodies.position_in_box(s, j) - self.bodies.position_in_box(s, i)
+            distance, relative = branch.norm(), self.bodies.velocity[i] - self.bodies.velocity[j]
+            across = (relative[1] * branch[0] - relative[0] * branch[1]) / distance
+            slip = self.rotation.slip_of_pair(i, j, distance, across)
+            overlap, way = contact.reach - distance, self.bodies.lead[s] * slip
+            energy, force = self._stored(contact, overlap, way, self.pair_spring[s, k])
+            total, power = total + energy, power + ti.max(0.0, force * slip)
         return total, power
 
     @ti.func
     def of_walls(self, s, i, contact, above, below):
         """Energy of the springs of a sphere at walls [J]; way left to each wall [m].
 
-        At the time of the velocities, as ``of_pair``.
+        At the time of the velocities, as ``of_pairs``.
         """
         total, relative = 0.0, self.bodies.velocity[i] - vec2(0.0, self.speed[s])
         if self.wall_step[i] == self.step[s]:
             for axis in ti.static(range(2)):
                 for side in ti.static(range(2)):
                     room = above[axis] if ti.static(side == 0) else below[axis]
-                    # As along the tangent of ``wall_forces``: of (normal x, y), (-y, x).
+                    # As along the tangent of ``WallForces``: of (normal x, y), (-y, x).
                     sign = 1.0 if ti.static((axis == 0) == (side == 1)) else -1.0
                     slip = self.rotation.slip_at_wall(i, room, sign * relative[1 - axis])
                     way = self.bodies.lead[s] * slip

@@ -10,9 +10,8 @@ from ca_damper.report.certificate import NEGLIGIBLE, Estimate
 from ca_damper.scenes.gravity import checked_gravity, gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.contact_law import FRICTION_LAWS, POWERS, contact_duration, pair_numbers
-from ca_damper.spheres.divergence_codes import DIVERGENCES
-from ca_damper.spheres.dynamics import DeviceSpheres
-from ca_damper.spheres.estimates import air_estimate, rotation_estimate
+from ca_damper.spheres.dynamics import DIVERGENCES, DeviceSpheres
+from ca_damper.spheres.effect_activity import air_estimate, rotation_estimate
 from ca_damper.spheres.expected_contacts import SEARCHES
 from ca_damper.spheres.search import listed_pairs
 from ca_damper.spheres.start_values import (
@@ -185,6 +184,11 @@ class Spheres:
         return self.friction > 0.0 or self.wall_friction > 0.0
 
     @property
+    def remembers(self) -> bool:
+        """Whether friction has a history."""
+        return self.rubs and self.friction_law == "history"
+
+    @property
     def effects(self) -> tuple[str, ...]:
         """Effects that are computed, in words for the report."""
         asked = {"friction": self.rubs, "rotation": self.rotation}
@@ -345,8 +349,7 @@ class Spheres:
     @property
     def structure(self) -> Structure:
         """Effects, laws and the search are compiled; numbers, box and places of start are not."""
-        remembers = self.rubs and self.friction_law == "history"
-        key = (self.damping, self.rubs, remembers, self.rotation, self.search)
+        key = (self.damping, self.rubs, self.remembers, self.rotation, self.search)
         given = self.start is not None, self.start_velocity is not None
         # As many as go with the spheres of an engine, so that both find room or neither.
         pairs = listed_pairs(power_of_two(self.capacity, LEAST_PLACES))

@@ -1,77 +1,34 @@
-"""Rotation of the spheres, an effect that the paper leaves out: present, or without any trace."""
-
-from typing import Any
+"""Rotation of the spheres, an effect that the paper leaves out."""
 
 import numpy as np
 import taichi as ti
 
+from ca_damper.spheres.bodies import Bodies
 from taichi_dem.kit.allocation import values
 
 
 @ti.data_oriented
-class NoRotation:
-    """Spheres that do not turn, as in the paper."""
-
-    # Share of the effective mass that resists a tangential impulse.
-    tangential_share = 1.0
-    turns = False
-
-    def bind(self, bodies: Any) -> None:
-        """Nothing to allocate."""
-
-    @ti.func
-    def reset(self, i):
-        """Nothing to reset."""
-
-    @ti.func
-    def slip_of_pair(self, i, j, distance, slip):
-        """Slip [m/s] of two spheres."""
-        return slip
-
-    @ti.func
-    def slip_at_wall(self, i, lever, slip):
-        """Slip [m/s] of a sphere at a wall."""
-        return slip
-
-    @ti.func
-    def twist(self, i, torque):
-        """Nothing to twist."""
-
-    @ti.func
-    def kick(self, i, dt):
-        """Nothing to turn."""
-
-    @ti.func
-    def energy(self, i):
-        """No energy [J]."""
-        return 0.0
-
-    def snapshot(self, rows: slice) -> dict[str, np.ndarray]:
-        """Nothing to show."""
-        return {}
-
-
-@ti.data_oriented
 class Rotation:
-    """Spheres turn in the plane: solid spheres with moment of inertia 2/5 m r^2.
+    """Turning of solid spheres in the plane, of moment of inertia 2/5 m r^2; or no trace of it.
 
-    spin: angular velocity [rad/s], anticlockwise. torque: of this step [N m]. Shape: one a sphere.
+    turns: whether there is any. spin: angular velocity [rad/s], anticlockwise. torque: of this step
+    [N m]. Shape: one a sphere. tangential_share: of the effective mass that resists a tangential
+    impulse.
     """
 
-    # A tangential impulse on a solid sphere's surface moves it like 1 / (1 + 5/2) of its mass.
-    tangential_share = 2.0 / 7.0
-    turns = True
-
-    def bind(self, bodies: Any) -> None:
-        """Allocate spins and torques."""
-        self.bodies = bodies
-        self.spin = bodies.table.field(ti.f64, "spheres", flat=True)
-        self.torque = bodies.table.field(ti.f64, "spheres", flat=True)
+    def __init__(self, bodies: Bodies, turns: bool):
+        self.bodies, self.turns = bodies, turns
+        # An impulse on a solid sphere's surface moves it like 1 / (1 + 5/2) of its mass.
+        self.tangential_share = 2.0 / 7.0 if turns else 1.0
+        if turns:
+            self.spin = bodies.table.field(ti.f64, "spheres", flat=True)
+            self.torque = bodies.table.field(ti.f64, "spheres", flat=True)
 
     @ti.func
     def reset(self, i):
         """At rest."""
-        self.spin[i], self.torque[i] = 0.0, 0.0
+        if ti.static(self.turns):
+            self.spin[i], self.torque[i] = 0.0, 0.0
 
     @ti.func
     def share(self, i, j):
@@ -92,36 +49,44 @@ class Rotation:
     @ti.func
     def slip_of_pair(self, i, j, distance, slip):
         """Slip [m/s] of two spheres whose centres are a distance [m] apart."""
-        return slip + distance * self.turning(i, j)
+        if ti.static(self.turns):
+            return slip + distance * self.turning(i, j)
+        return slip
 
     @ti.func
     def slip_at_wall(self, i, lever, slip):
         """Slip [m/s] of a sphere at a wall that is a lever [m] from its centre."""
-        return slip + lever * self.spin[i]
+        if ti.static(self.turns):
+            return slip + lever * self.spin[i]
+        return slip
 
     @ti.func
     def twist(self, i, torque):
         """Add a torque [N m] on sphere i."""
         # Not "+=", which would be an atomic addition; a scene is one thread.
-        self.torque[i] = self.torque[i] + torque
+        if ti.static(self.turns):
+            self.torque[i] = self.torque[i] + torque
 
     @ti.func
     def kick(self, i, dt):
         """Change the spin of sphere i by its torques over a step [s]."""
-        self.spin[i] = self.spin[i] + dt * self.torque[i] / self._inertia(i)
-        self.torque[i] = 0.0
+        if ti.static(self.turns):
+            self.spin[i] = self.spin[i] + dt * self.torque[i] / self._inertia(i)
+            self.torque[i] = 0.0
 
     @ti.func
     def energy(self, i):
         """Energy [J] of the turning."""
-        return 0.5 * self._inertia(i) * self.spin[i] * self.spin[i]
-
-    def snapshot(self, rows: slice) -> dict[str, np.ndarray]:
-        """Spins [rad/s] of some spheres."""
-        return {"spin": values(self.spin)[rows]}
+        if ti.static(self.turns):
+            return 0.5 * self._inertia(i) * self.spin[i] * self.spin[i]
+        return 0.0
 
     @ti.func
     def _inertia(self, i):
         body = self.bodies.body[None]
         radius = self.bodies.radius(i, body)
         return 0.4 * self.bodies.mass(i, body) * radius * radius
+
+    def snapshot(self, rows: slice) -> dict[str, np.ndarray]:
+        """Spins [rad/s] of some spheres, where they turn."""
+        return {"spin": values(self.spin)[rows]} if self.turns else {}

@@ -1,14 +1,11 @@
 """Checks of what users give of the spheres one by one: places and velocities at the start."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import LARGEST, positive, shown, whole
-
-if TYPE_CHECKING:
-    from ca_damper.spheres.options import Spheres
 
 # Sizes have a contact law for each pair of them.
 _MOST_SIZES, _MOST_OF_A_SIZE = 8, 1_000_000
@@ -16,7 +13,7 @@ _MOST_SIZES, _MOST_OF_A_SIZE = 8, 1_000_000
 _ROUNDING = 1e-9
 
 
-def checked_start(options: "Spheres") -> tuple:
+def checked_start(options: Any) -> tuple:
     """Places as a tuple of pairs, none in a wall or in another sphere."""
     places = _pairs("start", options.start, "coordinates [m]", options.capacity)
     whole("places in start", len(places), 0, options.capacity)
@@ -33,7 +30,7 @@ def checked_start(options: "Spheres") -> tuple:
     return tuple(map(tuple, places.tolist()))
 
 
-def checked_start_velocity(options: "Spheres") -> tuple:
+def checked_start_velocity(options: Any) -> tuple:
     """Velocities as a tuple of pairs, as many as places where these are given."""
     velocity = _pairs("start_velocity", options.start_velocity, "speeds [m/s]", options.capacity)
     slow = np.abs(velocity) <= LARGEST
@@ -69,7 +66,7 @@ def checked_sizes(sizes: Any) -> tuple:
     )
 
 
-def _radii(options: "Spheres", count: int) -> np.ndarray:
+def _radii(options: Any, count: int) -> np.ndarray:
     """Radius of each sphere whose place is given [m], (count,)."""
     if options.sizes is None:
         return np.full(count, options.radius)

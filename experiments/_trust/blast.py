@@ -9,7 +9,7 @@ from _meshes import mirrored_copies, with_moved_nodes
 from _trust.common import Number
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.kit.plot_style import BLACK, GREY, RED
-from taichi_dem.mesh.joined import in_space_order
+from taichi_dem.mesh.shapes import in_space_order
 from taichi_dem.mesh.tetrahedra import all_faces, outer_rows
 
 #: Copies of the paper's block, one behind the other; end of a run [s].

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.elasticity.rates import PAIRS, STRAINS, face_laws, levers, springs_of
-from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.kit.terminal import aligned
@@ -93,9 +92,6 @@ class MeshStiffness:
         moduli = {"pressure": confined, "shear": self.shear, "bar": self.young}
         return {name: float(np.sqrt(value / self.density)) for name, value in moduli.items()}
 
-    def __repr__(self):
-        return in_brief(self, f"E {self.young:.4g} Pa", f"nu {self.poisson:.3g}")
-
     def __str__(self):
         """A line for each axis, the means, and the wave speeds."""
         means = self.young, self.poisson, self.shear, self.bulk + 4.0 / 3.0 * self.shear
@@ -107,6 +103,8 @@ class MeshStiffness:
             cells.append([name, *own, *(f"{modulus * 1e-9:.4g}" for modulus in moduli)])
         speeds = ", ".join(f"{name} {speed:.4g} m/s" for name, speed in self.wave_speeds.items())
         return "\n".join([*aligned(cells), f"long waves: {speeds}"])
+
+    __repr__ = __str__
 
 
 def mesh_stiffness(mesh: Mesh, material: AnyMaterial) -> MeshStiffness:

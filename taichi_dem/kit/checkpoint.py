@@ -7,10 +7,10 @@ Nothing here depends on the physics.
 import hashlib
 import json
 import math
+import mmap
 import os
 import signal
 import threading
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError, Portable
 from taichi_dem.kit.files import renamed_when_done
-from taichi_dem.kit.sealed_file import read_sealed, write_sealed
 from taichi_dem.kit.validation import (
     FileName,
     is_real,
@@ -28,14 +27,13 @@ from taichi_dem.kit.validation import (
     path_name,
     plain_fields,
     positive,
-    shown,
     whole,
 )
 from taichi_dem.kit.version import __version__, taichi_version
 
-#: Of the file; another one cannot be read.
-FORMAT = 6
 _ABOUT = "about"
+#: Letters of the digest at the end of a file.
+_DIGITS = 64
 _MOST_STEPS = 2**53
 _MOST_MARKS = 1_000_000
 
@@ -112,26 +110,6 @@ class Checkpoint:
                 f"{last} steps, got {self.every_steps} and {self.every_s}"
             )
         return {step for distance in every for step in range(0, last + 1, distance)}
-
-
-class SaveTimer:
-    """Timer that tells whether a checkpoint is due."""
-
-    def __init__(self, checkpoint: Checkpoint):
-        self.every = (checkpoint.every_steps, checkpoint.every_s, checkpoint.every_wall_s)
-        self.saved_at(0, 0.0)
-
-    def saved_at(self, step: int, time_s: float) -> None:
-        """Count from a step and a time [s] on."""
-        self.last = (step, time_s, time.perf_counter())
-
-    def now(self, step: int, time_s: float) -> bool:
-        """Whether the run, at a step and a time [s], should be saved."""
-        passed = zip(self.every, (step, time_s, time.perf_counter()), self.last)
-        return any(
-            every is not None and present - last >= every * (1.0 - 1e-9)
-            for every, present, last in passed
-        )
 
 
 #: What asks a run to end: Ctrl-C, and what batch systems and closed terminals send.
@@ -228,11 +206,17 @@ def write_checkpoint(
 ) -> None:
     """Write arrays by name under an identity, a dict of words; on the disk before it appears.
 
+    The file is a NumPy archive (``np.load`` reads it) with the digest of its bytes at the end.
     Raises InputError when the file cannot be written; one that was there stays as it was.
     """
-    about = json.dumps({"format": FORMAT, "identity": identity})
-    with renamed_when_done(path) as temporary:
-        write_sealed(temporary, {_ABOUT: np.array(about), **arrays})
+    about = np.array(json.dumps(dict(identity)))
+    with renamed_when_done(path) as temporary, open(temporary, "w+b") as file:
+        np.savez(file, allow_pickle=False, **{_ABOUT: about}, **arrays)
+        file.seek(0)
+        sealed = hashlib.file_digest(file, "sha256").hexdigest()
+        file.write(sealed.encode())
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def read_checkpoint(path: FileName, identity: Mapping[str, str]) -> dict[str, np.ndarray]:
@@ -241,36 +225,31 @@ def read_checkpoint(path: FileName, identity: Mapping[str, str]) -> dict[str, np
     Raises InputError for a file that is absent, none of ours or not to the last bit as it was
     written, and for one of another identity, naming what differs.
     """
-    about, arrays = _read(path)
-    if about["format"] != FORMAT:
+    path = path_name("checkpoint", path)
+    try:
+        arrays = _sealed_arrays(path)
+        about = json.loads(str(arrays.pop(_ABOUT)))
+    except OSError as error:
+        raise InputError(f"cannot read checkpoint {path}: {error.strerror or error}") from None
+    except (ValueError, KeyError):
         raise InputError(
-            f"checkpoint {path} must have format {FORMAT}, got {shown(about['format'])}: "
-            "it is of another version"
-        )
+            f"{path} must be a whole checkpoint: it is damaged, none, or of an earlier version"
+        ) from None
     for name, mine in identity.items():
-        theirs = about["identity"].get(name, "nothing")
+        theirs = about.get(name, "nothing")
         if theirs != mine:
-            theirs = theirs if isinstance(theirs, str) and theirs.isprintable() else shown(theirs)
             raise InputError(f"checkpoint {path} is of another {name}: {theirs[:200]}, not {mine}")
     return arrays
 
 
-def _read(path):
-    """Header of a file, and its arrays; every part is checked against its checksum."""
-    path = path_name("checkpoint", path)
-    if os.path.exists(path) and not os.path.isfile(path):
-        what = "it is a folder" if os.path.isdir(path) else "it is no file"
-        raise InputError(f"cannot read checkpoint {path}: {what}")
-    try:
-        arrays = read_sealed(path)
-        about = json.loads(str(arrays.pop(_ABOUT)))
-        if not isinstance(about, dict) or not isinstance(about["identity"], dict):
-            raise ValueError("it says nothing of itself")
-        about["format"]
-    except OSError as error:
-        raise InputError(f"cannot read checkpoint {path}: {error.strerror or error}") from None
-    except (ValueError, KeyError, RecursionError, MemoryError):
-        raise InputError(
-            f"{path} must be a whole checkpoint: it is damaged, none, or of an earlier version"
-        ) from None
-    return about, arrays
+def _sealed_arrays(path):
+    """Arrays of a file; ValueError unless it ends with the digest of all bytes before."""
+    with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        end = len(content) - _DIGITS
+        if (
+            end <= 0
+            or content[end:] != hashlib.sha256(memoryview(content)[:end]).hexdigest().encode()
+        ):
+            raise ValueError("its digest does not fit")
+        with np.load(file, allow_pickle=False) as archive:
+            return dict(archive)

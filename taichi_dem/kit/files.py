@@ -24,11 +24,9 @@ _HOST = re.sub(r"[^A-Za-z0-9]", "", platform.node())[:32] or "here"
 _TEMPORARY = re.compile(rf"\..*\.{_HOST}-(\d+)\.part(\.[^.]*)?")
 
 #: Endings of what experiments write.
-_WRITTEN = (
-    *(".csv", ".gif", ".glb", ".html", ".json", ".msh", ".npz", ".png", ".pvd", ".txt", ".vtkhdf"),
-    *(".vtu", ".xyz"),
-)
+_WRITTEN = tuple(".csv .gif .glb .html .json .msh .npz .png .pvd .txt .vtkhdf .vtu .xyz".split())
 
+#: Locks of folders by path, inside ``claiming``.
 _claims: dict[str, int] | None = None
 
 
@@ -42,18 +40,17 @@ def output_folder(path: FileName) -> str:
     path = folder_name("output folder", path)
     try:
         os.makedirs(path, exist_ok=True)
-        if _claims is not None:
+        if _claims is not None and fcntl is not None:
             _claim(path, _claims)
         # Runs that begin at once must not take away each other's file.
-        own = f".write-test-{threading.get_ident()}.{_HOST}-{os.getpid()}.part"
-        probe = os.path.join(path, own)
+        probe = os.path.join(path, f".write-{threading.get_ident()}.{_HOST}-{os.getpid()}.part")
         with open(probe, "w") as handle:
             handle.write("x")
         os.remove(probe)
+        _remove_leftovers(path)
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"output folder {path} must be writable: {reason}") from None
-    _remove_leftovers(path)
     return path
 
 
@@ -77,16 +74,14 @@ def claiming() -> Iterator[None]:
 
 
 def _claim(path: str, claims: dict[str, int]) -> None:
-    """Claim a folder, unless it cannot be locked; InputError where another process has it."""
+    """Claim a folder, where it can be locked; InputError where another process has it."""
     place = os.path.realpath(path)
-    if fcntl is None or place in claims:
+    if place in claims:
         return
-    try:
-        lock = os.open(place, os.O_RDONLY)
-    except PermissionError:  # a folder may be written to and not be read
-        return
+    lock = os.open(place, os.O_RDONLY)
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        claims[place] = lock
     except BlockingIOError:
         os.close(lock)
         raise InputError(
@@ -94,29 +89,21 @@ def _claim(path: str, claims: dict[str, int]) -> None:
         ) from None
     except OSError:
         os.close(lock)
-        return
-    claims[place] = lock
 
 
 def _remove_leftovers(folder):
     """Remove temporary files of processes of this machine that are no more."""
-    names: list[str] = []
-    with contextlib.suppress(PermissionError):
-        names = os.listdir(folder)
-    for name in names:
+    for name in os.listdir(folder):
         found = _TEMPORARY.fullmatch(name)
         if found and not _is_alive(int(found[1])):
-            with contextlib.suppress(OSError):
-                os.remove(os.path.join(folder, name))
+            os.remove(os.path.join(folder, name))
 
 
 def _is_alive(process):
     try:
         os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except OSError:
-        return True
+    except OSError as error:
+        return not isinstance(error, ProcessLookupError)
     return True
 
 
@@ -125,18 +112,14 @@ def renamed_when_done(path: FileName) -> Iterator[str]:
     """A temporary name beside ``path`` that becomes ``path`` only after a complete write."""
     path = path_name("file", path)
     folder, name = os.path.split(path)
-    if not os.path.isdir(folder or "."):
-        raise InputError(f"cannot write {path}: there is no folder {folder}")
     root, ending = os.path.splitext(name)  # kept, since some writers derive the format from it
     temporary = os.path.join(folder, f".{root}.{_HOST}-{os.getpid()}.part{ending}")
     try:
         yield temporary
         os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror or error}") from None
-    except UnicodeEncodeError as error:
-        text = error.object[error.start : error.end]
-        raise InputError(f"cannot write {path}: it would hold {text!a}, no text of UTF-8") from None
+    except (OSError, UnicodeEncodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot write {path}: {reason}") from None
     finally:
         if os.path.exists(temporary):
             os.remove(temporary)
@@ -147,9 +130,7 @@ def remove_files(folder: FileName, pattern: str) -> None:
 
     Raises InputError when one of them cannot be removed.
     """
-    if not os.path.isdir(folder):
-        return
-    for name in os.listdir(folder):
+    for name in os.listdir(folder) if os.path.isdir(folder) else ():
         path = os.path.join(folder, name)
         if re.fullmatch(pattern, name) and os.path.isfile(path):
             try:

@@ -1,15 +1,15 @@
 """Saving and resuming runs: the parts of a run, the times of saving, and how a run is resumed."""
 
 import os
+import time
 from collections.abc import Callable, Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from taichi_dem.kit.checkpoint import (
     Checkpoint,
     Interrupted,
-    SaveTimer,
     StopRequests,
     read_checkpoint,
     write_checkpoint,
@@ -19,49 +19,24 @@ from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.validation import FileName
 
 
-class Memory(Protocol):
-    """Fields on the device, such as ``FieldMemory``."""
-
-    def read(self) -> dict[str, np.ndarray]:
-        """Copies of all fields as arrays by name."""
-
-    def misfit(self, arrays: Mapping[str, np.ndarray], /) -> str:
-        """Name of a field that arrays lack or do not fit; else ""."""
-
-    def write(self, arrays: Mapping[str, np.ndarray], /) -> None:
-        """Restore all fields."""
-
-
 class Owner(Protocol):
     """Part of a run that holds changing values on the host."""
 
     def saved(self) -> dict[str, np.ndarray]:
-        """Data for a checkpoint beside the fields.
-
-        Returns
-        -------
-        dict of ndarray
-            Arrays by name.
-        """
+        """Data for a checkpoint beside the fields, arrays by name."""
 
     def resume(self, saved: Mapping[str, np.ndarray], /) -> None:
-        """Restore the data that ``saved`` returned.
-
-        Parameters
-        ----------
-        saved : mapping
-            Arrays by name.
-        """
+        """Restore the data that ``saved`` returned."""
 
 
 class RunSnapshot:
     """All changing data of a run: fields on the device, and data of its owners on the host.
 
     identity: what two runs must share for one to go on from the other, words by name. memory: of
-    the fields. owners: by name.
+    the fields, as ``FieldMemory``. owners: by name.
     """
 
-    def __init__(self, identity: Mapping[str, str], memory: Memory, owners: Mapping[str, Owner]):
+    def __init__(self, identity: Mapping[str, str], memory: Any, owners: Mapping[str, Owner]):
         self.identity, self.memory, self.owners = identity, memory, owners
 
     def write(self, path: FileName) -> None:
@@ -104,9 +79,9 @@ class CheckpointWriter:
         self, checkpoint: Checkpoint, snapshot: RunSnapshot, now: Callable[[], tuple[int, float]]
     ):
         self.checkpoint, self.snapshot, self.now = checkpoint, snapshot, now
-        self.timer, self.stop = SaveTimer(checkpoint), StopRequests()
+        self.stop = StopRequests()
         self.saved_s: float | None = None
-        self.timer.saved_at(*now())
+        self._last = (*now(), time.perf_counter())
 
     def __enter__(self) -> "CheckpointWriter":
         self.stop.__enter__()
@@ -121,11 +96,19 @@ class CheckpointWriter:
 
     def save_if_needed(self) -> None:
         """Save the run if a save is due. Raises Interrupted after a stop signal, InputError."""
-        step, time_s = self.now()
-        if self.stop.asked or self.timer.now(step, time_s):
+        if self.stop.asked or self._is_due():
             self.save()
         if self.stop.asked:
-            raise Interrupted(time_s, self.checkpoint.path, self.stop.asked)
+            raise Interrupted(self.now()[1], self.checkpoint.path, self.stop.asked)
+
+    def _is_due(self):
+        given = self.checkpoint
+        every = given.every_steps, given.every_s, given.every_wall_s
+        passed = zip(every, (*self.now(), time.perf_counter()), self._last)
+        return any(
+            distance is not None and present - last >= distance * (1.0 - 1e-9)
+            for distance, present, last in passed
+        )
 
     def save(self) -> None:
         """Save the run. Raises InputError that names the last good checkpoint."""
@@ -133,9 +116,8 @@ class CheckpointWriter:
             self.snapshot.write(self.checkpoint.path)
         except InputError as error:
             raise InputError(f"{error}{self.last_good()}") from None
-        step, time_s = self.now()
-        self.saved_s = time_s
-        self.timer.saved_at(step, time_s)
+        self._last = (*self.now(), time.perf_counter())
+        self.saved_s = self._last[1]
 
     def last_good(self) -> str:
         """The last good checkpoint, as the end of a sentence."""

@@ -167,7 +167,7 @@ class Effect:
         """
 
     def stress(self, material: Material, size: float) -> float:
-        """Stress that a load, support or ground may cause in a block, for estimates before a run.
+        """Stress that a load or support may cause in a block, for estimates before a run.
 
         Parameters
         ----------

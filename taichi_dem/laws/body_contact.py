@@ -24,12 +24,7 @@ from taichi_dem.materials.bond_rules import typical_of
 from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES, all_faces, area_vectors
-from taichi_dem.physics.body_overlap import (
-    raised,
-    ray_ends,
-    sum_of_rays,
-    turning,
-)
+from taichi_dem.physics.body_overlap import raised, ray_ends, sum_of_rays, turning
 from taichi_dem.physics.sphere_pair import Meeting, Nearest
 from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import Model

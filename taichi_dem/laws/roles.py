@@ -110,7 +110,7 @@ MEMBERS = {
     "load": (
         # Nonzero for a body on which it acts.
         "acts_on(i)",
-        # Force [N] and torque about the centre [N m]; motion: a ``body_motion.BodyMotion``.
+        # Force [N] and torque about the centre [N m]; motion: a ``state.BodyMotion``.
         "wrench(i, motion)",
     ),
     # Constraint of bodies.

@@ -14,7 +14,6 @@ from taichi_dem.kit.fixed_order import length, product, transposed
 from taichi_dem.kit.types import real
 from taichi_dem.kit.validation import positive, word
 from taichi_dem.laws.base import Effect
-from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
 from taichi_dem.physics.wrench import Block
@@ -65,10 +64,6 @@ class QuietBoundary(Effect):
         self.group = word("group", group)
         self.p_speed = None if p_speed is None else positive("p_speed", p_speed)
         self.s_speed = None if s_speed is None else positive("s_speed", s_speed)
-
-    def stress(self, material: Material, size: float) -> float:
-        """None of its own."""
-        return 0.0
 
     def declare(self, capacity: Capacity) -> None:
         """Faces of every body in the group, and what resists it: the parts of a ``Block``."""

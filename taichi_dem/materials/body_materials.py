@@ -80,10 +80,6 @@ class BodyMaterials:
     def __init__(self, mesh: Mesh, materials: tuple[Material, ...], of_body: np.ndarray):
         self.mesh, self.materials, self.of_body = mesh, materials, of_body
 
-    def __repr__(self):
-        counts = np.bincount(self.of_body, minlength=len(self.materials)).tolist()
-        return f"<BodyMaterials: {len(counts)} materials, of {counts} bodies>"
-
     @property
     def is_one(self) -> bool:
         """Whether all bodies have the same material."""

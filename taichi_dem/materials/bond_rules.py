@@ -40,8 +40,6 @@ class BondGeometry:
     master_share: np.ndarray
     bodies: np.ndarray
 
-    __repr__ = by_fields
-
 
 def bond_geometry(mesh: Mesh, topology: Topology, density: Density) -> BondGeometry:
     """Sizes of all bonds of a mesh; density [kg/m3]: of all bodies, or of each, (body_count,)."""

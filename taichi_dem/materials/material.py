@@ -61,11 +61,7 @@ SPREAD = 0.03, 0.002
 #: Poisson's ratios from the least to the largest that bonds give with ratios of stiffness in use.
 POISSON = -0.2, 0.45
 #: Fields whose number tells by its size when another unit is meant.
-_QUANTITIES = {
-    "density": DENSITY,
-    "tensile_strength": STRENGTH,
-    "cohesion": STRENGTH,
-}
+_QUANTITIES = {"density": DENSITY, "tensile_strength": STRENGTH, "cohesion": STRENGTH}
 _MAY_BE_ZERO = frozenset(
     {"normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"}
 )

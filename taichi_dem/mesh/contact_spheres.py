@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.fixed_order import dot, length, product, transposed
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
@@ -38,8 +37,6 @@ class ContactSpheres:
     radius: np.ndarray
     cluster: np.ndarray
     extent: np.ndarray
-
-    __repr__ = by_fields
 
     @property
     def per_face(self) -> int:

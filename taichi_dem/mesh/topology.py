@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length, product, transposed
 from taichi_dem.mesh import tetrahedra as geometry
@@ -49,8 +48,6 @@ class Topology:
     outer_face: np.ndarray
     is_open: np.ndarray
     bonded_share: np.ndarray
-
-    __repr__ = by_fields
 
     @property
     def bond_count(self) -> int:

@@ -209,11 +209,7 @@ def plot_acting(
 
 
 def plot_film(
-    result: Any,
-    path: FileName,
-    *,
-    magnify: float = 5.0,
-    axis: Sequence[float] = ALONG_Z,
+    result: Any, path: FileName, *, magnify: float = 5.0, axis: Sequence[float] = ALONG_Z
 ) -> None:
     """Write the deforming block, coloured by speed, as a GIF below a megabyte.
 

@@ -132,11 +132,7 @@ def plot_fragments(result: Any, frame: int = -1, *, path: FileName | None = None
 
 
 def plot_rose(
-    result: Any,
-    axis: Sequence[float] = ALONG_Z,
-    *,
-    sectors: int = 36,
-    path: FileName | None = None,
+    result: Any, axis: Sequence[float] = ALONG_Z, *, sectors: int = 36, path: FileName | None = None
 ) -> Figure:
     """Draw crack area by direction in a plane; arguments as of ``Result.rose``.
 
@@ -177,11 +173,7 @@ def _emptiest(rose):
 
 
 def plot_attenuation(
-    result: Any,
-    group: str | None = None,
-    *,
-    nearest: float = 4.0,
-    path: FileName | None = None,
+    result: Any, group: str | None = None, *, nearest: float = 4.0, path: FileName | None = None
 ) -> Figure:
     """Draw peak velocities over the distance from a hole, with a power law.
 

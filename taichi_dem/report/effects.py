@@ -12,7 +12,6 @@ import numpy as np
 
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.audit import Audit
-from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.mesh.topology import parts_of
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
@@ -236,9 +235,6 @@ class Certificate:
             remedy = f"list {', '.join(one.effect for one in self.missing)}"
         return f"{', and '.join(missed)}: {remedy}" if missed else ""
 
-    def __repr__(self):
-        return in_brief(self, *self._acted(), "" if self.holds else "does not hold")
-
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file.
 
@@ -260,6 +256,8 @@ class Certificate:
     def __str__(self):
         """A line for every kind of thing."""
         return "\n".join([*self._acted(), *self.left_out_lines()])
+
+    __repr__ = __str__
 
     def left_out_lines(self) -> list[str]:
         """What was left out, in lines."""

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.elasticity.mesh_stiffness import MeshStiffness, mesh_stiffness
 from taichi_dem.elasticity.rates import bond_rates, contact_eigenvalues, dashpots_of, springs_of
-from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.terminal import aligned
 from taichi_dem.kit.validation import instance
@@ -101,11 +100,6 @@ class StepReport:
         # Of the stability limit 2 of an explicit step, limited dashpots take at most LIMITED.
         return np.maximum(together, springs * np.sqrt(1.0 - 0.5 * LIMITED))
 
-    def __repr__(self):
-        worst = int(np.argmin(self.step_s))
-        step = f"smallest step {self.step_s[worst]:.3g} s by {self.binding[worst]}"
-        return in_brief(self, counted(len(self.step_s), "body"), step, "print it for the table")
-
     def __str__(self):
         """Steps by method, numbers of bodies by criterion, the worst bodies and their cost."""
         warnings = [f"warning: {warning}" for warning in self.warnings]
@@ -127,6 +121,8 @@ class StepReport:
             "each has its own; a StepControl keeps to its safety's share of them"
         )
         return "\n".join([*lines, *self._worst(), explained, *warnings])
+
+    __repr__ = __str__
 
     def _worst(self):
         """Lines about the bodies of the smallest steps, and what they cost."""
@@ -260,10 +256,6 @@ class ElasticReport:
         ends = np.unique([np.min(self.crack_length), np.max(self.crack_length)])
         return " to ".join(f"{length:.3g}" for length in ends)
 
-    def __repr__(self):
-        stiffness = f"E {self.stiffness.young:.4g} Pa, nu {self.stiffness.poisson:.3g}"
-        return in_brief(self, stiffness, *self.warnings, "print it for the table")
-
     def __str__(self):
         """Elastic constants, wave speeds, elements in a characteristic length, warnings, steps."""
         lines = [str(self.stiffness)]
@@ -277,6 +269,8 @@ class ElasticReport:
         )
         lines += [f"warning: {words}" for words in self.warnings]
         return "\n".join([*lines, str(self.steps)])
+
+    __repr__ = __str__
 
 
 def elastic_report(scene: Scene) -> ElasticReport:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.elasticity.rates import dashpots_of, springs_of, subset_rates
-from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.fixed_order import length, product, transposed
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import AnyMaterial, BodyMaterials, body_materials
@@ -53,10 +52,6 @@ class Model:
         self.loads, self.supports, self.ground = (tuple(self.by_role[role]) for role in MANY)
         self.contact: Any = next(iter(self.by_role["contact"]), None)
         self.has_contact = self.contact is not None
-
-    def __repr__(self):
-        bodies, bonds = counted(self.body_count, "body"), counted(self.bond_count, "bond")
-        return in_brief(self, bodies, bonds, *(effect.name for effect in self.effects))
 
     def harmless(self) -> "Model":
         """A copy with the materials with which silent effects never act."""

@@ -99,8 +99,9 @@ KINDS = {
     "any": """about acceleration axis base bend by displacement factor force history hole notch
         normal phase phases points shapes start_velocity t time_s times times_s turned u v values
         value velocity x y spin sizes motion tetrahedra goal boxes excitation observers amplitude
-        amplitudes effects.Pressure.peak measures.Cycles.base_amplitude measures.Cycles.stiffness
-        measures.Cycles.damping measures.Cycles.mass Oscillator.added_mass Oscillator.frequency
+        amplitudes effects.Pressure.peak report.measures.Cycles.base_amplitude
+        report.measures.Cycles.stiffness report.measures.Cycles.damping
+        report.measures.Cycles.mass Oscillator.added_mass Oscillator.frequency
         Oscillator.gravity ModalStructure.frequency""",
     "text": """column group index label name names notes path role source title treated unit
         unread""",

@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 
 from _meshes import with_moved_nodes
-from taichi_dem import (
-    CONCRETE,
-    Scene,
-    Simulation,
-    Uniform,
-    effects,
-    in_space_order,
-    read_mesh,
-)
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, in_space_order, read_mesh
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.mesh.mesh import with_cut, with_inner_group
 from taichi_dem.mesh.shapes import bar, pair

@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 
 from _meshes import with_moved_nodes
-from taichi_dem import (
-    CONCRETE,
-    ImplicitDashpots,
-    Scene,
-    Simulation,
-    Uniform,
-    effects,
-)
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
 from taichi_dem.elasticity.rates import wave_moduli
 from taichi_dem.mesh.shapes import bar, single
 from tests.closed_forms import carried

@@ -88,17 +88,11 @@ def test_a_budget_that_runs_out_gives_the_best_answer_and_says_what_is_missing()
     assert most.plan.seconds <= 1.5 * 1.3
 
 
-class TwoMotions:
-    """Stands for runs of a filling of which every third seed swings by a quarter less."""
-
-    def __init__(self, *given):
-        self.runs = SceneRuns(*given)
-
-    def __getattr__(self, name):
-        return getattr(self.runs, name)
+class TwoMotions(SceneRuns):
+    """Runs of a filling of which every third seed swings by a quarter less."""
 
     def measures(self, key, *rest):
-        found = self.runs.measures(key, *rest)
+        found = super().measures(key, *rest)
         less = 0.75 if key.seed % 3 == 0 else 1.0
         return {**found, "rms": less * found["rms"]}
 
@@ -119,23 +113,16 @@ def test_several_steady_motions_come_as_branches(monkeypatch):
     assert "no single number" in str(answer)
 
 
-class Shaky:
+class Shaky(SceneRuns):
     """Runs that diverge at steps above a limit [s]."""
 
     most = 1.2e-4
 
-    def __init__(self, *given):
-        self.runs = SceneRuns(*given)
-
-    def __getattr__(self, name):
-        return getattr(self.runs, name)
-
     def go_on(self, cycles):
         if any(key.dt > self.most for key in cycles):
-            raise SimulationDiverged(
-                "diverged", scene={}, step=1, time_s=0.0, dt=1.0, dt_allowed=0.5
-            )
-        self.runs.go_on(cycles)
+            known = {"scene": {}, "step": 1, "time_s": 0.0, "dt": 1.0, "dt_allowed": 0.5}
+            raise SimulationDiverged("diverged", **known)
+        super().go_on(cycles)
 
 
 def test_a_step_that_diverges_is_shortened(monkeypatch):
@@ -156,9 +143,10 @@ def test_scenes_go_on_from_where_they_are_each_as_far_as_asked():
     whole = batch.run(0, 70)
     for s, key in enumerate(keys):
         assert runs.cycles(key) == 70
-        assert np.array_equal(runs.series(key)[1][-1:], 0.5 * whole.record[s, -1:, 9:11] @ [1, -1])
+        found = runs.by_cycle(key)
+        assert np.array_equal(found["amplitude"][-1:], 0.5 * whole.record[s, -1:, 9:11] @ [1, -1])
         square, mean = (whole.record[s, :, k] / whole.steps[s] for k in (1, 0))
-        assert np.array_equal(runs.series(key)[0], np.sqrt(np.maximum(square - mean**2, 0.0)))
+        assert np.array_equal(found["rms"], np.sqrt(np.maximum(square - mean**2, 0.0)))
     assert runs.steps == int(70 * whole.steps.sum()) and runs.runs == 2
 
 

@@ -97,7 +97,7 @@ def test_short_steps_see_the_container_recoil():
     # A spring so soft that it does nothing in the 30 ms of flight and blow.
     batch = Batch(filling, SceneTable(1, 1, 1e-5, 5.0, 0.0, 8.6e-3 / ratio, 1e-9, 0.0))
     batch.start()
-    bodies = batch.device.spheres.bodies
+    bodies = batch.device.bodies
     for s in range(4):
         bodies.velocity[s * bodies.stride] = [0.0, speed]
     batch.advance(3000)

@@ -6,8 +6,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ca_damper import ImpactDamper, Oscillator, Spheres
-from ca_damper.spheres.contact_law import wall_numbers
-from ca_damper.spheres.restitution import damping_number
+from ca_damper.spheres.contact_law import damping_number, wall_numbers
 
 DIAMETER = 6e-3
 PAPER = Oscillator()

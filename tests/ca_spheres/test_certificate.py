@@ -6,7 +6,7 @@ import numpy as np
 
 from ca_damper import Batch, SceneTable, Spheres
 from ca_damper.spheres.contact_law import wall_numbers
-from ca_damper.spheres.estimates import rotation_estimate
+from ca_damper.spheres.effect_activity import rotation_estimate
 from tests.ca_spheres.rig import Rig
 
 DT = 2e-5

@@ -7,8 +7,14 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from ca_damper.spheres import Spheres
-from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers, wall_numbers
-from ca_damper.spheres.restitution import damping_number, restitution_of
+from ca_damper.spheres.contact_law import (
+    POWERS,
+    contact_duration,
+    damping_number,
+    pair_numbers,
+    restitution_of,
+    wall_numbers,
+)
 from tests.ca_spheres.rig import Rig
 
 # Every speed with a step of 5e-6 and of 1e-6 s.

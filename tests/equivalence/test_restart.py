@@ -15,7 +15,7 @@ from taichi_dem.kit.field_memory import FieldMemory, fields_of
 from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.record import Recorder
-from taichi_dem.saving import saved_run
+from taichi_dem.simulate import saved_run
 from taichi_dem.state.timeline import MACRO_TICKS
 from tests.bar_blast import METHODS, UNTIL, bar_scene
 
@@ -91,8 +91,7 @@ CASES = {
 
 
 @pytest.fixture(
-    scope="module",
-    params=["controlled", "implicit", pytest.param("faces", marks=pytest.mark.slow)],
+    scope="module", params=["controlled", "implicit", pytest.param("faces", marks=pytest.mark.slow)]
 )
 def case(request):
     """Each of them in turn."""

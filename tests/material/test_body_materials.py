@@ -5,20 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_dem import (
-    CONCRETE,
-    InputError,
-    Scene,
-    effects,
-    step_report,
-)
+from taichi_dem import CONCRETE, InputError, Scene, effects, step_report
 from taichi_dem.materials.body_materials import joined
 from taichi_dem.materials.bond_rules import bond_geometry
 from taichi_dem.materials.material import bond_moduli
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import body_properties, topology_of
 from taichi_dem.methods import Uniform
-from taichi_dem.saving import run_identity
+from taichi_dem.simulate import run_identity
 from taichi_dem.state.model import Model
 from tests.material.blocks import NU, ORE, E, random_block, rock
 

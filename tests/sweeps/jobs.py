@@ -7,9 +7,8 @@ from pathlib import Path
 
 from ca_damper import RigidMass, frequency_response
 from taichi_dem import InputError, SimulationDiverged, parameter_grid, runtime
-from taichi_dem.kit.sweeps.job import jobs_of, run_job
-from taichi_dem.kit.sweeps.rows import checked_rows
-from taichi_dem.kit.sweeps.table import SweepTable
+from taichi_dem.kit.sweeps.jobs import jobs_of, run_job, table_of
+from taichi_dem.kit.sweeps.table import checked_rows
 
 
 def squared(row):
@@ -82,7 +81,7 @@ def by_loop(function, table, seed=0):
     """The table of a sweep by a plain loop in this process."""
     rows = checked_rows(table)
     each = jobs_of(function, rows, seed)
-    return SweepTable(each, [run_job(function, job.row) for job in each], "seed" in rows[0])
+    return table_of(each, [run_job(function, job.row) for job in each], "seed" in rows[0])
 
 
 def assert_same_bits(one, other):

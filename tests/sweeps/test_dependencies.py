@@ -8,8 +8,7 @@ import pytest
 
 from taichi_dem import sweep
 from taichi_dem.kit.sweeps.dependencies import Dependencies
-from taichi_dem.kit.sweeps.job import jobs_of, run_job
-from taichi_dem.kit.sweeps.journal import Journal
+from taichi_dem.kit.sweeps.jobs import Journal, jobs_of, run_job
 from tests.processes import users_environment
 from tests.scenes import ROOT
 from tests.sweeps import jobs
@@ -147,7 +146,7 @@ def test_a_changed_input_file_runs_the_rows_that_name_it_again(place):
 
 def test_a_key_is_that_of_any_other_process(place):
     say = "import job; print(job.jobs_of(job.work, [{'x': 1.0}], 0)[0].digest)"
-    (place / "job.py").write_text(JOB + "from taichi_dem.kit.sweeps.job import jobs_of\n")
+    (place / "job.py").write_text(JOB + "from taichi_dem.kit.sweeps.jobs import jobs_of\n")
     said = set()
     for seed in ("1", "2"):
         options = {"capture_output": True, "text": True, "check": True, "cwd": place}

@@ -6,12 +6,13 @@ import subprocess
 import sys
 import time
 
+import distributed
 import numpy as np
 import pytest
 
 from taichi_dem import InputError, sweep
-from taichi_dem.kit.sweeps.journal import Journal
-from taichi_dem.kit.sweeps.rows import checked_rows
+from taichi_dem.kit.sweeps.jobs import Journal
+from taichi_dem.kit.sweeps.table import checked_rows
 from tests.processes import users_environment
 from tests.scenes import ROOT
 from tests.sweeps import jobs
@@ -34,16 +35,19 @@ def test_a_process_that_is_killed_loses_nothing_and_bits_are_those_of_a_loop(loo
     jobs.assert_same_bits(found, table)
 
 
-def test_so_it_is_on_a_cluster_and_what_it_kept_is_used_here(looped, tmp_path):
-    distributed = pytest.importorskip("distributed")
-    folder, table = looped
+@pytest.fixture(scope="module")
+def client():
+    """A cluster of two workers, one for all tests, as it takes seconds to start."""
     options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0"}
-    with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
-        rows = jobs.damper_rows(folder, killed=True)
-        found = sweep(jobs.damper, rows, client=client, out=tmp_path, **QUIET)
-        jobs.assert_same_bits(found, table)
-        failed = sweep(jobs.bad, {"how": ["well", "input", "mute"]}, client=client, **QUIET)
-        assert [bool(words) for words in failed["error"]] == [False, True, True]
+    with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as made:
+        yield made
+
+
+def test_so_it_is_on_a_cluster_and_what_it_kept_is_used_here(looped, client, tmp_path):
+    folder, table = looped
+    rows, address = jobs.damper_rows(folder, killed=True), client.scheduler_info()["address"]
+    found = sweep(jobs.damper, rows, client=address, out=tmp_path, **QUIET)
+    jobs.assert_same_bits(found, table)
     written = {path: path.stat().st_mtime_ns for path in (tmp_path / "jobs").iterdir()}
     again = sweep(jobs.damper, rows, workers=1, out=tmp_path, **QUIET)
     jobs.assert_same_bits(again, table)
@@ -67,17 +71,18 @@ def folders(tmp_path):
     return tmp_path / "marks", tmp_path / "out"
 
 
-def test_a_second_call_runs_what_is_missing_or_changed(folders):
+def test_a_second_call_runs_what_is_missing_or_changed(folders, client):
     folder, out = folders
+    kept = {"client": client, "out": out, **QUIET}
     rows = [{"x": x, "folder": str(folder)} for x in range(4)]
-    first = sweep(jobs.counted, rows[:3], workers=1, out=out, **QUIET)
-    again = sweep(jobs.counted, rows[:3], workers=1, out=out, **QUIET)
+    first = sweep(jobs.counted, rows[:3], **kept)
+    again = sweep(jobs.counted, rows[:3], **kept)
     jobs.assert_same_bits(first, again)
     assert jobs.marks(folder) == [0, 1, 2]
     # A file that is damaged, such as by a full disk, does not count.
     next((out / "jobs").iterdir()).write_text('{"values": {')
     changed = [*rows[:2], {"x": 7, "folder": str(folder)}, rows[3]]
-    last = sweep(jobs.counted, changed, workers=1, out=out, **QUIET)
+    last = sweep(jobs.counted, changed, **kept)
     assert len(jobs.marks(folder)) in (5, 6) and last["square"].tolist() == [0, 1, 49, 9]
 
 
@@ -94,30 +99,30 @@ def test_a_sweep_that_is_killed_goes_on_to_the_same_bits(folders):
         time.sleep(0.01)
     first.send_signal(signal.SIGKILL)
     first.wait()
-    rows = [{"x": x, "folder": str(folder)} for x in range(60)]
+    rows = [{"x": x, "folder": str(folder)} for x in range(25)]
     assert len(list((out / "jobs").iterdir())) > 0
     found = sweep(jobs.counted, rows, workers=1, out=out, **QUIET)
     jobs.assert_same_bits(found, jobs.by_loop(jobs.squared, rows))
 
 
-def test_failures_are_rows_and_only_what_may_end_otherwise_is_run_again(tmp_path):
+def test_failures_are_rows_and_only_what_may_end_otherwise_is_run_again(tmp_path, client):
     how = ["well", "input", "diverged", "mute", "exits", "text", "leaves"]
-    found = sweep(jobs.bad, {"how": how}, workers=1, out=tmp_path, **QUIET)
+    found = sweep(jobs.bad, {"how": how}, client=client, out=tmp_path, **QUIET)
     assert np.array_equal(found["x"], [1.0, *6 * [np.nan]], equal_nan=True)
     assert [bool(words) for words in found["error"]] == [False, *6 * [True]]
     assert found["error"][1] == "sand must be dry, got wet"
-    assert found["error"][6].startswith("its process was lost 3 times")
+    assert found["error"][6].startswith("its process was lost 4 times")
     kept = {path.read_text() for path in (tmp_path / "jobs").iterdir()}
     assert len(kept) == 4
 
 
-def test_ctrl_c_keeps_what_is_finished(tmp_path):
+def test_ctrl_c_keeps_what_is_finished(tmp_path, client):
     def interrupt(progress):
-        if progress.done == 2:
+        if progress.share >= 0.04:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        sweep(jobs.squared, {"x": range(50)}, workers=1, out=tmp_path, progress=interrupt)
+        sweep(jobs.squared, {"x": range(50)}, client=client, out=tmp_path, progress=interrupt)
     assert len(list((tmp_path / "jobs").iterdir())) == 2
 
 

@@ -12,10 +12,7 @@ import ca_damper
 import taichi_dem
 from taichi_dem import Checkpoint, InputError
 from taichi_dem.kit.allocation import FieldTree
-from taichi_dem.kit.checkpoint import (
-    read_checkpoint,
-    write_checkpoint,
-)
+from taichi_dem.kit.checkpoint import read_checkpoint, write_checkpoint
 from taichi_dem.kit.field_memory import FieldMemory, fields_of
 from taichi_dem.kit.restart import CheckpointWriter
 

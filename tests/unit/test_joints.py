@@ -9,9 +9,8 @@ import pytest
 from _meshes import mirrored_copies
 from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, effects, read_mesh
 from taichi_dem.mesh.files import write_mesh
-from taichi_dem.mesh.joined import in_space_order
 from taichi_dem.mesh.mesh import Mesh, checked_mesh, with_cut
-from taichi_dem.mesh.shapes import bar, placed_together, single
+from taichi_dem.mesh.shapes import bar, in_space_order, placed_together, single
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.scene import outer_faces_warnings
 

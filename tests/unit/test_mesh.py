@@ -14,9 +14,8 @@ from _meshes import group_area
 from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, join, read_mesh
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.contact_spheres import interior_crossings, spheres_of_faces
-from taichi_dem.mesh.joined import in_space_order
 from taichi_dem.mesh.mesh import Mesh, volumes
-from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.shapes import bar, in_space_order, pair, single
 from taichi_dem.mesh.topology import (
     body_properties,
     edge_colours,

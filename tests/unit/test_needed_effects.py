@@ -190,7 +190,7 @@ def recorded(energy=(1.0, 2.0), heat=(0.0, 1e-3), broken=(np.nan, 1e-5, 2e-5), s
     report = SimpleNamespace(round_off_J=2e-10, until_s=1.0)
     model = SimpleNamespace(body_mass=np.array([1.0, 4.0]), mesh=TWO)
     return SimpleNamespace(
-        history=history,
+        series=history,
         peak_speed=np.array([speed, slow]),
         broken_time=np.array(broken),
         report=report,

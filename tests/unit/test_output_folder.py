@@ -7,15 +7,7 @@ import sys
 
 import pytest
 
-from taichi_dem import (
-    CONCRETE,
-    At,
-    Checkpoint,
-    Collector,
-    Scene,
-    Uniform,
-    simulate,
-)
+from taichi_dem import CONCRETE, At, Checkpoint, Collector, Scene, Uniform, simulate
 from taichi_dem.kit import files
 from taichi_dem.kit.checkpoint import Interrupted
 from taichi_dem.kit.files import output_folder

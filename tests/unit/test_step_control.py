@@ -21,19 +21,10 @@ from taichi_dem import (
     read_mesh,
     step_report,
 )
-from taichi_dem.elasticity.rates import (
-    bond_rates,
-    dashpots_of,
-    springs_of,
-)
+from taichi_dem.elasticity.rates import bond_rates, dashpots_of, springs_of
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.mesh.topology import body_properties, faces_of_group, topology_of
-from taichi_dem.stability.body_limits import (
-    dashpot_limit,
-    dashpot_step,
-    spring_limit,
-    spring_step,
-)
+from taichi_dem.stability.body_limits import dashpot_limit, dashpot_step, spring_limit, spring_step
 from taichi_dem.stability.step_report import stable_together
 from taichi_dem.step_control import CRITERIA
 

@@ -83,10 +83,7 @@ def test_a_body_on_one_plane_turns_about_its_normal_alone():
 
 @pytest.mark.parametrize(
     "other",
-    [
-        lambda group: effects.Fixed(group),
-        lambda group: effects.PrescribedMotion(group, PUSH, 10.0),
-    ],
+    [lambda group: effects.Fixed(group), lambda group: effects.PrescribedMotion(group, PUSH, 10.0)],
 )
 def test_supports_that_contradict_a_motion_are_refused(other):
     mesh = single(0.1)

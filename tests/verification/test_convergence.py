@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_dem import (
-    CONCRETE,
-    ImplicitDashpots,
-    Multirate,
-    Scene,
-    Simulation,
-    Uniform,
-    effects,
-)
+from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.methods import Method

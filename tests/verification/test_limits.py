@@ -6,21 +6,8 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_dem import (
-    CONCRETE,
-    ImplicitDashpots,
-    Scene,
-    Simulation,
-    Uniform,
-    effects,
-    step_report,
-)
-from taichi_dem.elasticity.rates import (
-    bond_rates,
-    contact_eigenvalues,
-    dashpots_of,
-    springs_of,
-)
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, step_report
+from taichi_dem.elasticity.rates import bond_rates, contact_eigenvalues, dashpots_of, springs_of
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import pair, placed_together, single

@@ -12,15 +12,7 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_dem import (
-    CONCRETE,
-    ImplicitDashpots,
-    Scene,
-    Simulation,
-    Uniform,
-    checked_mesh,
-    effects,
-)
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, checked_mesh, effects
 from taichi_dem.mesh.shapes import single
 
 EPS = np.finfo(float).eps
@@ -28,10 +20,7 @@ GROUND, EDGE, G, MU = 2e4, 0.1, 9.81, 0.3
 STEP = 1e-4
 #: The body shakes at 1.2e3 rad/s on its contacts; their dashpots, near critical, end that in this.
 SETTLED = 0.5
-METHODS = {
-    "implicit": ImplicitDashpots(STEP),
-    "uniform": Uniform(STEP),
-}
+METHODS = {"implicit": ImplicitDashpots(STEP), "uniform": Uniform(STEP)}
 
 
 def slope(tangent, friction):

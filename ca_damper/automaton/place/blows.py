@@ -8,7 +8,7 @@ from typing import Any
 import taichi as ti
 
 from ca_damper.automaton.accounting import QUANTUM, quanta
-from ca_damper.automaton.device import HOLDS, PAIRS, WALLS, Rule
+from ca_damper.automaton.device import HOLDS, PAIRS, WALLS
 from ca_damper.automaton.place.contacts import BRUSH, END, JOIN, LINE, OBLIQUE, Contacts
 from ca_damper.automaton.place.disc_blows import (
     chord,
@@ -21,10 +21,11 @@ from ca_damper.automaton.place.disc_blows import (
 from ca_damper.engine.random_numbers import LINE as LINE_DRAW
 from ca_damper.engine.random_numbers import bits, unit
 from ca_damper.filling import Blows, Recoil
+from ca_damper.scenes.scene_fields import Part
 
 
 @ti.data_oriented
-class Collisions(Rule):
+class Collisions(Part):
     """Carry out the collisions of a step; no two of them change the same grain.
 
     Of a step, (scenes,): count: of the grains that meet the container, ends: of them on floor and

@@ -5,10 +5,10 @@ from typing import Any
 import taichi as ti
 
 from ca_damper.automaton.conflict_resolution import SLOTS, rank_in_phase
-from ca_damper.automaton.device import Rule
 from ca_damper.automaton.lattice import HELD, UP, WALL
 from ca_damper.automaton.place.disc_blows import chord, contact_rate
 from ca_damper.engine.random_numbers import GLANCE, SIDE, bits, scrambled, unit
+from ca_damper.scenes.scene_fields import Part
 
 #: Kinds of event: at floor or ceiling, at a side wall, coming to rest, in a column, across columns.
 END, BRUSH, JOIN, LINE, OBLIQUE = range(5)
@@ -20,7 +20,7 @@ _AT_END, _AT_SIDE, _ABOVE, _BESIDE = range(4)
 
 
 @ti.data_oriented
-class Contacts(Rule):
+class Contacts(Part):
     """Find the events of a step and the grains that each of them needs.
 
     events: cell, second cell and kind in one number; ranks: of their claims; shape (scenes, cells,

@@ -8,9 +8,9 @@ from typing import Any
 import taichi as ti
 
 from ca_damper.automaton.conflict_resolution import rank_in_phase
-from ca_damper.automaton.device import Rule
 from ca_damper.automaton.lattice import EMPTY, UP
 from ca_damper.engine.random_numbers import HOP, bits, unit
+from ca_damper.scenes.scene_fields import Part
 
 #: Phases of a step after that of the blows, by rising rank.
 _ACROSS, _ALONG = 1, 2
@@ -18,7 +18,7 @@ _NOWHERE = -1
 
 
 @ti.data_oriented
-class Transport(Rule):
+class Transport(Part):
     """Grains keep their places in the room when the lattice steps, and fly under full gravity.
 
     movers, targets: cells that grains leave and enter, shape (scenes, cells).

@@ -136,8 +136,9 @@ def _display():
     python = sys.modules.get("IPython")
     if python is not None and hasattr(python.get_ipython(), "kernel"):
         return _notebook
-    if sys.stderr.isatty() and os.environ.get("TERM") != "dumb":
-        return _terminal
+    if sys.stderr.isatty():
+        # A dumb one cannot move its cursor.
+        return _lines if os.environ.get("TERM") == "dumb" else _terminal
     return _lines if _modes[-1] == "lines" else _nothing
 
 

@@ -10,6 +10,8 @@ from typing import Any
 
 from taichi_dem.kit.terminal import show_heading
 
+#: Key figures that are shown.
+MOST_FIGURES = 12
 #: File of the entries in the folder of the scripts.
 ENTRIES = "_gallery_pages.txt"
 #: Python as a user types it in a checkout: no environment has to be active.
@@ -75,9 +77,14 @@ def entry_of(run: Callable) -> Entry | None:
     return next((entry for entry in known if entry.name == script.stem), None)
 
 
-def is_key_figure(name: str, item: Mapping[str, Any], patterns: Sequence[str]) -> bool:
-    """Whether a figure of summary.json has a paper's value or a name that fits a pattern."""
-    return item["paper"] is not None or any(fnmatchcase(name, pattern) for pattern in patterns)
+def key_figures(figures: Mapping[str, Mapping], patterns: Sequence[str]) -> list[str]:
+    """Names of the figures of summary.json to show first, those of a paper before others.
+
+    Key are those with a paper's value and those that match a pattern, at most a dozen.
+    """
+    compared = [name for name, one in figures.items() if one["paper"] is not None]
+    matching = [name for name in figures if any(fnmatchcase(name, one) for one in patterns)]
+    return list(dict.fromkeys([*compared, *matching]))[:MOST_FIGURES]
 
 
 def show_opening(description: str | None, entry: Entry | None, quick: bool = False) -> None:

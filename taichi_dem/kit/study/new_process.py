@@ -14,13 +14,12 @@ from taichi_dem.kit.errors import InputError
 
 _CHILD = """
 import importlib, json, sys
-with open(sys.argv[1], encoding="utf-8") as file:
-    job = json.load(file)
-sys.path.insert(0, job["folder"])
-work = getattr(importlib.import_module(job["module"]), job["function"])
+folder, module, function, arch, threads, arguments = json.loads(sys.argv[1])
+sys.path.insert(0, folder)
+work = getattr(importlib.import_module(module), function)
 from taichi_dem.kit import runtime
-runtime.start(job["arch"], job["threads"])
-print(json.dumps(work(**job["arguments"])))
+runtime.start(arch, threads)
+print(json.dumps(work(**arguments)))
 """
 
 
@@ -33,30 +32,18 @@ def call_in_process(
     has them. cache: a folder of compiled kernels instead of Taichi's own. Raises InputError with
     the end of what the process said, where it failed; title: of the run in that sentence.
     """
-    folder, file = os.path.split(os.path.abspath(str(sys.modules[work.__module__].__file__)))
+    file = Path(str(sys.modules[work.__module__].__file__)).absolute()
     settings: Any = runtime.settings()
-    job: dict[str, Any] = {
-        "folder": folder,
-        "module": os.path.splitext(file)[0],
-        "function": work.__name__,
-    }
-    job.update(arch=settings.arch, threads=threads, arguments=arguments)
+    job = [str(file.parent), file.stem, work.__name__, settings.arch, threads, arguments]
+    environment = dict(os.environ)
     if cache:
         os.makedirs(cache, exist_ok=True)
-    own = {"TI_OFFLINE_CACHE": "1", "TI_OFFLINE_CACHE_FILE_PATH": cache} if cache else {}
-    return _answer(job, title or f"of {work.__name__}", own)
-
-
-def _answer(job: dict, title: str, environment: Mapping[str, str]) -> Any:
-    """Last line that the new process prints, from JSON; the job reaches it in a file."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "job.json")
-        with open(path, "w", encoding="utf-8") as handle:
-            json.dump(job, handle)
-        line = [sys.executable, "-c", _CHILD, path]
-        done = children.run(line, env={**os.environ, **environment})
+        environment.update(TI_OFFLINE_CACHE="1", TI_OFFLINE_CACHE_FILE_PATH=cache)
+    done = children.run([sys.executable, "-c", _CHILD, json.dumps(job)], env=environment)
     if done.returncode != 0:
-        raise InputError(f"the run {title} ended with: {done.stderr.strip()[-300:]}")
+        said = done.stderr.strip()[-300:]
+        raise InputError(f"the run {title or f'of {work.__name__}'} ended with: {said}")
+    # Taichi may have printed lines of its own before.
     return json.loads(done.stdout.splitlines()[-1])
 
 
@@ -79,8 +66,7 @@ def call_rounds(
 
         def take_turn(name: str) -> dict:
             work, arguments = calls[name]
-            title = f"of {name}"
-            found = call_in_process(work, cache=str(places[name]), title=title, **arguments)
+            found = call_in_process(work, cache=str(places[name]), title=f"of {name}", **arguments)
             size = sum(file.stat().st_size for file in places[name].rglob("*.tic"))
             return {**found, "compiled_kB": 1e-3 * size}
 

@@ -12,20 +12,14 @@ from types import SimpleNamespace
 from typing import Any
 from urllib.parse import quote
 
-from taichi_dem.kit.files import output_folder, write_text, write_whole
-from taichi_dem.kit.study.entries import PYTHON, Entry, is_key_figure
+from taichi_dem.kit.files import write_text, write_whole
+from taichi_dem.kit.study.entries import PYTHON, Entry, key_figures
 from taichi_dem.kit.study.summary import value_in_words
 
 #: Notes of the program that ran a study, beside its output: seconds, and what it printed.
 RUN = "gallery.json"
-#: Folder of the small pictures of the list, beside the page; their widest side [pixels], colours.
-_THUMBNAILS, _THUMBNAIL = "thumbnails", (480, 64)
 #: Words of a run about its own pictures, where there are any.
 CAPTION = "caption.txt"
-#: Key figures shown unfolded; all others are one touch away.
-_MOST_KEY_FIGURES = 12
-#: Text of a table: name, value, paper's value.
-Row = tuple[str, str, str]
 
 
 def markdown_table(entries: Sequence[Entry], root: str | Path, pictures: str) -> str:
@@ -99,12 +93,12 @@ def _shown(page, root, failed):
     it did not end well, or "". pictures, more: files shown, and files linked. caption: words of the
     run about its own pictures. key, rest: rows of figures (name, value, paper).
     """
-    folder, thumbnails = Path(root, page.name), output_folder(os.path.join(root, _THUMBNAILS))
+    folder = Path(root, page.name)
     summary, run = read_json(folder / "summary.json"), read_json(folder / RUN)
     files = sorted(path.name for path in folder.glob("*") if path.is_file())
     pictures = [name for name in page.pictures if name in files]
     key, rest = figure_rows(summary.get("figures", {}), page.figures)
-    small, caption = shrink_picture(page, root, thumbnails, *_THUMBNAIL), folder / CAPTION
+    caption = folder / CAPTION
     return SimpleNamespace(
         page=page,
         folder=quote(page.name),
@@ -112,7 +106,6 @@ def _shown(page, root, failed):
         quick=summary.get("quick", False),
         pictures=pictures,
         more=[name for name in files if name not in (*pictures, RUN, CAPTION)],
-        thumbnail=f"{_THUMBNAILS}/{quote(page.name)}.png" if small else "",
         caption=caption.read_text(encoding="utf-8").strip() if caption.is_file() else "",
         key=key,
         rest=rest,
@@ -128,22 +121,19 @@ def read_json(path: str | Path) -> dict:
     return json.loads(Path(path).read_text(encoding="utf-8")) if Path(path).is_file() else {}
 
 
-def figure_rows(
-    figures: Mapping[str, dict], patterns: Sequence[str]
-) -> tuple[tuple[Row, ...], tuple[Row, ...]]:
+def figure_rows(figures: Mapping[str, dict], patterns: Sequence[str]) -> tuple[list, list]:
     """Rows (name, value, paper) of the key figures, and of all others; paper: "" without a value.
 
-    figures: of summary.json. Key are those with a paper's value and those that match a pattern.
+    figures: of summary.json.
     """
-    key: list[Row] = []
-    rest: list[Row] = []
-    for name, item in figures.items():
-        value, paper = (_with_unit(item[k], item["unit"]) for k in ("value", "paper"))
-        row = (_in_words(name, item["unit"]), value, "" if item["paper"] is None else paper)
-        (key if is_key_figure(name, item, patterns) else rest).append(row)
-    # Those with a paper's value first, so that the cut never takes them.
-    key.sort(key=lambda row: not row[2])
-    return tuple(key[:_MOST_KEY_FIGURES]), tuple(key[_MOST_KEY_FIGURES:] + rest)
+    key = key_figures(figures, patterns)
+    rest = [name for name in figures if name not in key]
+    return [_row(name, figures[name]) for name in key], [_row(name, figures[name]) for name in rest]
+
+
+def _row(name, item):
+    value, paper = (_with_unit(item[k], item["unit"]) for k in ("value", "paper"))
+    return _in_words(name, item["unit"]), value, "" if item["paper"] is None else paper
 
 
 def _in_words(name, unit):

@@ -19,11 +19,11 @@ from taichi_dem.kit.bars.answer import Answer
 from taichi_dem.kit.files import older_files, write_csv, write_text
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.provenance import commit, processor
-from taichi_dem.kit.study.entries import Entry, is_key_figure
+from taichi_dem.kit.study.entries import MOST_FIGURES, Entry, key_figures
 from taichi_dem.kit.terminal import print_table, show_heading, show_paragraph
 from taichi_dem.kit.version import __version__, taichi_version
 
-#: Most figures of a table, and most pictures of a list.
+#: Most pictures of a list.
 _MOST = 12
 #: Endings of what is looked at.
 _PICTURES = (".png", ".gif", ".mp4", ".html")
@@ -122,7 +122,9 @@ def print_figures(figures: Mapping[str, dict], entry: Entry | None = None) -> No
     entry: of the study; with one only the key figures are printed, those of a paper first, and no
     more than a dozen.
     """
-    shown = [*figures] if entry is None else _key_names(figures, entry)
+    shown = [*figures]
+    if entry is not None:
+        shown = key_figures(figures, entry.figures) or shown[:MOST_FIGURES]
     header, rows = ["figure", "value", "unit", "paper"], []
     for name in shown:
         one = figures[name]
@@ -132,11 +134,6 @@ def print_figures(figures: Mapping[str, dict], entry: Entry | None = None) -> No
     print_table([row[:columns] for row in rows], header[:columns])
     if len(shown) < len(figures):
         print(f"and {len(figures) - len(shown)} more in summary.json")
-
-
-def _key_names(figures, entry):
-    key = [name for name, one in figures.items() if is_key_figure(name, one, entry.figures)]
-    return sorted(key or figures, key=lambda name: figures[name]["paper"] is None)[:_MOST]
 
 
 def value_in_words(value: Any) -> str:

@@ -62,7 +62,7 @@ def picture_work_precision(
             drawn[cost].draw(floors, order)
             axes[cost].set(xlabel=name, ylabel=error_name)
         if residual_names:
-            _draw_residuals(axes["residual"], points, looks, step_unit)
+            _draw_residuals(drawn["seconds"], axes["residual"], step_unit)
             axes["residual"].set_xlabel(residual_names[0])
             axes["residual"].set_ylabel(textwrap.fill(residual_names[1], 36))
         figure.legend(*_legend(axes["seconds"], titles), loc="outside upper left", ncols=2)
@@ -119,7 +119,7 @@ def _legend(axis, titles):
     return handles, [titles.get(label, label) for label in labels]
 
 
-def cost_of(point: Point, points: Sequence[Point], cost: str) -> float:
+def _cost(point, points, cost):
     """Cost of a point; of one without a time, at the rate of the method's nearest run."""
     if cost == "evaluations" or point.seconds:
         return point.evaluations if cost == "evaluations" else point.low
@@ -127,12 +127,6 @@ def cost_of(point: Point, points: Sequence[Point], cost: str) -> float:
     own = [p for p in timed if p.method == point.method] or timed
     near = min(own, key=lambda p: abs(math.log(p.step / point.step)))
     return near.low * point.evaluations / near.evaluations if near.seconds else math.nan
-
-
-def _good(points, method):
-    """Points with an error, coarse to fine; an error of zero has no place on a log scale."""
-    own = [p for p in points if p.method == method and p.error > 0.0]
-    return sorted(own, key=lambda p: -p.step)
 
 
 class _Panel:
@@ -143,10 +137,11 @@ class _Panel:
         self.axis, self.looks, self.timed = axis, looks, cost == "seconds"
         self.good, self.failed = {}, {}
         for method in looks:
-            failed = [p for p in points if p.method == method and p.failure]
-            failed.sort(key=lambda p: -p.step)
-            self.good[method] = [(cost_of(p, points, cost), p) for p in _good(points, method)]
-            self.failed[method] = [(cost_of(p, points, cost), p) for p in failed]
+            own = sorted((p for p in points if p.method == method), key=lambda p: -p.step)
+            pairs = [(_cost(p, points, cost), p) for p in own]
+            # An error of zero has no place on a log scale.
+            self.good[method] = [pair for pair in pairs if pair[1].error > 0.0]
+            self.failed[method] = [pair for pair in pairs if pair[1].failure]
 
     def draw(self, floors: Mapping[str, float], order: int) -> None:
         """Draw points, floors, the ideal gain and failures."""
@@ -162,14 +157,14 @@ class _Panel:
                 self.axis.axhline(floors[method], color=look["color"], ls=":", lw=1.0)
         if floors:
             self.axis.plot([], [], ls=":", color=GREY, label="chaos floor of each method")
-        good = [(at, p.error) for own in self.good.values() for at, p in own]
-        if good:
-            self._draw_ideal(good, order)
+        if any(self.good.values()):
+            self._draw_ideal(order)
         if any(self.failed.values()):
             self._draw_failures()
 
-    def _draw_ideal(self, good, order):
+    def _draw_ideal(self, order):
         """The line along which twice the cost brings 2^order times the accuracy: the ideal gain."""
+        good = [(at, p.error) for own in self.good.values() for at, p in own]
         x, y = min(good, key=lambda at: at[0] * at[1] ** (1.0 / order))
         (left, right), (bottom, top) = self.axis.get_xlim(), self.axis.get_ylim()
         # A line that leaves at the bottom first would shift the limits.
@@ -187,23 +182,21 @@ class _Panel:
         step = (top / bottom) ** 0.055
         edge = top * step ** (len(failed) + 0.3)
         axis.axhspan(top, edge, color="0.94", lw=0, label="× no result: its cost, but no error")
-        costs = [at for own in failed.values() for at, _ in own]
-        left, right = axis.get_xlim()
+        costs, (left, right) = [at for own in failed.values() for at, _ in own], axis.get_xlim()
         left, right = min(left, 0.8 * min(costs)), max(right, 1.25 * max(costs))
         axis.set(xlim=(left, right), ylim=(bottom, edge))
         for k, (method, own) in enumerate(failed.items()):
-            level, colour = top * step ** (k + 0.65), self.looks[method]["color"]
+            level, look = top * step ** (k + 0.65), self.looks[method]
             place = [at for at, _ in own]
             axis.plot(place, [level] * len(own), "x", color=BLACK, ms=4, mew=1.2)
-            around = {**self.looks[method], "ms": 9, "ls": "none", "mfc": "none"}
-            axis.plot(place, [level] * len(own), **around)
+            axis.plot(place, [level] * len(own), **{**look, "ms": 9, "ls": "none", "mfc": "none"})
             # The small panel shows the crosses alone.
             words = ", ".join(f"{p.label} {p.failure}" for _, p in own) if self.timed else ""
             # On the side where there is room for it.
             late = place[-1] ** 2 > left * right
             end, shift, side = (place[0], -7, "right") if late else (place[-1], 7, "left")
-            look = {"fontsize": _SMALL, "color": colour, "ha": side}
-            axis.annotate(words, (end, level), (shift, -2.5), textcoords="offset points", **look)
+            text = {"fontsize": _SMALL, "color": look["color"], "ha": side}
+            axis.annotate(words, (end, level), (shift, -2.5), textcoords="offset points", **text)
 
     def label_steps(self) -> None:
         """Write every point's step beside it, where it covers least of what is there already."""
@@ -242,10 +235,11 @@ def _shared(box, others):
     return np.maximum(edges, 0.0).prod(axis=1)
 
 
-def _draw_residuals(axis, points, looks, unit):
+def _draw_residuals(panel, axis, unit):
+    """The residual of each run over its step, in a unit [s]."""
     axis.set(xscale="log", yscale="log")
-    for method, look in looks.items():
-        own = [p for p in _good(points, method) if p.residual > 0.0]
+    for method, look in panel.looks.items():
+        own = [p for _, p in panel.good[method] if p.residual > 0.0]
         axis.plot([p.step / unit for p in own], [p.residual for p in own], **look)
     # Within a decade a log axis writes all its minor ticks, wide as they are.
     axis.xaxis.set_minor_formatter("")

@@ -5,7 +5,6 @@ it closes over, defaults. Other packages count by their name and version. No dig
 addresses, on the order of a set or on whether a file is run or imported.
 """
 
-import builtins
 import copyreg
 import dis
 import functools
@@ -16,21 +15,18 @@ import sys
 import sysconfig
 import types
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-#: Folders of Python, of both packages, and of what is installed.
-_HOUSE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-_LIBRARY = tuple(
-    os.path.join(os.path.realpath(folder), "")
-    for folder in (
-        *map(sysconfig.get_path, ("stdlib", "platstdlib")),
-        os.path.join(os.path.dirname(_HOUSE), "ca_damper"),
-        _HOUSE,
-    )
+_HOUSE = Path(__file__).resolve().parents[2]
+#: Folders of Python and of both packages, and names of those of what is installed.
+_LIBRARY = (
+    *(Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib")),
+    *(_HOUSE, _HOUSE.with_name("ca_damper")),
 )
-_INSTALLED = ("site-packages", "dist-packages")
+_INSTALLED = {"site-packages", "dist-packages"}
 #: Names of a module or class that say where it stands, not what it does.
 _PLACE = frozenset(
     "__name__ __file__ __spec__ __doc__ __module__ __qualname__ __dict__ __weakref__ "
@@ -43,8 +39,7 @@ _READS = frozenset(
     "rglob iterdir scandir walk".split()
 )
 _PLAIN: Any = (str, bytes, int, float, complex, type(None), type(...))
-_NAMED = (types.BuiltinFunctionType, types.GetSetDescriptorType, types.MemberDescriptorType)
-_LONGEST_PATH, _MOST = 4096, 100_000
+_WRAPPERS = (staticmethod, classmethod, property, functools.cached_property)
 
 
 class Dependencies:
@@ -56,44 +51,28 @@ class Dependencies:
 
     def __init__(self, work: Any):
         self.files: dict[str, str] = {}
-        self._unseen: dict[str, None] = {}
+        self.unseen: list[str] = []
         self._known: dict[int, str] = {}
         self._kept: list[Any] = []
-        try:
-            self.digest = self._digest(work, getattr(work, "__qualname__", "function"))
-        except RecursionError:
-            self.digest = self._hidden("values that are nested too deeply")
-
-    @property
-    def unseen(self) -> tuple[str, ...]:
-        """Sentences, each once."""
-        return tuple(self._unseen)
+        self.digest = self._digest(work, getattr(work, "__qualname__", "function"))
 
     def _digest(self, value: Any, name: str) -> str:
         """Digest of a value that goes by a name; of itself, where it is reached once more."""
+        if isinstance(value, str):
+            self.files.update(named_file(value, self.files))
         for kind in _PLAIN:
             if isinstance(value, kind):
-                return self._plain(value, kind)
+                return _sha256(f"{type(value).__qualname__} {kind.__repr__(value)}".encode())
         if id(value) not in self._known:
-            if len(self._known) > _MOST:
-                return self._hidden(f"{name} holds too much to be looked through")
             self._known[id(value)] = f"cycle {type(value).__qualname__}"
             self._kept.append(value)
-            made = hashlib.sha256(type(value).__qualname__.encode())
-            for part in self._parts(value, name):
-                made.update(f" {part}".encode())
-            self._known[id(value)] = made.hexdigest()
+            parts = " ".join([type(value).__qualname__, *self._parts(value, name)])
+            self._known[id(value)] = _sha256(parts.encode())
         return self._known[id(value)]
 
-    def _plain(self, value, kind):
-        if kind is str:
-            self.files.update(named_file(value, self.files))
-        # Python prints no whole number of more than 4300 digits.
-        text = hex(value) if kind is int else kind.__repr__(value)
-        return _sha256(f"{type(value).__qualname__} {text}".encode())
-
     def _hidden(self, sentence):
-        self._unseen[sentence] = None
+        if sentence not in self.unseen:
+            self.unseen.append(sentence)
         return sentence
 
     def _parts(self, value: Any, name: str) -> Iterator[str]:
@@ -108,10 +87,9 @@ class Dependencies:
         elif isinstance(value, types.FunctionType):
             yield from self._of_function(value)
         elif isinstance(value, types.ModuleType):
-            yield "module"  # what is taken from it counts: see _of_function
+            yield "module"  # what is taken from it counts: see _of_global
         elif isinstance(value, type):
-            bases = [kind for kind in value.__bases__ if kind is not object]
-            yield from (self._digest(kind, kind.__qualname__) for kind in bases)
+            yield from (self._digest(kind, kind.__qualname__) for kind in value.__bases__)
             yield from self._of_items(vars(value).items(), value.__qualname__)
         elif isinstance(value, (set, frozenset)):
             yield from sorted(self._digest(one, name) for one in value)
@@ -122,16 +100,10 @@ class Dependencies:
         elif isinstance(value, os.PathLike):
             yield self._digest(os.fspath(value), name)
         elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
-            yield f"{value.dtype} {value.shape}"
-            yield _sha256(value.tobytes())
-        elif isinstance(value, (staticmethod, classmethod)):
-            yield self._digest(value.__func__, name)
-        elif isinstance(value, functools.cached_property):
-            yield self._digest(value.func, name)
-        elif isinstance(value, property):
-            yield from (self._digest(one, name) for one in (value.fget, value.fset))
-        elif isinstance(value, _NAMED):
-            yield f"{getattr(value, '__module__', '')} {value.__qualname__}"
+            yield f"{value.dtype} {value.shape} {_sha256(value.tobytes())}"
+        elif isinstance(value, _WRAPPERS):
+            for part in ("__func__", "func", "fget", "fset"):
+                yield self._digest(getattr(value, part, None), name)
         else:
             yield from self._of_object(value, name)
 
@@ -142,12 +114,13 @@ class Dependencies:
                 yield self._digest(value, f"{name}.{key}" if isinstance(key, str) else name)
 
     def _of_object(self, value, name):
-        """An object by what would make it again."""
+        """An object by what would make it again; a method of C by its name."""
         try:
             registered = copyreg.dispatch_table.get(type(value))
             reduced = registered(value) if registered else value.__reduce_ex__(4)
         except Exception:
-            yield self._hidden(f"the value of {name}, a {type(value).__qualname__}")
+            unseen = f"the value of {name}, a {type(value).__qualname__}"
+            yield getattr(value, "__qualname__", "") or self._hidden(unseen)
             return
         for part in (reduced,) if isinstance(reduced, str) else reduced:
             yield self._digest(list(part) if isinstance(part, Iterator) else part, name)
@@ -158,17 +131,11 @@ class Dependencies:
         yield self._digest(function.__defaults__, f"a default of {name}")
         yield self._digest(function.__kwdefaults__, f"a default of {name}")
         for free, cell in zip(code.co_freevars, function.__closure__ or ()):
-            try:
-                yield self._digest(cell.cell_contents, free)
-            except ValueError:
-                yield f"{free} is empty"
-        names = set(_names(code))
-        for one in sorted(_globals_of(code)):
-            if one in function.__globals__ and one not in _PLACE:
-                yield one
-                yield from self._of_global(function.__globals__[one], one, names)
-            elif not hasattr(builtins, one) and one not in _PLACE:
-                yield f"{one} is missing"
+            yield self._digest(cell.cell_contents, free)
+        names = {*_names(code)} - _PLACE
+        for one in sorted(names & function.__globals__.keys()):
+            yield one
+            yield from self._of_global(function.__globals__[one], one, names)
 
     def _of_global(self, value, name, names):
         """A value by its name; of a module of the user what a function takes from it."""
@@ -183,7 +150,7 @@ class Dependencies:
         yield repr((code.co_names, code.co_varnames, code.co_freevars, code.co_flags))
         for constant in code.co_consts:
             yield self._digest(constant, name)
-            if isinstance(constant, str) and _is_folder(constant):
+            if isinstance(constant, str) and os.sep in constant and os.path.isdir(constant):
                 self._hidden(f"files in the folder {constant}, which {name} names")
         for one in code.co_names:
             if one in _HIDDEN:
@@ -196,32 +163,28 @@ class Dependencies:
 
     def _of_import(self, module, name):
         """A module that a function imports itself, by the text of its file."""
-        path = _file_of(module)
-        if path and _is_installed(path):
-            return
-        if path:
-            yield digest_of_file(path)
-        self._hidden(f"what {name} imports when it is run, by way of {module or '.'}")
+        try:
+            path = getattr(importlib.util.find_spec(module), "origin", None)
+        except (ImportError, ValueError):
+            path = None
+        if path is None or not _is_installed(path):
+            yield digest_of_file(path) if path else ""
+            self._hidden(f"what {name} imports when it is run, by way of {module or '.'}")
 
 
 def named_file(text: str, known: dict[str, str]) -> dict[str, str]:
     """Path and digest of the file that a text names, {} where it names none; known: digests."""
     path = os.path.expanduser(text)
     try:
-        if 0 < len(path) < _LONGEST_PATH and os.path.isfile(path):
-            return {path: known.get(path) or digest_of_file(path)}
+        return {path: known.get(path) or digest_of_file(path)} if os.path.isfile(path) else {}
     except (OSError, ValueError):
-        pass
-    return {}
+        return {}
 
 
 def digest_of_file(path: str) -> str:
     """Digest of the content of a file. Raises OSError."""
-    made = hashlib.sha256()
     with open(path, "rb") as file:
-        for block in iter(functools.partial(file.read, 1 << 20), b""):
-            made.update(block)
-    return made.hexdigest()[:24]
+        return hashlib.file_digest(file, "sha256").hexdigest()[:24]
 
 
 def _is_library(thing):
@@ -238,20 +201,10 @@ def _is_library(thing):
 
 @functools.cache
 def _is_installed(path):
-    place = os.path.realpath(path)
-    return place.startswith(_LIBRARY) or any(one in place.split(os.sep) for one in _INSTALLED)
-
-
-def _file_of(module):
-    """File of a module, "" where it is not known; the packages of libraries are not imported."""
-    try:
-        for name in (module.partition(".")[0], module):
-            path = getattr(importlib.util.find_spec(name), "origin", None) or ""
-            if path in ("built-in", "frozen") or _is_installed(path):
-                return os.__file__ if path in ("built-in", "frozen") else path
-        return path
-    except (ImportError, ValueError, AttributeError):
-        return ""
+    """Whether a file is none of the user's; modules of Python itself have none."""
+    place = Path(path).resolve()
+    is_within = any(place.is_relative_to(folder) for folder in _LIBRARY)
+    return is_within or not place.is_file() or not _INSTALLED.isdisjoint(place.parts)
 
 
 def _library_name(thing):
@@ -269,29 +222,9 @@ def _sha256(content):
     return hashlib.sha256(content).hexdigest()
 
 
-def _is_folder(text):
-    try:
-        return os.sep in text.strip("./") and os.path.isdir(os.path.expanduser(text))
-    except (OSError, ValueError):
-        return False
-
-
 def _names(code):
     """Names of globals and attributes in code and in the functions that stand within it."""
     yield from code.co_names
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
             yield from _names(constant)
-
-
-def _globals_of(code):
-    """Names that are looked up in the module."""
-    found = {
-        one.argval
-        for one in dis.get_instructions(code)
-        if one.opname in ("LOAD_GLOBAL", "LOAD_NAME")
-    }
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            found |= _globals_of(constant)
-    return found

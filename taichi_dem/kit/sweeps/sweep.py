@@ -1,9 +1,13 @@
-"""Run one function over the rows of a table: in processes of this machine or on a Dask cluster."""
+"""Run one function over the rows of a table by Dask: in processes of one machine or of several."""
 
 import contextlib
+import logging
+import multiprocessing
 import os
+import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from typing import Any
 
 from taichi_dem.kit import runtime
@@ -11,17 +15,33 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import claiming
 from taichi_dem.kit.progress.progress import Listener, Progress
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.sweeps.cluster import check_client, run_on_cluster
 from taichi_dem.kit.sweeps.dependencies import Dependencies
-from taichi_dem.kit.sweeps.job import Job, Record, Work, checked_work, identity_of, jobs_of
-from taichi_dem.kit.sweeps.journal import Journal
-from taichi_dem.kit.sweeps.local import leave_unless_main, run_locally
-from taichi_dem.kit.sweeps.rows import SEED, TableLike, checked_rows
-from taichi_dem.kit.sweeps.table import SweepTable
+from taichi_dem.kit.sweeps.jobs import (
+    Job,
+    Journal,
+    Record,
+    Work,
+    failed,
+    identity_of,
+    jobs_of,
+    run_in_worker,
+    table_of,
+)
+from taichi_dem.kit.sweeps.table import SEED, SweepTable, TableLike, checked_rows
 from taichi_dem.kit.validation import AUTO, FileName, whole
 
 #: File of the whole table in the folder of a sweep.
 RESULTS = "results.csv"
+_GUARD = 'if __name__ == "__main__":'
+#: Time without any worker after which none is expected any more [s].
+_NO_WORKER = 60.0
+#: Dask's on this machine: a row whose process is lost is run three times, and a worker whose kernel
+#: keeps it from answering for long is not lost.
+_SETTINGS = {
+    "distributed.scheduler.allowed-failures": 2,
+    "distributed.scheduler.worker-ttl": None,
+    "distributed.comm.timeouts.connect": "1h",
+}
 
 
 @claiming()
@@ -51,8 +71,9 @@ def sweep(
         with a header, or what ``parameter_grid`` makes.
     workers : int, optional
         Number of processes on this machine, from 1 to 1024; by default one a core.
-    client : distributed.Client, optional
-        A ``dask.distributed.Client`` whose workers run the rows instead; each has one thread.
+    client : distributed.Client or str, optional
+        A ``dask.distributed.Client``, or the address of a Dask scheduler, whose workers run the
+        rows instead; each has one thread.
     out : path, optional
         Folder that keeps each finished row. The same call later runs only rows that are missing
         or changed, or for which the function changed, what it calls, names or closes over in the
@@ -71,8 +92,8 @@ def sweep(
     Raises
     ------
     InputError
-        For a bad argument, a folder of another sweep or without space, or a client that is lost:
-        finished rows are kept in ``out``.
+        For a bad argument, a folder of another sweep or without space, a client that is lost, or
+        where ``distributed`` is not installed; finished rows are kept in ``out``.
 
     Notes
     -----
@@ -86,81 +107,128 @@ def sweep(
     ... # doctest: +SKIP
     """
     rows = checked_rows(table)
-    jobs = jobs_of(function, rows, whole("seed", seed, 0, 2**63))
-    count = _processes(workers, client)
+    count = runtime.usable_cores() if workers is None else whole("workers", workers, 1, 1024)
     journal = Journal(out, identity_of(function))
-    records = run_missing(function, jobs, journal, count=count, client=client, progress=progress)
-    made = SweepTable(jobs, records, SEED in rows[0], Dependencies(function).unseen)
+    jobs = jobs_of(function, rows, whole("seed", seed, 0, 2**63))
+    records = _run_missing(function, jobs, journal, count, client, progress)
+    made = table_of(jobs, records, SEED in rows[0], Dependencies(function).unseen)
     if journal.folder:
         made.write_csv(os.path.join(journal.folder, RESULTS))
     return made
 
 
-def run_missing(
+def _run_missing(
     function: Work,
     jobs: Sequence[Job],
     journal: Journal,
-    *,
     count: int,
-    client: Any = None,
-    progress: Listener | str | None = AUTO,
+    client: Any,
+    progress: Listener | str | None,
 ) -> list[Record]:
-    """Records of jobs, of which those that the journal lacks are run; count: of processes."""
-    leave_unless_main()
-    name, records = checked_work(function), journal.read(jobs)
+    """Records of jobs, of which those that the journal lacks are run; count: of processes here."""
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        # A worker imports the main script, which starts the sweep again.
+        sys.exit(1)
+    records = journal.read(jobs)
     missing = [*{job.digest: job for job in jobs if job.digest not in records}.values()]
+    started = time.perf_counter()
     if missing:
-        arch = _architecture()
         with (
             reporting(progress, "sweeping") as listen,
-            contextlib.closing(
-                run_locally(name, missing, count, arch)
-                if client is None
-                else run_on_cluster(function, missing, client, arch)
-            ) as ended,
+            contextlib.closing(_run(function, missing, client, count)) as ended,
         ):
-            _collect(ended, records, journal, _counter(listen, len(missing)))
+            for done, (job, record) in enumerate(ended):
+                records[job.digest] = record
+                journal.write(job, record)
+                if listen is not None:
+                    words = f"{done + 1} of {len(missing)} runs"
+                    share, seconds = (done + 1) / len(missing), time.perf_counter() - started
+                    listen(Progress(share, seconds, words=words))
     return [records[job.digest] for job in jobs]
 
 
-def _collect(ended: Iterator[tuple[Job, Record]], records, journal, count):
-    """Keep the records of jobs as they end. Raises InputError, which says what is kept."""
-    done = 0
+def _run(work, jobs, client, count) -> Generator[tuple[Job, Record], None, None]:
+    """Jobs and their records as they end. Raises InputError where no more can be run."""
     try:
-        for job, record in ended:
-            done += 1
-            records[job.digest] = record
-            journal.write(job, record)
-            count(done)
-    except InputError as error:
-        kept = f"; {journal.words()}" if done or journal.kept else ""
-        raise InputError(f"{error}{kept}") from None
+        import distributed
+    except ImportError:
+        raise InputError(
+            'a sweep needs Dask: python -m pip install "taichi-dem[sweeps]", or distributed alone'
+        ) from None
+    try:
+        with contextlib.ExitStack() as opened:
+            if client is None:
+                client = opened.enter_context(_here(min(count, len(jobs))))
+                work = work if work.__module__ != "__main__" else work.__qualname__
+            elif isinstance(client, str):
+                client = opened.enter_context(distributed.Client(client))
+            yield from _records(work, jobs, client)
+    except (OSError, RuntimeError) as error:
+        raise InputError(
+            f"workers of the sweep do not start, as the call of sweep must stand below {_GUARD}, "
+            f"or are lost: {error}"
+        ) from None
 
 
-def _counter(listen: Listener | None, total: int) -> Callable[[int], None]:
-    """Function that tells a listener how many jobs of a number are done."""
-    started = time.perf_counter()
+@contextlib.contextmanager
+def _here(count: int):
+    """A client of processes on this machine; at the end they write the kernels that they made."""
+    import dask
+    import distributed
 
-    def count(done):
-        if listen is not None:
-            words = f"{done} of {total} runs"
-            listen(Progress(done / total, time.perf_counter() - started, words=words))
-
-    count(0)
-    return count
-
-
-def _processes(workers, client):
-    """Number of processes of this machine, 0 with a client; both checked."""
-    if client is None:
-        return runtime.usable_cores() if workers is None else whole("workers", workers, 1, 1024)
-    if workers is not None:
-        raise InputError(f"workers must be left out with a client, got {workers}")
-    check_client(client)
-    return 0
+    options = {"threads_per_worker": 1, "memory_limit": 0, "dashboard_address": ":0"}
+    with (
+        dask.config.set(_SETTINGS),
+        distributed.LocalCluster(count, silence_logs=logging.CRITICAL, **options) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+        wait = [client.submit(runtime.stop, workers=[one], pure=False) for one in client.nthreads()]
+        distributed.wait(wait)
 
 
-def _architecture():
-    """Architecture that this process has chosen, the CPU where it has not started Taichi."""
-    settings = runtime.settings()
-    return settings.arch if settings else "cpu"
+def _records(work, jobs: Iterable[Job], client) -> Iterator[tuple[Job, Record]]:
+    """Jobs and their records, at most one job a worker at a time.
+
+    Dask counts for each job how often a worker died that had it, also where it only waited.
+    """
+    import distributed
+
+    arch = runtime.settings().arch if runtime.settings() else "cpu"
+    waiting, active, ended = deque(jobs), {}, distributed.as_completed()
+    try:
+        while waiting or active:
+            client.wait_for_workers(1, timeout=_NO_WORKER)
+            for _ in range(min(len(waiting), _worker_count(client) - len(active))):
+                job = waiting.popleft()
+                future = client.submit(run_in_worker, work, job.row, arch, pure=False)
+                active[future] = job
+                ended.add(future)
+            for future in ended.next_batch():
+                yield active.pop(future), _record_of(future)
+    finally:
+        client.cancel([*active])
+
+
+def _worker_count(client):
+    """Number of workers; InputError where one has several threads."""
+    threads = client.nthreads().values()
+    if any(count != 1 for count in threads):
+        raise InputError(
+            "workers of the client must have one thread each, as Taichi runs on one alone, got "
+            f"{max(threads)}: start them with threads_per_worker=1, or --nthreads 1"
+        )
+    return len(threads)
+
+
+def _record_of(future) -> Record:
+    """Record of a future that has ended, one way or another."""
+    import distributed
+
+    try:
+        return future.result()
+    except distributed.KilledWorker as error:
+        # Dask allows a number of failures, 3 unless it is told otherwise.
+        return failed(f"its process was lost {error.allowed_failures + 1} times")
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"workers cannot import the function: {error}") from None

@@ -1,36 +1,159 @@
-"""The table that a sweep returns: results apart from what tells where they come from."""
+"""The table of a sweep: rows that go in, checked before any run, and columns that come out.
 
+A row is a dict of column name to number or text.
+"""
+
+import csv
 import hashlib
-from collections.abc import Sequence
+import itertools
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from taichi_dem.kit.data_table import data_frame
-from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.sweeps.job import Job, Record
-from taichi_dem.kit.sweeps.rows import SEED
-from taichi_dem.kit.validation import FileName
+from taichi_dem.kit.validation import FileName, path_name, shown
 
-#: Columns of the provenance that stand in a record.
-_OF_RECORDS = ("version", "commit", "machine", "seconds")
+#: A value of a table.
+Value = bool | int | float | str
+#: A row by column name.
+Row = dict[str, Value]
+#: What a sweep takes for a table.
+TableLike = Iterable[Mapping[str, Any]] | Mapping[str, Sequence] | FileName
+#: Column of the seeds of rows.
+SEED = "seed"
+#: Names of columns that a sweep adds to its result.
+ADDED = ("error", "version", "commit", "machine", "seconds")
+
+
+def parameter_grid(**columns: Iterable) -> list[Row]:
+    """Rows of all combinations of some values, for ``sweep``.
+
+    Parameters
+    ----------
+    **columns : iterable
+        Values of each column; the last column varies fastest.
+
+    Returns
+    -------
+    list of dict
+        One row for each combination, each value in the unit of its column.
+
+    Raises
+    ------
+    InputError
+        A column is not a list of values.
+
+    Examples
+    --------
+    >>> parameter_grid(peak=[1.0, 2.0], rise=[3.0])
+    [{'peak': 1.0, 'rise': 3.0}, {'peak': 2.0, 'rise': 3.0}]
+    """
+    lists = [_values(name, values) for name, values in columns.items()]
+    return [dict(zip(columns, combination)) for combination in itertools.product(*lists)]
+
+
+def checked_rows(table: TableLike) -> list[Row]:
+    """Rows of a table, all with the same columns, values as Python has them. Raises InputError."""
+    rows = _rows(table)
+    if not rows or not rows[0]:
+        raise InputError("a table must have at least one row and one column, got none")
+    for name in rows[0]:
+        if not isinstance(name, str) or not name or name in ADDED:
+            raise InputError(
+                f"a column of a table must have a name other than {', '.join(ADDED)}, "
+                f"got {shown(name)}"
+            )
+    for k, row in enumerate(rows):
+        if row.keys() != rows[0].keys():
+            wanted, got = shown([*rows[0]]), shown([*row])
+            raise InputError(f"row {k} must have the columns of row 0, {wanted}, got {got}")
+    return [
+        {name: plain_value(f"{name} of row {k}", row[name]) for name in rows[0]}
+        for k, row in enumerate(rows)
+    ]
+
+
+def _read_rows(path):
+    """Rows of a CSV file with a header; cells that read as numbers become numbers."""
+    name = path_name("table", path)
+    try:
+        with open(name, encoding="utf-8-sig", newline="") as file:
+            lines = [[cell.strip() for cell in line] for line in csv.reader(file) if line]
+    except (OSError, UnicodeError, csv.Error) as error:
+        raise InputError(f"table {name} cannot be read: {error}") from None
+    header, *cells = lines or [[]]
+    if len({*header}) < len(header) or not cells:
+        raise InputError(f"table {name} must have a header that names each column once, and rows")
+    for k, line in enumerate(cells):
+        if len(line) != len(header) or "" in line:
+            raise InputError(f"row {k} of table {name} must have {len(header)} cells, none empty")
+    return [{column: _number_or_text(cell) for column, cell in zip(header, line)} for line in cells]
+
+
+def plain_value(name: str, value: Any) -> Value:
+    """A number or text as Python has it; InputError, which calls it by name, for anything else."""
+    # A duration or date would become a number without its unit.
+    if isinstance(value, np.generic) and value.dtype.kind in "biufU":
+        value = value.item()
+    if not isinstance(value, (bool, int, float, str)) or value == "" or value != value:
+        raise InputError(f"{name} must be a number or text, got {shown(value)}")
+    return value
+
+
+def _rows(table):
+    if isinstance(table, (str, os.PathLike)):
+        return _read_rows(table)
+    if hasattr(table, "to_dict"):
+        return table.to_dict("records")
+    if isinstance(table, Mapping):
+        return _rows_of_columns({name: _values(name, column) for name, column in table.items()})
+    rows = list(table) if hasattr(table, "__iter__") else [table]
+    if not all(isinstance(row, Mapping) for row in rows):
+        raise InputError(
+            f"a table must be rows, columns or the name of a CSV file, got {shown(table)}"
+        )
+    return rows
+
+
+def _rows_of_columns(columns):
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len({*lengths.values()}) > 1:
+        raise InputError(f"columns of a table must be equally long, got {shown(lengths)}")
+    return [dict(zip(columns, values)) for values in zip(*columns.values())]
+
+
+def _values(name, values):
+    if isinstance(values, str) or not hasattr(values, "__iter__"):
+        raise InputError(f"column {name} must be a list of values, got {shown(values)}")
+    return list(values)
+
+
+def _number_or_text(cell):
+    # Python would read 2024_01 as 202401.
+    for kind in () if "_" in cell else (int, float):
+        try:
+            return kind(cell)
+        except ValueError:
+            continue
+    return cell
 
 
 class SweepTable(dict[str, np.ndarray]):
     """Result of ``sweep``: column name -> array, a row for each row of the input, in its order.
 
     Columns are those of the input, the results, NaN or "" where a row has none, and ``error``: the
-    sentence of a row that failed, else "". They are the same bits wherever a job ran.
+    sentence of a row that failed, else "". They are the same bits wherever a row ran.
 
     Parameters
     ----------
-    jobs : sequence of Job
-        One a row, in the order of the input.
-    records : sequence of Record
-        What running them left.
-    seeded : bool
-        Whether the input has a column of seeds.
+    columns : mapping of str to list
+        Values by column, None where a row has none.
+    provenance : mapping of str to list
+        Likewise, of the columns that say where results come from.
     unseen : sequence of str
         What the key of a row does not cover.
 
@@ -50,27 +173,17 @@ class SweepTable(dict[str, np.ndarray]):
 
     def __init__(
         self,
-        jobs: Sequence[Job],
-        records: Sequence[Record],
-        seeded: bool,
+        columns: Mapping[str, Sequence],
+        provenance: Mapping[str, Sequence],
         unseen: Sequence[str] = (),
     ):
-        given = [name for name in jobs[0].row if name != SEED or seeded]
-        results = dict.fromkeys(name for record in records for name in record.values)
-        columns = {name: _column([job.row[name] for job in jobs]) for name in given}
-        for name in results:
-            columns[name] = _column([record.values.get(name) for record in records])
-        columns["error"] = np.array([record.error for record in records], dtype=str)
-        super().__init__(columns)
+        super().__init__({name: _column(values) for name, values in columns.items()})
+        self.provenance = {name: _column(values) for name, values in provenance.items()}
         self.unseen = tuple(unseen)
-        self.provenance = {SEED: _column([job.row[SEED] for job in jobs])}
-        for name in _OF_RECORDS:
-            self.provenance[name] = _column([getattr(record, name) for record in records])
 
     def __repr__(self):
-        failures = int((self["error"] != "").sum())
-        rows = counted(len(self["error"]), "row"), counted(len(self), "column")
-        return in_brief(self, *rows, f"{failures} failed" if failures else "", ", ".join(self))
+        rows, failed = len(self["error"]), int((self["error"] != "").sum())
+        return f"<SweepTable: {rows} rows, {failed} failed, columns {', '.join(self)}>"
 
     @property
     def digest(self) -> str:
@@ -118,11 +231,9 @@ class SweepTable(dict[str, np.ndarray]):
 
 
 def _column(values):
-    """Values as an array: of text where one is text, of floats where one is a float or missing."""
-    there = [value for value in values if value is not None]
-    if any(isinstance(value, str) for value in there):
-        return np.array(["" if value is None else str(value) for value in values], dtype=str)
-    for kind in (bool, int):
-        if len(there) == len(values) and all(type(value) is kind for value in values):
-            return np.array(values, dtype=kind if kind is bool else np.int64)
-    return np.array([np.nan if value is None else float(value) for value in values])
+    """Values as an array: of text where one is text, of floats where one is missing."""
+    if any(isinstance(value, str) for value in values):
+        return np.array(["" if value is None else str(value) for value in values])
+    if None in values:
+        return np.array([np.nan if value is None else float(value) for value in values])
+    return np.array(values)

@@ -1,0 +1,228 @@
+"""Jobs of a sweep: a row, its seed and its digest; what running it leaves; the finished ones."""
+
+import contextlib
+import hashlib
+import importlib
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+from taichi_dem.kit import runtime
+from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.files import output_folder, write_text
+from taichi_dem.kit.progress.progress_bar import hide_bars
+from taichi_dem.kit.provenance import commit, machine
+from taichi_dem.kit.sweeps.dependencies import Dependencies, named_file
+from taichi_dem.kit.sweeps.table import ADDED, SEED, Row, SweepTable, Value, plain_value
+from taichi_dem.kit.validation import FileName, shown
+from taichi_dem.kit.version import __version__
+
+#: What is run: a row in, numbers and text by name out.
+Work = Callable[[Row], Mapping[str, Any]]
+
+
+class Record(NamedTuple):
+    """What is kept of a job.
+
+    values: results by name. error: a sentence where there are none. final: whether another run
+    would end alike. seconds: on the wall [s]. version, commit, machine: of what computed it.
+    """
+
+    values: dict[str, Value]
+    error: str
+    final: bool
+    seconds: float
+    version: str = __version__
+    commit: str = ""
+    machine: str = ""
+
+
+class Job(NamedTuple):
+    """row: with its seed. digest: of the function and the row. files: named there, by digest."""
+
+    row: Row
+    digest: str
+    files: dict[str, str]
+
+
+def identity_of(work: Any) -> str:
+    """Name of a function as file:name; InputError unless other processes can import it."""
+    module, name = (getattr(work, key, "") for key in ("__module__", "__qualname__"))
+    try:
+        found = attrgetter(name)(sys.modules[module])
+    except (AttributeError, KeyError, TypeError):
+        found = None
+    file = getattr(sys.modules.get(module), "__file__", None)
+    if found is not work or not file:
+        raise InputError(
+            "function must be defined at the top of a file, where other processes can import it, "
+            f"got {name or shown(work)}"
+        )
+    if module == "__main__":
+        module = os.path.splitext(os.path.basename(file))[0]
+    return f"{module}:{name}"
+
+
+def jobs_of(work: Any, rows: Sequence[Row], seed: int) -> list[Job]:
+    """A job for each row; a row without a column seed gets one from the sweep's and its number."""
+    seen = Dependencies(work)
+    depends = [identity_of(work), seen.digest, __version__]
+    known, jobs = dict(seen.files), []
+    for number, given in enumerate(rows):
+        row = {**given, SEED: given.get(SEED, seed_of(seed, number))}
+        own: dict[str, str] = {}
+        for value in row.values():
+            own.update(named_file(value, known) if isinstance(value, str) else {})
+        known.update(own)
+        jobs.append(Job(row, _digest([*depends, row]), {**seen.files, **own}))
+    return jobs
+
+
+def seed_of(seed: int, number: int) -> int:
+    """Seed of row ``number`` of a sweep, a whole number below 2^31."""
+    return int.from_bytes(hashlib.sha256(f"{seed} {number}".encode()).digest()[:4], "big") >> 1
+
+
+def run_job(work: Work, row: Row) -> Record:
+    """Run one job; an error of its function is part of the record."""
+    started = time.perf_counter()
+    values, error, final = {}, "", True
+    try:
+        values = _checked_values(work(dict(row)), row)
+    except (InputError, SimulationDiverged) as failure:
+        error = _in_one_line(failure)
+    except (Exception, SystemExit) as failure:
+        # SystemExit of a program's parser would end the process, and the row with it.
+        error, final = f"{type(failure).__name__}: {_in_one_line(failure)}", False
+    seconds = time.perf_counter() - started
+    return Record(values, error, final, seconds, commit=commit(), machine=machine())
+
+
+def run_in_worker(work: Work | str, row: Row, arch: str) -> Record:
+    """Run one job with Taichi started on one CPU thread; work: also as main script's name."""
+    if isinstance(work, str):
+        work = attrgetter(work)(importlib.import_module("__main__"))
+    settings = runtime.settings()
+    if settings and settings.threads != 1:
+        raise InputError(
+            f"Taichi must run on one thread in a worker of a sweep, got {settings.threads}: the "
+            'file of the function must call runtime.start() below if __name__ == "__main__": only'
+        )
+    runtime.start(arch, threads=1)
+    hide_bars()
+    return run_job(work, row)
+
+
+def failed(error: str) -> Record:
+    """Record of a job that never came to its end."""
+    return Record({}, error, False, 0.0)
+
+
+def table_of(
+    jobs: Sequence[Job], records: Sequence[Record], seeded: bool, unseen: Sequence[str] = ()
+) -> SweepTable:
+    """Table of jobs and what running them left; seeded: whether the input has a column of seeds."""
+    given = [name for name in jobs[0].row if name != SEED or seeded]
+    columns: dict[str, list] = {name: [job.row[name] for job in jobs] for name in given}
+    for name in dict.fromkeys(name for record in records for name in record.values):
+        columns[name] = [record.values.get(name) for record in records]
+    columns["error"] = [record.error for record in records]
+    provenance = {SEED: [job.row[SEED] for job in jobs]}
+    for name in ADDED[1:]:
+        provenance[name] = [getattr(record, name) for record in records]
+    return SweepTable(columns, provenance, unseen)
+
+
+def _checked_values(values, row):
+    """Results as numbers and text; InputError where they are something else."""
+    if not isinstance(values, Mapping):
+        raise InputError(f"the function of a sweep must return a dict, got {shown(values)}")
+    for name in values:
+        if not isinstance(name, str) or name in row or name in ADDED:
+            raise InputError(
+                "a result must have a name that is no column of the table and none of "
+                f"{', '.join(ADDED)}, got {shown(name)}"
+            )
+    return {name: _value(f"result {name}", value) for name, value in values.items()}
+
+
+def _value(name, value):
+    """A result; NaN may be one."""
+    return float("nan") if value != value else plain_value(name, value)
+
+
+def _in_one_line(failure):
+    try:
+        return " ".join(str(failure).split())
+    except Exception as broken:
+        return f"its text cannot be read: {type(broken).__name__}"
+
+
+def _digest(content):
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
+
+
+class Journal:
+    """Records of finished jobs in a folder, a small file each: whole or not there.
+
+    folder: path; None for a journal that forgets. identity: of the function. Raises InputError for
+    a folder that cannot be written to, or holds the jobs of another function.
+    """
+
+    def __init__(self, folder: FileName | None, identity: str):
+        self.folder = "" if folder is None else output_folder(folder)
+        if self.folder:
+            self._check_title(os.path.join(self.folder, "sweep.json"), identity)
+            output_folder(os.path.join(self.folder, "jobs"))
+
+    def read(self, jobs: Iterable[Job]) -> dict[str, Record]:
+        """Records of those jobs that are finished, by digest.
+
+        Damaged files do not count, nor those of a job that names a file which has changed.
+        """
+        found = {}
+        for job in jobs if self.folder else ():
+            with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
+                with open(self._path(job), encoding="utf-8") as file:
+                    kept = json.load(file)
+                record, files = Record(**kept["record"]), kept["files"]
+                sound = kept["check"] == _digest([kept["record"], files])
+                if sound and _is_current(record, files, job):
+                    found[job.digest] = record
+        return found
+
+    def write(self, job: Job, record: Record) -> None:
+        """Keep the record of a job that is final. Raises InputError where there is no space."""
+        if self.folder and record.final:
+            check = _digest([record._asdict(), job.files])
+            kept = {"record": record._asdict(), "files": job.files, "check": check}
+            write_text(self._path(job), json.dumps(kept))
+
+    def _path(self, job):
+        return os.path.join(self.folder, "jobs", f"{job.digest}.json")
+
+    def _check_title(self, path, identity):
+        there = identity
+        if os.path.exists(path):
+            with open(path, encoding="utf-8") as file:
+                there = json.load(file)["function"]
+        if there != identity:
+            raise InputError(
+                f"out must be a folder of this sweep, of {identity}, got {self.folder}, which "
+                f"holds one of {there}"
+            )
+        write_text(path, json.dumps({"function": identity}))
+
+
+def _is_current(record, files, job):
+    """Whether files are as they were: what has come since may be what the job wrote.
+
+    Where the job failed it may be what it lacked.
+    """
+    if record.error:
+        return files == job.files
+    return all(job.files.get(path) == digest for path, digest in files.items())
