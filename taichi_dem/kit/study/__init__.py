@@ -37,6 +37,6 @@ from taichi_dem.kit.study.summary import (
     write_accuracy,
 )
 from taichi_dem.kit.study.tables import Table, columns_of, show_rows, write_rows
-from taichi_dem.kit.study.timing import Timing, clock, on_device, seconds_of
 from taichi_dem.kit.study.work_precision import cheapest_figures, figures_by_method, give_answers
 from taichi_dem.kit.terminal import print_table
+from taichi_dem.kit.timing import Timing, clock, on_device, seconds_of
