@@ -256,8 +256,7 @@ def run(options):
     """Measure, then write and print."""
     folder, calls, rows, figures = study.begin(options), calls_of(options), [], {}
     with ProgressBar("compiling, measuring") as bar:
-        results = study.call_rounds(calls, 1, options.threads or 1, bar.count)
-    results = {key: found for key, (found,) in results.items()}
+        results = study.call_all(calls, options.threads or 1, bar.count)
     costs = costs_of(options, calls, results)
     elastic = study.call_in_process(absent, substeps=SUBSTEPS, repeats=options.again)
     # Each against its neighbour in time: a machine is never equally fast for long.
