@@ -12,8 +12,7 @@ from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
 from ca_damper.report.certificate import Certificate
-from ca_damper.report.needed_effects import needed_effects
-from ca_damper.report.report import Report
+from ca_damper.report.report import Report, needed_effects
 from ca_damper.runs.damper_map import DamperMap, damper_map
 from ca_damper.runs.film import film
 from ca_damper.runs.frequency_sweep import Sweep, sweep_up_and_down

@@ -47,7 +47,7 @@ from taichi_dem.kit import study
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import GREY, picture
-from taichi_dem.kit.process_memory import peak_memory_mb
+from taichi_dem.kit.provenance import peak_memory_mb
 from taichi_dem.mesh.shapes import in_space_order
 from taichi_dem.output.hole_monitor import HoleMonitor
 from taichi_dem.plot.view import draw_lines, shades

@@ -11,7 +11,6 @@ from taichi_dem.kit.data_table import locked
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import (
     FileName,
     direction,
@@ -283,7 +282,7 @@ def _read(name, words) -> Any:
     return property(lambda view: getattr(view._simulation, name), doc=words)
 
 
-class RunView(Uncopied):
+class RunView:
     """Read-only view of a run at its present step.
 
     An observer gets it. Arrays are copies that refuse to be written.

@@ -16,7 +16,6 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
-from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, instance, shown, whole
 from taichi_dem.methods import Method
 from taichi_dem.report.divergence import DivergenceCheck
@@ -41,6 +40,8 @@ from taichi_dem.step_control import CRITERIA
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
+#: Figures of a report that the schedule counts, in its order.
+_COUNTS = "substeps body_updates bond_evaluations pair_evaluations uniform_evaluations".split()
 #: Parts in which the kernels of a run are compiled, the last of them the recording's.
 PARTS = 5
 
@@ -50,7 +51,7 @@ def _part(name) -> Any:
     return property(lambda simulation: getattr(simulation.engine, name))
 
 
-class Simulation(Uncopied):
+class Simulation:
     """One scene, one method, one driver, on an engine of the session.
 
     ``simulate`` makes one; it is the level below for those who step by themselves. ``tables``,
@@ -404,7 +405,6 @@ class Simulation(Uncopied):
             The simulation was not started.
         """
         flag("brief", brief)
-        counts = values(self.schedule.evaluations).tolist()
         if self.energy_balance is None:
             raise InputError("report must be asked for once the simulation was started, got none")
         here = slice(self.model.body_count)
@@ -425,14 +425,10 @@ class Simulation(Uncopied):
             bond_count=self.model.bond_count,
             broken_faces=int(self.state.broken().sum()),
             smallest_step_s=self.method.dt0 / 2.0 ** int(values(self.state.level, here).max()),
-            substeps=counts[0],
-            body_updates=counts[1],
-            bond_evaluations=counts[2],
-            pair_evaluations=counts[3],
+            **dict(zip(_COUNTS, values(self.schedule.evaluations).tolist())),
             sweeps=self.sweeps(),
             unconverged_steps=unconverged,
             worst_residual=worst,
-            uniform_evaluations=counts[4],
             searches=self.searches,
             energy_balance=account,
             linear_momentum_error=float(linear),

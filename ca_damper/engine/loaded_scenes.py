@@ -20,7 +20,6 @@ from ca_damper.scenes.scene_numbers import SceneNumbers
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
-from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import whole
 
 #: Parts in which the kernels of a batch are compiled.
@@ -28,7 +27,7 @@ _PARTS = 3
 _LOST_IN_WORDS = "lost its container, whose motion is no finite number"
 
 
-class LoadedScenes(Uncopied):
+class LoadedScenes:
     """A filling and a table of scenes on an engine, put there by a Batch.
 
     numbers: of the scenes, as SceneNumbers. time_origin: when step 0 would have been at the present

@@ -21,21 +21,22 @@ from taichi.lang.matrix import MatrixField
 from taichi.lang.snode import SNode
 from taichi.lang.util import to_numpy_type
 
-from taichi_dem.kit.declarations import Declarations
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.uncopied import Uncopied
 
 #: Trees beyond which no new one is begun; a few more complete those begun.
 MOST_TREES = 480
 #: Share of the free memory that a tree may take.
 _SHARE = 0.9
+#: Taichi's lists of fields without a place.
+_FIELDS = ("global_vars", "grad_vars", "dual_vars", "matrix_fields")
 
 
+#: Taichi's lists of fields without a place.
 class CapacityError(InputError):
     """The machine's memory, or Taichi's room for field trees, is used up."""
 
 
-class FieldTree(Uncopied):
+class FieldTree:
     """Fields declared in its ``with`` block; memory is taken at the end of the block, all at once.
 
     advice: what to do where the machine lacks the memory, as the end of a sentence. bytes: size of
@@ -51,38 +52,24 @@ class FieldTree(Uncopied):
 
     def __enter__(self) -> "FieldTree":
         check_capacity()
-        self._before = Declarations()
-        try:
-            self._builder = FieldsBuilder()
-            impl._root_fb = self._builder
-            self._anchor = ti.field(ti.i64, shape=1)
-        except BaseException:
-            self._before.restore_trees()
-            self._before.restore_fields()
-            raise
+        self._before = _Declared()
+        self._builder = impl._root_fb = FieldsBuilder()
+        self._anchor = ti.field(ti.i64, shape=1)
         return self
 
     def __exit__(self, kind, error, _):
-        used = self._builder.finalized
         self._before.restore_trees()
-        if kind is None and not used:
-            try:
-                self._allocate()
-            except BaseException:
-                self._before.restore_fields(self._builder)
-                raise
+        if kind is not None:
+            self._before.restore_fields()
             return
-        self._before.restore_fields()
-        if used and not isinstance(error, InputError):
-            raise InputError(
-                "fields must not be read or written before all are declared: fill them in load"
-            ) from error
+        try:
+            self._allocate()
+        except BaseException:
+            self._before.restore_fields(self._builder)
+            raise
 
     def _allocate(self):
         """Take the memory of the declared fields."""
-        for field in impl.get_runtime().global_vars:
-            if field.ptr.snode() is None:
-                raise InputError("a field must be declared with a shape, got one without")
         self.bytes = _declared_bytes(self._builder.root.ptr)
         check_memory(self.bytes, self.advice)
         # Taichi takes it off its list of trees that are not finalized, and expects it there.
@@ -105,6 +92,32 @@ class FieldTree(Uncopied):
         _destroyed.add(self._builder.root.ptr.id)
         self._tree.destroy()
         self._tree = None
+
+
+class _Declared:
+    """Fields and trees that Taichi takes for declared and not yet allocated, to return to.
+
+    It would refuse every later kernel while it knows of a tree that is not finalized, or of a field
+    without a place, as an effect whose declaration fails leaves them.
+    """
+
+    def __init__(self):
+        self._runtime, self._root = impl.get_runtime(), impl._root_fb
+        self._trees = dict(self._runtime.unfinalized_fields_builder)
+        self._fields = {name: list(getattr(self._runtime, name)) for name in _FIELDS}
+
+    def restore_trees(self) -> None:
+        """Forget the trees declared since."""
+        if impl.get_runtime() is self._runtime:
+            impl._root_fb = self._root
+            self._runtime.unfinalized_fields_builder = dict(self._trees)
+
+    def restore_fields(self, tree: Any = None) -> None:
+        """Forget the fields declared since, and a tree."""
+        if impl.get_runtime() is self._runtime:
+            self._runtime.unfinalized_fields_builder.pop(tree, None)
+            for name, fields in self._fields.items():
+                setattr(self._runtime, name, list(fields))
 
 
 #: Addresses of the trees of the session by their roots, and the session's program.

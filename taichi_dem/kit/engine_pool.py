@@ -17,10 +17,9 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.allocation import CapacityError, FieldTree
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.field_memory import fields_of
-from taichi_dem.kit.uncopied import Uncopied
 
 
-class Engine(Uncopied):
+class Engine:
     """Base of engines: fields in one ``FieldTree``.
 
     capacity: tuple of whole numbers, the most that fits. Derived classes declare all of their
@@ -89,7 +88,7 @@ def _made(kind, structure, capacity):
         return kind(structure, capacity)
 
 
-class EnginePool(Uncopied):
+class EnginePool:
     """Engines of one kind, by structure.
 
     kind: class derived from ``Engine``. least: smallest capacity of an engine; sizes are rounded up

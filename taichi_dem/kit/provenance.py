@@ -1,9 +1,10 @@
-"""Where a number was computed: processor, machine, and commit of the sources."""
+"""Where a number was computed: processor, machine, memory, and commit of the sources."""
 
 import functools
 import os
 import platform
 import subprocess
+import sys
 
 _HERE = os.path.dirname(os.path.abspath(__file__))
 #: Stands for a commit that is not known.
@@ -44,3 +45,11 @@ def commit() -> str:
     """
     tracked = git("ls-files", "--", os.path.basename(__file__))
     return (git("rev-parse", "--short", "HEAD") if tracked else "") or UNKNOWN
+
+
+def peak_memory_mb() -> float:
+    """Most memory that the process has taken so far [MB]."""
+    import resource
+
+    size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return size / (1e6 if sys.platform == "darwin" else 1e3)

@@ -1,12 +1,10 @@
 """The only place that starts Taichi: architecture, threads, and the settings that keep bits equal.
 
-Imported before any other module of the package, because some environment variables must stand
-before the first ``import taichi`` (``environment``).
+Imported before any other module of the package, because Taichi must not see some environment
+variables when it is first imported (``environment``).
 """
 
 import atexit
-import contextlib
-import io
 import os
 import threading
 from collections.abc import Callable
@@ -14,11 +12,7 @@ from dataclasses import dataclass
 from typing import Optional
 
 # First, out of order: it prepares the environment for ``import taichi``.
-from taichi_dem.kit.environment import (  # isort: skip
-    interrupts_deferred,
-    kernel_cache,
-    settings_hidden,
-)
+from taichi_dem.kit.environment import kernel_cache, taichi_alone  # isort: skip
 
 import taichi as ti
 from taichi.lang import impl
@@ -26,7 +20,6 @@ from taichi.lang import impl
 from taichi_dem.kit import llvm_options
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.kernel_source_cache import remember
-from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, whole
 
 # Before any other module has Taichi decorate its functions.
@@ -57,11 +50,9 @@ class Settings:
 _current: Settings | None = None
 _session: Optional["Session"] = None
 _on_clear: list[Callable[[], object]] = []
-#: Threads that start or stop Taichi at once do so one after the other.
-_turn = threading.RLock()
 
 
-class Session(Uncopied):
+class Session:
     """One start of Taichi; objects that own fields remember theirs.
 
     Attributes
@@ -117,16 +108,15 @@ def start(arch: str = "cpu", threads: int | None = None, debug: bool = False) ->
     global _current, _session
     wanted = _checked(arch, threads, debug)
     _check_process()
-    with _turn:
-        if _current and _session and _session._is_running():
-            if wanted != _current:
-                raise InputError(
-                    f"Taichi already runs with {_current}, asked for {wanted}: call stop()"
-                )
-            return _current
-        _initialise(wanted)
-        _current, _session = wanted, Session()
+    if _current and _session and _session._is_running():
+        if wanted != _current:
+            raise InputError(
+                f"Taichi already runs with {_current}, asked for {wanted}: call stop()"
+            )
         return _current
+    _initialise(wanted)
+    _current, _session = wanted, Session()
+    return _current
 
 
 def stop() -> None:
@@ -139,15 +129,14 @@ def stop() -> None:
     """
     global _current, _session
     _check_process()
-    with _turn:
-        here = threading.get_ident()
-        others = {thread.ident for thread in threading.enumerate()} - {here}
-        if _session is not None and _session.thread in others:
-            check_thread("session")
-        if _session is not None and _session.thread == here and _session._is_running():
-            _free_engines()
-        ti.reset()
-        _current = _session = None
+    here = threading.get_ident()
+    others = {thread.ident for thread in threading.enumerate()} - {here}
+    if _session is not None and _session.thread in others:
+        check_thread("session")
+    if _session is not None and _session.thread == here and _session._is_running():
+        _free_engines()
+    _reset()
+    _current = _session = None
 
 
 def clear() -> None:
@@ -162,10 +151,9 @@ def clear() -> None:
     check_session(_session, "session")
     _free_engines()
     _session.cleared = True
-    with _turn:
-        ti.reset()
-        _initialise(_current)
-        _session = Session()
+    _reset()
+    _initialise(_current)
+    _session = Session()
 
 
 def _free_engines():
@@ -293,7 +281,7 @@ def _end_session():
     """
     if _session and _session.thread == threading.get_ident() and _session.process == os.getpid():
         if impl.get_runtime().prog is _session.program:
-            ti.reset()
+            _reset()
 
 
 def _checked(arch, threads, debug):
@@ -309,7 +297,7 @@ def _initialise(wanted):
     if wanted.arch == "cpu":
         llvm_options.switch_off()
     keeps, folder = kernel_cache(impl.default_cfg().offline_cache_file_path)
-    with settings_hidden(), _quietly(), interrupts_deferred(), _failures_in_words():
+    with taichi_alone():
         ti.init(
             arch=ti.cuda if wanted.arch == "cuda" else ti.cpu,
             default_fp=ti.f64,
@@ -328,22 +316,13 @@ def _initialise(wanted):
         )
     got = impl.current_cfg().arch
     if (got == ti.cuda) != (wanted.arch == "cuda"):
-        ti.reset()
+        _reset()
         raise InputError(f"arch {wanted.arch!r} was asked for, Taichi started {got}")
 
 
-def _quietly():
-    return contextlib.redirect_stdout(io.StringIO())
-
-
-@contextlib.contextmanager
-def _failures_in_words():
-    """Name the reason where Taichi does not start, such as too little memory."""
-    try:
-        yield
-    except (RuntimeError, MemoryError) as error:
-        reason = " ".join(str(error).split()) or "out of memory"
-        raise InputError(f"Taichi could not start: {reason}") from None
+def _reset():
+    with taichi_alone():
+        ti.reset()
 
 
 def cuda_present() -> bool:

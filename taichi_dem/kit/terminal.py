@@ -87,6 +87,9 @@ def _console():
 @contextlib.contextmanager
 def lasting_output() -> Iterator[None]:
     """Discard prints in the block silently once their reader has left, as ``| head -1`` does."""
+    if sys.stdout is None:
+        yield
+        return
     if hasattr(sys.stdout, "reconfigure"):
         # Question marks for characters that the encoding of the stream lacks.
         sys.stdout.reconfigure(errors="replace")

@@ -11,11 +11,12 @@ import pytest
 from tests.scenes import ROOT
 
 _SCRIPT = """
-import gc, json, weakref
+import gc, json, os, sys, weakref
+before = dict(os.environ), sys.excepthook
 from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, effects, runtime
 from taichi_dem.mesh.shapes import pair
 
-said = {}
+said = {"untouched": (dict(os.environ), sys.excepthook) == before}
 
 def refused(name, call):
     try:
@@ -63,7 +64,7 @@ def answers(tmp_path, text=_SCRIPT, **environment):
 def test_sessions_start_once_and_say_why_they_refuse(tmp_path):
     said = answers(tmp_path)
     assert "call runtime.start() first" in said["not started"]
-    assert said["same"]
+    assert said["same"] and said["untouched"]
     assert "already runs" in said["other"] and "call stop()" in said["other"]
     assert "has been stopped" in said["older session"]
     assert said["kept"] == [True, False]

@@ -197,8 +197,10 @@ def _records(work, jobs: Iterable[Job], client) -> Iterator[tuple[Job, Record]]:
     """
     import distributed
 
-    arch = runtime.settings().arch if runtime.settings() else "cpu"
-    waiting, active, ended = deque(jobs), {}, distributed.as_completed()
+    settings = runtime.settings()
+    arch = settings.arch if settings else "cpu"
+    active: dict[Any, Job] = {}
+    waiting, ended = deque(jobs), distributed.as_completed()
     try:
         while waiting or active:
             client.wait_for_workers(1, timeout=_NO_WORKER)
