@@ -194,8 +194,10 @@ def _records(work, jobs: Iterable[Job], client) -> Iterator[tuple[Job, Record]]:
     """
     import distributed
 
-    arch = runtime.settings().arch if runtime.settings() else "cpu"
-    waiting, active, ended = deque(jobs), {}, distributed.as_completed()
+    started = runtime.settings()
+    arch = started.arch if started else "cpu"
+    waiting, ended = deque(jobs), distributed.as_completed()
+    active: dict[Any, Job] = {}
     try:
         while waiting or active:
             client.wait_for_workers(1, timeout=_NO_WORKER)
