@@ -12,8 +12,7 @@ from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
 from ca_damper.report.certificate import Certificate
-from ca_damper.report.needed_effects import needed_effects
-from ca_damper.report.report import Report
+from ca_damper.report.report import Report, needed_effects
 from ca_damper.runs.damper_map import DamperMap, damper_map
 from ca_damper.runs.film import film
 from ca_damper.runs.frequency_sweep import Sweep, sweep_up_and_down
@@ -31,7 +30,7 @@ from taichi_dem.kit.bars.answer import Answer, Branch
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.sweeps.sweep import sweep
-from taichi_dem.kit.sweeps.table import SweepTable, parameter_grid
+from taichi_dem.kit.sweeps.table import parameter_grid
 from taichi_dem.kit.version import __version__
 
 __all__ = [
@@ -61,7 +60,6 @@ __all__ = [
     "Spheres",
     "StructureHistory",
     "Sweep",
-    "SweepTable",
     "TimeHistory",
     "__version__",
     "collect_and_collide",

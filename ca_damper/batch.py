@@ -20,7 +20,7 @@ from ca_damper.engine.recorder import ROOM
 from ca_damper.excitation.excitation import Excitation
 from ca_damper.filling import Filling, check_filling
 from ca_damper.report import measures
-from ca_damper.report.certificate import EFFECTS, Certificate
+from ca_damper.report.certificate import EFFECTS, Certificate, Periods
 from ca_damper.report.checked_range import checked_range, warn_outside
 from ca_damper.report.progress import BatchProgress
 from ca_damper.report.report import RK45_STAGES, Report
@@ -142,7 +142,8 @@ class Batch(LoadedScenes):
         self.excitation = checked_excitation(excitation, mount)
         self.recorded_samples = checked_samples(recorded_samples, self.count)
         self._more_sizes = self.excitation.sizes(self.count)
-        self.time_origin, self.periods = np.zeros(self.count), None
+        self.time_origin = np.zeros(self.count)
+        self.periods: Periods | None = None
         self.launches, self.compile_seconds = Launches(self.count), 0.0
         # Whether the present run goes on from a checkpoint.
         self.going_on = False

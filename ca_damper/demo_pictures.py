@@ -10,7 +10,7 @@ import numpy as np
 from ca_damper.oscillator import Oscillator
 from ca_damper.runs.film import Film
 from ca_damper.theory.decay import logarithmic_decrement
-from taichi_dem.kit.display import counted, in_brief, listed
+from taichi_dem.kit.display import counted
 from taichi_dem.kit.files import write_csv
 
 #: Cycles are counted down to this amplitude; decrements are means above and below two [mm].
@@ -39,9 +39,6 @@ class Decay:
     counts: Sequence[int]
     amplitude: np.ndarray
     x: np.ndarray
-
-    def __repr__(self):
-        return in_brief(self, f"{listed(self.counts)} particles", f"{len(self.x)} decays")
 
     def _of(self, array: np.ndarray, count: int) -> np.ndarray:
         """Rows of a number of particles, (starts, ...)."""

@@ -14,7 +14,6 @@ import taichi as ti
 
 from ca_damper.scenes.contracts import check_members, members_of
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
@@ -96,9 +95,6 @@ class Structure:
 
     key: Hashable
     sizes: dict[str, int] = field(default_factory=dict)
-
-    def __repr__(self) -> str:
-        return by_fields(self)
 
 
 class Filling(Protocol):

@@ -96,26 +96,6 @@ class Oscillator:
         """Share of critical damping, with the container empty."""
         return self.damping / (2.0 * math.sqrt(self.stiffness * self.mass))
 
-    def energy(self, x: FloatOrArray, v: FloatOrArray, y: FloatOrArray = 0.0) -> Any:
-        """Energy of the container's motion and of its spring.
-
-        Parameters
-        ----------
-        x : float or ndarray
-            Displacement of the container [m].
-        v : float or ndarray
-            Velocity of the container [m/s].
-        y : float or ndarray, default 0.0
-            Displacement of the base [m].
-
-        Returns
-        -------
-        float or ndarray
-            Energy [J].
-        """
-        x, v, y = (real_numbers(*one) for one in (("x", x), ("v", v), ("y", y)))
-        return 0.5 * (self.mass * v**2 + self.stiffness * (x - y) ** 2)
-
     def transfer(self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0) -> Any:
         """Complex ratio x / y of the steady state.
 

@@ -169,10 +169,10 @@ def run(options):
     # A second process would compile as well, which takes longer than four blasts.
     workers = 1 if options.quick else options.threads
     table = dem.sweep(blast, rows, out=at("members"), workers=workers, seed=options.seed)
-    table.write_csv(at("members.csv"))
+    table.to_csv(at("members.csv"), index=False)
     ended = table["error"] == ""
     if ended.sum() < 2:
-        raise dem.InputError(f"two blasts must end well, got: {table['error'][~ended][0]}")
+        raise dem.InputError(f"two blasts must end well, got: {table['error'][~ended].iloc[0]}")
     broken = np.array([[*text] for text in table["broken"][ended]]) == "1"
     moves = np.array([table[name][ended] for name in table if name.startswith(HOLE[:8])])
     columns, last = over_time(moves, options.until, options.samples), moves[-1]
@@ -195,7 +195,7 @@ def run(options):
         "failed_members": (int((~ended).sum()), "1"),
     }
     # Compiling is what blasts took beyond the usual one.
-    seconds = table.provenance["seconds"]
+    seconds = table["seconds"]
     compiling = float(np.maximum(0.0, seconds - np.median(seconds)).sum())
     spent = compiling, float(seconds.sum()) - compiling
     study.finish(options, NAME, figures, spent, see="probability.png")

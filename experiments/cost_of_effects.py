@@ -35,7 +35,7 @@ from ca_damper.report.measures import curve_distance
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, SKY, area_key, line_key, picture
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study.paired_timing import median_interval
+from taichi_dem.kit.study.timing import median_interval
 
 NAME = "cost_of_effects"
 ALL, LAST_BIT = "all effects", "all effects, last bit of the load changed"

@@ -25,10 +25,10 @@ from taichi_dem.kit.study.entries import ENTRIES, read_entries
 from taichi_dem.kit.study.results_page import (
     markdown_table,
     read_json,
+    run_entries,
     shrink_picture,
     write_page,
 )
-from taichi_dem.kit.study.results_run import run_entries
 
 HERE = Path(__file__).resolve().parent
 PAGES = read_entries(HERE / ENTRIES)

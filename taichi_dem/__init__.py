@@ -26,7 +26,7 @@ from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.sweeps.sweep import sweep
-from taichi_dem.kit.sweeps.table import SweepTable, parameter_grid
+from taichi_dem.kit.sweeps.table import parameter_grid
 from taichi_dem.kit.version import __version__
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh.files import read_mesh
@@ -70,7 +70,6 @@ __all__ = [
     "Simulation",
     "SimulationDiverged",
     "StepControl",
-    "SweepTable",
     "Uniform",
     "__version__",
     "checked_mesh",

@@ -40,6 +40,8 @@ from taichi_dem.step_control import CRITERIA
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
+#: Figures of a report that the schedule counts, in its order.
+_COUNTS = "substeps body_updates bond_evaluations pair_evaluations uniform_evaluations".split()
 #: Parts in which the kernels of a run are compiled, the last of them the recording's.
 PARTS = 5
 
@@ -403,7 +405,6 @@ class Simulation:
             The simulation was not started.
         """
         flag("brief", brief)
-        counts = values(self.schedule.evaluations).tolist()
         if self.energy_balance is None:
             raise InputError("report must be asked for once the simulation was started, got none")
         here = slice(self.model.body_count)
@@ -424,14 +425,10 @@ class Simulation:
             bond_count=self.model.bond_count,
             broken_faces=int(self.state.broken().sum()),
             smallest_step_s=self.method.dt0 / 2.0 ** int(values(self.state.level, here).max()),
-            substeps=counts[0],
-            body_updates=counts[1],
-            bond_evaluations=counts[2],
-            pair_evaluations=counts[3],
+            **dict(zip(_COUNTS, values(self.schedule.evaluations).tolist())),
             sweeps=self.sweeps(),
             unconverged_steps=unconverged,
             worst_residual=worst,
-            uniform_evaluations=counts[4],
             searches=self.searches,
             energy_balance=account,
             linear_momentum_error=float(linear),

@@ -77,7 +77,8 @@ class SceneRuns:
     def failures(self) -> list[str]:
         """Why certificates of the runs do not hold, and what would settle it."""
         homes = dict.fromkeys(home for home, _ in self._homes.values())
-        return sorted({self._batch(home).certificate.failure for home in homes})
+        found = sorted({self._batch(home).certificate.failure for home in homes} - {""})
+        return [f"the certificate of a run does not hold, as {why}" for why in found]
 
     def cycles(self, key: SceneKey) -> int:
         """Number of cycles that a scene has gone."""

@@ -9,6 +9,7 @@ from ca_damper.automaton.accounting import QUANTUM
 from ca_damper.automaton.cells import Cells, Placement
 from ca_damper.automaton.conflict_resolution import ConflictResolution
 from ca_damper.automaton.lattice import Geometry, Lattice
+from ca_damper.engine.event_counts import EventCounts
 from ca_damper.engine.random_numbers import stream
 from ca_damper.filling import Action
 from ca_damper.scenes.scene_fields import SceneFields
@@ -23,6 +24,7 @@ _COUNTED = {
     "ejection": (PUSHES, "particles pushed along"),
     "static contact": (HOLDS, "particles came to rest"),
 }
+_BY = {name: (kind,) for name, (kind, _) in _COUNTED.items()}
 
 
 @ti.data_oriented
@@ -54,47 +56,6 @@ class Parameters:
 
 
 @ti.data_oriented
-class EventCounts:
-    """Events since the reset and the step of the first, shape (scenes, kinds of event).
-
-    step: the present one, (scenes,).
-    """
-
-    def __init__(self, table: SceneFields):
-        self.table, self.step = table, table.field(ti.i32)
-        self.events, self.first = table.field(ti.i64, HOLDS + 1), table.field(ti.i32, HOLDS + 1)
-
-    @ti.func
-    def clear(self, s):
-        """Nothing has happened yet."""
-        for kind in range(HOLDS + 1):
-            self.events[s, kind] = ti.cast(0, ti.i64)
-
-    @ti.func
-    def note(self, s, kind):
-        """Count one event."""
-        if self.events[s, kind] == 0:
-            self.first[s, kind] = self.step[s]
-        # Not "+=", which would be an atomic addition; a scene is one thread.
-        self.events[s, kind] = self.events[s, kind] + 1
-
-    def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
-        """Step in which each counted effect first acted, infinite if never, (scenes,)."""
-        first, events = map(self.table.in_use, (self.first, self.events))
-        steps = np.where(events > 0, first.astype(np.float64), np.inf)
-        return {name: steps[:, _COUNTED[name][0]] for name in effects if name in _COUNTED}
-
-    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
-        """An EffectUse for each named effect that is an event, over all scenes.
-
-        The automaton keeps no account of energy: what it does steers.
-        """
-        total = self.table.in_use(self.events).sum(axis=0)
-        found = [(name, *_COUNTED[name]) for name in effects if name in _COUNTED]
-        return tuple(EffectUse(name, what, int(total[k]), steers=True) for name, k, what in found)
-
-
-@ti.data_oriented
 class LatticeDevice:
     """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``.
 
@@ -107,7 +68,7 @@ class LatticeDevice:
     def __init__(self, table: SceneFields):
         self.table, self.parameters, self.lattice = table, Parameters(), Lattice(table)
         self.conflict_resolution = ConflictResolution(table, self.lattice)
-        self.event_counts = EventCounts(table)
+        self.event_counts = EventCounts(table, len(_BY), _BY)
         self.velocity, self.gained = table.field(ti.f64), table.field(ti.i64)
 
     def _fill(self, options: Any, cells: Cells, resting: Any, way: int) -> None:
@@ -168,8 +129,10 @@ class LatticeDevice:
         return self.parameters.mass[None] * total
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
-        """How often each of the named effects acted."""
-        return self.event_counts.uses(effects)
+        """How often each of the named effects acted; without their energy, all of them steer."""
+        found = [(name, *_COUNTED[name]) for name in effects if name in _COUNTED]
+        total = self.event_counts.total
+        return tuple(EffectUse(name, what, total(kind), steers=True) for name, kind, what in found)
 
     def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
         """Step in which each counted effect first acted, infinite if never, (scenes,)."""

@@ -10,22 +10,20 @@ structure moves it at the end of the whole step only.
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
 import taichi as ti
 
 from ca_damper.filling import Action, Motion, Structure
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import vec2
 from ca_damper.spheres.dynamics import DeviceSpheres
+from ca_damper.spheres.effect_activity import FLIGHTS
 from ca_damper.spheres.options import Spheres
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import whole
 
 # Steps that a flight must be clear of contacts: itself, and half of one, by which positions lead.
 _CLEAR = 1.5
-FLIGHTS = "long flights"
 
 
 @ti.data_oriented
@@ -33,13 +31,11 @@ class DeviceCombined(DeviceSpheres):
     """The grains of all scenes of a table; see ``ca_damper.filling``.
 
     substeps: short steps of a step, shape (). substep: short steps and flights since the reset.
-    flights: of them; first: step of the first, or -1.
     """
 
     def __init__(self, options: Any, table: SceneFields):
         super().__init__(options, table)
-        self.substeps = ti.field(ti.i32, shape=())
-        self.substep, self.flights, self.first = (table.field(ti.i32) for _ in range(3))
+        self.substeps, self.substep = ti.field(ti.i32, shape=()), table.field(ti.i32)
 
     def load(self, options: Any) -> None:
         """Take over the numbers of grains of the same structure."""
@@ -50,7 +46,7 @@ class DeviceCombined(DeviceSpheres):
     def reset(self, s):
         """Place the grains of scene s, at rest."""
         self.place(s)
-        self.substep[s], self.flights[s], self.first[s] = 0, 0, -1
+        self.substep[s] = 0
 
     @ti.func
     def advance(self, s, step, motion):
@@ -60,9 +56,8 @@ class DeviceCombined(DeviceSpheres):
             self.board(s, motion)
         if self._is_clear(s, dt, motion):
             self._fly(s, dt, motion)
-            self.flights[s] = self.flights[s] + 1
-            if self.first[s] < 0:
-                self.first[s] = step
+            self.effect_activity.step[s] = step
+            self.effect_activity.note(s, FLIGHTS)
         else:
             impulse = self._take_short_steps(s, step, dt, motion)
         return Action(impulse, 0.0)
@@ -130,17 +125,6 @@ class DeviceCombined(DeviceSpheres):
             self.substep[s], since = self.substep[s] + 1, dt
         return total
 
-    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
-        """Activity of each of the named effects."""
-        flown = EffectUse(FLIGHTS, "flights", int(self.table.in_use(self.flights).sum()))
-        return (*super().uses(effects), *((flown,) if FLIGHTS in effects else ()))
-
-    def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
-        """Step in which each of the named effects first acted, infinite if never, (scenes,)."""
-        first = self.table.in_use(self.first).astype(np.float64)
-        first[first < 0] = np.inf
-        return {**super().first_steps(effects), FLIGHTS: first}
-
 
 @dataclass(frozen=True)
 class Combined(Spheres):
@@ -179,7 +163,7 @@ class Combined(Spheres):
     @property
     def effects(self) -> tuple[str, ...]:
         """Effects that are computed, in words for the report."""
-        return (*super().effects, FLIGHTS)
+        return (*super().effects, "long flights")
 
     def safe_step(self) -> float:
         """Step [s] whose short ones resolve the contact of spheres that fell through the box."""

@@ -6,16 +6,17 @@ decided on; ``left_out(particles)`` returns an Estimate for each effect that it 
 Its device may have ``first_steps(effects)`` and ``audit()``, as that of the spheres.
 """
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from ca_damper.filling import check_filling
-from ca_damper.report.certificate import Certificate, Estimate, Periods, onset
+from ca_damper.report.certificate import Certificate, Periods
 from ca_damper.report.measures import Cycles
 from ca_damper.report.steady_state import period
 from ca_damper.scenes.table import SceneTable
+from taichi_dem.kit.certificate import Estimate
+from taichi_dem.kit.effect_usage import EffectUse
 
 #: Difference of cycles up to which they are alike, as a share of the first harmonic.
 ALIKE = 1e-3
@@ -33,13 +34,13 @@ def certificate_of(batch: Any) -> Certificate:
     """Certificate of a batch since its start."""
     filling, device = batch.filling, batch.device
     left_out = getattr(filling, "left_out", None)
+    audit = device.audit() if hasattr(device, "audit") else None
     return Certificate(
         effects=batch.asked_effects,
-        scenes=batch.count,
-        onsets=tuple(onset(name, times) for name, times in _first_times(batch, device).items()),
+        acting=_acting(batch, device) if hasattr(device, "first_steps") else (),
         left_out=left_out(_most_particles(batch.table)) if left_out else (),
         estimates=batch.estimates,
-        audit=device.audit() if hasattr(device, "audit") else None,
+        audits=() if audit is None else (audit,),
         periods=batch.periods,
     )
 
@@ -61,10 +62,12 @@ def _most_particles(table: Any) -> int:
     return int(table.column("particles").max()) if isinstance(table, SceneTable) else 0
 
 
-def _first_times(batch: Any, device: Any) -> Mapping[str, np.ndarray]:
-    """Time at which each effect first acted [s], (scenes,), for fillings that note it."""
-    if not hasattr(device, "first_steps"):
-        return {}
-    steps = device.first_steps(batch.filling.effects)
-    dt = batch.table.column("dt")
-    return {name: batch.time_origin + first * dt for name, first in steps.items()}
+def _acting(batch, device):
+    """In how many scenes each effect acted, and from when [s], for fillings that note it."""
+    found = []
+    for name, steps in device.first_steps(batch.filling.effects).items():
+        times = batch.time_origin + steps * batch.table.column("dt")
+        acted = times[np.isfinite(times)]
+        since = float(acted.min()) if acted.size else None
+        found.append(EffectUse(name, "scenes", acted.size, batch.count, since_s=since))
+    return tuple(found)

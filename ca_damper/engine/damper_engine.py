@@ -59,7 +59,8 @@ class DamperEngine(Engine):
         self.clock = Clock(self.table)
         self.account, self.recorder = MomentumAccount(self.table), Recorder(self.table)
         mount: Any = self.structure.mount
-        kind, coupling = self.structure.excitation, Coupling
+        kind = self.structure.excitation
+        coupling: type[Coupling] | type[GroupCoupling] = Coupling
         if isinstance(mount, ModalKind):
             self.container = ModalContainer(self.table, self.clock, kind, mount.modes)
             coupling = GroupCoupling

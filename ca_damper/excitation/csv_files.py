@@ -2,11 +2,12 @@
 
 import csv
 import math
+from dataclasses import replace
 
 import numpy as np
 
-from ca_damper.excitation.samples import checked_signal
-from ca_damper.excitation.signal import LEAST_NODES, Signal
+from ca_damper.excitation.samples import from_samples
+from ca_damper.excitation.signal import Signal
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, choice, flag, path_name, shown
 
@@ -62,15 +63,14 @@ def from_csv(
     times = [one for one in TIMES if one in head]
     if len(times) != 1:
         raise InputError(f"{name} must have one column of {' or '.join(TIMES)}, got {shown(head)}")
-    if len(rows) <= LEAST_NODES:
-        raise InputError(f"{name} must have at least {LEAST_NODES} samples, got {len(rows) - 1}")
     time_s = TIMES[times[0]] * _numbers(name, rows, head, times[0])
     of, unit = COLUMNS[wanted]
     samples = unit * _numbers(name, rows, head, wanted)
     try:
-        return checked_signal(time_s, samples, of, correct_baseline, f"{wanted} of {name}")
+        made = from_samples(time_s, samples, of=of, correct_baseline=correct_baseline)
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
+    return replace(made, label=f"{wanted} of {name}")
 
 
 def _rows(name):

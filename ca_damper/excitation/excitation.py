@@ -107,9 +107,12 @@ class Excitation:
             value = getattr(self, name)
             if isinstance(value, list):
                 object.__setattr__(self, name, tuple(value))
-        _signals("base", self.base)
-        if not isinstance(self.force, SineForce):
-            _signals("force", self.force)
+            given = value if isinstance(value, (list, tuple)) else (value,)
+            plain = value is None or (name == "force" and isinstance(value, SineForce))
+            if not plain and not (given and all(isinstance(one, Signal) for one in given)):
+                raise InputError(
+                    f"{name} must be a Signal, one for each scene, or None, got {shown(value)}"
+                )
 
     @property
     def kind(self) -> ExcitationKind:
@@ -242,21 +245,6 @@ def _identity(value: Any) -> str:
     if isinstance(given, tuple):
         given = tuple((one.step, one.value, one.bend) for one in given)
     return identity_of(given)
-
-
-def _signals(name: str, value: Any) -> tuple[Signal, ...] | None:
-    """InputError unless a value is a Signal, several or None."""
-    given = (value,) if isinstance(value, Signal) else value
-    if given is None:
-        return None
-    if not isinstance(given, tuple) or not given:
-        raise InputError(
-            f"{name} must be a Signal, one for each scene, or None, got {shown(value)}"
-        )
-    for one in given:
-        if not isinstance(one, Signal):
-            raise InputError(f"{name} must hold Signals only, got {shown(one)}")
-    return given
 
 
 def _numbers(name, value):

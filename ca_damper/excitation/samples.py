@@ -66,21 +66,14 @@ def from_samples(
     times, samples = _column("time_s", time_s), _column("values", values)
     if len(times) != len(samples):
         raise InputError(f"values must be {len(times)}, as many as times, got {len(samples)}")
-    return checked_signal(times, samples, of, correct_baseline, "samples")
-
-
-def checked_signal(
-    times: np.ndarray, samples: np.ndarray, of: str, correct_baseline: bool, label: str
-) -> Signal:
-    """Signal of samples as ``from_samples``, for columns of finite numbers."""
     step, evened = _even_step(times)
     _check_spectrum(step, samples)
     if of == "value":
-        made, treated = spline(step, samples, label), ""
+        made, treated = spline(step, samples, "samples"), ""
     elif correct_baseline:
-        made, treated = _at_rest_again(step, samples, label)
+        made, treated = _at_rest_again(step, samples)
     else:
-        made = integral(step, samples, label)
+        made = integral(step, samples, "samples")
         treated = "integrated twice from rest, no base line taken off"
     return replace(made, treated="; ".join(filter(None, (evened, treated))))
 
@@ -143,12 +136,12 @@ def _check_spectrum(step, samples):
         )
 
 
-def _at_rest_again(step, samples, label):
+def _at_rest_again(step, samples):
     """Double integral less that of the line a + b t that lets it end at rest in zero, and words.
 
     At the end T the line has the speed a T + b T^2 / 2 and the place a T^2 / 2 + b T^3 / 6.
     """
-    rough = integral(step, samples, label)
+    rough = integral(step, samples, "samples")
     total, speed, place = rough.duration, end_slope(rough), float(rough.value[-1])
     slope = 6.0 * (speed * total - 2.0 * place) / total**3
     offset = speed / total - 0.5 * slope * total
@@ -157,4 +150,4 @@ def _at_rest_again(step, samples, label):
         "integrated twice from rest, less a base line of acceleration from "
         f"{line[0]:.3g} to {line[-1]:.3g} m/s^2 that takes {speed:.3g} m/s and {place:.3g} m away"
     )
-    return integral(step, samples - line, label), treated
+    return integral(step, samples - line, "samples"), treated

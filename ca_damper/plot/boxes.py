@@ -10,7 +10,6 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
 from ca_damper.report.record import Frame, inner_size
-from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.plot_style import (
     BLACK,
     BLUE,
@@ -210,9 +209,6 @@ class Hanging:
     frames: Sequence[Frame]
     colour: str
     curve: tuple[np.ndarray, np.ndarray] | None = None
-
-    def __repr__(self):
-        return in_brief(self, self.title, f"{len(self.frames)} frames")
 
 
 def film_hanging(path: FileName, containers: Sequence[Hanging], fastest: float) -> None:

@@ -88,10 +88,7 @@ def picture_compared(path: FileName, curves: Any, oscillator: Oscillator) -> Non
     styles = styles_of(curves)
     with picture(path, 1, 1, (7.0, 4.6)) as (_, axis):
         for label, (ratios, rms) in curves.items():
-            style, middle = styles[label], 1e3 * rms.mean(axis=1)
-            bars = [middle - 1e3 * rms.min(axis=1), 1e3 * rms.max(axis=1) - middle]
-            look = {"color": style.colour, "marker": style.marker, "ms": 4, "lw": 1.2}
-            axis.errorbar(ratios, middle, yerr=bars, label=style.label, **look)
+            _bars(axis, ratios, 1e3 * rms, 1e3 * rms.mean(axis=1), styles[label], 4)
         top = 1.15e3 * max(np.nanmax(rms) for _, rms in curves.values())
         _draw_empty(axis, oscillator, np.concatenate([ratios for ratios, _ in curves.values()]))
         axis.set(title="mean over seeds; bars: their range", ylim=(0.0, top))
@@ -121,6 +118,13 @@ def _band(axis, x, values, colour, label):
     """values: (points, seeds)."""
     axis.plot(x, np.median(values, axis=1), color=colour, label=label)
     axis.fill_between(x, values.min(axis=1), values.max(axis=1), color=colour, alpha=0.25, lw=0)
+
+
+def _bars(axis, x, values, middle, style, size):
+    """values: (points, seeds), of which the bars go from lowest to highest."""
+    ends = [middle - values.min(axis=1), values.max(axis=1) - middle]
+    look = {"marker": style.marker, "ms": size, "color": style.colour, "lw": 1.2}
+    axis.errorbar(x, middle, yerr=ends, label=style.label, **look)
 
 
 def _columns(figure, handles):
@@ -157,13 +161,10 @@ def _draw_peaks(place, height, responses, particle_mass=None):
     """
     styles = styles_of(responses)
     for label, response in responses.items():
-        style = styles[label]
         ratio, rms = response.peaks()
         for axis, values in ((place, ratio), (height, 1e3 * rms)):
             middle = np.median(values, axis=1)
-            bars = [middle - values.min(axis=1), values.max(axis=1) - middle]
-            look = {"marker": style.marker, "ms": 4.5, "color": style.colour, "lw": 1.2}
-            axis.errorbar(response.particles, middle, yerr=bars, label=style.label, **look)
+            _bars(axis, response.particles, values, middle, styles[label], 4.5)
     first = next(iter(responses.values()))
     if particle_mass is not None:
         rigid = [first.oscillator.peak(n * particle_mass) for n in first.particles]

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from ca_damper.report.measures import first_harmonic
-from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.plot_style import BLACK, GREY, area_key, line_key, picture, styles_of
 from taichi_dem.kit.validation import FileName
 
@@ -26,9 +25,6 @@ class FilmMeasures:
     above_floor_mm: np.ndarray
     floor: np.ndarray
     ceiling: np.ndarray
-
-    def __repr__(self):
-        return by_fields(self)
 
     @classmethod
     def of(cls, box: Any, cycles: Any, phase: Any) -> Any:

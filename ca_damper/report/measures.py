@@ -40,8 +40,8 @@ MEASURE_UNITS = {
 }
 #: Units of what is sampled over time.
 SAMPLE_UNITS = {
-    **{"time_s": "s", "x": "m", "base": "m", "y": "m", "rms": "m", "peak": "m", "v": "m/s"},
-    **{"a": "m/s^2", "force": "N", "energy": "J", "momentum": "kg m/s"},
+    **{"time_s": "s", "x": "m", "y": "m", "v": "m/s", "a": "m/s^2"},
+    **{"force": "N", "energy": "J", "momentum": "kg m/s"},
 }
 
 _NOT_A_NUMBER = complex(np.nan, np.nan)
@@ -76,8 +76,7 @@ class Cycles:
     steps: np.ndarray
     record: np.ndarray
 
-    def __repr__(self):
-        return by_fields(self)
+    __repr__ = by_fields
 
     def mean_of(self, name: str) -> np.ndarray:
         """Mean of a column over cycles.

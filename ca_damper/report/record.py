@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
 
@@ -38,9 +37,6 @@ class Frame:
     position: np.ndarray
     velocity: np.ndarray
     diameter: np.ndarray | None = None
-
-    def __repr__(self):
-        return by_fields(self)
 
 
 def frames_of(batch: Any, present: dict[str, np.ndarray] | None = None) -> tuple[Frame, ...]:

@@ -7,9 +7,10 @@ from typing import Any
 from ca_damper.report.certificate import Certificate
 from ca_damper.report.checked_range import CheckedRange
 from taichi_dem.kit.display import counted, in_brief
-from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.effect_usage import Advice, EffectUse
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_text
-from taichi_dem.kit.validation import FileName
+from taichi_dem.kit.validation import FileName, fraction
 
 #: Evaluations of the right-hand side in an attempt of RK45; the first slope is the last one's.
 RK45_STAGES = 6
@@ -151,6 +152,13 @@ class Report:
         """
         write_text(path, json.dumps(self.as_dict(), indent=1))
 
+    def _certified(self):
+        """Lines of the certificate."""
+        found = self.certificate
+        if found is None:
+            return []
+        return [*(f"acted: {line}" for line in found.acted()), *found.left_out_lines()]
+
     def _diverged_rows(self):
         """Number of scenes that diverged, and the first of them."""
         if not self.diverged:
@@ -179,7 +187,7 @@ class Report:
             *self._further_excitations(),
             ("effects", ", ".join(self.effects) or "none"),
             *(("", f"{use.effect}: {use}") for use in self.effect_activity),
-            *(self.certificate.rows() if self.certificate is not None else ()),
+            *(("", line) for line in self._certified()),
             ("scenes", f"{self.scenes:,} with {_range(self.particles)} particles"),
             ("simulated", f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s"),
             *self._diverged_rows(),
@@ -202,3 +210,40 @@ class Report:
 def _range(pair):
     low, high = (f"{value:.3g}" for value in pair)
     return low if low == high else f"{low} to {high}"
+
+
+def needed_effects(result: object, tolerance: float = 1e-3) -> Advice:
+    """Advice on the effects of a run of the damper.
+
+    Parameters
+    ----------
+    result : Response or Report
+        Result of ``frequency_response``, or the report of a batch.
+    tolerance : float, default 0.001
+        Share of the energy taken (friction) or in motion (rotation) below which an effect is
+        negligible, from 0 to 1.
+
+    Returns
+    -------
+    Advice
+        Print it, or read its ``droppable``.
+
+    Raises
+    ------
+    InputError
+        The result is of another kind, or the tolerance is out of range.
+
+    Notes
+    -----
+    Spheres are checked every few steps: an effect that may have acted unseen between two checks is
+    kept.
+
+    Examples
+    --------
+    >>> print(needed_effects(response))  # doctest: +SKIP
+    """
+    report = getattr(result, "report", result)
+    if not isinstance(report, Report):
+        kind = type(result).__name__
+        raise InputError(f"result must be a Response or the Report of a Batch, got {kind}")
+    return Advice(report.effect_activity, (), fraction("tolerance", tolerance))

@@ -13,7 +13,7 @@ from ca_damper.filling import Filling, check_filling
 from ca_damper.report.progress import Stages
 from ca_damper.report.report import Report
 from ca_damper.runs.result import Result, scenes_over
-from ca_damper.scenes.checks import MOST_CYCLES, MOST_SCENES, run_seeds
+from ca_damper.scenes.checks import STARTS, check_run, run_seeds
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.scenes.table import SceneTable
 from ca_damper.theory.collect_and_collide import CollectAndCollide, collect_and_collide
@@ -24,11 +24,21 @@ from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import (
     AUTO,
     positive,
-    progress_option,
     several,
     shown,
     whole,
 )
+
+#: Axes of a map: attribute and unit by dimension; units of its measures.
+_AXES = {
+    "clearance": ("clearances", "m"),
+    "particles": ("particles", "1"),
+    "amplitude": ("amplitudes", "m"),
+    "frequency": ("frequencies", "Hz"),
+    "seed": ("seeds", "1"),
+}
+_UNITS = {"apparent_damping": "N s/m", "apparent_mass": "kg"}
+_UNITS |= dict.fromkeys(("loss", "mass_share", "energy"), "1")
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,45 +116,18 @@ class DamperMap(Result):
         """Energy taken in a cycle by N m A^2 w^2."""
         return np.pi * self.loss
 
-    def loss_factor(self, container_mass: float) -> np.ndarray:
-        """Energy lost in a radian over the energy in motion, c / (w (M + m)).
-
-        Parameters
-        ----------
-        container_mass : float
-            Mass M of the container [kg].
-
-        Returns
-        -------
-        ndarray
-            Loss factor [-], shape of all axes.
-        """
-        moving = positive("container_mass", container_mass) + self.apparent_mass
-        return self.apparent_damping / (self.omega * moving)
-
     @property
     def theory(self) -> CollectAndCollide:
         """Collect and collide without gravity, at every clearance, number and amplitude."""
         return collect_and_collide(np.array(self.amplitudes), self.gaps[:, :, None])
 
     def _axes(self) -> dict[str, Any]:
-        axes = {
-            "clearance": (self.clearances, "m"),
-            "particles": (self.particles, "1"),
-            "amplitude": (self.amplitudes, "m"),
-            "frequency": (self.frequencies, "Hz"),
-            "seed": (self.seeds, "1"),
-        }
-        if self.clearances == (None,):
-            del axes["clearance"]
-        return axes
+        axes = {one: (getattr(self, name), unit) for one, (name, unit) in _AXES.items()}
+        return {one: axis for one, axis in axes.items() if axis[0] != (None,)}
 
     def _variables(self) -> dict[str, Any]:
-        dims = "clearance", "particles", "amplitude", "frequency", "seed"
-        pure = dict.fromkeys(("loss", "mass_share", "energy"), "1")
-        units = {"apparent_damping": "N s/m", "apparent_mass": "kg", **pure}
-        found = {name: (dims, getattr(self, name), unit) for name, unit in units.items()}
-        return {**found, "gap": (dims[:2], self.gaps, "m")}
+        found = {name: (tuple(_AXES), getattr(self, name), unit) for name, unit in _UNITS.items()}
+        return {**found, "gap": (("clearance", "particles"), self.gaps, "m")}
 
     def columns(self) -> dict[str, Any]:
         """A row a scene: its place on the axes, measures, and the theory's loss and mass.
@@ -154,15 +137,11 @@ class DamperMap(Result):
         dict
             Columns by name, which ends in the unit.
         """
+        places = scenes_over(**{one: getattr(self, name) for one, (name, _) in _AXES.items()})
         columns: dict[str, Any] = {"filling": [self.label] * self.loss.size}
-        columns |= scenes_over(
-            clearance_m=range(len(self.clearances)),
-            particles=self.particles,
-            amplitude_m=self.amplitudes,
-            frequency_Hz=self.frequencies,
-            seed=self.seeds,
-        )
         columns["clearance_m"] = self._of_scenes(self.gaps)
+        columns["particles"], columns["amplitude_m"] = places["particles"], places["amplitude"]
+        columns["frequency_Hz"], columns["seed"] = places["frequency"], places["seed"]
         measures = "loss", "mass_share", "energy"
         columns |= {name: getattr(self, name).ravel() for name in measures}
         made = {"loss_theory": self.theory.loss, "mass_theory": self.theory.mass}
@@ -234,23 +213,14 @@ def damper_map(
     ...     Spheres(), amplitudes=[5e-3, 1e-2], frequencies=10.0, particles=30
     ... )  # doctest: +SKIP
     """
-    progress_option("progress", progress)
-    axes = {
+    axes: dict[str, Any] = {
         "particles": several("particles", particles, lambda n, x: whole(n, x, 1, 1_000_000)),
         "amplitudes": several("amplitudes", amplitudes, positive),
         "frequencies": several("frequencies", frequencies, positive),
         "seeds": run_seeds(seeds),
     }
-    scenes = math.prod(map(len, axes.values()))
-    if scenes > MOST_SCENES:
-        raise InputError(
-            f"amplitudes x frequencies x particles x seeds must make at most {MOST_SCENES} "
-            f"scenes, got {scenes}"
-        )
-    cycles = (
-        whole("transient_cycles", transient_cycles, 0, MOST_CYCLES),
-        whole("measured_cycles", measured_cycles, 1, 100_000),
-    )
+    check_run(transient_cycles, measured_cycles, STARTS[0], progress)
+    cycles = transient_cycles, measured_cycles
     longest = automatic_dt(check_filling(filling).default_dt, max(axes["frequencies"]))
     step = longest if dt is None else positive("dt", dt)
     ways = (None,) if clearances is None else several("clearances", clearances, positive)
@@ -262,19 +232,17 @@ def damper_map(
         ]
     gaps = [clearance_of(one, number) for one, numbers in jobs for number in numbers]
     shape = len(ways), *map(len, axes.values())
-    measures = {
+    measures: dict[str, Any] = {
         name: np.concatenate([getattr(found, name) for found, _ in runs]).reshape(shape)
         for name in ("apparent_damping", "apparent_mass")
     }
-    return DamperMap(
-        label=filling.label,
-        particle_mass=filling.particle_mass,
-        clearances=ways,
-        gaps=np.array(gaps).reshape(shape[:2]),
-        reports=tuple(report for _, report in runs),
-        **axes,
-        **measures,
-    )
+    own: dict[str, Any] = {
+        "label": filling.label,
+        "particle_mass": filling.particle_mass,
+        "clearances": ways,
+    }
+    own |= {"gaps": np.array(gaps).reshape(shape[:2]), "reports": tuple(told for _, told in runs)}
+    return DamperMap(**own, **axes, **measures)
 
 
 def _jobs(filling, particles, clearances):
@@ -287,12 +255,12 @@ def _jobs(filling, particles, clearances):
 
 def _run(filling, axes, dt, cycles, progress):
     """Cycles of all scenes of a batch, and its report."""
-    scenes = scenes_over(**axes)
+    (transient, measured), scenes = cycles, scenes_over(**axes)
     frequency, size = scenes["frequencies"], scenes["amplitudes"]
     table = SceneTable(scenes["particles"], scenes["seeds"], dt, frequency, size)
-    batch = Batch(filling, table, mount="base", measured_cycles=cycles[1])
+    batch = Batch(filling, table, mount="base", measured_cycles=measured)
     batch.start()
-    return batch.run(*cycles, progress), batch.report()
+    return batch.run(transient, measured, progress), batch.report()
 
 
 def clearance_of(filling: Any, particles: int) -> float:

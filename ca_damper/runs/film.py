@@ -20,7 +20,6 @@ from taichi_dem.kit.validation import AUTO, FileName, several, shown, whole
 from taichi_dem.kit.viewer import WebPage
 
 _MOST_STEPS = 2**31 - 1
-_MOST_MARKS = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,8 +189,10 @@ def film(
     if not hasattr(batch, "sample") or isinstance(batch, type):
         raise InputError(f"batch must be a Batch that has been started, got {shown(batch)}")
     steps = whole("steps", steps, 1, _MOST_STEPS)
-    samples = _marks("sample_every", sample_every, steps)
-    frames = _marks("frame_every", frame_every, steps) if frame_every is not None else range(0)
+    samples = range(0, steps + 1, whole("sample_every", sample_every, 1, _MOST_STEPS))
+    frames = range(0)
+    if frame_every is not None:
+        frames = range(0, steps + 1, whole("frame_every", frame_every, 1, _MOST_STEPS))
     # The kernel takes the samples; they are read at every frame, and where it has no more room.
     room = samples.step * ROOM
     ends = sorted({*range(room, steps, room), *frames[1:], steps})
@@ -209,13 +210,3 @@ def film(
         shots.append(frames_of(batch, present))
     history = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
     return Film(history, tuple(zip(*shots)), batch.filling, batch.mount)
-
-
-def _marks(name, every, steps):
-    """Range of steps at which to record; InputError where they are too many to be kept."""
-    if whole(name, every, 1, _MOST_STEPS) * _MOST_MARKS < steps:
-        raise InputError(
-            f"{name} must be at least {-(-steps // _MOST_MARKS)} in a film of {steps} steps, "
-            f"got {every}"
-        )
-    return range(0, steps + 1, int(every))

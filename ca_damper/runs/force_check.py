@@ -61,6 +61,5 @@ def checked_response(
     begin = batch.sample()
     cycles = batch.run(0, measured_cycles, progress)
     mismatch = force_mismatch(cycles, grid.oscillator, begin, batch.sample())
-    steps = batch.steps_per_cycle.reshape(grid.shape)[0, :, 0]
-    values = {name: value.reshape(grid.shape) for name, value in grid.measures(cycles).items()}
-    return replace(grid.response(steps, values), report=batch.report()), mismatch
+    (found,) = grid.responses(batch, cycles)
+    return replace(found, report=batch.report()), mismatch

@@ -174,7 +174,7 @@ def sweep_up_and_down(
         tells which, and their results are nan.
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
-    check_run(transient_cycles, start, progress)
+    check_run(transient_cycles, measured_cycles, start, progress)
     ways = _Ways(grid)
     with reporting(progress, "sweep") as report_progress:
         batch = grid.batch(grid.ratios[:1], measured_cycles)
@@ -183,7 +183,7 @@ def sweep_up_and_down(
         identity = {"job": f"{job}, {grid.identity()}"}
         with batch.checkpointed(checkpoint, resume, identity, {"ways": ways}) as writer:
             pending = ways.order[ways.done :]
-            ends = (np.arange(len(pending)) + 1.0) / max(1, len(pending))
+            ends = [(k + 1.0) / len(pending) for k in range(len(pending))]
             tell = Stages(report_progress, ends)
             for _, k in pending:
                 if not batch.going_on:

@@ -14,7 +14,7 @@ from ca_damper.report.measures import MEASURE_UNITS, Cycles, column_of, peak
 from ca_damper.report.report import Report
 from ca_damper.report.steady_state import LEAST_TESTED, change_of_halves, half_width
 from ca_damper.runs.result import Result, scenes_over
-from ca_damper.scenes.checks import MOST_SCENES, check_run, run_seeds
+from ca_damper.scenes.checks import check_run, run_seeds
 from ca_damper.scenes.clock import automatic_dt, steps_per_cycle
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.checkpoint import Checkpoint, identity_of
@@ -23,7 +23,7 @@ from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, t
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, FileName, choice, instance, positive, several, whole
+from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, whole
 
 #: Particle numbers that a notebook shows, evenly over those there are.
 _MOST_SHOWN = 8
@@ -249,22 +249,6 @@ class AmplitudeResponse(Tabulated):
     def __iter__(self) -> Iterator[Response]:
         return iter(self.responses)
 
-    def measure(self, name: str) -> np.ndarray:
-        """Measure of all responses by name, stacked by amplitude.
-
-        Parameters
-        ----------
-        name : str
-            Name of a measure of a Response, such as ``"rms"``.
-
-        Returns
-        -------
-        ndarray
-            Values, shape (amplitudes, particles, ratios, seeds), in the unit of the measure.
-        """
-        choice("name", name, MEASURE_UNITS)
-        return np.stack([getattr(one, name) for one in self.responses])
-
     def peaks(self) -> tuple[np.ndarray, np.ndarray]:
         """Locate the peak of each curve.
 
@@ -379,7 +363,7 @@ def frequency_response(
     >>> ratio, rms = response.peaks()  # doctest: +SKIP
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt, base_amplitude)
-    check_run(transient_cycles, start, progress)
+    check_run(transient_cycles, measured_cycles, start, progress)
     job = f"response, {grid.identity()}, {transient_cycles} + {measured_cycles} cycles from {start}"
     with reporting(progress, "response") as report_progress:
         batch = grid.batch(grid.ratios, measured_cycles, effects)
@@ -388,20 +372,8 @@ def frequency_response(
             cycles = batch.run(transient_cycles, measured_cycles, report_progress)
             writer.save()
     report = replace(batch.report(), **_sampling(cycles))
-    return _by_amplitude(grid, batch.steps_per_cycle, grid.measures(cycles), report)
-
-
-def _by_amplitude(grid, steps, values, report):
-    """A Response for each amplitude, or the one there is; steps, values: of all scenes."""
-    shape = (len(grid.amplitudes), *grid.shape)
-    steps = steps.reshape(shape)[0, 0, :, 0]
-    values = {name: value.reshape(shape) for name, value in values.items()}
-    made = []
-    for k, amplitude in enumerate(grid.amplitudes):
-        one = grid.response(steps, {name: value[k] for name, value in values.items()})
-        oscillator = replace(grid.oscillator, base_amplitude=amplitude)
-        made.append(replace(one, oscillator=oscillator, report=report))
-    return AmplitudeResponse(grid.amplitudes, tuple(made)) if grid.is_several else made[0]
+    made = tuple(replace(one, report=report) for one in grid.responses(batch, cycles))
+    return AmplitudeResponse(grid.amplitudes, made) if grid.is_several else made[0]
 
 
 def _sampling(cycles):
@@ -457,11 +429,6 @@ class Grid:
         highest = float(self.ratios[-1]) * own.natural_frequency
         longest = automatic_dt(filling.default_dt, highest)
         self.dt = longest if dt is None else positive("dt", dt)
-        scenes = len(self.amplitudes) * math.prod(self.shape)
-        if scenes > MOST_SCENES:
-            raise InputError(
-                f"particles x ratios x seeds must make at most {MOST_SCENES} scenes, got {scenes}"
-            )
         self._check_steps()
 
     def _check_steps(self):
@@ -483,12 +450,11 @@ class Grid:
 
     def batch(self, ratios: np.ndarray, measured_cycles: int, effects: str = "listed") -> Batch:
         """Batch of all scenes at these ratios, amplitude by amplitude, seeds running fastest."""
-        whole("measured_cycles", measured_cycles, 1, 100_000)
-        o, axes = (
-            self.oscillator,
-            {"particles": self.particles, "ratio": ratios, "seed": self.seeds},
+        o = self.oscillator
+        scenes = scenes_over(
+            amplitudes=self.amplitudes, particles=self.particles, ratios=ratios, seeds=self.seeds
         )
-        amplitude, number, ratio, seed = scenes_over(amplitude=self.amplitudes, **axes).values()
+        amplitude, number, ratio, seed = scenes.values()
         structure = (amplitude, o.mass, o.stiffness, o.damping)
         table = SceneTable(number, seed, self.dt, ratio * o.natural_frequency, *structure)
         return Batch(self.filling, table, measured_cycles=measured_cycles, effects=effects)
@@ -502,6 +468,15 @@ class Grid:
         dt = 1.0 / (self.ratios * self.oscillator.natural_frequency * steps)
         axes = (self.particles, self.ratios, self.seeds)
         return Response(self.filling.label, self.oscillator, *axes, steps, dt, **values)
+
+    def responses(self, batch: Batch, cycles: Cycles) -> Iterator[Response]:
+        """The Response of a batch that has run, one for each amplitude."""
+        shape = (len(self.amplitudes), *self.shape)
+        steps = batch.steps_per_cycle.reshape(shape)[0, 0, :, 0]
+        values = {name: one.reshape(shape) for name, one in self.measures(cycles).items()}
+        for k, amplitude in enumerate(self.amplitudes):
+            made = self.response(steps, {name: one[k] for name, one in values.items()})
+            yield replace(made, oscillator=replace(self.oscillator, base_amplitude=amplitude))
 
 
 def measures_of(oscillator: Oscillator, cycles: Cycles) -> dict[str, np.ndarray]:

@@ -1,10 +1,13 @@
 """What the results of all runs have in common: values over named axes, as tables and grids."""
 
+import math
 from typing import Any
 
 import numpy as np
 
+from ca_damper.scenes.checks import MOST_SCENES
 from taichi_dem.kit.data_table import Tabulated, dataset
+from taichi_dem.kit.errors import InputError
 
 
 class Result(Tabulated):
@@ -32,6 +35,13 @@ class Result(Tabulated):
 
 
 def scenes_over(**axes: Any) -> dict[str, np.ndarray]:
-    """Value on each axis of all scenes, (scenes,) by name; the last axis runs fastest."""
+    """Value on each axis of all scenes, (scenes,) by name; the last axis runs fastest.
+
+    InputError for more scenes than a batch can count.
+    """
+    scenes = math.prod(map(len, axes.values()))
+    if scenes > MOST_SCENES:
+        words = " x ".join(axes)
+        raise InputError(f"{words} must make at most {MOST_SCENES} scenes, got {scenes}")
     grids = np.meshgrid(*axes.values(), indexing="ij")
     return dict(zip(axes, (grid.ravel() for grid in grids)))

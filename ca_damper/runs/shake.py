@@ -118,13 +118,11 @@ def shake(
     excitation, numbered = _one_for_all(excitation), run_seeds(seeds)
     own = instance("oscillator", Oscillator() if oscillator is None else oscillator, Oscillator)
     counts = several("particles", particles, lambda n, x: whole(n, x, 0, filling.capacity))
-    if len(counts) * len(numbered) > MOST_SCENES:
-        raise InputError(f"particles x seeds must make at most {MOST_SCENES} scenes")
     most = filling.default_dt if dt is None else positive("dt", dt)
     window = _window(excitation, duration, most, interval)
     structure = 0.0, own.mass, own.stiffness, own.damping
-    scenes = scenes_over(particles=counts, seed=numbered).values()
-    table = SceneTable(*scenes, window.dt, 1.0 / window.duration, *structure)
+    number, seed = scenes_over(particles=counts, seeds=numbered).values()
+    table = SceneTable(number, seed, window.dt, 1.0 / window.duration, *structure)
     start = {"displacement": displacement, "velocity": velocity}
     job = f"shaken {identity_of((counts, numbered, window, own, mount, start))}"
     options = {"excitation": excitation, "mount": mount, "effects": effects}
@@ -291,7 +289,7 @@ def _recorded(scenes, options, window, start, progress, saving):
             cycles = batch.run(0, 1, tell, record_every=window.every)
             writer.save()
     series, sound = batch.time_series(), int(np.argmin(batch.diverged))
-    common = {"time_s": series["time_s"][:, sound], "base": series["y"][:, sound]}
+    common: dict[str, Any] = {"time_s": series["time_s"][:, sound], "base": series["y"][:, sound]}
     common.update(label=scenes[0].label, excitation=batch.excitation, report=batch.report())
     highest = np.maximum(cycles.mean_of("x_max"), -cycles.mean_of("x_min"))
     motion = {name: series[name] for name in ("x", "v", "force")}

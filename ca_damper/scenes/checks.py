@@ -26,9 +26,10 @@ MOST_SCENES, MOST_SEED = 2**24, 2**31 - 1
 _MOST_NUMBERS = 2**27
 
 
-def check_run(transient_cycles: Any, start: Any, progress: Any) -> None:
+def check_run(transient_cycles: Any, measured_cycles: Any, start: Any, progress: Any) -> None:
     """Raise InputError for an invalid number of cycles, start or progress."""
     whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
+    whole("measured_cycles", measured_cycles, 1, 100_000)
     choice("start", start, STARTS)
     progress_option("progress", progress)
 

@@ -58,9 +58,9 @@ class Bodies:
         self.force = table.vector(2, ti.f64, "spheres", flat=True)
         self.lead = table.field(ti.f64)
         self.floor = table.field(ti.f64)
+        self.radii, self.masses = (ti.field(ti.f64, shape=kinds) for _ in range(2))
         if kinds > 1:
             self.kind = table.field(ti.i32, "spheres", flat=True)
-            self.radii, self.masses = (ti.field(ti.f64, shape=kinds) for _ in range(2))
             self.counts = ti.field(ti.i32, shape=kinds)
         if given:
             self.start = ti.Vector.field(2, ti.f64, shape=self.stride)
@@ -74,9 +74,9 @@ class Bodies:
         sphere = {"radius": options.radius, "mass": options.particle_mass}
         box = {"width": options.width, "height": options.height, "columns": columns, "rows": rows}
         assign_members(self.body, **sphere, pull=(0.0 - across, down), **box)
+        assign(self.radii, options.radii)
+        assign(self.masses, options.masses)
         if self.kinds > 1:
-            assign(self.radii, options.radii)
-            assign(self.masses, options.masses)
             assign(self.counts, [count for count, _ in options.sizes])
         if self.given:
             assign(self.start, np.reshape(options.start, (-1, 2)))
@@ -102,20 +102,14 @@ class Bodies:
         return kind
 
     @ti.func
-    def mass(self, i, body):
+    def mass(self, i):
         """Mass of sphere i [kg]."""
-        mass = body.mass
-        if ti.static(self.kinds > 1):
-            mass = self.masses[self.kind[i]]
-        return mass
+        return self.masses[self.kind_of(i)]
 
     @ti.func
-    def radius(self, i, body):
+    def radius(self, i):
         """Radius of sphere i [m]."""
-        radius = body.radius
-        if ti.static(self.kinds > 1):
-            radius = self.radii[self.kind[i]]
-        return radius
+        return self.radii[self.kind_of(i)]
 
     @ti.func
     def short_of_reach(self, i, j):
@@ -128,10 +122,7 @@ class Bodies:
     @ti.func
     def short_of_radius(self, i):
         """Length by which the radius of sphere i is below the largest [m]."""
-        short = 0.0
-        if ti.static(self.kinds > 1):
-            short = self.body[None].radius - self.radii[self.kind[i]]
-        return short
+        return self.body[None].radius - self.radius(i)
 
     @ti.func
     def position_in_box(self, s, i):
@@ -163,7 +154,7 @@ class Bodies:
     @ti.func
     def kick(self, i, body, dt):
         """Take sphere i over a step under its contacts and gravity; returns its new velocity."""
-        rate = self.force[i] / self.mass(i, body) - body.pull
+        rate = self.force[i] / self.mass(i) - body.pull
         velocity = self.velocity[i] + dt * rate
         self.force[i] = vec2(0.0)
         self.velocity[i] = velocity

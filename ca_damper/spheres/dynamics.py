@@ -27,7 +27,7 @@ from ca_damper.spheres.forces import PairForces, WallForces
 from ca_damper.spheres.friction_history import FrictionHistory
 from ca_damper.spheres.rotation import Rotation
 from taichi_dem.kit.allocation import values
-from taichi_dem.kit.audit import Audit
+from taichi_dem.kit.certificate import Audit
 from taichi_dem.kit.effect_usage import EffectUse
 
 # Codes of divergence; a speed is a runaway's when it crosses more than a radius in a step.
@@ -95,7 +95,7 @@ class DeviceSpheres:
             self.rotation.reset(i)
         self.wall_contacts.reset(s)
         self.history.reset(s)
-        self.effect_activity.clear(s)
+        self.effect_activity.reset(s)
         self.search.forget(s)
         self.search.clear(s)
         self.given[s], self.lost[s] = 0.0, -ti.math.inf
@@ -154,12 +154,14 @@ class DeviceSpheres:
         """
         contact = self.pair_contacts.over_step(dt, since)
         which, count = self.search.find(s, contact.reach)
-        self.effect_activity.note(s, PAIRS, count > 0)
+        if count > 0:
+            self.effect_activity.note(s, PAIRS)
         self.pair_forces.add(s, contact, which, count)
         self.search.audit(s, self.effect_activity.step[s], low, high, contact.reach)
         of_walls = self.wall_contacts.over_step(s, 0, dt, since)
         force, touching = self.wall_forces.add(s, of_walls, low, high, speed)
-        self.effect_activity.note(s, WALLS, touching > 0)
+        if touching > 0:
+            self.effect_activity.note(s, WALLS)
         return force
 
     @ti.func
@@ -196,7 +198,7 @@ class DeviceSpheres:
         """Kinetic and potential energy of a sphere and that of its contacts with walls [J]."""
         body = self.bodies.body[None]
         velocity, place = self.bodies.velocity[i], self.bodies.position_in_box(s, i)
-        mass, contact = self.bodies.mass(i, body), self.wall_contacts.at_rest(i)
+        mass, contact = self.bodies.mass(i), self.wall_contacts.at_rest(i)
         total = mass * (0.5 * velocity.norm_sqr() + self.bodies.height(place))
         total += self.rotation.energy(i)
         room = ti.min(place, vec2(body.width, body.height) - place)
@@ -217,9 +219,9 @@ class DeviceSpheres:
     @ti.func
     def momentum(self, s):
         """Momentum along x [kg m/s]."""
-        total, body = 0.0, self.bodies.body[None]
+        total = 0.0
         for i in range(self.bodies.first(s), self.bodies.last(s)):
-            total += self.bodies.mass(i, body) * self.bodies.velocity[i][1]
+            total += self.bodies.mass(i) * self.bodies.velocity[i][1]
         return total
 
     @ti.func
@@ -243,14 +245,14 @@ class DeviceSpheres:
             place, speed = self.bodies.position_in_box(s, i), self.bodies.velocity[i].norm()
             if (place < 0.0).any() or (place > vec2(body.width, body.height)).any():
                 code = OVERLAP
-            radius = self.bodies.radius(i, body)
+            radius = self.bodies.radius(i)
             if not (speed * dt < radius):
                 code = RUNAWAY
             if not (speed < ti.math.inf):
                 code = NOT_FINITE
             room = ti.min(place, vec2(body.width, body.height) - place)
             at_wall = ti.cast((room < radius).any(), ti.i32)
-            going = 0.5 * self.bodies.mass(i, body) * speed * speed
+            going = 0.5 * self.bodies.mass(i) * speed * speed
             self.effect_activity.note_sphere(s, at_wall, going, self.rotation.energy(i))
         return code
 
@@ -265,7 +267,7 @@ class DeviceSpheres:
         energy, shift = self.held[s], 0.0
         for i in range(self.bodies.first(s), self.bodies.last(s)):
             energy += self._own_energy(s, i)
-            mass, velocity = self.bodies.mass(i, body), self.bodies.velocity[i]
+            mass, velocity = self.bodies.mass(i), self.bodies.velocity[i]
             shift += mass * speed * (0.5 * speed - velocity[1])
         lost = self.given[s] - energy - weight * self.bodies.floor[s]
         kept = 1.0 - FORGOTTEN

@@ -19,17 +19,23 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from ca_damper.report.certificate import Estimate
+from ca_damper.engine.event_counts import EventCounts
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.certificate import Estimate
 from taichi_dem.kit.effect_usage import EffectUse
 
 vec2 = ti.types.vector(2, ti.f64)
 
-#: What is noted when it happens first: two spheres touch, one touches a wall, friction acts.
-PAIRS, WALLS, FRICTION = range(3)
+#: What is noted when it happens first: two spheres touch, one touches a wall, friction acts; and
+#: how often all of them fly through a whole step.
+PAIRS, WALLS, FRICTION, FLIGHTS = range(4)
 #: Those by which each effect acts.
-_BY = {"normal contact": (PAIRS, WALLS), "friction": (FRICTION,), "rotation": (FRICTION,)}
-_NEVER = -1
+_BY = {
+    "normal contact": (PAIRS, WALLS),
+    "friction": (FRICTION,),
+    "rotation": (FRICTION,),
+    "long flights": (FLIGHTS,),
+}
 
 #: Reason why an unseen effect may have acted: an impact is shorter than the time between checks.
 _UNSEEN = "touches between two looks leave no trace"
@@ -37,40 +43,29 @@ _UNSEEN = "touches between two looks leave no trace"
 # Blows that may all turn a sphere the same way.
 _BLOWS = 1000
 _AIR_DENSITY = 1.2
+# Shares below which an effect is negligible, and from which on it is needed.
+_LIMITS = (1e-3, 1e-2)
 
 
 @ti.data_oriented
-class EffectActivity:
+class EffectActivity(EventCounts):
     """Sums over the checks since the reset, by scene.
 
     touches: of two spheres, or of a sphere and a wall. power: into dashpots and into friction of
-    sphere on sphere [W]. motion: energy of going and of turning [J]. first: step in which each of
-    PAIRS, WALLS and FRICTION first happened, or -1. step: the present one.
+    sphere on sphere [W]. motion: energy of going and of turning [J].
     """
 
     def __init__(self, table: SceneFields):
-        self.table, self.touches = table, table.field(ti.i64)
+        super().__init__(table, len(_BY), _BY)
+        self.touches = table.field(ti.i64)
         self.power, self.motion = table.vector(2, ti.f64), table.vector(2, ti.f64)
-        self.first, self.step = table.field(ti.i32, FRICTION + 1), table.field(ti.i32)
 
     @ti.func
-    def clear(self, s):
+    def reset(self, s):
         """Nothing has been seen yet."""
+        self.clear(s)
         self.touches[s] = ti.cast(0, ti.i64)
         self.power[s], self.motion[s] = vec2(0.0), vec2(0.0)
-        for kind in range(FRICTION + 1):
-            self.first[s, kind] = _NEVER
-
-    @ti.func
-    def is_new(self, s, kind):
-        """Whether something has not happened yet."""
-        return self.first[s, kind] == _NEVER
-
-    @ti.func
-    def note(self, s, kind, happens):
-        """Note whether something happens in the present step."""
-        if happens and self.is_new(s, kind):
-            self.first[s, kind] = self.step[s]
 
     @ti.func
     def note_contact(self, s, dragged, rubbed):
@@ -84,12 +79,6 @@ class EffectActivity:
         """Note a sphere: whether it is at a wall, and the energy of its motion [J]."""
         self.touches[s] = self.touches[s] + at_wall
         self.motion[s] = self.motion[s] + vec2(going, turning)
-
-    def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
-        """Step in which each of the named effects first acted, infinite if never, (scenes,)."""
-        first = self.table.in_use(self.first).astype(np.float64)
-        first[first == _NEVER] = np.inf
-        return {name: first[:, list(_BY[name])].min(axis=1) for name in effects if name in _BY}
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """An EffectUse for each of the named effects, over all scenes."""
@@ -110,6 +99,7 @@ class EffectActivity:
                 whole="the energy of motion",
                 kept=unseen if turn else "",
             ),
+            EffectUse("long flights", "flights", self.total(FLIGHTS)),
         )
         return tuple(use for name in effects for use in found if use.effect == name)
 
@@ -124,21 +114,20 @@ def rotation_estimate(spheres: Any, particles: int) -> Estimate:
     meets = spheres.wall_friction > 0.0 or (particles > 1 and spheres.friction > 0.0)
     if not meets or particles == 0:
         why = "no friction turns a sphere" if particles else "there is no sphere"
-        return Estimate("rotation", 0.0, "the energy in motion", why)
+        return Estimate("rotation", 0.0, f"share of the energy in motion, as {why}:", _LIMITS)
     friction = max(spheres.friction, spheres.wall_friction)
     restitution = max(spheres.restitution, spheres.wall_restitution)
     slides, sticks = friction * (1.0 + restitution), 2.0 / 7.0
     change = math.sqrt(0.5) * min(_BLOWS * slides, sticks)
-    return Estimate(
-        "rotation",
-        2.5 * change * change,
-        "the energy in motion",
-        f"blows at 45 degrees, friction {friction:g}, {_BLOWS} of them turning the same way",
+    words = (
+        f"share of the energy in motion after {_BLOWS} blows at 45 degrees that all turn a sphere "
+        f"the same way, friction {friction:g}, at most"
     )
+    return Estimate("rotation", 2.5 * change * change, words, _LIMITS)
 
 
 def air_estimate(spheres: Any) -> Estimate:
     """Share of its energy that a sphere loses to the air from floor to lid; never computed."""
     air = _AIR_DENSITY * math.pi * min(spheres.radii) ** 2 * spheres.height
-    why = "drag coefficient 1; this filling has no air"
-    return Estimate("air drag", min(1.0, air / min(spheres.masses)), "the energy of a flight", why)
+    words = "share of the energy of a flight at a drag coefficient of 1, at most"
+    return Estimate("air drag", min(1.0, air / min(spheres.masses)), words, _LIMITS)

@@ -17,7 +17,7 @@ from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.search import EXPECTED, TOUCHING, AllPairs, CellList
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.audit import Audit
+from taichi_dem.kit.certificate import Audit
 
 vec2i = ti.types.vector(2, ti.i32)
 

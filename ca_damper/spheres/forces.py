@@ -103,7 +103,8 @@ class PairForces(Part):
                 slip += distance * self._turning(pairs)
             drag = self._friction(s, contact, contact.reach - distance, push, slip)
             if self.effect_activity.is_new(s, FRICTION):
-                self.effect_activity.note(s, FRICTION, (ti.select(touch, drag, 0.0) != 0.0).any())
+                if (ti.select(touch, drag, 0.0) != 0.0).any():
+                    self.effect_activity.note(s, FRICTION)
             fx, fy = fx - drag * ny, fy + drag * nx
             if ti.static(self.turns):
                 self.torque[s] = ti.select(touch, distance * drag, 0.0)
@@ -178,7 +179,8 @@ class WallForces(Part):
             tangent, lever = vec2(-normal[1], normal[0]), contact.reach - overlap
             slip = self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
             drag = self._friction(s, i, wall, contact, overlap, push, slip, tangent)
-            self.effect_activity.note(s, FRICTION, drag != 0.0)
+            if drag != 0.0 and self.effect_activity.is_new(s, FRICTION):
+                self.effect_activity.note(s, FRICTION)
             self.rotation.twist(i, lever * drag)
             force += drag * tangent
         return force

@@ -6,7 +6,6 @@ from operator import mul
 from typing import ClassVar
 
 from ca_damper.filling import LEAST_PLACES, DeviceFilling, Structure
-from ca_damper.report.certificate import NEGLIGIBLE, Estimate
 from ca_damper.scenes.gravity import checked_gravity, gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.contact_law import FRICTION_LAWS, POWERS, contact_duration, pair_numbers
@@ -19,6 +18,7 @@ from ca_damper.spheres.start_values import (
     checked_start,
     checked_start_velocity,
 )
+from taichi_dem.kit.certificate import NEGLIGIBLE, Estimate
 from taichi_dem.kit.engine_pool import power_of_two
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import BOX, GRAIN, GRAIN_MASS, MODULUS, in_unit

@@ -35,9 +35,8 @@ class Rotation:
         """Share of the distance of two spheres that lies on the side of the first."""
         share = 0.5
         if ti.static(self.bodies.kinds > 1):
-            body = self.bodies.body[None]
-            own = self.bodies.radius(i, body)
-            share = own / (own + self.bodies.radius(j, body))
+            own = self.bodies.radius(i)
+            share = own / (own + self.bodies.radius(j))
         return share
 
     @ti.func
@@ -83,9 +82,8 @@ class Rotation:
 
     @ti.func
     def _inertia(self, i):
-        body = self.bodies.body[None]
-        radius = self.bodies.radius(i, body)
-        return 0.4 * self.bodies.mass(i, body) * radius * radius
+        radius = self.bodies.radius(i)
+        return 0.4 * self.bodies.mass(i) * radius * radius
 
     def snapshot(self, rows: slice) -> dict[str, np.ndarray]:
         """Spins [rad/s] of some spheres, where they turn."""

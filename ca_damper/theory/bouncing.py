@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.kit.display import by_fields
-
 
 @dataclass(frozen=True)
 class Fall:
@@ -58,9 +56,6 @@ class RecordedFall:
     height_m: np.ndarray
     impacts_s: np.ndarray
     apexes_m: np.ndarray
-
-    def __repr__(self):
-        return by_fields(self)
 
     @classmethod
     def of(cls, history: Mapping[str, np.ndarray], fall: Fall, mass: float) -> "RecordedFall":

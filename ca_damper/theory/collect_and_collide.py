@@ -57,8 +57,7 @@ class CollectAndCollide:
     mass: np.ndarray
     phase: np.ndarray
 
-    def __repr__(self) -> str:
-        return by_fields(self)
+    __repr__ = by_fields
 
 
 def collect_and_collide(amplitude: ArrayLike, gap: ArrayLike) -> CollectAndCollide:

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.allocation import values
-from taichi_dem.kit.audit import Audit
+from taichi_dem.kit.certificate import Audit, BaseCertificate
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.mesh.topology import parts_of
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.report.energy_balance import EnergyBalance
-from taichi_dem.report.estimates import AIR, BENDS, WEIGHT, Estimate, PartScales
+from taichi_dem.report.estimates import AIR, BENDS, WEIGHT, PartScales
 from taichi_dem.report.missing_effects import MissingEffect, bond_rounding
 from taichi_dem.report.readings import Run
 from taichi_dem.state.state import LATER
@@ -167,14 +167,18 @@ class _Uses:
         return found
 
 
-@dataclass(frozen=True)
-class Certificate:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Certificate(BaseCertificate):
     """What acted in a run with effects="auto", and a bound of what was left out.
 
     Parameters
     ----------
     acting : tuple of EffectUse
         Activity, onset and evaluations of each effect.
+    audits : tuple of Audit
+        Audit of what sleeps.
+    left_out : tuple of Estimate
+        Estimate of each effect that no law of the scene serves.
     sleep : float
         Share that was asked for [-], see ``Scene``.
     asleep : float
@@ -184,21 +188,14 @@ class Certificate:
         momentum of that part; of the part where this is largest.
     energy : float
         Bound of the energy that they left out, as a share of the energy of that part, likewise.
-    audits : tuple of Audit
-        Audit of what sleeps.
-    left_out : tuple of Estimate
-        Estimate of each effect that no law of the scene serves.
     missing : tuple of MissingEffect, default ()
         Effects that were left out and would have acted.
     """
 
-    acting: tuple[EffectUse, ...]
     sleep: float
     asleep: float
     impulse: float
     energy: float
-    audits: tuple[Audit, ...]
-    left_out: tuple[Estimate, ...]
     missing: tuple[MissingEffect, ...] = ()
 
     @property
@@ -216,24 +213,21 @@ class Certificate:
         """Factor by which evaluations of the law of bonds are fewer than with effects="all"."""
         return self.all_law_evaluations / max(1, self.law_evaluations)
 
-    @property
-    def holds(self) -> bool:
-        """Whether no audit found a miss, no part left out more than asked, nothing is missed."""
-        return not self.failure
-
-    @property
-    def failure(self) -> str:
-        """Why the certificate does not hold, and what settles it; ``""`` where it holds."""
-        missed = [audit.failure for audit in self.audits if audit.misses]
+    def _faults(self) -> list[str]:
+        """Misses of audits, more left out than asked, and effects that are missed."""
+        faults = super()._faults()
         if not self.impulse <= self.sleep:
-            missed.append(
+            faults.append(
                 f"sleep left out {self.impulse:.2g} of a part's impulse, {self.sleep:g} asked"
             )
-        missed += [one.what for one in self.missing]
-        remedy = "run the scene with effects='all'"
+        return [*faults, *(one.what for one in self.missing)]
+
+    @property
+    def remedy(self) -> str:
+        """What would settle it."""
         if self.missing:
-            remedy = f"list {', '.join(one.effect for one in self.missing)}"
-        return f"{', and '.join(missed)}: {remedy}" if missed else ""
+            return f"list {', '.join(one.effect for one in self.missing)}"
+        return "run the scene with effects='all'"
 
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file.
@@ -245,19 +239,11 @@ class Certificate:
         """
         laws = "law_evaluations", "all_law_evaluations", "law_ratio"
         return {
-            "acting_since_s": {use.effect: use.since_s for use in self.acting},
-            **{name: getattr(self, name) for name in (*laws, "sleep", "asleep", "holds")},
+            **super().as_dict(),
+            **{name: getattr(self, name) for name in (*laws, "sleep", "asleep")},
             "left_out_impulse": self.impulse,
             "left_out_energy": self.energy,
-            "audits": [audit.as_dict() for audit in self.audits],
-            "left_out": [estimate.as_dict() for estimate in self.left_out],
         }
-
-    def __str__(self):
-        """A line for every kind of thing."""
-        return "\n".join([*self._acted(), *self.left_out_lines()])
-
-    __repr__ = __str__
 
     def left_out_lines(self) -> list[str]:
         """What was left out, in lines."""
@@ -269,21 +255,8 @@ class Certificate:
                 f"{self.impulse:.1g} of the impulse, {self.energy:.1g} of the energy of a part; "
                 f"{self.sleep:g} asked)"
             )
-        lines = [
-            f"law of bonds: {skipped:.3g} % of its evaluations skipped",
-            asleep,
-            *(f"left out: {estimate}" for estimate in self.left_out),
-            *(f"audit: {audit}" for audit in self.audits if audit.skipped),
-        ]
-        if not self.holds:
-            lines.append(f"this certificate does not hold, as {self.failure}")
-        return lines
-
-    def _acted(self):
-        """A line for each effect: what it did, and since when."""
-        for use in self.acting:
-            begun = f" from {1e3 * use.since_s:.3g} ms" if use.since_s is not None else ""
-            yield f"{use.effect}: {'never' if use.idle else use.acted + begun}"
+        law = f"law of bonds: {skipped:.3g} % of its evaluations skipped"
+        return [law, asleep, *super().left_out_lines()]
 
 
 def certificate_of(simulation: Any, report: Any) -> Certificate:

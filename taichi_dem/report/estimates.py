@@ -9,63 +9,21 @@ would hide what moves or breaks a small or slow one.
 
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.certificate import LIMITS, Estimate
 from taichi_dem.kit.validation import instance, positive
 from taichi_dem.mesh.topology import may_meet, part_boxes, parts_of, parts_under
 from taichi_dem.scene import Scene
 from taichi_dem.state.model import Model, centres, sums
 
-NEGLIGIBLE, NEEDED, UNCLEAR = "negligible", "needed", "unclear"
-#: Groups below which an effect is negligible, and from which on it is needed.
-_LOW, _HIGH = 0.05, 2.0
 #: Density of air [kg/m^3], and standard weight [m/s^2].
 AIR, WEIGHT = 1.2, 9.80665
 #: Groups in words.
 _OPENS = "stress over strength, as contact needs free faces"
 BENDS = "stress of the weight over tensile strength, at most"
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """Dimensionless group by which an effect is judged.
-
-    Parameters
-    ----------
-    effect : str
-        Name of the effect.
-    group : float
-        Value of the group [-]; NaN where it is not known.
-    words : str
-        The group in words.
-    """
-
-    effect: str
-    group: float
-    words: str
-
-    @property
-    def verdict(self) -> str:
-        """``"negligible"``, ``"needed"`` or ``"unclear"``."""
-        return NEGLIGIBLE if self.group < _LOW else NEEDED if self.group >= _HIGH else UNCLEAR
-
-    @property
-    def row(self) -> dict[str, Any]:
-        """What it adds to the table of effects."""
-        said = {"advice": self.verdict, "reason": self.words}
-        return {"effect": self.effect, "left_out": self.group, **said}
-
-    def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file; a group that is not known is None."""
-        group = None if math.isnan(self.group) else self.group
-        return {**asdict(self), "group": group, "verdict": self.verdict}
-
-    def __str__(self):
-        value = "not known" if math.isnan(self.group) else f"{self.group:.2g}"
-        return f"{self.effect}: {self.verdict} ({self.words} {value})"
 
 
 class PartScales:
@@ -175,7 +133,7 @@ class PartScales:
         values = np.stack([value for value, _ in groups])
         known = np.where(np.isnan(values), -1.0, values)
         k, p = np.unravel_index(int(np.argmax(known)), known.shape)
-        if known[k, p] < _HIGH and np.isnan(values).any():
+        if known[k, p] < LIMITS[1] and np.isnan(values).any():
             k, p = np.argwhere(np.isnan(values))[0]
         part = f"part of body {self.first[p]}: " if self.count > 1 else ""
         return Estimate(effect, float(values[k, p]), part + groups[k][1])

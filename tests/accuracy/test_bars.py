@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from taichi_dem.kit.audit import misses_bound
 from taichi_dem.kit.bars.answer import branches_of
 from taichi_dem.kit.bars.chance import clusters_of, f_outside, t_outside, t_quantile
 from taichi_dem.kit.bars.step import SAFETY, step_error, step_part
+from taichi_dem.kit.certificate import Audit
 
 SEEDS = tuple(range(1, 13))
 STEPS = ([1.0, 0.5, 0.25], [1.0, 0.25, 0.125], [1.0, 0.5, 0.125], [3.0, 1.0, 0.5])
@@ -29,9 +29,9 @@ def test_quantiles_are_those_of_the_tables_in_textbooks(confidence, freedom, wan
 
 @pytest.mark.parametrize(("misses", "audited"), [(0, 10), (9, 10), (120, 900)])
 def test_so_few_misses_have_a_chance_of_five_percent_at_the_bound(misses, audited):
-    bound = misses_bound(misses, audited)
+    bound = Audit(1000, audited, misses).misses_bound
     assert stats.binom.cdf(misses, audited, bound) == pytest.approx(0.05, rel=1e-9)
-    assert misses_bound(0, 0) == misses_bound(7, 7) == 1.0
+    assert Audit(9, 0, 0).misses_bound == Audit(9, 7, 7).misses_bound == 1.0
 
 
 def test_two_motions_are_told_apart_with_their_shares():

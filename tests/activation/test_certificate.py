@@ -16,7 +16,7 @@ from taichi_dem import (
     simulate,
     solve,
 )
-from taichi_dem.kit.audit import Audit
+from taichi_dem.kit.certificate import Audit
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.state.timeline import NEVER
 from tests.scenes import beside

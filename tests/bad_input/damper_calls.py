@@ -110,7 +110,6 @@ def _batches():
 
 def _structures():
     yield "Oscillator", ca.Oscillator, {}
-    yield "Oscillator.energy", OSCILLATOR.energy, {"x": 0.1, "v": 0.1}
     for name in ("transfer", "rms", "steady_state", "right_hand_side"):
         yield f"Oscillator.{name}", getattr(OSCILLATOR, name), {"frequency": 6.0}
     yield "Oscillator.peak", OSCILLATOR.peak, {}
@@ -168,7 +167,6 @@ def _excitations():
 
 def _answers():
     found, many = response(), ca.AmplitudeResponse([1e-3], [response()])
-    yield "AmplitudeResponse.measure", many.measure, {"name": "rms"}
     yield "AmplitudeResponse.write_csv", many.write_csv, {"path": path("x.csv")}
     yield "Response.write_csv", found.write_csv, {"path": path("x.csv")}
     goal = {"name": "x", "unit": "m", "kind": "value", "function": len, "ratios": (1.0,)}

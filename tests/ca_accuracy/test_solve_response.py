@@ -22,7 +22,7 @@ from ca_damper.accuracy import runs
 from ca_damper.accuracy.job import Job
 from ca_damper.accuracy.runs import SceneKey, SceneRuns
 from ca_damper.report.certificate import Certificate
-from taichi_dem.kit.audit import Audit
+from taichi_dem.kit.certificate import Audit
 from tests.paper import outside, paper
 
 PAPER = Oscillator()
@@ -162,7 +162,7 @@ def test_a_scene_that_is_never_steady_says_so(monkeypatch):
 
 def test_a_certificate_that_does_not_hold_is_never_reached(monkeypatch):
     audit = Audit(10_000, 100, 1, "contact tests")
-    monkeypatch.setattr(Batch, "certificate", Certificate("listed", 1, audit=audit))
+    monkeypatch.setattr(Batch, "certificate", Certificate(effects="listed", audits=(audit,)))
     answer = solve_response(RigidMass(), particles=30, goal=goals.rms_at(1.0), **QUIET)
     assert not answer.reached and "skips no contact test" in answer.shortfall
 

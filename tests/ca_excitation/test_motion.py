@@ -1,5 +1,6 @@
-"""Structures under signals move as the exact solution, and no sample or restart changes a bit."""
+"""Structures under signals, shocks, let go and on floors move as the exact solution."""
 
+import math
 import os
 import signal
 
@@ -14,6 +15,7 @@ from ca_damper import (
     RigidMass,
     SceneTable,
     excitation,
+    logarithmic_decrement,
     shake,
 )
 from ca_damper.excitation import Excitation, SineForce
@@ -188,3 +190,119 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(tmp_path):
         assert np.array_equal(getattr(whole, name), getattr(resumed, name)), name
     with pytest.raises(InputError, match="another excitation"):
         shake(Automaton(), motion.scaled(1.1), **few, resume=file)
+
+
+#: Half a sine of 10 g in 11 ms.
+PEAK, LAST = 10.0 * 9.80665, 11e-3
+#: A parabola through three samples a millisecond apart is off by (w h)^4 / 100 or so at 6 Hz.
+APART = (2.0 * math.pi * 6.03 * 1e-3) ** 4
+
+
+def exact(mass):
+    """Decrement of the paper's structure with a mass [kg] in it."""
+    ratio = PAPER.damping / (2.0 * math.sqrt(PAPER.stiffness * (PAPER.mass + mass)))
+    return 2.0 * math.pi * ratio / math.sqrt(1.0 - ratio**2)
+
+
+@pytest.mark.parametrize(("particles", "mass"), [(0, 0.0), (20, 4e-3)])
+def test_decrement_of_a_linear_structure_is_its_closed_form(particles, mass):
+    """At every amplitude, also about the place to which the weight of the mass pulls it."""
+    still = excitation.sines(6.0, 0.0, 3.0)
+    job = {"particles": particles, "seeds": 1, "progress": None}
+    made = shake(RigidMass(), still, displacement=0.02, **job)
+    amplitude, decrement = logarithmic_decrement(made.x[:, 0, 0])
+    assert len(amplitude) > 25 and (np.diff(amplitude) < 0.0).all()
+    # Of two amplitudes, each off by APART of itself and of the sag's share.
+    assert decrement == pytest.approx(np.full(len(decrement), exact(mass)), abs=10.0 * APART)
+
+
+def largest_stretch():
+    """Of the paper's oscillator under the half-sine [m], by Duhamel's integral.
+
+    Over 10,000 steps of the pulse by the trapezoidal rule, which is off by (pi / 10,000)^2 / 12.
+    """
+    decay = 0.5 * PAPER.damping / PAPER.mass
+    turn = np.sqrt(PAPER.stiffness / PAPER.mass - decay**2)
+    time, step = np.linspace(0.0, LAST, 10_001, retstep=True)
+    pull = PEAK * np.sin(np.pi * time / LAST)
+    later = np.linspace(LAST, 0.1, 10_001)
+    away = np.exp(decay * time) * pull
+    cosine, sine = step * (away @ np.cos(turn * time)), step * (away @ np.sin(turn * time))
+    free = np.sin(turn * later) * cosine - np.cos(turn * later) * sine
+    return float(np.abs(np.exp(-decay * later) * free / turn).max())
+
+
+@pytest.mark.parametrize("length", [0.15, 1.0])
+def test_a_half_sine_stretches_the_spring_as_duhamel_says(length):
+    """17.7 mm whatever the length of the record; samples of 1 ms miss a peak by (w dt)^2 / 8."""
+    time = np.arange(round(length / 1e-4) + 1) * 1e-4
+    pull = np.where(time < LAST, PEAK * np.sin(np.pi * time / LAST), 0.0)
+    shock = excitation.from_samples(time, pull, of="acceleration")
+    made = shake(RigidMass(), shock, particles=0, seeds=1, progress=None)
+    wanted = largest_stretch()
+    assert wanted == pytest.approx(17.7e-3, rel=3e-3)
+    missed = (2.0 * np.pi * PAPER.natural_frequency * 1e-3) ** 2 / 8.0
+    # The pulse is a polygon of 110 sides, smaller than the sine by (pi / 110)^2 / 12.
+    assert made.relative_peak[0, 0] == pytest.approx(wanted, rel=missed + 7e-5)
+
+
+G = 9.8
+MASS = 8e-3
+#: Of the floor: natural frequency of the container on it [rad/s].
+OMEGA = 2.0 * math.pi * 1000.0
+STIFFNESS = MASS * OMEGA**2
+
+
+def restitution(ratio):
+    """Of a linear spring and dashpot that never pull, without gravity (Schwager, Poeschel 2007)."""
+    turn = math.sqrt(1.0 - ratio**2)
+    angle = math.pi - math.atan2(2.0 * ratio * turn, 1.0 - 2.0 * ratio**2)
+    return math.exp(-ratio / turn * angle)
+
+
+def box(particles=0, ratio=0.5, amplitude=0.0):
+    """A batch of one box on the floor, of which every step is recorded."""
+    damping = 2.0 * ratio * OMEGA * MASS
+    table = SceneTable(particles, 1, 2e-5, 10.0, amplitude, MASS, STIFFNESS, damping)
+    return Batch(RigidMass(gravity=G), table, mount="floor", recorded_samples=50_000)
+
+
+def motion(batch, cycles):
+    """Times, and place of the box and of the floor."""
+    batch.run(cycles, 0, record_every=1)
+    series = batch.time_series()
+    return [series[name][:, 0] for name in ("time_s", "x", "y")]
+
+
+def test_a_dropped_box_falls_and_rebounds_with_its_restitution():
+    """From 20 mm; gravity matters in the blow by g / (w v), 0.25 %, of either speed."""
+    height, batch = 0.02, box(ratio=0.2)
+    batch.start(displacement=height)
+    time, x, _ = motion(batch, 2)
+    fall = math.sqrt(2.0 * height / G)
+    flying = time < fall
+    assert x[flying] == pytest.approx(height - 0.5 * G * time[flying] ** 2, abs=1e-9)
+    after = x[time > fall + 1e-3]
+    rise = after[: np.argmax(after < 0.0)].max()
+    speed = math.sqrt(2.0 * G * height)
+    gravity = 4.0 * G / (OMEGA * speed)
+    assert math.sqrt(rise / height) == pytest.approx(restitution(0.2), rel=gravity)
+
+
+def test_a_box_at_rest_lies_on_its_weight():
+    """And on that of what it carries: x = -(M + m) g / K."""
+    batch = box(particles=20)
+    batch.start()
+    batch.advance(20_000)
+    heavy = MASS + 20 * RigidMass().particle_mass
+    assert batch.sample()["x"][0] == pytest.approx(-heavy * G / STIFFNESS, rel=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.9, 1.2])
+def test_it_lifts_once_the_floor_falls_faster_than_it(share):
+    """A w^2 = g is the limit; below it, the box stays within its static sag or so."""
+    batch = box(amplitude=share * G / (2.0 * math.pi * 10.0) ** 2)
+    batch.start()
+    _, x, y = motion(batch, 5)
+    settled = (x - y)[len(x) // 5 :]
+    assert (settled.max() > 1e-5) == (share > 1.0)

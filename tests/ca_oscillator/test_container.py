@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from ca_damper import Batch, Oscillator, RigidMass, SceneTable
+from ca_damper import Automaton, Batch, Oscillator, RigidMass, SceneTable, Spheres
 from tests.ca_oscillator.kicks import Kicks
+from tests.rounding import momentum_rounding
 
 PAPER = Oscillator()
 F0 = PAPER.natural_frequency
@@ -121,3 +122,26 @@ def test_container_on_the_base_follows_it():
     assert now["v"] == pytest.approx(omega * y0 * np.cos(phase), abs=1e-11 * y0)
     assert now["a"] == pytest.approx(-(omega**2) * y0 * np.sin(phase), abs=1e-9 * y0)
     assert np.array_equal(now["x"], now["y"])
+
+
+def shaken(filling):
+    """A batch after a few cycles of hard shaking of 1 and of 10 or 40 particles."""
+    table = SceneTable((1, min(40, filling.capacity)), 1, filling.default_dt, 6.0, 2e-3)
+    batch = Batch(filling, table)
+    batch.start()
+    batch.run(3, 0)
+    return batch
+
+
+@pytest.mark.parametrize("filling", [RigidMass(), Automaton(), Spheres()], ids=lambda f: f.label)
+def test_what_filling_and_container_exchange_is_accounted_for(filling):
+    """Momentum of the particles = -N m g t - what they gave to the container."""
+    batch = shaken(filling)
+    assert batch.report().momentum_error < momentum_rounding(batch) < 1e-8
+
+
+def test_blows_that_no_momentum_stands_for_are_found_out():
+    """What is missing is of the order of what is counted: no rounding."""
+    report = shaken(Kicks(strength=2e-5, mass=0.005)).report()
+    assert report.momentum_error > 0.1
+    assert f"{report.momentum_error:.2g} of what was exchanged" in str(report)

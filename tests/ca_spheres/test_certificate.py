@@ -90,8 +90,8 @@ def test_estimate_of_rotation_bounds_the_share_of_a_blow():
     rig = Rig(Spheres(rotation=True, gravity=0.0), 1, 2e-6).put((0.03, 0.01), (speed, -speed))
     spin = rig.run(10_000).spin()[0]
     share = 0.4 * (3e-3 * spin) ** 2 / (2.0 * speed**2)
-    assert 0.5 * rotation_estimate(rig.filling, 1).share < share
+    assert 0.5 * rotation_estimate(rig.filling, 1).group < share
     # The lever is shorter by the overlap, which is at most that of an elastic blow.
     numbers = wall_numbers(rig.filling)
     deepest = (1.25 * numbers["mass"] * speed**2 / numbers["stiffness"]) ** 0.4
-    assert share < rotation_estimate(rig.filling, 1).share * (1.0 + deepest / 3e-3)
+    assert share < rotation_estimate(rig.filling, 1).group * (1.0 + deepest / 3e-3)

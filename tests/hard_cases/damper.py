@@ -4,19 +4,9 @@ import numpy as np
 
 from ca_damper import Batch, SceneTable, SimulationDiverged
 from ca_damper.plot import Box
+from tests.hard_cases import damper_run
 from tests.hard_cases.cases import Cases
-from tests.hard_cases.damper_run import (
-    ALL,
-    AUTOMATA,
-    EXACT,
-    OSCILLATOR,
-    SPHERES,
-    Run,
-    drive,
-    fall,
-    filling,
-    spring,
-)
+from tests.hard_cases.damper_run import ALL, AUTOMATA, EXACT, SPHERES, drive, fall, filling, spring
 
 case = CASES = Cases("damper")
 #: An amplitude [m] at which spheres are shaken at 2.2 g.
@@ -197,8 +187,9 @@ def light_particles(trial):
     what = filling(trial, particle_mass=1e-7)
     # Contacts of light spheres are as much briefer.
     dt = what.safe_step() if trial.method in SPHERES else what.default_dt
-    quality, share = 0.5 / OSCILLATOR.damping_ratio, 30.0 * 1e-7 / OSCILLATOR.mass
-    limit, cycles = (4.0 * quality * share + 1e-8, "4 Q N m / M"), 4 if trial.quick else 40
+    empty, cycles = damper_run.OSCILLATOR, 4 if trial.quick else 40
+    quality, share = 0.5 / empty.damping_ratio, 30.0 * 1e-7 / empty.mass
+    limit = 4.0 * quality * share + 1e-8, "4 Q N m / M"
     below_lift_off(trial, 30, cycles, *limit, what=what, dt=dt)
 
 
@@ -216,7 +207,7 @@ def odd_step(trial):
 def still_heap(trial):
     """A hundred particles in a container at rest come to rest, and weigh what they weigh."""
     options = {"frequency": 10.0, "base_amplitude": 0.0, "transient": 30}
-    run = Run(trial, filling(trial), 100, 10 if trial.quick else 100, **options)
+    run = damper_run.Run(trial, filling(trial), 100, 10 if trial.quick else 100, **options)
     run.kept_inside()
     run.weight_carried(1e-3, "the specification")
     energy = run.column("energy")
@@ -243,7 +234,7 @@ def single_cell(trial):
         # first harmonic 4 / pi as high.
         bounds[1] = 2.0 * what.width / (np.pi * 24e-3), "4 / pi x half a cell / amplitude"
     for when, amplitude, limit in zip(("below g", "at 3.5 g"), (5e-3, 24e-3), bounds):
-        run = Run(trial, what, 1, 20, base_amplitude=amplitude)
+        run = damper_run.Run(trial, what, 1, 20, base_amplitude=amplitude)
         mass = run.cycles.apparent_mass[0] / what.particle_mass
         trial.limit(f"apparent mass error {when}", abs(mass - 1.0), *limit)
     run.sound()

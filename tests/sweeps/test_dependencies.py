@@ -158,7 +158,7 @@ def test_a_key_is_that_of_any_other_process(place):
 
 def test_a_sweep_says_what_its_rows_do_not_notice(tmp_path):
     table = sweep(jobs.counted, {"x": [3], "folder": [str(tmp_path)]}, workers=1, progress=None)
-    assert table.unseen == ("files whose names counted computes, by listdir",)
+    assert table.attrs["unseen"] == ("files whose names counted computes, by listdir",)
 
 
 def test_a_record_with_a_changed_digit_is_not_believed(tmp_path):

@@ -23,9 +23,9 @@ from taichi_dem import (
     shapes,
 )
 from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.certificate import NEEDED, NEGLIGIBLE, UNCLEAR
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.report.energy_balance import TERMS, injected_words, open_account, unexplained_share
-from taichi_dem.report.estimates import NEEDED, NEGLIGIBLE, UNCLEAR
 from taichi_dem.report.missing_effects import unserved
 from taichi_dem.report.resolution import MOST_SLIP
 from taichi_dem.state.model import Model

@@ -82,8 +82,8 @@ def test_every_module_has_a_layer_and_imports_nothing_from_a_later_one():
 
 
 def arrows():
-    """Modules of the package that each module of ``taichi_dem`` imports, by path."""
-    paths = {name_of(path): path for path in PATHS if path.startswith("taichi_dem/")}
+    """Modules of both packages that each module imports, by path."""
+    paths = {name_of(path): path for path in PATHS}
     found = {}
     for path in paths.values():
         names = set(imported(parsed(path)))

@@ -1,4 +1,4 @@
-"""One static page of the results of several studies: pictures, figures, and their reading.
+"""Studies run one after the other, and one static page of their results.
 
 Every study has an ``Entry`` of texts, and a folder of results as ``finish`` leaves it.
 """
@@ -6,13 +6,16 @@ Every study has an ``Entry`` of texts, and a folder of results as ``finish`` lea
 import json
 import os
 import re
+import sys
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 from urllib.parse import quote
 
-from taichi_dem.kit.files import write_text, write_whole
+from taichi_dem.kit import children
+from taichi_dem.kit.files import output_folder, write_text, write_whole
 from taichi_dem.kit.study.entries import PYTHON, Entry, key_figures
 from taichi_dem.kit.study.summary import value_in_words
 
@@ -33,6 +36,48 @@ def markdown_table(entries: Sequence[Entry], root: str | Path, pictures: str) ->
         link = f"[picture]({small})" if Path(root, small).is_file() else ""
         lines.append(f"| {entry.question} | `{entry.command}` | {entry.time} | {link} |")
     return "\n".join(lines) + "\n"
+
+
+def run_entries(
+    scripts: str | Path,
+    entries: Sequence[Entry],
+    root: str,
+    *,
+    quick: bool = False,
+    reuse: bool = False,
+) -> dict[str, str]:
+    """Run studies into root/NAME, and print how each ended; name -> why it failed, or "".
+
+    scripts: folder of them. quick: whether as smaller jobs. reuse: whether to leave out those that
+    have a result.
+    """
+    failed = {}
+    for number, entry in enumerate(entries, 1):
+        if reuse and Path(root, entry.name, "summary.json").exists():
+            continue
+        print(f"{number:2d}/{len(entries)} {entry.name} ... ", end="", flush=True)
+        started = time.perf_counter()
+        failed[entry.name] = run_entry(scripts, entry, root, quick)
+        print(failed[entry.name] or f"{time.perf_counter() - started:.0f} s", flush=True)
+    return failed
+
+
+def run_entry(scripts: str | Path, entry: Entry, root: str, quick: bool = False) -> str:
+    """Run a study and note what it printed, for its page; returns why it failed, or ""."""
+    folder = output_folder(os.path.join(root, entry.name))
+    # None of an earlier run shall pass for this one's.
+    for name in ("summary.json", RUN, CAPTION, *entry.pictures):
+        Path(folder, name).unlink(missing_ok=True)
+    line = [sys.executable, os.path.join(scripts, f"{entry.name}.py"), *entry.options.split()]
+    line += ["--out", folder, *(["--quick"] if quick else [])]
+    started = time.perf_counter()
+    done = children.run(line)
+    note = {"seconds": time.perf_counter() - started, "output": done.stdout}
+    write_text(os.path.join(folder, RUN), json.dumps(note, indent=1))
+    if done.returncode == 0:
+        return ""
+    said = done.stderr.strip().splitlines() or ["it said nothing"]
+    return f"exit code {done.returncode}: {said[-1]}"
 
 
 def write_page(root: str, entries: Sequence[Entry], failed: Mapping[str, str]) -> list:

@@ -11,12 +11,13 @@ from operator import attrgetter
 from typing import Any, NamedTuple
 
 from taichi_dem.kit import runtime
+from taichi_dem.kit.data_table import data_frame
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import output_folder, write_text
 from taichi_dem.kit.progress.progress_bar import hide_bars
 from taichi_dem.kit.provenance import commit, machine
 from taichi_dem.kit.sweeps.dependencies import Dependencies, named_file
-from taichi_dem.kit.sweeps.table import ADDED, SEED, Row, SweepTable, Value, plain_value
+from taichi_dem.kit.sweeps.table import ADDED, SEED, Row, Value, column_of, plain_value
 from taichi_dem.kit.validation import FileName, shown
 from taichi_dem.kit.version import __version__
 
@@ -122,17 +123,18 @@ def failed(error: str) -> Record:
 
 def table_of(
     jobs: Sequence[Job], records: Sequence[Record], seeded: bool, unseen: Sequence[str] = ()
-) -> SweepTable:
-    """Table of jobs and what running them left; seeded: whether the input has a column of seeds."""
+) -> Any:
+    """DataFrame of jobs and what running them left; seeded: whether the input has seeds."""
     given = [name for name in jobs[0].row if name != SEED or seeded]
     columns: dict[str, list] = {name: [job.row[name] for job in jobs] for name in given}
     for name in dict.fromkeys(name for record in records for name in record.values):
         columns[name] = [record.values.get(name) for record in records]
     columns["error"] = [record.error for record in records]
-    provenance = {SEED: [job.row[SEED] for job in jobs]}
+    columns.setdefault(SEED, [job.row[SEED] for job in jobs])
     for name in ADDED[1:]:
-        provenance[name] = [getattr(record, name) for record in records]
-    return SweepTable(columns, provenance, unseen)
+        columns[name] = [getattr(record, name) for record in records]
+    arrays = {name: column_of(values) for name, values in columns.items()}
+    return data_frame(arrays, unseen=tuple(unseen))
 
 
 def _checked_values(values, row):

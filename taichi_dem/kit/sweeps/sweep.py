@@ -11,8 +11,9 @@ from collections.abc import Generator, Iterable, Iterator, Sequence
 from typing import Any
 
 from taichi_dem.kit import runtime
+from taichi_dem.kit.data_table import arrays_of
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import claiming
+from taichi_dem.kit.files import claiming, write_csv
 from taichi_dem.kit.progress.progress import Listener, Progress
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.sweeps.dependencies import Dependencies
@@ -27,7 +28,7 @@ from taichi_dem.kit.sweeps.jobs import (
     run_in_worker,
     table_of,
 )
-from taichi_dem.kit.sweeps.table import SEED, SweepTable, TableLike, checked_rows
+from taichi_dem.kit.sweeps.table import SEED, TableLike, checked_rows
 from taichi_dem.kit.validation import AUTO, FileName, whole
 
 #: File of the whole table in the folder of a sweep.
@@ -54,7 +55,7 @@ def sweep(
     out: FileName | None = None,
     seed: int = 0,
     progress: Listener | str | None = AUTO,
-) -> SweepTable:
+) -> Any:
     """Run a function on each row of a table, many rows at a time.
 
     Each worker is a process with Taichi on one CPU thread, which compiles a structure once and
@@ -85,9 +86,11 @@ def sweep(
 
     Returns
     -------
-    SweepTable
-        A row for each row of the table, in its order, with provenance; its attribute ``unseen``
-        says of what a change is not noticed.
+    pandas.DataFrame
+        A row for each row of the table, in its order: the columns of the table, the results, NaN or
+        "" where a row has none, ``error``, the sentence of a row that failed, and ``seed``,
+        ``version``, ``commit``, ``machine``, ``seconds`` on the wall. All but the last three are
+        the same bits wherever a row ran. ``attrs["unseen"]`` says of what a change is not noticed.
 
     Raises
     ------
@@ -113,7 +116,7 @@ def sweep(
     records = _run_missing(function, jobs, journal, count, client, progress)
     made = table_of(jobs, records, SEED in rows[0], Dependencies(function).unseen)
     if journal.folder:
-        made.write_csv(os.path.join(journal.folder, RESULTS))
+        write_csv(os.path.join(journal.folder, RESULTS), arrays_of(made))
     return made
 
 
@@ -194,10 +197,10 @@ def _records(work, jobs: Iterable[Job], client) -> Iterator[tuple[Job, Record]]:
     """
     import distributed
 
-    started = runtime.settings()
-    arch = started.arch if started else "cpu"
-    waiting, ended = deque(jobs), distributed.as_completed()
+    settings = runtime.settings()
+    arch = settings.arch if settings else "cpu"
     active: dict[Any, Job] = {}
+    waiting, ended = deque(jobs), distributed.as_completed()
     try:
         while waiting or active:
             client.wait_for_workers(1, timeout=_NO_WORKER)

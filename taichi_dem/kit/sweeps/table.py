@@ -4,7 +4,6 @@ A row is a dict of column name to number or text.
 """
 
 import csv
-import hashlib
 import itertools
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,9 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.data_table import data_frame
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.validation import FileName, path_name, shown
 
 #: A value of a table.
@@ -142,95 +139,7 @@ def _number_or_text(cell):
     return cell
 
 
-class SweepTable(dict[str, np.ndarray]):
-    """Result of ``sweep``: column name -> array, a row for each row of the input, in its order.
-
-    Columns are those of the input, the results, NaN or "" where a row has none, and ``error``: the
-    sentence of a row that failed, else "". They are the same bits wherever a row ran.
-
-    Parameters
-    ----------
-    columns : mapping of str to list
-        Values by column, None where a row has none.
-    provenance : mapping of str to list
-        Likewise, of the columns that say where results come from.
-    unseen : sequence of str
-        What the key of a row does not cover.
-
-    Attributes
-    ----------
-    unseen : tuple of str
-        What a change of would not run finished rows again, such as files of a computed name.
-    provenance : dict of str to ndarray
-        Seed of each row, version of the package, commit of its sources or "unknown", machine, and
-        seconds on the wall [s].
-
-    Examples
-    --------
-    >>> table = sweep(run, rows)                           # doctest: +SKIP
-    >>> table["displacement_mm"].mean(), table.provenance["seconds"].sum()  # doctest: +SKIP
-    """
-
-    def __init__(
-        self,
-        columns: Mapping[str, Sequence],
-        provenance: Mapping[str, Sequence],
-        unseen: Sequence[str] = (),
-    ):
-        super().__init__({name: _column(values) for name, values in columns.items()})
-        self.provenance = {name: _column(values) for name, values in provenance.items()}
-        self.unseen = tuple(unseen)
-
-    def __repr__(self):
-        rows, failed = len(self["error"]), int((self["error"] != "").sum())
-        return f"<SweepTable: {rows} rows, {failed} failed, columns {', '.join(self)}>"
-
-    @property
-    def digest(self) -> str:
-        """Digest of all columns but the provenance: equal where tables agree bit for bit."""
-        made = hashlib.sha256()
-        for name, column in self.items():
-            content = column.tobytes() if column.dtype.kind != "U" else repr(column.tolist())
-            made.update(f"{name} {column.dtype.kind} {len(column)} ".encode())
-            made.update(content if isinstance(content, bytes) else content.encode())
-        return made.hexdigest()[:24]
-
-    def to_pandas(self, provenance: bool = False) -> Any:
-        """Return the table as a pandas.DataFrame.
-
-        Parameters
-        ----------
-        provenance : bool
-            Whether its columns stand behind the others.
-
-        Returns
-        -------
-        pandas.DataFrame
-        """
-        return data_frame(self._with(provenance))
-
-    def write_csv(self, path: FileName, provenance: bool = True) -> None:
-        """Write the table as a CSV file.
-
-        Parameters
-        ----------
-        path : path
-            Name of the file.
-        provenance : bool
-            Whether its columns stand behind the others.
-
-        Raises
-        ------
-        InputError
-            When the file cannot be written.
-        """
-        write_csv(path, self._with(provenance))
-
-    def _with(self, provenance):
-        return {**self, **self.provenance} if provenance else {**self}
-
-
-def _column(values):
+def column_of(values: Sequence[Any]) -> np.ndarray:
     """Values as an array: of text where one is text, of floats where one is missing."""
     if any(isinstance(value, str) for value in values):
         return np.array(["" if value is None else str(value) for value in values])
