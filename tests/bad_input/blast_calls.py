@@ -191,4 +191,4 @@ def _results():
     yield f"{where}.rose", done.rose, {"axis": (0.0, 0.0, 1.0)}
     yield f"{where}.attenuation", done.attenuation, {"group": "left", "radius": 0.01}
     law = done.attenuation(group="left", radius=0.01).power_law
-    yield "output.attenuation.Attenuation.power_law", law, {"nearest": 0.01}
+    yield "output.hole_monitor.Attenuation.power_law", law, {"nearest": 0.01}
