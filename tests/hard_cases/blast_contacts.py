@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from _closed_forms import damped_opening, velocity_after_impact
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
 from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.mesh.topology import body_properties
+from tests.closed_forms import damped_opening, velocity_after_impact
 from tests.hard_cases.blast_run import AREA, EDGE, FREE, MASS, TOUCHING, Run, X
 from tests.hard_cases.cases import Cases
 
