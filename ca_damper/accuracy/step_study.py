@@ -15,8 +15,8 @@ from ca_damper.runs.response import Response, frequency_response
 from ca_damper.scenes.gravity import gravity_along
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.plot_style import seconds
-from taichi_dem.kit.study.timing import Timing
 from taichi_dem.kit.study.work_precision import Point
+from taichi_dem.kit.timing import Timing
 
 #: Seeds of a reference are counted from here: a run that shares them would look too good.
 FIRST_SEED = 1001
