@@ -35,7 +35,7 @@ from ca_damper.report.measures import curve_distance
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, SKY, area_key, line_key, picture
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study.timing import median_interval
+from taichi_dem.kit.timing import median_interval
 
 NAME = "cost_of_effects"
 ALL, LAST_BIT = "all effects", "all effects, last bit of the load changed"
@@ -253,8 +253,7 @@ def run(options):
     """Measure, then write and print."""
     folder, calls, rows, figures = study.begin(options), calls_of(options), [], {}
     with ProgressBar("compiling, measuring") as bar:
-        results = study.call_rounds(calls, 1, options.threads or 1, bar.count)
-    results = {key: found for key, (found,) in results.items()}
+        results = study.call_all(calls, options.threads or 1, bar.count)
     costs = costs_of(options, calls, results)
     elastic = study.call_in_process(absent, substeps=SUBSTEPS, repeats=options.again)
     # Each against its neighbour in time: a machine is never equally fast for long.
