@@ -1,8 +1,7 @@
 """Tools of a study: options, tables, figures of a summary, timings, kept results, workers."""
 
 from taichi_dem.kit.provenance import processor
-from taichi_dem.kit.study.cached_result import cached, digest
-from taichi_dem.kit.study.new_process import call_all, call_in_process
+from taichi_dem.kit.study.costly_work import cached, call_all, call_in_process, digest
 from taichi_dem.kit.study.program import (
     Parser,
     add_accuracy,
@@ -23,14 +22,16 @@ from taichi_dem.kit.study.program import (
     whole,
 )
 from taichi_dem.kit.study.summary import (
+    Table,
     add_to_summary,
     figure,
     finish,
     show_answer,
+    show_rows,
     versions,
     write_accuracy,
+    write_rows,
 )
-from taichi_dem.kit.study.tables import Table, show_rows, write_rows
 from taichi_dem.kit.study.work_precision import cheapest_figures, figures_by_method, give_answers
 from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.timing import Timing, clock, on_device, seconds_of

@@ -12,8 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from taichi_dem.kit.study.summary import figure
-from taichi_dem.kit.study.tables import write_rows
+from taichi_dem.kit.study.summary import figure, write_rows
 from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.timing import Timing
 
