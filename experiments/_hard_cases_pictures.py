@@ -1,5 +1,6 @@
 """Pictures of hard cases: curves of every case, and how far methods stay within their bounds."""
 
+import itertools
 import math
 import re
 import textwrap
@@ -23,11 +24,9 @@ def title_of(case):
 
 
 def by_name(trials):
-    """Trials of each case, by its name."""
-    found = {}
-    for trial in trials:
-        found.setdefault(trial.case.name, []).append(trial)
-    return found
+    """Trials of each case, by its name; those of a case follow each other."""
+    groups = itertools.groupby(trials, lambda trial: trial.case.name)
+    return {name: list(own) for name, own in groups}
 
 
 def looks_of(trials):

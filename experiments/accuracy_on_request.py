@@ -54,8 +54,6 @@ SETTINGS = {
 }
 #: Times are of one thread.
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
-#: Deviations beyond this many half-widths share the last bar of the histogram.
-FARTHEST = 3.0
 #: Columns of bars.csv.
 COLUMNS = "kind seed question tolerance_percent value error true holds reached cpu_s".split()
 
@@ -135,10 +133,10 @@ def draw_cost(path, panels):
 
 def draw_calibration(path, judged, coverage):
     """Histogram of (value - true) / half-width of its bar, by package; coverage: share inside."""
-    edges = np.linspace(-FARTHEST, FARTHEST, 25)
+    edges = np.linspace(-3.0, 3.0, 25)
     with picture(path, size=(6.6, 4.2)) as (_, axes):
         axes.axvspan(-1.0, 1.0, color=GREY, alpha=0.15, label="inside the bar")
-        found = [np.clip(deviation, -FARTHEST, FARTHEST) for deviation in judged.values()]
+        found = [np.clip(deviation, edges[0], edges[-1]) for deviation in judged.values()]
         names = [f"{len(deviation)} of the {name}" for name, deviation in judged.items()]
         axes.hist(found, edges, stacked=True, label=names, color=[BLUE, ORANGE][: len(found)])
         axes.set_xlabel("(value − true value) / half-width of the bar [1]; beyond 3 at the ends")

@@ -126,14 +126,11 @@ class Lattice:
         """Take over the tables of a geometry."""
         cosines = np.zeros((KINDS, DIRECTIONS))
         cosines[:DIRECTIONS] = alignments()
-        height = geometry.rows + 2
-        sizes = {"columns": geometry.columns, "rows": geometry.rows, "height": height}
-        cells = (geometry.columns + 2) * height
-        ends = {"first": height + 1, "end": geometry.columns * height + geometry.rows + 1}
-        assign_members(self.size, cells=cells, **sizes, **ends)
-        column, row = np.divmod(np.arange(cells + 1), height)
+        first, end = geometry.cell_of(0, 0), geometry.cell_of(geometry.columns - 1, geometry.rows)
+        assign_members(self.size, **vars(geometry), first=first, end=end)
+        column, row = np.divmod(np.arange(geometry.cells + 1), geometry.height)
         assign(self.level, row - 0.5 + 0.5 * (column % 2))
-        assign(self.bottom, column * height)
+        assign(self.bottom, column * geometry.height)
         assign(self.raised, column % 2)
         assign(self.blank, geometry.blank())
         assign(self.neighbour, geometry.neighbours())

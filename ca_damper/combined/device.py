@@ -75,7 +75,7 @@ class DeviceCombined(DeviceSpheres):
             fall = time * (vec2(0.0, walls) + time * pull)
             fastest = ti.max(ti.abs(least), ti.abs(most)).max()
             ahead = vec2(time * (most - least).norm(), time * fastest + fall.norm())
-            if (ahead < search.longest_way()).all():
+            if (ahead < search.cells.grid[None].skin).all():
                 search.refresh(s, low, high, ahead)
                 clear = search.is_clear(s, time, low, high, fall)
             else:

@@ -4,8 +4,6 @@ from collections.abc import Hashable
 from dataclasses import dataclass, field
 from typing import Any
 
-from taichi.lang import impl
-
 from ca_damper.engine.container import container_of
 from ca_damper.engine.coupling import Coupling, MomentumAccount
 from ca_damper.engine.group_coupling import GroupCoupling
@@ -20,7 +18,6 @@ from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.engine_pool import Engine, EnginePool
-from taichi_dem.kit.errors import InputError
 
 #: Least room for scenes, measured cycles, samples, and places of a scene: below, nothing is saved.
 _LEAST = (64, 32, ROOM, *(LEAST_PLACES,) * 32)
@@ -66,22 +63,11 @@ class DamperEngine(Engine):
             coupling = GroupCoupling
         else:
             self.container = container_of(mount, self.table, self.clock, kind)
-        self.device = self._bound()
+        filling = self.structure.filling
+        self.device = check_device(filling, filling.bind(self.table))
         parts = self.container, self.device, self.account, self.recorder
         self.coupling = coupling(self.table, self.clock, *parts)
         self.is_compiled = False
-
-    def _bound(self) -> Any:
-        filling, builder = self.structure.filling, impl._root_fb
-        try:
-            return check_device(filling, filling.bind(self.table))
-        finally:
-            if builder.finalized:
-                # Taichi allocated what was declared so far at the first use of a field.
-                raise InputError(
-                    "bind of a filling must declare its fields and use none of them: write their "
-                    f"values in 'load', got {type(filling).__name__}"
-                )
 
     def load(
         self, filling: Any, table: SceneTable, rtol: float, atol: float, excitation: Excitation

@@ -79,15 +79,10 @@ class GroupCoupling(Coupling):
                 self.container.set_blows(each, blows)
             self.container.resolve(s)
         for each in range(s, end):
-            motion = self.container.motion(each)
-            self.container.set_action(each, self._action(each, motion))
-
-    @ti.func
-    def _action(self, s, motion):
-        action = Action(0.0, 0.0)
-        if ti.static(self.wait):
-            recoil = self.container.recoil_of(s)
-            action = self.device.carry_out(s, self.step[s], motion, recoil)
-        else:
-            action = self.device.advance(s, self.step[s], motion)
-        return action
+            motion, action = self.container.motion(each), Action(0.0, 0.0)
+            if ti.static(self.wait):
+                recoil = self.container.recoil_of(each)
+                action = self.device.carry_out(each, self.step[each], motion, recoil)
+            else:
+                action = self.device.advance(each, self.step[each], motion)
+            self.container.set_action(each, action)

@@ -5,10 +5,9 @@ is a base displacement [m] or a force [N]; a SineForce is a force in closed form
 ``shake`` take a Signal for the motion of the base, or an Excitation for base and force.
 """
 
-from ca_damper.excitation.csv_files import from_csv
 from ca_damper.excitation.excitation import Excitation, SineForce
 from ca_damper.excitation.generators import random_vibration, sines, sweep
-from ca_damper.excitation.samples import from_samples
+from ca_damper.excitation.samples import from_csv, from_samples
 from ca_damper.excitation.signal import Signal
 
 __all__ = [

@@ -10,12 +10,13 @@ from ca_damper.plot.boxes import (
     picture_film_strips,
 )
 from ca_damper.plot.curves import (
+    FilmMeasures,
     picture_compared,
+    picture_cycle,
     picture_hysteresis,
     picture_measures,
     picture_responses,
 )
-from ca_damper.plot.cycle import FilmMeasures, picture_cycle
 
 __all__ = [
     "Box",

@@ -1,7 +1,9 @@
-"""Pictures of responses over frequency: curves with bands over seeds, measures, hysteresis."""
+"""Pictures of responses over frequency, and of filmed grains over one cycle: curves."""
 
+import itertools
 import textwrap
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,8 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from ca_damper.oscillator import Oscillator
-from taichi_dem.kit.plot_style import GREY, STYLES, area_key, picture, styles_of
+from ca_damper.report.measures import first_harmonic
+from taichi_dem.kit.plot_style import BLACK, GREY, STYLES, area_key, line_key, picture, styles_of
 from taichi_dem.kit.validation import FileName, choice
 
 _SHADES = colormaps["viridis"]
@@ -35,49 +38,6 @@ def picture_responses(path: FileName, responses: Mapping[str, Any], particle_mas
         _draw_peaks(panels[count], panels[count + 1], responses, particle_mass)
         for axis in panels[count + 2 :]:
             axis.set_axis_off()
-
-
-def picture_rms(path: FileName | None, response: Any, rows: Any = None) -> Figure:
-    """RMS over frequency, and of the empty container; rows: which particle numbers, all if None."""
-    with picture(path, size=(7.2, 4.0)) as (figure, axis):
-        # Without damping the empty container has no end at its natural frequency.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            _draw_curves(axis, response, rows)
-        axis.set_ylim(0.0, None)
-        _explain_curves(axis, response)
-    return figure
-
-
-def _explain_curves(axis, response):
-    """Marks where a curve is a point, legend, and what the bands are."""
-    if len(response.ratios) == 1:
-        for line in axis.lines:
-            line.set_marker("o")
-    handles, _ = axis.get_legend_handles_labels()
-    if len(response.seeds) > 1:
-        axis.set_title(f"median of {len(response.seeds)} seeds")
-        handles.append(_band_key())
-    axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
-
-
-def picture_measure(path: FileName | None, response: Any, name: str) -> Figure:
-    """A measure of a response over frequency, for every particle number."""
-    with picture(path, size=(7.2, 4.0)) as (figure, axis):
-        for k, particles in enumerate(response.particles):
-            label = f"{particles} particles"
-            values = getattr(response, name)[k]
-            _band(axis, response.ratios, values, _shade(response, k), label)
-        words = f"{name.replace('_', ' ')} [{response.units[name]}]"
-        axis.set(xlabel="frequency f / f$_0$ [1]", ylabel=words)
-        _explain_curves(axis, response)
-    return figure
-
-
-def picture_peaks(path: FileName | None, response: Any) -> Figure:
-    """Place and height of the peaks of a response over the particle number."""
-    with picture(path, 1, 2, size=(8.4, 3.6)) as (figure, (place, height)):
-        _draw_peaks(place, height, {response.label: response})
-    return figure
 
 
 def picture_compared(path: FileName, curves: Any, oscillator: Oscillator) -> None:
@@ -270,13 +230,43 @@ class ResponsePlots:
             Name of a measure of the response; the RMS beside that of the empty container.
         path : str or path, optional
         """
-        if choice("measure", measure, self._response.units) == "rms":
-            return picture_rms(path, self._response)
-        return picture_measure(path, self._response, measure)
+        return self._curves(choice("measure", measure, self._response.units), path)
+
+    def _curves(self, name, path=None, rows=None):
+        """The same; rows: which of the particle numbers, all if None."""
+        response = self._response
+        with picture(path, size=(7.2, 4.0)) as (figure, axis):
+            if name == "rms":
+                # Without damping the empty container has no end at its natural frequency.
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    _draw_curves(axis, response, rows)
+                axis.set_ylim(0.0, None)
+            else:
+                for k, particles in enumerate(response.particles):
+                    shade, values = _shade(response, k), getattr(response, name)[k]
+                    _band(axis, response.ratios, values, shade, f"{particles} particles")
+                words = f"{name.replace('_', ' ')} [{response.units[name]}]"
+                axis.set(xlabel="frequency f / f$_0$ [1]", ylabel=words)
+            _explain_curves(axis, response)
+        return figure
 
     def peaks(self, *, path: FileName | None = None) -> Figure:
         """Draw place and height of the peaks over the particle number."""
-        return picture_peaks(path, self._response)
+        with picture(path, 1, 2, size=(8.4, 3.6)) as (figure, (place, height)):
+            _draw_peaks(place, height, {self._response.label: self._response})
+        return figure
+
+
+def _explain_curves(axis, response):
+    """Marks where a curve is a point, legend, and what the bands are."""
+    if len(response.ratios) == 1:
+        for line in axis.lines:
+            line.set_marker("o")
+    handles, _ = axis.get_legend_handles_labels()
+    if len(response.seeds) > 1:
+        axis.set_title(f"median of {len(response.seeds)} seeds")
+        handles.append(_band_key())
+    axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 class SweepPlots:
@@ -288,3 +278,83 @@ class SweepPlots:
     def hysteresis(self, *, path: FileName | None = None) -> Figure:
         """Draw the RMS over frequency, up and down, each seed a line."""
         return picture_hysteresis(path, {self._sweep.up.label: self._sweep})
+
+
+@dataclass(frozen=True, eq=False)
+class FilmMeasures:
+    """Measures of the particles in every frame of filmed cycles; arrays (cycles, frames).
+
+    height_mm: mean over the particles, in the room, less that of particles at rest on the floor of
+    a container in its middle. above_floor_mm: the same over the container's floor. floor, ceiling:
+    share of the particles less than half a diameter away from it. phase: of the frames [cycles].
+    """
+
+    phase: np.ndarray
+    height_mm: np.ndarray
+    above_floor_mm: np.ndarray
+    floor: np.ndarray
+    ceiling: np.ndarray
+
+    @classmethod
+    def of(cls, box: Any, cycles: Any, phase: Any) -> Any:
+        """Measures of a Box with at least one particle; cycles: each a list of record.Frame."""
+        rows, near = [], 0.5 * box.diameter
+        for frame in itertools.chain(*cycles):
+            below, above = box.gaps(frame.position)
+            over = below.mean()
+            heights = 1e3 * (box.lift(frame.x) + over), 1e3 * over
+            rows.append((*heights, (below < near).mean(), (above < near).mean()))
+        return cls(phase, *np.array(rows).T.reshape(4, len(cycles), len(phase)))
+
+    @property
+    def mean_height_mm(self) -> Any:
+        """Mean of height_mm over the cycles, (frames,)."""
+        return self.height_mm.mean(axis=0)
+
+    def swing(self) -> Any:
+        """Amplitude [mm] of the mean height, and its lag [degrees] behind the container."""
+        return first_harmonic(self.phase, self.mean_height_mm)
+
+
+def picture_cycle(path: FileName, measures: Any, amplitude: float) -> None:
+    """Mean height of the particles and how many touch floor and ceiling, over one closed cycle.
+
+    measures: by title of a panel, FilmMeasures by label of the filling. amplitude: of the container
+    [mm].
+    """
+    styles, time = styles_of(next(iter(measures.values()))), np.linspace(0.0, 1.0, 200)
+    shape = {"size": (2.85 * len(measures) + 0.6, 5.7), "sharex": True, "sharey": "row"}
+    with picture(path, 2, len(measures), squeeze=False, **shape) as (figure, panels):
+        for top, bottom, (title, fillings) in zip(*panels, measures.items()):
+            motion = amplitude * np.sin(2.0 * np.pi * time)
+            top.plot(time, motion, color=GREY, linestyle=":", label="container")
+            top.set_title(title)
+            for label, one in fillings.items():
+                _draw_cycle(top, bottom, one, styles[label])
+            bottom.set(xlabel="phase of the container [cycles]", xlim=(0.0, 1.0), ylim=(0.0, None))
+        panels[0, 0].set_ylabel("mean height in the room\nless that at rest [mm]")
+        panels[1, 0].set_ylabel("particles that touch [%]")
+        ends = {"-": "floor", "--": "ceiling"}
+        keys = [line_key(words, color=BLACK, ls=line) for line, words in ends.items()]
+        panels[1, 0].legend(handles=keys, loc="upper right")
+        keys, _ = panels[0, 0].get_legend_handles_labels()
+        keys.append(area_key("± standard deviation of the cycles", fc=GREY, alpha=0.3))
+        figure.legend(handles=keys, loc="outside upper left", ncols=2)
+
+
+def _draw_cycle(top, bottom, one, style):
+    """Curves of a filling: means over the cycles, and the spread of the height between them."""
+    # The cycle is closed: it ends as it begins.
+    phase, ends = np.append(one.phase, 1.0), {"-": one.floor, "--": one.ceiling}
+    height, spread = (_closed(over(one.height_mm, axis=0)) for over in (np.mean, np.std))
+    look = {"color": style.colour, "marker": style.marker, "ms": 4}
+    top.plot(phase, height, label=style.label, **look)
+    band = {"color": style.colour, "alpha": 0.18, "linewidth": 0}
+    top.fill_between(phase, height - spread, height + spread, **band)
+    for line, share in ends.items():
+        percent = 100.0 * _closed(share.mean(axis=0))
+        bottom.plot(phase, percent, linestyle=line, **look)
+
+
+def _closed(values):
+    return np.append(values, values[:1])

@@ -228,7 +228,7 @@ class DeviceSpheres:
     def divergence_code(self, s):
         """Code of DIVERGENCES, or 0; "not" makes NaN fail a test."""
         body, dt = self.bodies.body[None], self.table.dt[s]
-        self.crushed[s], self.held[s] = self.search.crowded(s), 0.0
+        self.crushed[s], self.held[s] = self.search.full[s], 0.0
         # Positions run half a step of the contacts ahead, and not at all before the first one.
         last = ti.select(self.bodies.lead[s] > 0.0, 2.0 * self.bodies.lead[s], dt)
         contact = self.pair_contacts.over_step(last, last)

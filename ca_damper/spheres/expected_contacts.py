@@ -54,6 +54,7 @@ class ExpectedContacts:
 
     def __init__(self, table: SceneFields, bodies: Bodies):
         self.table, self.bodies, self.cells = table, bodies, CellList(table, bodies)
+        self.full = self.cells.full
         self.pair = table.vector(2, ti.i32, 2, "pairs")
         self.sphere = table.field(ti.i32, "spheres")
         for name in ("pair_count", "sphere_count", "most_touch"):
@@ -98,11 +99,6 @@ class ExpectedContacts:
         """Note that all spheres have gone on by a share of their last way, or back if negative."""
         one, other = share * self.least[s], share * self.most[s]
         self.note_motion(s, ti.min(one, other), ti.max(one, other))
-
-    @ti.func
-    def longest_way(self):
-        """Longest way ahead that lists can serve [m]."""
-        return self.cells.grid[None].skin
 
     @ti.func
     def is_clear(self, s, time, low, high, fall):
@@ -185,11 +181,6 @@ class ExpectedContacts:
         self.sphere_count[s] = count
 
     @ti.func
-    def crowded(self, s):
-        """Whether more spheres lay near each other than spheres that do not interpenetrate can."""
-        return self.cells.crowded(s)
-
-    @ti.func
     def _list_pair(self, s, i, j, reach, count: ti.template()):
         """List a pair nearer than reach[1]; count those, and those nearer than reach[0]."""
         square = (self.bodies.position[j] - self.bodies.position[i]).norm_sqr()
@@ -248,8 +239,8 @@ class ExpectedContacts:
             if pair[0] == i or pair[1] == i:
                 tests -= 1
                 contacts -= self._touching(pair[0], pair[1], reach)
-        for k in range(self.wall_count(s)):
-            if self.wall_sphere(s, k) == i:
+        for k in range(self.sphere_count[s]):
+            if self.sphere[s, k] == i:
                 tests -= 1
                 contacts -= self._is_at_wall(i, low, high)
         self.audited[s] = self.audited[s] + tests
@@ -267,16 +258,6 @@ class ExpectedContacts:
         """1 for a sphere that touches a wall, else 0."""
         place = self.bodies.position[i]
         return ti.cast((place < low).any() or (place > high).any(), ti.i32)
-
-    @ti.func
-    def wall_count(self, s):
-        """Number of the spheres that are expected to touch a wall."""
-        return self.sphere_count[s]
-
-    @ti.func
-    def wall_sphere(self, s, k):
-        """The k-th of them."""
-        return self.sphere[s, k]
 
     def found(self) -> Audit:
         """Outcome of the audit, over all scenes since their start."""

@@ -140,8 +140,8 @@ class WallForces(Part):
         spheres begin to touch [m]; speed: of the walls [m/s].
         """
         total, touching = 0.0, 0
-        for k in range(self.search.wall_count(s)):
-            i = self.search.wall_sphere(s, k)
+        for k in range(self.search.sphere_count[s]):
+            i = self.search.sphere[s, k]
             place, short = self.bodies.position[i], self.bodies.short_of_radius(i)
             if (place < low - short).any() or (place > high + short).any():
                 if ti.static(self.history.remembers):

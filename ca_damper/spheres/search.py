@@ -35,19 +35,27 @@ class Grid:
 
 @ti.data_oriented
 class AllPairs:
-    """Test every pair and every sphere in every step, as the paper does."""
+    """Test every pair and every sphere in every step, as the paper does.
+
+    pair[s, TOUCHING]: those that touch. sphere, sphere_count, full: as of ``ExpectedContacts``.
+    """
 
     def __init__(self, table: SceneFields, bodies: Bodies):
         self.table, self.bodies = table, bodies
         self.places = table.length("pairs")
         self.pair = table.vector(2, ti.i32, 2, "pairs")
+        self.sphere, self.sphere_count = table.field(ti.i32, "spheres"), table.field(ti.i32)
+        self.full = table.field(ti.i32)
 
     def load(self, options: Any) -> None:
         """Nothing to write."""
 
     @ti.func
     def clear(self, s):
-        """Nothing was counted."""
+        """All spheres are tested against the walls; there is room for all pairs."""
+        self.sphere_count[s], self.full[s] = self.table.particles[s], 0
+        for k in range(self.table.particles[s]):
+            self.sphere[s, k] = self.bodies.first(s) + k
 
     @ti.func
     def forget(self, s):
@@ -60,11 +68,6 @@ class AllPairs:
     @ti.func
     def refresh(self, s, low, high, ahead):
         """Nothing to refresh."""
-
-    @ti.func
-    def crowded(self, s):
-        """Never runs out of room."""
-        return False
 
     @ti.func
     def find(self, s, reach):
@@ -99,16 +102,6 @@ class AllPairs:
     def found(self) -> None:
         """No audit."""
 
-    @ti.func
-    def wall_count(self, s):
-        """Number of the spheres that are tested against the walls: all."""
-        return self.table.particles[s]
-
-    @ti.func
-    def wall_sphere(self, s, k):
-        """The k-th of them."""
-        return self.bodies.first(s) + k
-
 
 @ti.data_oriented
 class CellList:
@@ -116,7 +109,8 @@ class CellList:
 
     grid: a Grid, shape (). cell_first, next: chains of the spheres in a cell, the first and each
     one's next. pair: the list; that of a scene fills its places from the end, at ``_list_end``,
-    back to pair_first. travel: by how much two spheres may have come nearer since the search [m].
+    back to pair_first. full: whether more spheres lay near each other than spheres that do not
+    interpenetrate can. travel: by how much two spheres may have come nearer since the search [m].
     """
 
     def __init__(self, table: SceneFields, bodies: Bodies):
@@ -153,11 +147,6 @@ class CellList:
     def moved(self, s, distance):
         """Note that two spheres of scene s may have come nearer to each other by a distance [m]."""
         self.travel[s] = self.travel[s] + distance
-
-    @ti.func
-    def crowded(self, s):
-        """Whether more spheres lay near each other than spheres that do not interpenetrate can."""
-        return self.full[s] > 0
 
     @ti.func
     def each_pair(self, s, contact, visit: ti.template(), count: ti.template()):

@@ -65,16 +65,9 @@ def bodies_in(raw: Any, points: np.ndarray) -> Bodies:
     """
     solids = blocks_of(raw, 3)
     solids.sort(key=lambda numbered: shape_of(numbered[1].type) != "tetra")
-    found, blocks, cells = [], [], []
-    for k, block in solids:
-        if shape_of(block.type) == "tetra":
-            tetrahedra, owner = corners_of(block, len(points)), np.arange(len(block))
-        else:
-            tetrahedra, owner = _cut(block, points)
-        found.append(tetrahedra)
-        blocks.append(np.full(len(owner), k))
-        cells.append(owner)
-    return Bodies(np.vstack(found), np.concatenate(blocks), np.concatenate(cells))
+    found, owners = zip(*(_cut(block, points) for _, block in solids))
+    blocks = np.repeat([k for k, _ in solids], list(map(len, owners)))
+    return Bodies(np.vstack(found), blocks, np.concatenate(owners))
 
 
 def corners_of(block: Any, point_count: int) -> np.ndarray:
@@ -94,8 +87,10 @@ def triangles_in(faces: np.ndarray) -> np.ndarray:
 
 
 def _cut(block, points):
-    """Tetrahedra of positive volume in a block of other solids, and the cell of each."""
+    """Tetrahedra of a block, of positive volume where it has other solids, and the cell of each."""
     cells = corners_of(block, len(points))
+    if shape_of(block.type) == "tetra":
+        return cells, np.arange(len(cells))
     tetrahedra, owner = _cones(block, cells)
     empty = np.bincount(owner, minlength=len(cells)) == 0
     if empty.any():
@@ -166,8 +161,10 @@ def volumes_of(mesh: Mesh, first: int) -> tuple[list[str], np.ndarray]:
         member[bodies, k] = True
     kinds, kind = np.unique(member, axis=0, return_inverse=True)
     names = [_BOTH.join(np.array(list(mesh.body_groups))[row]) for row in kinds]
-    tags = np.cumsum([bool(name) for name in names]) * [bool(name) for name in names]
-    return [name for name in names if name], np.where(tags, tags + first - 1, 0)[kind.reshape(-1)]
+    # Bodies in no group come first, where there are some.
+    alone = int(not names[0])
+    tags = np.arange(first - alone, first - alone + len(names)) * [bool(name) for name in names]
+    return names[alone:], tags[kind.reshape(-1)]
 
 
 def unread_groups(raw: Any, mesh: Mesh) -> tuple[str, ...]:

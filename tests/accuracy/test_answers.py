@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Checkpoint, InputError, Scene, effects, goals, simulate, solve
+from taichi_dem import CONCRETE, InputError, Scene, effects, goals, solve
 from taichi_dem.accuracy.runs import Job, Runs
 from taichi_dem.goals import Goal
 from taichi_dem.mesh.shapes import placed_together, single
@@ -47,15 +47,6 @@ def test_the_same_question_has_the_same_bits_also_after_another(broken):
         broken.error,
         broken.plan.runs,
     )
-
-
-def test_a_run_that_goes_on_from_a_checkpoint_gives_the_answer(broken, tmp_path):
-    """The run that an answer rests on, stopped in the middle and gone on with: the same bits."""
-    kept = Checkpoint(tmp_path / "half.npz")
-    looks = {"samples": 1, "frames": 1, "progress": None, "method": broken.result.method}
-    simulate(broken_bar(), until=0.5 * BROKEN_UNTIL, checkpoint=kept, **looks)
-    result = simulate(broken_bar(), until=BROKEN_UNTIL, resume=kept.path, **looks)
-    assert ENERGY.value(result) == broken.value
 
 
 def test_bodies_that_fall_freely_have_an_answer_to_rounding():

@@ -31,18 +31,6 @@ def test_a_bar_of_seeds_and_sampling_holds_the_mean(between, within, seeds):
     assert 366 <= held <= 400
 
 
-def test_an_estimate_has_the_value_of_the_finest_step_and_the_parts_of_all():
-    """Values 1 + h, 1 + 2 h and 1 + 4 h, order 1: the finest is off by h, times 1.25."""
-    levels = [
-        SeedValues(np.full((3, 1), v), np.array([1e-6]), 21, NOTHING) for v in (1.1, 1.2, 1.4)
-    ]
-    found = estimate(GOAL, (1.0, 2.0, 4.0), levels, np.array([0.3]), 0.95)
-    assert found.value[0] == pytest.approx(1.1) and found.fine is levels[0]
-    assert found.step.error[0] == pytest.approx(0.125) and found.step.is_seen
-    own = 2.0796 * 1e-3 / 3.0**0.5
-    assert found.parts.sampling[0] == pytest.approx(np.hypot(own, 0.3), rel=1e-4)
-
-
 def test_a_bar_holds_the_limit_where_the_step_s_error_is_like_that_of_chance():
     """1200 cases, standard deviation 0.6 %; squares of both parts alone would hold it in 89 %."""
     rng, sigma, steps = np.random.default_rng(4), 0.01, (1.0, 2.0, 4.0)

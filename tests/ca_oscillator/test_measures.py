@@ -1,11 +1,13 @@
 """Measures of signals whose measures are known: RMS, apparent mass and damping, power, peaks."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from ca_damper import Automaton, Oscillator
+from ca_damper import Automaton, Oscillator, Spheres
+from ca_damper.accuracy.step_study import StepStudy
 from ca_damper.report.measures import COLUMNS, Cycles, peak
 from ca_damper.runs.force_check import checked_response, force_mismatch
 
@@ -152,3 +154,13 @@ def test_noise_is_no_resonance_between_the_points():
     assert peak(ratios[1:4], curve[1:4])[1] > 2.0 * max(curve)
     ratio, height = peak(ratios, curve)
     assert 1.0 < ratio < 1.02 and max(curve) < height < 1.1 * max(curve)
+
+
+def test_the_floor_is_the_spread_of_means_over_the_seeds():
+    # Seeds 2 and 4 at one of two frequencies: variance 2, over both 1, over the peak squared 1 / 9;
+    # the run has none, so that half of it is left.
+    study = StepStudy("dem", Spheres(), 2, range(1, 3), ratios=(0.95, 1.0))
+    study.reference = {"rms": [[2.0, 4.0], [1.0, 1.0]]}
+    study.runs = {2e-5: [SimpleNamespace(rms=np.full((1, 2, 2), 3.0))]}
+    assert study.seed_spread == pytest.approx((0.5 / 9.0) ** 0.5)
+    assert study.floor == pytest.approx(study.seed_spread * (1.0 / 2.0 + 1.0 / 2.0) ** 0.5)

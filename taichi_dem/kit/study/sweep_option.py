@@ -16,7 +16,7 @@ from taichi_dem.kit import children, runtime
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, write_text
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study.cached_result import cached
+from taichi_dem.kit.study.costly_work import cached
 from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.validation import shown
 
