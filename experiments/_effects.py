@@ -19,7 +19,7 @@ from ca_damper.automaton.lattice import DOWN, HELD, UP
 from taichi_dem.demo import figures_of_certificate
 from taichi_dem.kit.allocation import assign, field_bytes, values
 from taichi_dem.kit.field_memory import FieldMemory
-from taichi_dem.kit.study.timing import on_device, paired_timing, seconds_of
+from taichi_dem.kit.timing import on_device, paired_timing, seconds_of
 from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.physics.bond import unit_arm, unit_opening
 from taichi_dem.step.advance import Advance

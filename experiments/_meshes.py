@@ -1,33 +1,11 @@
 """Small meshes, and changes of meshes, that several experiments and tests share."""
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_dem import Mesh, checked_mesh
-from taichi_dem.kit.validation import positive, whole
-from taichi_dem.mesh.shapes import single
+from taichi_dem.kit.validation import whole
 from taichi_dem.mesh.tetrahedra import area_vectors
-
-
-def with_neighbours(edge: float, heights: Mapping[int, float]) -> tuple[Mesh, np.ndarray]:
-    """A regular tetrahedron with a neighbour on some of its faces, bodies in the order of the dict.
-
-    edge: [m]. heights: of the neighbours over that of a regular one, by the corner opposite to the
-    face. Returns the mesh and the unit vectors (n, 3) from body 0 towards the neighbours.
-    """
-    alone = single(edge)
-    corners = alone.points[alone.tetrahedra[0]]
-    points, bodies, outward = [*corners], [[0, 1, 2, 3]], []
-    for k, height in heights.items():
-        positive("height of a neighbour", height)
-        face = [j for j in range(4) if j != k]
-        bodies.append([*face, len(points)])
-        away = corners[face].mean(axis=0) - corners[k]
-        points.append(corners[face].mean(axis=0) + height * away)
-        outward.append(away / np.linalg.norm(away))
-    return checked_mesh(points, bodies, {}), np.array(outward)
 
 
 def with_moved_nodes(mesh: Mesh, most: ArrayLike, seed: int) -> Mesh:

@@ -2,11 +2,7 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from taichi_dem import CONCRETE, effects
-from taichi_dem.mesh.mesh import checked_mesh
-from taichi_dem.mesh.shapes import bar
 
 #: Acceleration [m/s2], down along x.
 GRAVITY = 9.81
@@ -27,14 +23,3 @@ def loose(weight=(-GRAVITY, 0.0, 0.0), fixed=("plate_left",), **contact):
     """Effects of blocks that touch and stick, on plates that are held at groups ``fixed``."""
     touch = effects.BondDamping(), effects.BodyContact(**contact), effects.StickingFriction()
     return [*touch, effects.Gravity(tuple(weight)), *map(effects.Fixed, fixed)]
-
-
-def hexahedron(place):
-    """A block of six bodies; place: of points (n, 3) of the unit cube, their places [m]."""
-    cube = bar(1.0, 1.0, (1, 1, 1))
-    return checked_mesh(np.asarray(place(cube.points)), cube.tetrahedra, dict(cube.groups))
-
-
-def brick(size, corner=(0.0, 0.0, 0.0)):
-    """A block of six bodies with edges ``size`` [m] from a corner on."""
-    return hexahedron(lambda unit: np.asarray(corner) + unit * np.asarray(size, dtype=float))

@@ -13,7 +13,7 @@ from taichi_dem.kit.checkpoint import digest
 from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.study import call_in_process
 from taichi_dem.kit.study.floors import CACHE, Copy, Work
-from taichi_dem.kit.study.timing import busiest_seconds, thread_seconds
+from taichi_dem.kit.timing import busiest_seconds, thread_seconds
 from taichi_dem.mesh.shapes import bar, in_space_order
 
 #: How often runs on one and on two threads take turns.

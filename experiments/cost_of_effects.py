@@ -35,7 +35,7 @@ from ca_damper.report.measures import curve_distance
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, SKY, area_key, line_key, picture
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study.timing import median_interval
+from taichi_dem.kit.timing import median_interval
 
 NAME = "cost_of_effects"
 ALL, LAST_BIT = "all effects", "all effects, last bit of the load changed"
@@ -89,6 +89,8 @@ TITLES = {
     "spheres": "Damper, spheres",
     "automaton": "Damper, automaton",
 }
+#: Cost of an effect, and the ends of its interval.
+STEP = ("step_percent", "step_low_percent", "step_high_percent")
 #: Threads are processes side by side.
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 
@@ -139,22 +141,23 @@ def costs_of(options, calls, results):
 
 def row_of(group, scene, found, complete, costs):
     """Row of a table; complete: result of the first scene. sign: -1 of what was added."""
-    name = scene.removeprefix("without ")
-    row = {"group": group, "scene": scene, "failed": found.get("failed", "")}
-    key = CONTACTS.get(name, name.split())[0] if group == "blast" else name
+    name, sign = scene.removeprefix("without "), 1.0
+    if name in ADDED:
+        sign = -1.0
+    key = CONTACTS.get(name, name.split())[0] if group == "blast" else f"{group} {name}"
+    row = {"group": group, "scene": scene, "key": key.replace(" ", "_"), "sign": sign}
     row["effect"] = name if group != "blast" or name != scene or name in ADDED else ""
-    row["key"], row["sign"] = f"{group}_{key}".removeprefix("blast_").replace(" ", "_"), 1.0
-    row["sign"] = -1.0 if name in ADDED else 1.0
+    row["failed"] = found.get("failed", "")
     if row["failed"]:
         return row
     if scene in costs:
         # By ratio and not by seconds, which differ from round to round with the machine's load.
         base, cost = next(iter(costs.values()))["seconds"], costs[scene]
         spared = [1.0 - cost[end] for end in ("ratio", "low", "high")]
-        ends = sorted(row["sign"] * 100.0 * one for one in spared)
-        row.update(step_ms=1e3 * base * cost["ratio"], step_percent=ends[1])
-        row.update(step_low_percent=ends[0], step_high_percent=ends[2])
-        row["seconds"] = row["sign"] * spared[0] * base * found["steps"]
+        low, middle, high = sorted(100.0 * sign * one for one in spared)
+        row.update(zip(STEP, (middle, low, high)))
+        row.update(step_ms=1e3 * base * cost["ratio"])
+        row["seconds"] = sign * spared[0] * base * found["steps"]
     row.update({name: found[name] for name in ("before_first_step_s", "memory_MB", "compiled_kB")})
     if group == "blast":
         hole, wanted = found["hole_mm"], complete["hole_mm"]
@@ -163,12 +166,9 @@ def row_of(group, scene, found, complete, costs):
     # Of the complete filling half of the distance of two seeds: what the mean may owe to chance.
     curve, (one, other) = np.mean(found["rms_mm"], axis=0), complete["rms_mm"]
     change = 100.0 * curve_distance(curve, np.mean(complete["rms_mm"], axis=0))
-    chance = 50.0 * curve_distance(one, other)
-    return {
-        **row,
-        "peak_mm": curve.max(),
-        "change_percent": chance if found is complete else change,
-    }
+    if found is complete:
+        change = 50.0 * curve_distance(one, other)
+    return {**row, "peak_mm": curve.max(), "change_percent": change}
 
 
 def figures_of(table):
@@ -185,9 +185,6 @@ def figures_of(table):
             more = row.broken_faces - first.broken_faces
             figures[f"{row.key}_broken_faces_change"] = more if pd.isna(more) else int(more), "1"
     return figures
-
-
-STEP = ("step_percent", "step_low_percent", "step_high_percent")
 
 
 def effects_in(table):
@@ -256,8 +253,7 @@ def run(options):
     """Measure, then write and print."""
     folder, calls, rows, figures = study.begin(options), calls_of(options), [], {}
     with ProgressBar("compiling, measuring") as bar:
-        results = study.call_rounds(calls, 1, options.threads or 1, bar.count)
-    results = {key: found for key, (found,) in results.items()}
+        results = study.call_all(calls, options.threads or 1, bar.count)
     costs = costs_of(options, calls, results)
     elastic = study.call_in_process(absent, substeps=SUBSTEPS, repeats=options.again)
     # Each against its neighbour in time: a machine is never equally fast for long.

@@ -44,7 +44,7 @@ class Asked:
 
     def __init__(self, only, quick, bar):
         self.only, self.quick, self.bar = only, quick, bar
-        self.trials, self.count, self.interrupted = [], 0, False
+        self.trials, self.count, self.unknown, self.interrupted = [], 0, [], False
 
     def pytest_configure(self, config):
         """Tell the test that it is asked."""
@@ -54,7 +54,9 @@ class Asked:
         """Keep the cases of these names."""
         given = [getattr(item, "callspec", None) for item in items]
         cases = [one and one.params.get("case") for one in given]
-        chosen = self.only or {case.name for case in cases if case}
+        names = {case.name for case in cases if case}
+        self.unknown = sorted({*(self.only or ())} - names)
+        chosen = () if self.unknown else self.only or names
         items[:] = [item for item, case in zip(items, cases) if case and case.name in chosen]
         self.count = len(items)
 
@@ -75,29 +77,20 @@ def trials_of(options):
         pytest.main([str(TESTS), *PYTEST.split()], plugins=[asked])
     if asked.interrupted:
         raise KeyboardInterrupt
-    named = {trial.case.name for trial in asked.trials}
-    for name in options.only or ():
-        if name not in named:
-            raise InputError(f"only must name hard cases of {TESTS.parent}, got {name!r}")
+    if asked.unknown:
+        raise InputError(f"only must name cases of {TESTS.parent}, got {', '.join(asked.unknown)}")
     if not asked.trials or len(asked.trials) < asked.count:
         raise RuntimeError(f"tests of hard cases broke: see pytest {TESTS}")
     return asked.trials
 
 
 def row_of(trial):
-    """A trial as a row of the table."""
-    worst = trial.worst and {**trial.worst._asdict(), "margin": trial.worst.margin}
-    figure = worst or dict.fromkeys(("name", "value", "bound", "formula", "margin"), "")
-    return {
-        "case": trial.case.name,
-        "package": trial.case.package,
-        "method": trial.method,
-        "status": trial.status,
-        "figure": figure.pop("name"),
-        **figure,
-        "seconds": f"{trial.seconds:.3g}",
-        "words": trial.words,
-    }
+    """A trial as a row of the table, with its worst figure."""
+    names = ("name", "value", "bound", "formula", "margin")
+    figure, value, bound, formula, margin = (getattr(trial.worst, name, "") for name in names)
+    row = {"case": trial.case.name, "package": trial.case.package, "method": trial.method}
+    row.update(status=trial.status, figure=figure, value=value, bound=bound, formula=formula)
+    return {**row, "margin": margin, "seconds": f"{trial.seconds:.3g}", "words": trial.words}
 
 
 def run(options):

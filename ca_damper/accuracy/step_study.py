@@ -15,8 +15,8 @@ from ca_damper.runs.response import Response, frequency_response
 from ca_damper.scenes.gravity import gravity_along
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.plot_style import seconds
-from taichi_dem.kit.study.timing import Timing
 from taichi_dem.kit.study.work_precision import Point
+from taichi_dem.kit.timing import Timing
 
 #: Seeds of a reference are counted from here: a run that shares them would look too good.
 FIRST_SEED = 1001
@@ -117,16 +117,6 @@ class StepStudy:
                 point = replace(point, error=error, seconds=timing, residual=missing)
             found.append(point)
         return found
-
-    def rows(self) -> list[tuple]:
-        """Rows (name, ratio, step, seed, rms, whether of the reference) of all curves."""
-        runs = [(dt, repeats[0].rms[0], 0, 1) for dt, repeats in self.runs.items()]
-        runs.append((self.reference["step"], self.rms, 1, FIRST_SEED))
-        return [
-            (self.name, self.job["ratios"][k], dt, first + j, value, is_reference)
-            for dt, rms, is_reference, first in runs
-            for (k, j), value in np.ndenumerate(rms)
-        ]
 
     @property
     def floor(self) -> float:

@@ -9,8 +9,8 @@ from ca_damper.automaton.accounting import QUANTUM
 from ca_damper.automaton.cells import Cells, Placement
 from ca_damper.automaton.conflict_resolution import ConflictResolution
 from ca_damper.automaton.lattice import Geometry, Lattice
-from ca_damper.engine.event_counts import EventCounts
 from ca_damper.engine.random_numbers import stream
+from ca_damper.engine.recorder import EventCounts
 from ca_damper.filling import Action
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign

@@ -1,8 +1,7 @@
 """Options of the automaton."""
 
 from dataclasses import dataclass, replace
-from numbers import Integral
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from ca_damper.automaton.accounting import ACCOUNTINGS, Uncounted
 from ca_damper.automaton.conflict_resolution import MOST_CELLS
@@ -177,22 +176,18 @@ class Automaton:
             object.__setattr__(self, "start", self._checked_start())
 
     def _checked_start(self) -> tuple:
-        if not isinstance(self.start, (tuple, list)):
-            raise InputError(f"start must be a tuple of (column, row), got {shown(self.start)}")
-        cells = [tuple(cell) if isinstance(cell, (tuple, list)) else cell for cell in self.start]
-        for cell in cells:
-            if not (isinstance(cell, tuple) and len(cell) == 2 and self._inside(*cell)):
-                raise InputError(
-                    f"start must hold (column, row) from (0, 0) to ({self.columns - 1}, "
-                    f"{self.rows - 1}), got {shown(cell)}"
-                )
+        try:
+            cells = tuple((column, row) for column, row in self.start or ())
+        except (TypeError, ValueError):
+            raise InputError(
+                f"start must hold (column, row) of each particle, got {shown(self.start)}"
+            ) from None
+        for column, row in cells:
+            whole("column in start", column, 0, self.columns - 1)
+            whole("row in start", row, 0, self.rows - 1)
         if len(set(cells)) < len(cells):
             raise InputError(f"start must not name a cell twice, got {shown(self.start)}")
-        return tuple(cells)
-
-    def _inside(self, column: Any, row: Any) -> bool:
-        whole_numbers = isinstance(column, Integral) and isinstance(row, Integral)
-        return whole_numbers and 0 <= column < self.columns and 0 <= row < self.rows
+        return cells
 
     @property
     def _accounting(self) -> type[Uncounted]:

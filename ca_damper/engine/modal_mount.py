@@ -100,8 +100,12 @@ class ModalMount:
         s = self.structure
         to_modes = (s.masses @ s.shapes) * self.sizes
         rows = [
-            [*(s.shapes[i] / self.sizes), *(to_modes[i] * (i not in before)), s.residual[i]]
-            for i, before in zip(self.scene_places, self._befores())
+            [
+                *(s.shapes[i] / self.sizes),
+                *(to_modes[i] * (i not in self.scene_places[:k])),
+                s.residual[i],
+            ]
+            for k, i in enumerate(self.scene_places)
         ]
         return np.array(rows)
 
@@ -111,10 +115,6 @@ class ModalMount:
             return np.zeros_like(self.sizes)
         row: np.ndarray = self.structure.shapes[self.force_place] / self.sizes
         return row
-
-    def _befores(self) -> list[tuple[int, ...]]:
-        """Places of the scenes before each scene of a group."""
-        return [self.scene_places[:k] for k in range(self.group)]
 
 
 def checked_mount(mount: Any, structure: Any) -> tuple[str, ModalMount | None]:

@@ -37,49 +37,6 @@ def picture_responses(path: FileName, responses: Mapping[str, Any], particle_mas
             axis.set_axis_off()
 
 
-def picture_rms(path: FileName | None, response: Any, rows: Any = None) -> Figure:
-    """RMS over frequency, and of the empty container; rows: which particle numbers, all if None."""
-    with picture(path, size=(7.2, 4.0)) as (figure, axis):
-        # Without damping the empty container has no end at its natural frequency.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            _draw_curves(axis, response, rows)
-        axis.set_ylim(0.0, None)
-        _explain_curves(axis, response)
-    return figure
-
-
-def _explain_curves(axis, response):
-    """Marks where a curve is a point, legend, and what the bands are."""
-    if len(response.ratios) == 1:
-        for line in axis.lines:
-            line.set_marker("o")
-    handles, _ = axis.get_legend_handles_labels()
-    if len(response.seeds) > 1:
-        axis.set_title(f"median of {len(response.seeds)} seeds")
-        handles.append(_band_key())
-    axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
-
-
-def picture_measure(path: FileName | None, response: Any, name: str) -> Figure:
-    """A measure of a response over frequency, for every particle number."""
-    with picture(path, size=(7.2, 4.0)) as (figure, axis):
-        for k, particles in enumerate(response.particles):
-            label = f"{particles} particles"
-            values = getattr(response, name)[k]
-            _band(axis, response.ratios, values, _shade(response, k), label)
-        words = f"{name.replace('_', ' ')} [{response.units[name]}]"
-        axis.set(xlabel="frequency f / f$_0$ [1]", ylabel=words)
-        _explain_curves(axis, response)
-    return figure
-
-
-def picture_peaks(path: FileName | None, response: Any) -> Figure:
-    """Place and height of the peaks of a response over the particle number."""
-    with picture(path, 1, 2, size=(8.4, 3.6)) as (figure, (place, height)):
-        _draw_peaks(place, height, {response.label: response})
-    return figure
-
-
 def picture_compared(path: FileName, curves: Any, oscillator: Oscillator) -> None:
     """Curves of several fillings: mean over seeds as lines, their range as bars; empty dotted.
 
@@ -270,13 +227,43 @@ class ResponsePlots:
             Name of a measure of the response; the RMS beside that of the empty container.
         path : str or path, optional
         """
-        if choice("measure", measure, self._response.units) == "rms":
-            return picture_rms(path, self._response)
-        return picture_measure(path, self._response, measure)
+        return self._curves(choice("measure", measure, self._response.units), path)
+
+    def _curves(self, name, path=None, rows=None):
+        """The same; rows: which of the particle numbers, all if None."""
+        response = self._response
+        with picture(path, size=(7.2, 4.0)) as (figure, axis):
+            if name == "rms":
+                # Without damping the empty container has no end at its natural frequency.
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    _draw_curves(axis, response, rows)
+                axis.set_ylim(0.0, None)
+            else:
+                for k, particles in enumerate(response.particles):
+                    shade, values = _shade(response, k), getattr(response, name)[k]
+                    _band(axis, response.ratios, values, shade, f"{particles} particles")
+                words = f"{name.replace('_', ' ')} [{response.units[name]}]"
+                axis.set(xlabel="frequency f / f$_0$ [1]", ylabel=words)
+            _explain_curves(axis, response)
+        return figure
 
     def peaks(self, *, path: FileName | None = None) -> Figure:
         """Draw place and height of the peaks over the particle number."""
-        return picture_peaks(path, self._response)
+        with picture(path, 1, 2, size=(8.4, 3.6)) as (figure, (place, height)):
+            _draw_peaks(place, height, {self._response.label: self._response})
+        return figure
+
+
+def _explain_curves(axis, response):
+    """Marks where a curve is a point, legend, and what the bands are."""
+    if len(response.ratios) == 1:
+        for line in axis.lines:
+            line.set_marker("o")
+    handles, _ = axis.get_legend_handles_labels()
+    if len(response.seeds) > 1:
+        axis.set_title(f"median of {len(response.seeds)} seeds")
+        handles.append(_band_key())
+    axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 class SweepPlots:

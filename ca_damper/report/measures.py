@@ -23,8 +23,11 @@ from taichi_dem.kit.validation import choice, real_numbers
 SUMS = ("x", "x_squared", "x_cos", "x_sin", "v_cos", "v_sin", "f", "f_cos", "f_sin")
 #: Columns of the record of a cycle; energy: of the particles, at its end [J].
 COLUMNS = (*SUMS, "x_max", "x_min", "energy")
+#: Units of what is sampled over time.
+SAMPLE_UNITS = {"x": "m", "v": "m/s", "a": "m/s^2", "y": "m", "force": "N", "energy": "J"}
+SAMPLE_UNITS["momentum"] = "kg m/s"
 #: Columns of ``Batch.sample`` beside the time.
-SAMPLE = ("x", "v", "a", "y", "force", "energy", "momentum")
+SAMPLE = tuple(SAMPLE_UNITS)
 #: Measures of a response and the unit that a CSV file says behind their names.
 MEASURE_UNITS = {
     "rms": "m",
@@ -38,12 +41,6 @@ MEASURE_UNITS = {
     "energy": "J",
     "rms_about_all": "m",
 }
-#: Units of what is sampled over time.
-SAMPLE_UNITS = {
-    **{"time_s": "s", "x": "m", "y": "m", "v": "m/s", "a": "m/s^2"},
-    **{"force": "N", "energy": "J", "momentum": "kg m/s"},
-}
-
 _NOT_A_NUMBER = complex(np.nan, np.nan)
 #: A peak is far above the highest point of a curve where (point / peak)^2 is less than the first:
 #: its parabola must then come within the second, a factor, of the next points.

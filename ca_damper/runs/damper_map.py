@@ -130,23 +130,22 @@ class DamperMap(Result):
         return {**found, "gap": (("clearance", "particles"), self.gaps, "m")}
 
     def columns(self) -> dict[str, Any]:
-        """A row a scene: its place on the axes, measures, and the theory's loss and mass.
+        """A row a scene: its place on the axes, measures, and where there is one the theory.
 
         Returns
         -------
         dict
             Columns by name, which ends in the unit.
         """
-        places = scenes_over(**{one: getattr(self, name) for one, (name, _) in _AXES.items()})
-        columns: dict[str, Any] = {"filling": [self.label] * self.loss.size}
+        names = "clearance_m", "particles", "amplitude_m", "frequency_Hz", "seed"
+        axes = dict(zip(names, (getattr(self, name) for name, _ in _AXES.values())))
+        columns: dict[str, Any] = {"filling": [self.label] * self.loss.size} | scenes_over(**axes)
         columns["clearance_m"] = self._of_scenes(self.gaps)
-        columns["particles"], columns["amplitude_m"] = places["particles"], places["amplitude"]
-        columns["frequency_Hz"], columns["seed"] = places["frequency"], places["seed"]
-        measures = "loss", "mass_share", "energy"
-        columns |= {name: getattr(self, name).ravel() for name in measures}
+        columns |= {name: getattr(self, name).ravel() for name in ("loss", "mass_share", "energy")}
+        if np.isnan(self.gaps).any():  # a filling without a box: no theory
+            return columns
         made = {"loss_theory": self.theory.loss, "mass_theory": self.theory.mass}
-        columns |= {name: self._of_scenes(values) for name, values in made.items()}
-        return columns
+        return columns | {name: self._of_scenes(values) for name, values in made.items()}
 
     def _of_scenes(self, values: np.ndarray) -> np.ndarray:
         """Values over the first axes as a number a scene, (scenes,)."""

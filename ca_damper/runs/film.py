@@ -103,7 +103,8 @@ class Film:
             Units in the attributes of each variable.
         """
         dims = "sample", "scene"
-        found = {name: (dims, array, SAMPLE_UNITS[name]) for name, array in self.history.items()}
+        units = {"time_s": "s", **SAMPLE_UNITS}
+        found = {name: (dims, array, units[name]) for name, array in self.history.items()}
         return dataset(found, {})
 
     def write_xyz(self, path: FileName, scene: int = 0) -> None:

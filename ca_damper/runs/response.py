@@ -125,12 +125,11 @@ class Response(Result):
 
     def _repr_html_(self):
         # Imported here, so that matplotlib loads only where a picture is shown.
-        from ca_damper.plot.curves import picture_rms
         from taichi_dem.kit.plot_style import png_of
 
         count = len(self.particles)
         rows = np.unique(np.linspace(0, count - 1, _MOST_SHOWN).round().astype(int))
-        png = png_of(picture_rms(None, self, rows))
+        png = png_of(self.plot._curves("rms", rows=rows))
         some = f" ({len(rows)} of {count} particle numbers)" if len(rows) < count else ""
         return titled(
             f"Response: {self.axes_in_words()}{some}",

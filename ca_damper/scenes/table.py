@@ -6,7 +6,7 @@ import numpy as np
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import LARGEST, SMALLEST, choice, positive, shown, whole
+from taichi_dem.kit.validation import SMALLEST, choice, positive, real_numbers, shown, whole
 
 _WHOLE = ("particles", "seed")
 #: A container that is not driven stands still: only a Batch needs its cycles.
@@ -74,9 +74,16 @@ class SceneTable:
         damping: Any = 0.08,
     ):
         values = (particles, seed, dt, frequency, base_amplitude, mass, stiffness, damping)
-        rows = _broadcast(dict(zip(self.COLUMNS, values)))
-        self.count = len(rows[0])
-        self._host = dict(zip(self.COLUMNS, map(_kept, self.COLUMNS, rows)))
+        columns = {name: _checked(name, value) for name, value in zip(self.COLUMNS, values)}
+        lengths = {len(column) for column in columns.values()} - {1}
+        self.count = lengths.pop() if lengths else 1
+        if lengths or not 1 <= self.count <= _MOST_SCENES:
+            listed = ", ".join(f"{len(column)} of {name}" for name, column in columns.items())
+            raise InputError(
+                "a table must have one number or one a scene of everything, from 1 to "
+                f"{_MOST_SCENES} scenes, got {listed}"
+            )
+        self._host = {name: _kept(column, self.count) for name, column in columns.items()}
 
     def copy(self) -> "SceneTable":
         """Return a table of the same numbers.
@@ -163,56 +170,29 @@ class SceneTable:
         return {name: self._host[name][s].item() for name in self.COLUMNS}
 
 
-def _kept(name: str, column: np.ndarray) -> np.ndarray:
-    """A copy of a column of 64 bits, which refuses to be written."""
-    kept = column.astype(np.int64 if name in _WHOLE else np.float64)
+def _kept(column: np.ndarray, count: int) -> np.ndarray:
+    """A copy of a column for so many scenes, which refuses to be written."""
+    kept = np.broadcast_to(column, count).copy()
     kept.flags.writeable = False
     return kept
 
 
-def _broadcast(values: dict[str, Any]) -> list[np.ndarray]:
-    """Numbers by name as arrays of one shape (scenes,); InputError for anything else."""
-    columns = {name: _numbers(name, value) for name, value in values.items()}
-    for name, column in columns.items():
-        _check_whole(name, column) if name in _WHOLE else _check_range(name, column)
-    lengths = {len(column) for column in columns.values()} - {1}
-    count = lengths.pop() if lengths else 1
-    if lengths or not 1 <= count <= _MOST_SCENES:
-        listed = ", ".join(f"{len(column)} of {name}" for name, column in columns.items())
-        raise InputError(
-            f"a table must have one number or one a scene of everything, from 1 to {_MOST_SCENES} "
-            f"scenes, got {listed}"
-        )
-    return [np.broadcast_to(column, count) for column in columns.values()]
-
-
-def _numbers(name: str, value: Any) -> np.ndarray:
-    """One number or a sequence as an array (n,) of its own type; InputError for anything else."""
-    try:
-        column = np.atleast_1d(value)
-    except ValueError:
-        column = np.zeros(0, dtype=object)
-    if column.ndim != 1 or column.dtype.kind not in "iuf":
+def _checked(name: str, value: Any) -> np.ndarray:
+    """One number or a sequence as an array (n,) of 64 bits; InputError for any out of range."""
+    zero_allowed = name in _WHOLE + _MAY_BE_ZERO
+    column = np.atleast_1d(real_numbers(name, value, 0.0 if zero_allowed else SMALLEST))
+    if column.ndim != 1:
         raise InputError(f"{name} must be a number or a sequence of numbers, got {shown(value)}")
-    return column
-
-
-def _check_range(name: str, column: np.ndarray) -> None:
-    zero_allowed = name in _MAY_BE_ZERO
-    with np.errstate(over="ignore"):  # a number of more bits may become infinite
-        column = column.astype(np.float64)
-    inside = (column >= SMALLEST) & (column <= LARGEST) | (zero_allowed & (column == 0.0))
-    for value in column[~inside][:1].tolist():
-        positive(name, value, zero_allowed)
-
-
-def _check_whole(name: str, column: np.ndarray) -> None:
-    inside = (column >= 0) & (column <= _MOST_SEED)
-    bad = column[~(inside & (column == np.floor(column)))]
+    if name not in _WHOLE:
+        for number in column[(column > 0.0) & (column < SMALLEST)][:1].tolist():
+            positive(name, number, zero_allowed)
+        return column
+    bad = column[(column > _MOST_SEED) | (column != np.floor(column))]
     if len(bad):
         raise InputError(
             f"{name} must be whole numbers from 0 to {_MOST_SEED}, got {shown(bad[0].item())}"
         )
+    return column.astype(np.int64)
 
 
 def dealt(cost: np.ndarray, threads: int) -> np.ndarray:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from ca_damper.engine.event_counts import EventCounts
+from ca_damper.engine.recorder import EventCounts
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.certificate import Estimate
 from taichi_dem.kit.effect_usage import EffectUse

@@ -23,10 +23,9 @@ from taichi_dem.kit.engine_pool import power_of_two
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import BOX, GRAIN, GRAIN_MASS, MODULUS, in_unit
 from taichi_dem.kit.validation import (
+    between,
     choice,
-    finite,
     flag,
-    fraction,
     plain_fields,
     positive,
     shown,
@@ -35,6 +34,8 @@ from taichi_dem.kit.validation import (
 
 # Spheres part ever more slowly the stronger the dashpot, but none keeps them from parting.
 _LEAST_RESTITUTION = 0.01
+# Below, a modulus over 1 - poisson^2 has lost its digits; -1 itself has none.
+_LEAST_POISSON = -0.999999
 
 # Steps in a contact of two spheres that met at the speed of a fall through the box.
 _STEPS_PER_CONTACT = 5.0
@@ -161,11 +162,15 @@ class Spheres:
             positive(name, getattr(self, name), zero_allowed=True)
         object.__setattr__(self, "gravity", checked_gravity(self.gravity))
         for name in ("restitution", "wall_restitution"):
-            self._check_restitution(name)
+            between(name, getattr(self, name), _LEAST_RESTITUTION, 1.0)
         for name in ("poisson", "wall_poisson"):
-            self._check_poisson(name)
+            between(name, getattr(self, name), _LEAST_POISSON, 0.5)
         for name in ("width", "height"):
-            self._check_size(name)
+            value = positive(name, getattr(self, name))
+            if value < self.diameter * (1.0 - _ROUNDING):
+                raise InputError(
+                    f"{name} must be at least the diameter {self.diameter}, got {value!r}"
+                )
         self._check_capacity()
         for name, quantity in _QUANTITIES.items():
             in_unit(name, getattr(self, name), quantity)
@@ -360,21 +365,6 @@ class Spheres:
     def bind(self, table: SceneFields) -> DeviceFilling:
         """The spheres on the device, for all scenes of a table."""
         return DeviceSpheres(self, table)
-
-    def _check_restitution(self, name: str) -> None:
-        value = fraction(name, getattr(self, name))
-        if value < _LEAST_RESTITUTION:
-            raise InputError(f"{name} must lie in [{_LEAST_RESTITUTION}, 1], got {value!r}")
-
-    def _check_poisson(self, name: str) -> None:
-        value = getattr(self, name)
-        if not finite(value) or not -1.0 < value <= 0.5:
-            raise InputError(f"{name} must lie above -1 and up to 0.5, got {shown(value)}")
-
-    def _check_size(self, name: str) -> None:
-        value = positive(name, getattr(self, name))
-        if value < self.diameter * (1.0 - _ROUNDING):
-            raise InputError(f"{name} must be at least the diameter {self.diameter}, got {value!r}")
 
     def _check_capacity(self) -> None:
         if self.capacity > _MOST_SPHERES:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import LARGEST, positive, shown, whole
+from taichi_dem.kit.validation import positive, real_numbers, shown, whole
 
 # Sizes have a contact law for each pair of them.
 _MOST_SIZES, _MOST_OF_A_SIZE = 8, 1_000_000
@@ -15,8 +15,7 @@ _ROUNDING = 1e-9
 
 def checked_start(options: Any) -> tuple:
     """Places as a tuple of pairs, none in a wall or in another sphere."""
-    places = _pairs("start", options.start, "coordinates [m]", options.capacity)
-    whole("places in start", len(places), 0, options.capacity)
+    places = _pairs("start", options.start, options.capacity)
     radius, slack = _radii(options, len(places))[:, None], _ROUNDING * options.diameter
     inside = places >= radius - slack
     inside &= places <= np.array([options.width, options.height]) - radius + slack
@@ -32,20 +31,12 @@ def checked_start(options: Any) -> tuple:
 
 def checked_start_velocity(options: Any) -> tuple:
     """Velocities as a tuple of pairs, as many as places where these are given."""
-    velocity = _pairs("start_velocity", options.start_velocity, "speeds [m/s]", options.capacity)
-    slow = np.abs(velocity) <= LARGEST
-    if not slow.all():
-        k = int(np.flatnonzero(~slow.all(axis=1))[0])
-        raise InputError(
-            f"start_velocity must hold finite speeds of at most {LARGEST:g} m/s, "
-            f"got {velocity[k]} for number {k}"
-        )
+    velocity = _pairs("start_velocity", options.start_velocity, options.capacity)
     if options.start is not None and len(options.start) != len(velocity):
         raise InputError(
             f"start_velocity must hold {len(options.start)} velocities, as many as places in "
             f"start, got {len(velocity)}"
         )
-    whole("velocities in start_velocity", len(velocity), 0, options.capacity)
     return tuple(map(tuple, velocity.tolist()))
 
 
@@ -78,13 +69,10 @@ def _radii(options: Any, count: int) -> np.ndarray:
     return np.repeat(options.radii, numbers)
 
 
-def _pairs(name: str, value: Any, what: str, most: int) -> np.ndarray:
-    try:
-        pairs = np.array(value, dtype=np.float64).reshape(-1, 2)
-        if pairs.size != np.size(value):
-            raise ValueError
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(
-            f"{name} must hold two {what} for each of at most {most} spheres, got {shown(value)}"
-        ) from None
-    return pairs
+def _pairs(name: str, value: Any, most: int) -> np.ndarray:
+    """Two numbers for each of at most so many spheres, (spheres, 2)."""
+    pairs = real_numbers(name, value)
+    if pairs.size and (pairs.ndim != 2 or pairs.shape[1] != 2):
+        raise InputError(f"{name} must hold two numbers for each sphere, got {shown(value)}")
+    whole(f"spheres in {name}", len(pairs), 0, most)
+    return pairs.reshape(-1, 2)

@@ -11,7 +11,7 @@ from taichi_dem.elasticity.rates import bond_rates, springs_of
 from taichi_dem.goals import Goal
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.progress.progress import Listener, Progress
-from taichi_dem.kit.study.timing import clock
+from taichi_dem.kit.timing import clock
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.methods import ImplicitDashpots, Method, Uniform
 from taichi_dem.output.record import Frame

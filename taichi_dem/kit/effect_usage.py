@@ -6,7 +6,6 @@ from math import inf, nan
 from typing import Any
 
 from taichi_dem.kit.data_table import data_frame
-from taichi_dem.kit.display import in_brief
 
 #: Columns of ``Advice.table`` with what stands in a row that has nothing to say there.
 _COLUMNS = {
@@ -114,7 +113,7 @@ class EffectUse:
         return f"{self.events:,}{most} {self.what}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Advice:
     """Effects that a run needed, and those that it did not need.
 
@@ -204,14 +203,13 @@ class Advice:
         """
         rows = [self._row(use) for use in self.uses]
         rows += [finding.row for finding in (*self.missing, *self.left_out)]
-        columns = {n: [row.get(n, empty) for row in rows] for n, empty in _COLUMNS.items()}
-        return data_frame(columns)
+        known = [{n: value for n, value in row.items() if value is not None} for row in rows]
+        return data_frame({n: [row.get(n, e) for row in known] for n, e in _COLUMNS.items()})
 
     def _row(self, use) -> dict[str, Any]:
-        known = {"since_s": use.since_s, "energy_J": use.energy_J, "energy_share": use.share}
         return {
-            **{"effect": use.effect, "listed": True, "events": use.events, "where": use.where},
-            **{name: value for name, value in known.items() if value is not None},
+            **{"effect": use.effect, "listed": True, "events": use.events, "since_s": use.since_s},
+            **{"where": use.where, "energy_J": use.energy_J, "energy_share": use.share},
             **{"evaluations": use.evaluations, "skipped": use.skipped},
             **{"advice": self._advice(use), "reason": f"{use}{self._reason(use)}"},
         }
@@ -222,18 +220,12 @@ class Advice:
     def _reason(self, use):
         return f"; {use.kept}" if use.kept else self._shown(use)
 
-    def __repr__(self):
-        lists = {
-            "keep": [use.effect for use in self.uses if use.effect not in self.droppable],
-            "drop": self.droppable,
-            "missed": [str(getattr(finding, "effect", finding)) for finding in self.missing],
-        }
-        return in_brief(self, *(f"{word} {', '.join(of)}" for word, of in lists.items() if of))
-
     def __str__(self):
         """A line for every effect, then one for every missing effect."""
-        lines = [self._line(use) for use in self.uses]
+        lines = [
+            f"{self._advice(use):10s} {use.effect:16s} {use}{self._reason(use)}"
+            for use in self.uses
+        ]
         return "\n".join([*lines, *(f"missed     {finding}" for finding in self.missing)])
 
-    def _line(self, use):
-        return f"{self._advice(use):10s} {use.effect:16s} {use}{self._reason(use)}"
+    __repr__ = __str__

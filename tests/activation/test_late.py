@@ -1,21 +1,95 @@
 """effects="auto" finds what is needed once, late, in one place, and nothing where it is not."""
 
+from functools import cache
+
 import numpy as np
 import pytest
+import taichi as ti
 
 from taichi_dem import ImplicitDashpots, Multirate, Scene, StepControl, checked_mesh
+from taichi_dem.kit.products import squared
 from taichi_dem.state.timeline import NEVER
-from tests.activation.late_runs import BITS, NAMES, run
+from taichi_dem.step import phases
+from taichi_dem.step.sleeping import Sleeping
 from tests.activation.late_scenes import (
+    METHOD,
     SCENES,
     STEP,
     Late,
     late_scene,
     loads,
     rod,
+    scene_of,
     simulation,
     strengths,
 )
+
+#: Role of an effect by its name.
+NAMES = {
+    "tension": "softening",
+    "shear": "shear_slip",
+    "dashpot": "bond_damping",
+    "contact": "body_contact",
+    "friction": "sticking_friction",
+}
+#: What must have the same bits.
+BITS = (
+    "position velocity orientation angular_momentum broken_tick bond_heat contact_heat "
+    "load_work load_impulse softening_unit shear_slip_slip"
+).split()
+
+
+class Run:
+    """What is left of a run of a scene or its twin, whose engine goes on to others.
+
+    before: what acted before the effect may. since: of each bond and part of its law; evaluated: of
+    each bond. misses: what the audit of sleep found.
+    """
+
+    def __init__(self, name, word, needed=True, method=METHOD, driver="resident", **options):
+        self.late = late_scene(name) if needed else late_scene(name).without()
+        self.scene = scene_of(late_scene(name), word, needed, **options)
+        made = simulation(self.late, self.scene, method, driver)
+        self.before = None
+        if self.late.late > 0.0:
+            made.advance_to(int(self.late.late / method.dt0))
+            self.before = acting(made)
+        made.advance_to(round(self.late.until / method.dt0))
+        self.fields = {key: made.values(field) for key, field in made.state.fields().items()}
+        self.acting, self.report = acting(made), made.report(brief=True)
+        self.moved = self.fields["position"] - made.model.centre
+        self.start_energy, self.evaluations = made.energy_balance.start_energy, made.evaluations()
+        if word == "auto":
+            activity = made.state.activity
+            self.since, self.evaluated = map(made.values, (activity.since, activity.evaluated))
+            self.misses = int(made.values(made.step.audit.misses))
+
+    @property
+    def way(self):
+        """Largest displacement [m]."""
+        return np.abs(self.moved).max()
+
+
+def acting(simulation):
+    """Events of the effects that act, by name; friction by what it took.
+
+    Two faces that are pressed on each other slide by roundings, and rub so much.
+    """
+    report = simulation.report(brief=True)
+    pressed = report.energy_balance["sphere_dashpot"] + report.energy_balance["kinetic"]
+    found = {}
+    for use in report.effect_activity:
+        rounding = use.effect == NAMES["friction"] and use.energy_J <= 1e-9 * pressed
+        if use.is_active and not rounding:
+            found[use.effect] = use.events
+    return found
+
+
+@cache
+def run(name, word="auto", needed=True, **options):
+    """A run, made once."""
+    return Run(name, word, needed, **options)
+
 
 #: Largest difference that sleep may make, as a share of the largest displacement.
 MOST = 1e-3
@@ -129,3 +203,20 @@ def test_far_from_the_origin_bodies_at_rest_sleep():
     made = simulation(late, Scene(far, strengths(), "auto", loads=late.loads))
     made.advance_to(2)
     assert (made.values(made.schedule.sleeping.awake) == 0).sum() == 120
+
+
+@ti.func
+def too_deep(self, i, is_fast):
+    """Whether a body is a million times as fast as one that wakes others."""
+    return squared(self.state.velocity[i]) > 1e12 * self.bound2[self.part[i]]
+
+
+@pytest.mark.slow
+def test_sleep_that_is_too_deep_is_found(monkeypatch, compiled_anew):
+    """Every bond is audited in every substep, in engines of this test alone."""
+    monkeypatch.setattr(phases, "RATE", 1)
+    compiled_anew()
+    monkeypatch.setattr(Sleeping, "_opens", too_deep)
+    made = Run("far_end 0", "auto")
+    assert made.misses > 0
+    assert not made.report.certificate.holds

@@ -7,48 +7,15 @@ import tempfile
 from dataclasses import fields
 from functools import partial
 
-from taichi_dem import (
-    CONCRETE,
-    PAPER_BLOCK,
-    At,
-    Checkpoint,
-    Collector,
-    Every,
-    Goal,
-    ImplicitDashpots,
-    Material,
-    Mesh,
-    Multirate,
-    ProgressBar,
-    Receivers,
-    Scene,
-    Simulation,
-    StepControl,
-    Uniform,
-    checked_mesh,
-    effects,
-    elastic_report,
-    estimated_effects,
-    goals,
-    in_space_order,
-    join,
-    mesh_stiffness,
-    needed_effects,
-    read_mesh,
-    runtime,
-    shapes,
-    simulate,
-    solve,
-    step_report,
-    write_paraview,
-)
+import taichi_dem as td
+from taichi_dem import effects, goals, runtime, shapes
 from taichi_dem.mesh.mesh import with_inner_group
 from taichi_dem.mesh.shapes import bar, pair, single
 from tests.made_result import made_result
 
-PAIR, BAR, METHOD = pair(), bar(1.0, 0.3, (3, 1, 1)), Uniform(1e-7)
+PAIR, BAR, METHOD = pair(), bar(1.0, 0.3, (3, 1, 1)), td.Uniform(1e-7)
 CUT = with_inner_group(PAIR, "notch", lambda x: x[:, 0] < 1.0)
-SCENE, ALONE = Scene(PAIR, CONCRETE), Scene(single(), CONCRETE)
+SCENE, ALONE = td.Scene(PAIR, td.CONCRETE), td.Scene(single(), td.CONCRETE)
 ROCK = {
     **{"young": 32e9, "poisson": 0.2, "density": 2450.0, "tensile_strength": 5e6},
     **{"fracture_energy": 100.0, "friction_angle": 40.0, "cohesion": 10e6},
@@ -76,12 +43,12 @@ def result():
 @functools.cache
 def simulation():
     """A simulation of one body."""
-    return Simulation(ALONE, METHOD)
+    return td.Simulation(ALONE, METHOD)
 
 
 def run(**options):
     """A run of three steps; one without a report's figures shows nothing."""
-    return simulate(ALONE, method=METHOD, until=3e-7, progress=None, **options)
+    return td.simulate(ALONE, method=METHOD, until=3e-7, progress=None, **options)
 
 
 def blast_calls():
@@ -91,16 +58,16 @@ def blast_calls():
 
 def _scenes():
     every = {"time_s": 1.0, "steps": 2, "samples": 3, "wall_s": 1.0}
-    yield from ((f"Every#{name}", Every, {name: value}) for name, value in every.items())
-    yield "At", At, {"times_s": [0.0, 1.0]}
-    yield "Checkpoint", Checkpoint, {"path": "run.npz"}
-    yield "Collector", Collector, {"when": Every(steps=2), "read": len}
-    yield "ImplicitDashpots", ImplicitDashpots, {}
-    concrete = {field.name: getattr(CONCRETE, field.name) for field in fields(Material)}
-    yield "Material", Material, concrete
-    yield "Material.from_elastic", Material.from_elastic, ROCK
-    yield "Mesh", Mesh, {**MESH, "body_groups": {"ore": [0]}}
-    yield "checked_mesh", checked_mesh, MESH
+    yield from ((f"Every#{name}", td.Every, {name: value}) for name, value in every.items())
+    yield "At", td.At, {"times_s": [0.0, 1.0]}
+    yield "Checkpoint", td.Checkpoint, {"path": "run.npz"}
+    yield "Collector", td.Collector, {"when": td.Every(steps=2), "read": len}
+    yield "ImplicitDashpots", td.ImplicitDashpots, {}
+    concrete = {field.name: getattr(td.CONCRETE, field.name) for field in fields(td.Material)}
+    yield "Material", td.Material, concrete
+    yield "Material.from_elastic", td.Material.from_elastic, ROCK
+    yield "Mesh", td.Mesh, {**MESH, "body_groups": {"ore": [0]}}
+    yield "checked_mesh", td.checked_mesh, MESH
     yield "Mesh.group_faces", PAIR.group_faces, {"name": "left"}
     yield "Mesh.group_bodies", PAIR.body_group("ore", everywhere).group_bodies, {"name": "ore"}
     yield "Mesh.bonded_by", CUT.bonded_by, {"shares": {"notch": 0.5}}
@@ -108,16 +75,16 @@ def _scenes():
     yield "Mesh.group", PAIR.group, chosen
     yield "Mesh.body_group", PAIR.body_group, chosen
     yield "Mesh.moved", PAIR.moved, {}
-    yield "Multirate", Multirate, {"control": StepControl()}
-    yield "Uniform", Uniform, {"distance": 1e-5, "control": StepControl()}
-    yield "StepControl", StepControl, {}
-    yield "Receivers", Receivers, {"points": {"a": (0.0, 0.0, 0.0)}}
-    yield "Scene", Scene, {"mesh": CUT, "material": CONCRETE, "effects": [], "sleep": 0.0}
+    yield "Multirate", td.Multirate, {"control": td.StepControl()}
+    yield "Uniform", td.Uniform, {"distance": 1e-5, "control": td.StepControl()}
+    yield "StepControl", td.StepControl, {}
+    yield "Receivers", td.Receivers, {"points": {"a": (0.0, 0.0, 0.0)}}
+    yield "Scene", td.Scene, {"mesh": CUT, "material": td.CONCRETE, "effects": [], "sleep": 0.0}
     yield "Scene.effect", SCENE.effect, {"role": "softening"}
     yield "Scene.damped", SCENE.damped, {}
-    yield "join", partial(join, PAIR, PAIR.moved(by=(9.0, 0.0, 0.0))), {"names": ["a", "b"]}
-    yield "in_space_order", in_space_order, {"mesh": PAIR}
-    yield "read_mesh", read_mesh, {"path": PAPER_BLOCK}
+    yield "join", partial(td.join, PAIR, PAIR.moved(by=(9.0, 0.0, 0.0))), {"names": ["a", "b"]}
+    yield "in_space_order", td.in_space_order, {"mesh": PAIR}
+    yield "read_mesh", td.read_mesh, {"path": td.PAPER_BLOCK}
     yield "runtime.start", runtime.start, {"threads": 2}
     length = {"width": 0.5, "height": 0.5, "element": 0.5}
     yield "shapes.beam", shapes.beam, {"length": 1.0, **length}
@@ -146,8 +113,8 @@ def _effects():
 
 
 def _questions():
-    rock = Material.from_elastic(**ROCK)
-    yield "Goal", Goal, {"name": "x", "unit": "m", "function": len}
+    rock = td.Material.from_elastic(**ROCK)
+    yield "Goal", td.Goal, {"name": "x", "unit": "m", "function": len}
     of_body = goals.body_displacement(0)
     yield "Goal.check_scene", of_body.check_scene, {"scene": SCENE}
     yield "Goal.value", of_body.value, {"result": result()}
@@ -156,29 +123,29 @@ def _questions():
     yield "goals.energy_share", goals.energy_share, {"term": "kinetic"}
     yield "goals.hole_displacement", goals.hole_displacement, {}
     yield "goals.peak_speed", goals.peak_speed, {"body": 0}
-    yield "elastic_report", elastic_report, {"scene": Scene(BAR, rock)}
-    yield "estimated_effects", estimated_effects, {"scene": SCENE, "until": 1e-5}
-    yield "mesh_stiffness", mesh_stiffness, {"mesh": BAR, "material": rock}
-    yield "step_report", step_report, {"scene": SCENE}
-    yield "Simulation", Simulation, {"scene": ALONE, "method": METHOD}
+    yield "elastic_report", td.elastic_report, {"scene": td.Scene(BAR, rock)}
+    yield "estimated_effects", td.estimated_effects, {"scene": SCENE, "until": 1e-5}
+    yield "mesh_stiffness", td.mesh_stiffness, {"mesh": BAR, "material": rock}
+    yield "step_report", td.step_report, {"scene": SCENE}
+    yield "Simulation", td.Simulation, {"scene": ALONE, "method": METHOD}
     moving = simulation()
     yield "Simulation.reset", moving.reset, {"scene": ALONE, "method": METHOD}
     yield "Simulation.advance_to", moving.advance_to, {"macro_step": 1}
     yield "Simulation.report", moving.report, {}
     told = {"scene": ALONE, "until": 3e-7, "progress": None}
-    yield "simulate", simulate, {**told, "method": METHOD, "samples": 1}
+    yield "simulate", td.simulate, {**told, "method": METHOD, "samples": 1}
     asked = {"goal": goals.peak_speed(0), "tolerance": 0.5, "budget_s": 60.0}
-    yield "solve", solve, {**told, **asked}
-    yield "needed_effects", needed_effects, {"result": run()}
+    yield "solve", td.solve, {**told, **asked}
+    yield "needed_effects", td.needed_effects, {"result": run()}
 
 
 def _results():
-    done, bar_title = result(), ProgressBar("x")
-    yield "ProgressBar", ProgressBar, {"title": "x"}
+    done, bar_title = result(), td.ProgressBar("x")
+    yield "ProgressBar", td.ProgressBar, {"title": "x"}
     yield "ProgressBar.at", bar_title.at, {"share": 0.5}
     yield "ProgressBar.count", bar_title.count, {"done": 1, "total": 2}
     series = {"folder": path("pv"), "model": done.model, "frames": done.frames}
-    yield "write_paraview", write_paraview, series
+    yield "write_paraview", td.write_paraview, series
     where = "result.Result"
     yield f"{where}.write", run().write, {"folder": path("o")}
     page = {"path": path("v.html"), "open_browser": False}

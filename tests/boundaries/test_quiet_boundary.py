@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from _closed_forms import _carried
 from _meshes import with_moved_nodes
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
 from taichi_dem.elasticity.rates import wave_moduli
 from taichi_dem.mesh.shapes import bar, single
+from tests.closed_forms import carried
 
 #: Concrete whose bonds have no dashpots, so that no wave fades.
 UNDAMPED = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0)
@@ -80,7 +80,7 @@ def braked_body(speeds, method, steps):
     area = np.linalg.norm(vector)
     out = np.outer(vector, vector) / area**2
     law = CONCRETE.density * (speeds[0] * out + speeds[1] * (np.eye(3) - out))
-    levers = [_carried(corner - model.centre[0]) for corner in corners]
+    levers = [carried(corner - model.centre[0]) for corner in corners]
     block = sum(area / 3.0 * lever.T @ law @ lever for lever in levers)
     return np.append(motion["velocity"], motion["spin"]), mass, block, simulation
 

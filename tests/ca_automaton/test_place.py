@@ -6,7 +6,7 @@ import taichi as ti
 
 from ca_damper.automaton import Automaton
 from ca_damper.automaton.device import PAIRS
-from ca_damper.automaton.place.disc_blows import (
+from ca_damper.automaton.place.contacts import (
     common_velocity,
     dragged,
     line_of_centres,

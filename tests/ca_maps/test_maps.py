@@ -59,6 +59,7 @@ def test_a_rigid_mass_is_mass_and_no_loss_on_all_axes():
     assert made.mass_share == pytest.approx(1.0, rel=1e-6)
     assert made.loss == pytest.approx(0.0, abs=1e-6)
     assert np.isnan(made.gaps).all()
+    assert made.columns()["particles"].tolist() == [5, 5, 10, 10, 20, 20]
 
 
 STRUCTURE = Oscillator()

@@ -5,16 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from _closed_forms import (
-    LinearBonds,
-    bond_shear,
-    bond_tension,
-    damped_opening,
-    velocity_after_impact,
-)
+from _closed_forms import bond_shear, bond_tension
 from taichi_dem import CONCRETE
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.mesh.topology import body_properties
+from tests.closed_forms import LinearBonds, damped_opening, velocity_after_impact
 
 X = np.array([1.0, 0.0, 0.0])
 

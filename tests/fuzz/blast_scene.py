@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from _meshes import with_neighbours
 from taichi_dem import (
     CONCRETE,
     ImplicitDashpots,
@@ -19,6 +18,7 @@ from taichi_dem import (
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.stability.step_report import bond_steps
 from tests.fuzz.draws import Draws
+from tests.meshes import with_neighbours
 
 
 class Kind(NamedTuple):

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from _closed_forms import damped_opening
-from _motion_record import MotionRecord
 from taichi_dem import CONCRETE, Scene, Simulation, StepControl, effects
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.simulate import run_simulation
+from tests.closed_forms import damped_opening
+from tests.motion_record import MotionRecord
 
 EPS = np.finfo(float).eps
 SAMPLES = 40

@@ -257,10 +257,7 @@ def mass_on_a_floor_below_1_g(trial):
 REFUSED = {
     "container_without_mass": ("A container without mass", "mass", {"mass": 0.0}),
     "spring_that_pushes": ("A spring of negative stiffness", "stiffness", {"stiffness": -1.0}),
-    "amplitude_without_end": (
-        *("A base of infinite motion", "base_amplitude"),
-        {"base_amplitude": np.inf},
-    ),
+    "amplitude_without_end": ("Infinite motion", "base_amplitude", {"base_amplitude": np.inf}),
     "half_a_particle": ("Half a particle", "particles", {"particles": 0.5}),
     "seed_below_zero": ("A seed below zero", "seed", {"seed": -1}),
     "cycle_of_few_steps": ("Ten steps a cycle", "dt must lie in", {"dt": 1.0 / 60.0}),

@@ -10,7 +10,7 @@ import itertools
 import numpy as np
 import pytest
 
-from _meshes import group_area, with_neighbours
+from _meshes import group_area
 from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, join, read_mesh
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.contact_spheres import interior_crossings, spheres_of_faces
@@ -23,6 +23,7 @@ from taichi_dem.mesh.topology import (
     faces_of_group,
     topology_of,
 )
+from tests.meshes import with_neighbours
 from tests.turns import matrix, quaternion
 
 # Two tetrahedra on both sides of the triangle 0 1 2, apexes 3 (z > 0) and 4 (z < 0).

@@ -9,11 +9,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from _motion_record import MotionRecord
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, Simulation, Uniform, read_mesh, simulate
 from taichi_dem.mesh.shapes import bar, placed_together, single
 from taichi_dem.simulate import run_simulation
 from tests.made_result import made_result
+from tests.motion_record import MotionRecord
 from tests.notebook import shown
 
 NAN = float("nan")

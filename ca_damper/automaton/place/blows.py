@@ -9,8 +9,13 @@ import taichi as ti
 
 from ca_damper.automaton.accounting import QUANTUM, quanta
 from ca_damper.automaton.device import HOLDS, PAIRS, WALLS
-from ca_damper.automaton.place.contacts import BRUSH, END, JOIN, LINE, OBLIQUE, Contacts
-from ca_damper.automaton.place.disc_blows import (
+from ca_damper.automaton.place.contacts import (
+    BRUSH,
+    END,
+    JOIN,
+    LINE,
+    OBLIQUE,
+    Contacts,
     chord,
     common_velocity,
     dragged,

@@ -9,15 +9,12 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.bars.chance import mean_and_deviation, share_error, t_quantile
-from taichi_dem.kit.display import by_fields, counted, in_brief
+from taichi_dem.kit.display import by_fields, counted
 
 #: Tolerances of which an answer tells the cost.
 TOLERANCES = (0.1, 0.03, 0.01, 0.003)
 #: Sentences about runs that differ by one rounding, by the kind of their scenes (``kind_of``).
 known_partings: dict[Hashable, str] = {}
-#: Digits that a number has, and unit of the last of them below which it is written with a power of
-#: ten.
-_MOST_DIGITS, _LEAST_UNIT = 17, 1e-15
 #: A number, or one for each place of a curve.
 Values = float | np.ndarray
 
@@ -55,8 +52,7 @@ class ErrorParts:
 
     def __str__(self):
         found = {part.name: largest(getattr(self, part.name)) for part in fields(self)}
-        unit = 10.0 ** (_places(max(found.values())) if any(found.values()) else 0)
-        shown = (f"{name} {rounded(value, unit)}" for name, value in found.items() if value > 0.0)
+        shown = (f"{name} {value:.2g}" for name, value in found.items() if value > 0.0)
         return ", ".join(shown) or "no error found"
 
 
@@ -152,12 +148,11 @@ class Branch:
 
     def in_words(self, unit: str, runs: str) -> str:
         """Value, bar and share in words; runs: what a seed stands for, in the plural."""
-        end = f" {unit}" if unit != "1" else ""
         share = f"{100.0 * self.share:.0f} +- {100.0 * self.share_error:.0f} %"
-        return f"{self.value:.6g} +- {self.error:.2g}{end} for {share} of the {runs}"
+        return f"{_in_words(self.value, self.error, unit)} for {share} of the {runs}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Answer:
     """Value of a goal with its error bar.
 
@@ -228,23 +223,24 @@ class Answer:
         """Whether the bar is as narrow as asked, and no run is in doubt."""
         return not self.shortfall
 
-    def __repr__(self):
-        return in_brief(self, self.goal, self._bar(), self.shortfall)
-
     def __str__(self):
         lines = [f"{self._bar()} ({self.parts}); {self.plan}", self.shortfall]
         # What the report of the finest run warns of; a Response has none.
         needs = getattr(getattr(self.result, "report", None), "needs", ())
         return "\n".join(filter(None, [*lines, *(f"warning: {need}" for need in needs)]))
 
+    __repr__ = __str__
+
     def _bar(self):
         if isinstance(self.value, np.ndarray):
             count = counted(self.value.size, "value")
             return f"{count}, each to {largest(self.error):.2g} {self.unit}"
-        size = largest(self.error)
-        unit = 10.0 ** _places(size) if size else 0.0
-        ends = f" {self.unit}" if self.unit != "1" else ""
-        return f"{rounded(self.value, unit)} +- {rounded(size, unit)}{ends}"
+        return _in_words(self.value, self.error, self.unit)
+
+
+def _in_words(value, error, unit):
+    """A number with its bar and unit."""
+    return f"{value:.6g} +- {error:.2g}{f' {unit}' if unit != '1' else ''}"
 
 
 def doubted(answer: Answer, *reasons: str) -> Answer:
@@ -294,21 +290,3 @@ def cost_curve(tolerance: float, cost: Callable[[float], tuple[float, bool]]) ->
 def largest(values: Values) -> float:
     """Largest magnitude of a value or a curve."""
     return float(np.abs(values).max(initial=0.0))
-
-
-def rounded(value: float, unit: float) -> str:
-    """A number to a power of ten that its error leaves certain; to six digits for unit 0."""
-    if unit == 0.0 or not math.isfinite(value):
-        return f"{value:.6g}"
-    if 0.0 < abs(value) < 1e-4 or not _LEAST_UNIT <= unit < 1e5:
-        digits = math.floor(math.log10(abs(value)) - math.log10(unit)) + 1 if value else 1
-        return f"{value:.{min(_MOST_DIGITS, max(1, digits))}g}"
-    return f"{value:.{max(0, round(-math.log10(unit)))}f}"
-
-
-def _places(error):
-    """Power of ten of the second digit of an error, of the first where that is at least 3."""
-    if not math.isfinite(error):
-        return -math.inf
-    power = math.floor(math.log10(error))
-    return power if error / 10.0**power >= 3.0 else power - 1

@@ -4,13 +4,13 @@ A figure that states its least work stands as a share of its floor: the time tha
 these rates over the time that was measured.
 """
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from time import perf_counter, process_time
 
 import taichi as ti
 
-from taichi_dem.kit.study.timing import on_device
+from taichi_dem.kit.timing import on_device
 
 #: Names of the floors.
 MEMORY, CACHE = "copy in memory", "copy in cache"
@@ -59,11 +59,11 @@ class Copy:
 
     def bandwidth(self, repeats: int = 5) -> float:
         """Bytes a second that copies by all threads read and write, the best of some repeats."""
-        return self.bytes / _least_seconds(lambda: _copy(self.a, self.b), repeats)
+        return self.bytes / _least_seconds(lambda: _copy(self.a, self.b), repeats, perf_counter)
 
     def bandwidth_of_one_core(self, repeats: int = 5) -> float:
         """The same of many copies to and fro by one core, which stay in its cache if they fit."""
-        seconds = _least_cpu_seconds(lambda: _copy_often(self.a, self.b, _COPIES), repeats)
+        seconds = _least_seconds(lambda: _copy_often(self.a, self.b, _COPIES), repeats)
         return 2.0 * _COPIES * self.bytes / seconds
 
 
@@ -85,15 +85,18 @@ class Floors:
         if self.one_core:
             found[CACHE] = self.small.bandwidth_of_one_core(2 * repeats)
             chains = self.sums, 0.5, 1.0, _STEPS
-            seconds = _least_cpu_seconds(lambda: _multiply_add(*chains), 2 * repeats)
+            seconds = _least_seconds(lambda: _multiply_add(*chains), 2 * repeats)
             found[MULTIPLY_ADD] = 2.0 * LANES * CHAINS * _STEPS / seconds
         return found
 
 
 def _least_seconds(
-    work: Callable[[], object], repeats: int, clock: Callable[[], float] = time.perf_counter
+    work: Callable[[], object], repeats: int, clock: Callable[[], float] = process_time
 ) -> float:
-    """Shortest time of some calls; the first, which compiles, does not count."""
+    """Shortest time of some calls, of CPU time, which a busy machine changes less, for one core.
+
+    The first call, which compiles, does not count.
+    """
     work()
     seconds = []
     for _ in range(repeats):
@@ -103,11 +106,6 @@ def _least_seconds(
         ti.sync()
         seconds.append(clock() - started)
     return min(seconds)
-
-
-def _least_cpu_seconds(work: Callable[[], object], repeats: int) -> float:
-    """The same in CPU time, which a busy machine changes less: of the work of one core."""
-    return _least_seconds(work, repeats, time.process_time)
 
 
 @ti.kernel

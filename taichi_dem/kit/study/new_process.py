@@ -47,30 +47,26 @@ def call_in_process(
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def call_rounds(
-    calls: Mapping[str, tuple[Callable, dict]],
-    repeats: int,
-    workers: int,
-    progress: Callable[[int, int], None],
-) -> dict[str, list[dict]]:
-    """Results of calls in new processes by their names: all of them once before any one again.
+def call_all(
+    calls: Mapping[str, tuple[Callable, dict]], workers: int, progress: Callable[[int, int], None]
+) -> dict[str, dict]:
+    """Results of calls in new processes, by their names.
 
-    So a busy minute of the machine does not fall on one call alone. calls: (function, arguments) as
-    of ``call_in_process``; functions return dicts. Each call has a cache of kernels of its own,
-    empty before its first turn; compiled_kB in the result is its size. workers: processes side by
-    side. progress: called with the number of turns done and that of all.
+    calls: (function, arguments) as of ``call_in_process``; functions return dicts. Each call has an
+    empty cache of kernels of its own, whose size in the end is compiled_kB in the result. workers:
+    processes side by side. progress: called with the number of calls done and that of all.
     """
-    turns, results = [*calls] * repeats, []
-    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(workers) as pool:
-        places = {name: Path(folder, str(k)) for k, name in enumerate(calls)}
 
-        def take_turn(name: str) -> dict:
-            work, arguments = calls[name]
-            found = call_in_process(work, cache=str(places[name]), title=f"of {name}", **arguments)
-            size = sum(file.stat().st_size for file in places[name].rglob("*.tic"))
-            return {**found, "compiled_kB": 1e-3 * size}
+    def call(name: str) -> dict:
+        work, arguments = calls[name]
+        with tempfile.TemporaryDirectory() as cache:
+            found = call_in_process(work, cache=cache, title=f"of {name}", **arguments)
+            size = sum(file.stat().st_size for file in Path(cache).rglob("*.tic"))
+        return {**found, "compiled_kB": 1e-3 * size}
 
-        for result in pool.map(take_turn, turns):
-            results.append(result)
-            progress(len(results), len(turns))
-    return {name: results[k :: len(calls)] for k, name in enumerate(calls)}
+    found = {}
+    with ThreadPoolExecutor(workers) as pool:
+        for name, result in zip(calls, pool.map(call, calls)):
+            found[name] = result
+            progress(len(found), len(calls))
+    return found

@@ -120,7 +120,7 @@ def parser(
 ) -> Parser:
     """Parser with the options every experiment has; drivers: to choose from, where there are.
 
-    settings: further options, and numbers of the full and of the quick job, as of ``add_settings``.
+    settings: numbers of the full and of the quick job, which are options where they have a type.
     defaults: of options that every experiment has.
     """
     made = bare_parser(name, description)
@@ -134,7 +134,12 @@ def parser(
     made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
     add_sweep(made, whole(1, 1024))
     made.settings = settings
-    add_settings(made, settings, **defaults)
+    for name, (_, _, *option) in settings.items():
+        if option:
+            kind, words = option
+            words = words.replace("%", "%%")
+            made.add_argument(f"--{name.replace('_', '-')}", type=kind, help=words)
+    made.set_defaults(**defaults)
     return made
 
 
@@ -146,21 +151,7 @@ def bare_parser(name: str, description: str | None) -> Parser:
     return made
 
 
-def add_settings(made: ArgumentParser, settings: Settings, **defaults: Any) -> ArgumentParser:
-    """Add an option for each setting that has a type; returns the parser.
-
-    defaults: of options that the parser already has.
-    """
-    for name, (_, _, *option) in settings.items():
-        if option:
-            kind, words = option
-            words = words.replace("%", "%%")
-            made.add_argument(f"--{name.replace('_', '-')}", type=kind, help=words)
-    made.set_defaults(**defaults)
-    return made
-
-
-def take_settings(options: Namespace, settings: Settings) -> None:
+def _take_settings(options: Namespace, settings: Settings) -> None:
     """Give each setting that no option has set its value in the full or in the quick job."""
     for name, (full, quick, *_) in settings.items():
         if getattr(options, name, None) is None:
@@ -169,7 +160,7 @@ def take_settings(options: Namespace, settings: Settings) -> None:
 
 def begin(options: Namespace, settings: Settings = MappingProxyType({})) -> Path:
     """Take settings that ``main`` does not know; make the folder for the output."""
-    take_settings(options, settings)
+    _take_settings(options, settings)
     return Path(output_folder(options.out))
 
 
@@ -244,7 +235,7 @@ def main(
             return run_sweep(run, made, options, given)
         if options.workers is not None:
             raise InputError(f"workers must be left out without --sweep, got {options.workers}")
-        take_settings(options, made.settings)
+        _take_settings(options, made.settings)
         options.started = time.perf_counter()
         options.entry = made.entry or entry_of(run)
         options.command = [*made.prog.split()[1:], *given]

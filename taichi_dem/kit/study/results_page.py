@@ -95,7 +95,6 @@ def write_page(root: str, entries: Sequence[Entry], failed: Mapping[str, str]) -
     parts = list(dict.fromkeys(entry.part for entry in entries))
     text = environment.get_template("results_page.html").render(
         parts=[(part, [item for item in items if item.page.part == part]) for part in parts],
-        machines=list(dict.fromkeys(item.machine for item in items if item.machine)),
         quick=sum(item.quick for item in items if not item.failed),
         count=sum(not item.failed for item in items),
     )
@@ -157,7 +156,6 @@ def _shown(page, root, failed):
         seconds=_seconds(summary, run),
         output=run.get("output", ""),
         failed=failed or ("" if summary else "it has not been run"),
-        machine=_machine(summary),
     )
 
 
@@ -204,13 +202,3 @@ def _seconds(summary, run):
         [f"{spent['compile']:.1f} s compiling, {spent['run']:.1f} s computing"] if spent else []
     )
     return ", ".join(parts)
-
-
-def _machine(summary):
-    """Machine and versions of a result in words."""
-    if not summary:
-        return ""
-    machine, versions = summary["machine"], summary["versions"]
-    place = f"{machine['processor']}, {machine['cores']} cores, {machine['arch']}"
-    made = f"taichi {versions['taichi']}, numpy {versions['numpy']}"
-    return f"{place}; {made}, commit {versions.get('commit', 'unknown')}"

@@ -62,18 +62,13 @@ class Table:
         }
 
 
-def columns_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, list]:
-    """Rows, dicts with the same keys, as columns."""
-    return {name: [row[name] for row in rows] for name in rows[0]}
-
-
 def write_rows(path: Any, rows: Sequence, names: str | Sequence[str] | None = None) -> None:
     """Write rows as CSV.
 
     rows: dicts with the same keys, or cells under names of columns, a sequence or words.
     """
     if names is None:
-        write_csv(path, columns_of(rows))
+        write_csv(path, {name: [row[name] for row in rows] for name in rows[0]})
         return
     names = names.split() if isinstance(names, str) else names
     columns: list[Any] = list(zip(*rows)) or [()] * len(names)

@@ -14,8 +14,8 @@ from typing import Any
 
 from taichi_dem.kit.study.summary import figure
 from taichi_dem.kit.study.tables import write_rows
-from taichi_dem.kit.study.timing import Timing
 from taichi_dem.kit.terminal import print_table
+from taichi_dem.kit.timing import Timing
 
 _ANSWER_HEADER = ["I want", "take", "at a step of", "seconds", "evaluations", "error"]
 _POINT_HEADER = (

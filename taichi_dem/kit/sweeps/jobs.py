@@ -2,7 +2,6 @@
 
 import contextlib
 import hashlib
-import importlib
 import json
 import os
 import sys
@@ -104,10 +103,8 @@ def run_job(work: Work, row: Row) -> Record:
 
 
 def run_in_worker(work: Work | str, row: Row, arch: str) -> Record:
-    """Run one job with Taichi started on one CPU thread; work: also as main script's name."""
-    function = (
-        attrgetter(work)(importlib.import_module("__main__")) if isinstance(work, str) else work
-    )
+    """Run one job with Taichi started on one CPU thread; work: or its name in the main script."""
+    function: Work = attrgetter(work)(sys.modules["__main__"]) if isinstance(work, str) else work
     settings = runtime.settings()
     if settings and settings.threads != 1:
         raise InputError(
