@@ -1,6 +1,5 @@
-"""What a run says of its error for nothing: orders as measured."""
+"""What a run says of its error for nothing: a method has the order that it declares."""
 
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -56,18 +55,3 @@ def test_a_method_has_the_order_that_it_declares(name):
     assert orders == pytest.approx(order_of(make(step), damping, varying), abs=SEEN)
     word = "steps up to" if varying else "step"
     assert report.known_error.startswith(f"{word} {step:.3g} s, order {round(orders.mean())};")
-
-
-def test_a_method_of_one_s_own_declares_an_order_or_none_is_known():
-    """What it inherits may be wrong of it: forward Euler on the leapfrog's class is of order 1."""
-
-    @dataclass(frozen=True)
-    class Own(Uniform):
-        name = "own"
-
-    class Declared(Own):
-        def order(self, damped, varying):
-            return 3
-
-    assert order_of(Own(), False, False) is None and order_of(object(), True, True) is None
-    assert order_of(Declared(), True, True) == 3

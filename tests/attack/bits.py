@@ -6,12 +6,7 @@ import numpy as np
 
 from ca_damper import Batch, Oscillator, RigidMass, SceneTable
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, effects, runtime, simulate
-from taichi_dem.elasticity.rates import (
-    contact_eigenvalues,
-    dashpots_of,
-    inverse_root,
-    subset_rates,
-)
+from taichi_dem.elasticity.rates import contact_eigenvalues, dashpots_of, inverse_root, subset_rates
 from taichi_dem.kit.checkpoint import digest
 from taichi_dem.kit.elementary import fifth_root, sine_and_cosine
 from taichi_dem.kit.fixed_order import inverse

@@ -162,32 +162,3 @@ def run_apart(text, *arguments):
 def test_an_interrupt_at_any_moment_leaves_the_session_whole(seed):
     done = run_apart(_INTERRUPTED, seed)
     assert done.stdout.splitlines()[-1:] == ["survived"], done.stderr
-
-
-_FORKED = """
-import os
-from tests.attack.test_sessions import made
-from taichi_dem import InputError, runtime
-
-runtime.start(threads=2)
-made(0).advance_to(1)
-child = os.fork()
-if child == 0:
-    for call in (runtime.start, runtime.stop, lambda: made(0)):
-        try:
-            call()
-        except InputError as error:
-            print(error, flush=True)
-    os._exit(5)
-print(os.WEXITSTATUS(os.waitpid(child, 0)[1]))
-made(0).advance_to(1)
-print("survived")
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="forks")
-def test_a_fork_is_refused_in_words_and_ends():
-    done = run_apart(_FORKED)
-    lines = [line for line in done.stdout.splitlines() if not line.startswith("[Taichi]")]
-    assert lines[-2:] == ["5", "survived"], done.stderr
-    assert len(lines) == 5 and all("before this process was forked" in line for line in lines[:3])

@@ -23,12 +23,9 @@ LATER = ("--only", "--fillings")
 #: Lines that are checked later than their options, of which one experiment stands for all.
 LINES = {
     "output in a file": ("--out", "{file}/below"),
-    "output without a name": ("--out", "a\0b"),
     "no such option": ("--nonsense",),
-    "a word too many": ("extra",),
     "workers without a sweep": ("--workers", "2"),
     "no such table": ("--sweep", "none.csv"),
-    "table that is a folder": ("--sweep", "{folder}"),
     "mesh that is no file": ("--mesh", "{folder}"),
     "effect that is not there": ("--with", "dust"),
     "answer to an accuracy by a step": ("--accuracy", "1%", "--dt0", "1e-7"),

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ca_damper import InputError, Oscillator
+from ca_damper import Oscillator
 from ca_damper.accuracy.peak_search import PeakSearch
 
 
@@ -35,17 +35,3 @@ def test_the_peak_is_found_and_resolved_with_few_frequencies(damping, added):
     # Neighbours stand on the resonance: half of the peak or more.
     assert rms.min() > 0.5 * height
     assert set(around) <= set(curve.asked) and len(set(curve.asked)) == len(curve.asked) <= 24
-
-
-def test_a_search_leaves_a_range_that_may_be_extended():
-    curve = Curve(0.02)
-    ratio, *_ = PeakSearch(curve, 0.7, 0.9, True).run()
-    assert ratio == pytest.approx(1.0, abs=2e-3)
-    ratio, *_ = PeakSearch(Curve(0.02), 1.1, 1.3, True).run()
-    assert ratio == pytest.approx(1.0, abs=2e-3)
-
-
-@pytest.mark.parametrize(("low", "high", "side"), [(0.7, 0.9, "above"), (1.1, 1.3, "below")])
-def test_a_peak_outside_a_given_range_is_said_to_be_outside(low, high, side):
-    with pytest.raises(InputError, match=f"outside, {side}"):
-        PeakSearch(Curve(0.02), low, high, False).run()

@@ -5,13 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ca_damper.report.steady_state import (
-    FALSE_ALARMS,
-    LEAST_CYCLES,
-    mean_and_error,
-    period,
-    steady_part,
-)
+from ca_damper.report.steady_state import FALSE_ALARMS, mean_and_error, period, steady_part
 from taichi_dem.kit.bars.chance import t_quantile
 
 
@@ -47,16 +41,6 @@ def test_a_step_is_cut_off(end):
     part = steady_part(x, 1e-3)
     assert part.is_steady and end <= part.begin < 96
     assert part.mean == pytest.approx(5.0, abs=4e-3)
-
-
-@pytest.mark.parametrize("end", [70, 90, 110])
-def test_a_step_late_in_the_series_is_not_steady_or_its_bar_holds_the_end(end):
-    part = steady_part(np.where(np.arange(128) < end, 1.0, 5.0))
-    if part.is_steady:
-        # The first of its kind may be an event of many to come: three standard errors.
-        assert abs(part.mean - 5.0) <= 3.0 * part.error
-    else:
-        assert part.more >= LEAST_CYCLES
 
 
 @pytest.mark.parametrize("near", [0.0, 0.5])
@@ -105,12 +89,6 @@ def test_a_slow_approach_in_noise_ends_within_its_bar(time, noise):
         half = math.hypot(t_quantile(0.95, part.freedom) * part.error, part.drift)
         held += abs(part.mean - 1.0) <= half
     assert held >= 16
-
-
-def test_a_growing_series_is_never_steady():
-    for count in (64, 256, 1024):
-        assert not steady_part(np.exp(np.arange(count) / 200.0), 0.01).is_steady
-        assert not steady_part(1.0 * np.arange(count), 0.01).is_steady
 
 
 @pytest.mark.parametrize("cycles", [1, 2, 6])

@@ -38,12 +38,3 @@ def test_impacts_err_by_a_few_steps_a_rebound(dt):
     """
     errors = abs(found_impacts(dt) - impacts(5))
     assert np.all(errors <= dt * (1 + (1 + 1 / RESTITUTION + 2) * np.arange(5)))
-
-
-def test_a_column_falls_to_the_floor_and_stays_a_column():
-    """Ten in a column end in its ten lowest cells."""
-    start = tuple((4, 6 + k) for k in range(10))
-    box = Shaken(paper(accounting="landing+ejection", start=start), 10).run(30000)
-    height = box.device.snapshot(0)["position"][:, 1] / WIDTH
-    assert height.min() == pytest.approx(1.0, abs=0.2)
-    assert height.max() < 10.5

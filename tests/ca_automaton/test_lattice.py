@@ -17,13 +17,6 @@ BOX = Geometry(10, 16)
 WIDTH = 6e-3
 
 
-def test_every_neighbour_looks_back():
-    """Whoever is ahead has the cell straight behind in the opposite direction."""
-    ahead = BOX.neighbours()[:-1, :DIRECTIONS]
-    for cell, direction in np.argwhere(ahead < BOX.cells):
-        assert BOX.neighbours()[ahead[cell, direction], (direction + 3) % DIRECTIONS] == cell
-
-
 def test_inner_cells_have_six_neighbours_where_the_triangles_put_them():
     """Vertical neighbours one width away, oblique ones one column aside and half a width up."""
     ahead, centres = BOX.neighbours(), BOX.centres(WIDTH)

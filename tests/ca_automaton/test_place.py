@@ -9,15 +9,12 @@ from ca_damper.automaton.device import PAIRS
 from ca_damper.automaton.place.contacts import (
     common_velocity,
     dragged,
-    line_of_centres,
     most_drag,
-    speed_change,
 )
 from tests.ca_automaton.shaken import Shaken
 
 GRAVITY, WIDTH, MASS, DT = 10.0, 6e-3, 0.2e-3, 1e-4
 EPS = np.finfo(float).eps
-VECTORS = ti.types.ndarray(dtype=ti.f64, ndim=2)
 NUMBERS = ti.types.ndarray(dtype=ti.f64, ndim=1)
 
 
@@ -50,17 +47,6 @@ def rubbed(grains: NUMBERS, container: ti.f64, recoil: ti.f64, most: ti.f64):
     for k in range(count):
         slip = grains[k] - container
         grains[k] -= dragged(slip, ti.min(most, most_drag(slip, count * recoil)))
-
-
-@ti.kernel
-def met(grains: VECTORS, draws: NUMBERS, e: ti.f64, friction: ti.f64):
-    """Blows of pairs: grains[k] = (across, up) of both, before and after."""
-    for k in range(draws.shape[0]):
-        a, b = ti.Vector([grains[k, 0], grains[k, 1]]), ti.Vector([grains[k, 2], grains[k, 3]])
-        change = speed_change(a - b, line_of_centres(draws[k]), e, friction)
-        for i in ti.static(range(2)):
-            grains[k, i] += change[i]
-            grains[k, 2 + i] -= change[i]
 
 
 def test_a_heap_comes_to_rest():
@@ -105,21 +91,6 @@ def test_relative_speeds_of_blows_have_the_restitution():
     assert after - moved == pytest.approx(-0.75 * (grains - 0.3), rel=1e-14)
 
 
-def test_blows_of_pairs_keep_momentum_and_lose_energy():
-    """With friction and without; with e = 1 and no friction energy is kept."""
-    draw = np.random.default_rng(2)
-    before, draws = draw.normal(size=(500, 4)), draw.random(500)
-    for e, friction in ((0.75, 0.5), (0.0, 2.0), (1.0, 0.0)):
-        after = before.copy()
-        met(after, draws, e, friction)
-        total = [x[:, :2] + x[:, 2:] for x in (before, after)]
-        assert np.abs(total[0] - total[1]).max() < 20 * EPS
-        change = (after**2 - before**2).sum(axis=1)
-        assert change.max() <= 100 * EPS
-        if e == 1.0:
-            assert np.abs(change).max() < 100 * EPS
-
-
 def test_a_bounce_lower_than_a_cell_lands_after_2_v_over_g():
     """At 0.1 m/s, half a millimetre high."""
     box = Shaken(Automaton(start=((4, 0),)), 1, dt=DT, traced=500)
@@ -139,30 +110,6 @@ def test_rebounds_follow_theory_to_a_step():
     expected = first * (1 + np.concatenate([[0], np.cumsum(2 * 0.75 ** np.arange(1, 5))]))
     found = (np.flatnonzero(box.traces()[:, 0, 0])[:5] + 1) * DT
     assert found == pytest.approx(expected, abs=1.1 * DT)
-
-
-def test_grains_in_the_air_fall_with_g_and_push_nothing():
-    """Whatever their velocity across: momentum falls by m g t, and no force acts."""
-    box = Shaken(
-        Automaton(start=((4, 12),), columns=9), [1] * 5, seed=np.arange(5), dt=DT, traced=400
-    )
-    kick(box, (4, 12), across=0.1, up=0.2)
-    trace = box.run(400).traces()
-    assert not trace[:, :, 0].any()
-    fallen = MASS * (0.2 - GRAVITY * DT * np.arange(1, 401))
-    assert trace[:, :, 2] == pytest.approx(np.tile(fallen, (5, 1)).T, abs=1e-15)
-
-
-def test_places_do_not_move_when_the_lattice_steps():
-    """A grain at rest in the room without gravity, in a container that moves by five cells."""
-    grains = Automaton(start=((3, 8),), gravity=0.0)
-    box = Shaken(grains, 1, dt=DT, amplitude=30e-3)
-    for _ in range(10):
-        box.run(160)
-        x = 30e-3 * np.sin(2 * np.pi * 6.0 * box.done * DT)
-        position = box.device.snapshot(0)["position"][0, 1]
-        at_rest = 8.5 * WIDTH
-        assert position + x == pytest.approx(at_rest, abs=1e-5)
 
 
 def test_side_walls_take_grains_along():

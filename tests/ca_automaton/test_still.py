@@ -1,7 +1,6 @@
 """Particles in a container at rest lose energy, come to rest, and know no left and right."""
 
 import numpy as np
-import pytest
 
 from ca_damper.automaton.lattice import EMPTY, HELD, WALL
 from tests.ca_automaton.shaken import Shaken
@@ -29,25 +28,6 @@ def test_with_static_contact_all_are_held_at_the_end():
     for scene in kind:
         held = np.flatnonzero(scene == HELD)
         assert np.all(scene[held - 1] >= WALL)
-
-
-def test_without_static_contact_a_heap_only_trembles():
-    """The energy in motion is below 2 % of the start's: what gravity adds, blows take again."""
-    automaton = paper(accounting="landing+ejection")
-    box = Shaken(automaton, PARTICLES, traced=1).run(40000)
-    moving = 0.5 * MASS * (box.state()[1] ** 2).sum(axis=1)
-    assert np.all(moving < 0.02 * box.traces()[0, :, 3])
-
-
-@pytest.mark.parametrize("dt", [1.19e-3, 1e-5])
-def test_no_step_below_the_limit_blows_up(dt):
-    """No particle gets faster than the fall through the box: v^2 = 2 g h, and g dt for each of the
-    few steps by which a fall is seen late. Any dt < width / v_max.
-    """
-    box = Shaken(paper(), PARTICLES, dt=dt)
-    for _ in range(20):
-        box.run(round(min(0.05, 500 * dt) / dt))
-        assert box.state()[1].max() <= np.sqrt(2 * GRAVITY * 16 * WIDTH) + 4 * GRAVITY * dt
 
 
 def mean_columns(seeds):

@@ -81,15 +81,6 @@ def test_a_grain_without_contact_flies_every_step_on_its_parabola():
     assert found["velocity"][0] == pytest.approx([0.01, 0.5 - 9.8 * time], rel=1e-12)
 
 
-def test_grains_at_rest_on_the_floor_never_fly():
-    batch = Batch(Combined(), SceneTable(20, 1, 1e-4, 5.0))
-    batch.start()
-    batch.advance(20_000)
-    before = flights_of(batch, 0)
-    batch.advance(1000)
-    assert flights_of(batch, 0) == before
-
-
 def test_short_steps_see_the_container_recoil():
     """A blow of m on M, both free: the speeds of parting and of approach have the ratio e.
 

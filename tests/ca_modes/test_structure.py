@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ca_damper import InputError, ModalStructure, Oscillator
+from ca_damper import ModalStructure
 from tests.ca_modes.frames import MASSES, STIFFNESS, damping_of, frame
 
 FREQUENCIES = np.array([0.3, 1.5, 3.6, 5.0, 9.0])
@@ -50,20 +50,3 @@ def test_modes_left_out_leave_a_slow_translation_whole(modes):
     left = frame().shapes[:, modes:]
     omega = 2.0 * np.pi * frame().frequencies[modes:]
     assert flexible == pytest.approx(left @ (left[2] / omega**2), rel=1e-9)
-
-
-def test_one_place_is_an_oscillator():
-    o = Oscillator()
-    made = ModalStructure([o.mass], [o.natural_frequency], o.damping_ratio, [[o.mass**-0.5]])
-    wanted = o.transfer(FREQUENCIES, 0.02)
-    assert made.transfer(FREQUENCIES, [0.02])[:, 0] == pytest.approx(wanted, rel=1e-12)
-    assert made.recoil(0) == pytest.approx(1.0 / o.mass)
-
-
-def test_a_mode_without_damping_has_no_steady_state_at_its_frequency():
-    made = ModalStructure.from_matrices(MASSES, STIFFNESS, [0.02, 0.0, 0.02])
-    own = made.frequencies
-    for ask in (made.transfer, lambda frequency: made.force_transfer(frequency, 0)):
-        assert np.isfinite(ask(own[[0, 2]])).all()
-        with pytest.raises(InputError, match=f"no steady state .*, got {own[1]:.6g} Hz"):
-            ask(own)

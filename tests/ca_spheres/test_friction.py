@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ca_damper import Batch, SceneTable
 from ca_damper.spheres import Spheres
 from ca_damper.spheres.contact_law import shear_ratio, wall_numbers
-from taichi_dem import Checkpoint
 from tests.ca_spheres.rig import Rig
 
 G, MU, DT, RADIUS, MASS = 9.8, 0.5, 2e-5, 3e-3, 0.2e-3
@@ -84,34 +82,6 @@ def test_a_pile_of_three_stands():
     assert np.abs(velocity).max() < 1e-12
 
 
-def on_a_slope(angle, rotation=False):
-    """A sphere on a floor that is tilted by an angle with tan = its share of the friction."""
-    gravity = (G * np.sin(angle), G * np.cos(angle))
-    filling = Spheres(gravity=gravity, rotation=rotation, **HISTORY)
-    return Rig(filling, 1, DT).put((0.005, RADIUS), (0.0, 0.0)), gravity
-
-
-def test_a_block_holds_on_a_slope_below_the_angle_of_friction():
-    rig, (across, _) = on_a_slope(np.arctan(0.98 * MU))
-    before = rig.run(10_000).state()[0][0]
-    place, velocity = (array[0] for array in rig.run(50_000).state())
-    assert np.abs(place - before).max() < 50_000 * 2e-18
-    assert np.abs(velocity).max() < 1e-12
-    # It slips in the first blows only, which last for less than a millisecond.
-    assert 0.0 < place[0] - 0.005 < 0.5 * across * 1e-6
-
-
-def test_a_sphere_rolls_down_a_slope_at_five_sevenths():
-    """m a = m g sin - F and (2/5) m r^2 a / r = F r, with the lever shorter by the overlap.
-
-    It rolls while F = (2/7) m g sin stays below mu m g cos.
-    """
-    rig, (across, _) = on_a_slope(np.arctan(0.5 * MU), rotation=True)
-    (before,) = rig.run(2500).state()[1]
-    (after,) = rig.run(2500).state()[1]
-    assert (after[0] - before[0]) / (2500 * DT) == pytest.approx(5.0 / 7.0 * across, rel=1e-3)
-
-
 def sticking_blow(speed, across, **numbers):
     """Motion of a sphere in an elastic blow on a wall without slip, by the law in continuous time.
 
@@ -166,26 +136,6 @@ def test_a_change_of_step_within_a_blow_stretches_its_spring_by_the_way(steps):
     assert 0.0 < error / coarse < 1.0
 
 
-def test_a_sphere_that_comes_back_to_a_wall_has_no_spring_left():
-    """Its second blow has the bits of one of a sphere that starts from the flight between both."""
-    # Without a dashpot the push, and so the spring, lasts to the last step of a blow.
-    rig = Rig(Spheres(wall_restitution=1.0, **HISTORY), 1, DT, seed=[1, 1])
-    rig.put((0.01, 0.004), (0.1, -0.3))
-    springs = rig.device.history.wall_spring
-    while not springs[0, 2][0]:
-        rig.run(1)
-    rig.run(100)
-    bodies = rig.device.bodies
-    for field in (bodies.position, bodies.velocity):
-        field[bodies.stride] = field[0]
-    rig.device.history.wall_step[bodies.stride] = -3
-    for wall in range(4):
-        springs[bodies.stride, wall] = [0.0, 0.0]
-    (first, second), (velocity, other) = rig.run(5000).states()
-    assert np.array_equal(first, second)
-    assert np.array_equal(velocity, other)
-
-
 def test_springs_only_keep_and_lose_energy():
     """Elastic blows of rough spheres: all of the motion's energy, and what springs hold, falls.
 
@@ -202,47 +152,3 @@ def test_springs_only_keep_and_lose_energy():
     assert ((energy - lowest) < bound * energy[0]).all()
     assert energy[-1] < 0.9 * energy[0]
     assert rig.divergence_code() == 0
-
-
-@pytest.mark.parametrize(
-    ("places", "speeds"),
-    [
-        ([(0.03, RADIUS)], [(0.2, -0.2)]),
-        ([(0.027, 0.05), (0.033, 0.05)], [(0.1, 0.1), (-0.1, -0.1)]),
-    ],
-)
-def test_energy_holds_what_the_springs_store(places, speeds):
-    """In the middle of a blow that sticks, most of the tangential motion is in the spring.
-
-    On the floor, or of two spheres on each other.
-    """
-    rig = Rig(Spheres(gravity=0.0, **ROUGH, **HISTORY), len(places), 1e-6).put(places, speeds)
-    first = rig.energy()
-    least, before = first, rig.state()[1][0]
-    while rig.done < 400:
-        velocity = rig.run(1).state()[1]
-        least = min(least, 0.5 * MASS * (velocity**2).sum())
-        if velocity[0] @ before > 0.0:
-            # As the overlap grows a spring loses F^2 / 2 (1/k - 1/k'), which is heat.
-            assert 0.8 * first < rig.energy() < 1.001 * first
-    assert least < 0.2 * first
-
-
-def test_springs_survive_a_checkpoint(tmp_path):
-    """The run goes on from a file with the bits of one that was never stopped."""
-
-    def made():
-        table = SceneTable([20, 40], 1, DT, 6.0, 1e-3)
-        batch = Batch(Spheres(rotation=True, **HISTORY), table, measured_cycles=2)
-        batch.start()
-        return batch
-
-    checkpoint = Checkpoint(str(tmp_path / "run.npz"), every_wall_s=1e-3)
-    batch = made()
-    with batch.checkpointed(checkpoint, None, {"job": "test"}):
-        batch.run(2, 0)
-    expected = batch.run(0, 2).record
-    again = made()
-    with again.checkpointed(None, checkpoint.path, {"job": "test"}):
-        again.run(2, 0)
-    assert np.array_equal(again.run(0, 2).record, expected)

@@ -119,15 +119,6 @@ def test_printed_law_rebounds_less_at_higher_speed(partner):
     assert wanted[0] - wanted[-1] > 0.05 and wanted[1] == pytest.approx(0.75, abs=1e-9)
 
 
-def test_wall_and_pair_have_their_own_restitution():
-    options = Spheres(gravity=0.0, restitution=0.9, wall_restitution=0.4)
-    (wall,) = wall_rebound(options, [0.5], [1e-6])
-    (pair,) = pair_rebound(options, [0.5], [1e-6])
-    # The bound of 3/4 grows with the dashpot's strength, four times as large at 0.4.
-    bound = error_bound(wall_numbers(Spheres()), "tsuji", 0.5, 1e-6)
-    assert (wall, pair) == pytest.approx((0.4, 0.9), abs=4 * bound)
-
-
 def phases(options, dt, speed=0.5):
     """Rebounds in which the wall is met at 16 phases of a step, eight scenes at a time.
 
@@ -173,17 +164,3 @@ def test_restitution_converges_with_the_order_of_the_dashpots_onset(damping):
     # The force begins like t^p: order 1 + p, 5/4 or 3/2, as the leapfrog's 2 is higher.
     rebounds, _ = halvings(Spheres(damping=damping, gravity=0.0))
     assert slope(DTS, rebounds - 0.75) == pytest.approx(1.0 + POWERS[damping], abs=0.15)
-
-
-def test_spheres_never_pull_each_other():
-    # A dashpot this strong would pull while the spheres part; the clamped force only pushes.
-    rig = Rig(Spheres(restitution=0.05, gravity=0.0), 2, 1e-6)
-    rig.put(PAIR, [(0.25, 0.0), (-0.25, 0.0)])
-    before = 0.5
-    for _ in range(300):
-        velocity = rig.run(20).state()[1]
-        approach = velocity[0, 0] - velocity[1, 0]
-        # One rounding a step at most raises it.
-        assert approach <= before + 20 * 1e-16
-        before = approach
-    assert before < 0.0

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from _effects import KNOWN_LISTS, WARM, FrozenBatch, FrozenScene, scene_of
-from ca_damper.automaton.lattice import DIRECTIONS, HELD
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
 from taichi_dem.mesh.shapes import bar
 
@@ -29,22 +28,6 @@ def test_a_frozen_batch_goes_on_with_the_bits_of_its_run():
         assert first.seconds(0) > 0.0
         for name, values in first.batch.snapshot(3).items():
             assert np.array_equal(values, wanted[name]), name
-
-
-def test_without_static_contact_the_same_grains_are_released_where_they_are():
-    made, states = batches("automaton", 1e-4, {}, {"accounting": "landing"})
-    for one in made:
-        one.freeze(states, 1)
-    held, free = (np.array([kinds(one, k) for k in range(len(states))]) for one in made)
-    assert (held == HELD).sum() > 5 and not (free == HELD).any()
-    # Wherever a particle was, there is one.
-    assert np.array_equal((held < DIRECTIONS) | (held == HELD), free < DIRECTIONS)
-
-
-def kinds(frozen, state):
-    """Contents of the cells of its scenes in a state."""
-    frozen.memory.write(frozen.states[state])
-    return frozen.batch.engine.table.in_use(frozen.batch.device.cells.kind)
 
 
 def test_a_known_list_leaves_out_nothing():

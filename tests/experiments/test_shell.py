@@ -1,23 +1,17 @@
-"""Experiments in a user's shell: JSON alone, readers that leave, Ctrl-C and going on again."""
+"""Experiments in a user's shell: JSON alone, kept results, Ctrl-C and going on again."""
 
 import json
 import os
 import re
 import signal
-import subprocess
 import time
-import warnings
 
 import pytest
 
 import blast_fracture
-from taichi_dem import InputError
 from taichi_dem.kit import study
-from taichi_dem.kit.files import write_text
 from taichi_dem.kit.study import cached, digest
-from tests import arch
 from tests.experiments.contract import command
-from tests.processes import users_environment
 from tests.terminal import phases_of, run_in_terminal
 
 pytestmark = pytest.mark.experiment
@@ -37,50 +31,6 @@ def test_json_is_the_summary_alone_and_the_bar_stays_on_the_terminal(tmp_path):
     said = (tmp_path / "said").read_text()
     assert said == (folder / "summary.json").read_text() + "\n"
     assert json.loads(said)["experiment"] == SMALLEST
-
-
-def test_a_reader_that_leaves_costs_nothing(tmp_path):
-    line = command(SMALLEST, "--quick", "--out", tmp_path / "out")
-    script = '"$@" | head -1; exit "${PIPESTATUS[0]}"'
-    options = {"capture_output": True, "text": True, "env": users_environment()}
-    done = subprocess.run(["bash", "-c", script, "bash", *line], **options)
-    assert done.returncode == 0 and phases_of(done.stderr)[1] == [], done.stderr
-    assert (tmp_path / "out" / "summary.json").is_file()
-    assert (tmp_path / "out" / "energy.png").stat().st_size > 1000
-
-
-@pytest.fixture
-def ended(tmp_path, capsys):
-    """``ended(run, *options)``: exit code, standard output and standard error of a study."""
-
-    def run_study(run, *options):
-        given = ["--threads", "2", "--arch", arch.chosen(), "--out", str(tmp_path), *options]
-        code = study.main(run, study.parser("none", "What for?"), given)
-        return code, *capsys.readouterr()
-
-    return run_study
-
-
-@pytest.mark.filterwarnings("always")
-def test_json_and_errors_are_kept_apart(ended):
-    def loud(options):
-        print("a line")
-        warnings.warn("a warning", stacklevel=1)
-        write_text(os.path.join(options.out, "summary.json"), "{}")
-
-    def refuse(_):
-        print("a line")
-        raise InputError("until must be 1, got 2")
-
-    assert ended(loud, "--json") == (0, "{}\n", "warning: a warning\n")
-    assert ended(refuse, "--json") == (2, "", "until must be 1, got 2\n")
-
-
-def test_a_summary_of_an_earlier_run_is_not_passed_on(ended, tmp_path):
-    (tmp_path / "summary.json").write_text("{}")
-    os.utime(tmp_path / "summary.json", (1.0, 1.0))
-    code, said, _ = ended(lambda _: None, "--json")
-    assert (code, said) == (2, "")
 
 
 def test_a_kept_result_is_computed_once_for_the_same_settings_and_sources(tmp_path):

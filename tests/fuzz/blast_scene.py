@@ -207,7 +207,3 @@ class BlastScene:
         if draws.chance(0.2):
             motion["shift"] = size * draws.power(-9.0, -2.0) * draws.rng.standard_normal(rows)
         return motion
-
-    def __str__(self):
-        made = f"{self.scene!r}, {self.method!r}" if self.method else "not made"
-        return f"{self.kind.method}, {self.steps} steps: {made}"

@@ -82,6 +82,3 @@ class DamperScene:
         for name in ("friction", "wall_friction"):
             drawn[name] = draws.near(0.5)
         return {**drawn, "diameter": width}
-
-    def __str__(self):
-        return f"{self.filling!r} on the {self.kind.mount}, {self.table!r}"

@@ -6,7 +6,6 @@ import sys
 
 import pytest
 
-from taichi_dem import sweep
 from taichi_dem.kit.sweeps.dependencies import Dependencies
 from taichi_dem.kit.sweeps.jobs import Journal, jobs_of, run_job
 from tests.processes import users_environment
@@ -55,26 +54,22 @@ FILES = {"job.py": JOB, "parts.py": PARTS, "deeper.py": DEEPER, "input.txt": "0.
 #: What is changed into what, in which file.
 EDITS = {
     "an entry of an array": ("job.py", "[1.0, 2.0]", "[1.0, 2.5]"),
-    "an element of a set": ("job.py", '"z"}', '"w"}'),
     "an operator": ("job.py", "far)]", "far)][1:]"),
     "a helper of a helper": ("job.py", "3.0 * x", "4.0 * x"),
     "a default": ("job.py", "shift=1.5", "shift=1.6"),
     "a value closed over": ("job.py", "closing(2.0)", "closing(3.0)"),
     "an argument of a partial": ("job.py", "partial(pow, 0.5)", "partial(pow, 0.6)"),
     "a decorated function": ("job.py", "x + 5.0", "x + 6.0"),
-    "a default of a class": ("job.py", "peak: float = 4e8", "peak: float = 5e8"),
     "a method": ("job.py", "/ 8.0", "/ 9.0"),
     "a constant of a class": ("job.py", "tolerance = 1e-3", "tolerance = 1e-4"),
     "a base of a class": ("job.py", "Solver(Load)", "Solver(Exception)"),
     "a function from another file": ("parts.py", "x + offset", "x - offset"),
-    "a constant taken from a module": ("parts.py", "constant = 8.0", "constant = 9.0"),
     "a constant of a file's import": ("deeper.py", "BASE = 4.0", "BASE = 5.0"),
 }
 #: Changes after which the rows need not be run again.
 HARMLESS = {
     "a comment": ("job.py", "3.0 * x", "3.0 * x  # by hand\n\n"),
     "another function": ("job.py", "return 10.0", "return 11.0"),
-    "the order of a set": ("job.py", '{"x", "y", "z"}', '{"z", "y", "x"}'),
 }
 
 
@@ -154,11 +149,6 @@ def test_a_key_is_that_of_any_other_process(place):
         line = [sys.executable, "-c", say]
         said.add(subprocess.run(line, env=environment, **options).stdout)
     assert len(said) == 1 and len(said.pop().strip()) == 24
-
-
-def test_a_sweep_says_what_its_rows_do_not_notice(tmp_path):
-    table = sweep(jobs.counted, {"x": [3], "folder": [str(tmp_path)]}, workers=1, progress=None)
-    assert table.attrs["unseen"] == ("files whose names counted computes, by listdir",)
 
 
 def test_a_record_with_a_changed_digit_is_not_believed(tmp_path):

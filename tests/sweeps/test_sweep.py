@@ -10,9 +10,7 @@ import distributed
 import numpy as np
 import pytest
 
-from taichi_dem import InputError, sweep
-from taichi_dem.kit.sweeps.jobs import Journal
-from taichi_dem.kit.sweeps.table import checked_rows
+from taichi_dem import sweep
 from tests.processes import users_environment
 from tests.scenes import ROOT
 from tests.sweeps import jobs
@@ -114,31 +112,3 @@ def test_failures_are_rows_and_only_what_may_end_otherwise_is_run_again(tmp_path
     assert found["error"][6].startswith("its process was lost 4 times")
     kept = {path.read_text() for path in (tmp_path / "jobs").iterdir()}
     assert len(kept) == 4
-
-
-def test_ctrl_c_keeps_what_is_finished(tmp_path, client):
-    def interrupt(progress):
-        if progress.share >= 0.04:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        sweep(jobs.squared, {"x": range(50)}, client=client, out=tmp_path, progress=interrupt)
-    assert len(list((tmp_path / "jobs").iterdir())) == 2
-
-
-def test_a_folder_of_another_sweep_is_refused(tmp_path):
-    Journal(tmp_path, "tests.sweeps.jobs:squared")
-    with pytest.raises(InputError, match=r"of tests.sweeps.jobs:counted, got .*jobs:squared$"):
-        sweep(jobs.counted, {"x": [1]}, workers=1, out=tmp_path, **QUIET)
-
-
-def test_all_forms_of_a_table_give_the_same_rows_to_the_bit(tmp_path):
-    numbers = np.random.default_rng(1).standard_normal(50) * 10.0 ** np.arange(-25, 25)
-    rows = [{"x": k, "y": y, "w": "1_0"} for k, y in enumerate(numbers.tolist())]
-    lines = [f"{row['x']},{row['y']!r},1_0" for row in rows]
-    (tmp_path / "t.csv").write_text("\n".join(["x,y, w", *lines]))
-    columns = {"x": np.arange(50), "y": numbers, "w": 50 * ["1_0"]}
-    for table in (rows, columns, tmp_path / "t.csv", iter(rows)):
-        found = checked_rows(table)
-        assert found == rows
-        assert [type(value) for value in found[0].values()] == [int, float, str]
