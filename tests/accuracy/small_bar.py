@@ -12,13 +12,9 @@ def struck_bar(damping=True):
     return Scene(bar(0.1, 0.05, (3, 2, 2)), CONCRETE, [blow, *([effects.BondDamping()] * damping)])
 
 
-def laws(peak, blown="left", held="right"):
-    """A blow [Pa] that comes back as tension, and all that may happen then."""
-    breaks = [effects.Softening(), effects.ShearSlip(), effects.SphereContact(), effects.Friction()]
-    blow = effects.GasPressure(blown, peak=peak, rise=1e-5, decay_ratio=1.5)
-    return [blow, effects.BondDamping(), *breaks, effects.Fixed(held)]
-
-
-def broken_bar(parts=(2, 1, 1)):
-    """Bar of twelve bodies that its blow breaks."""
-    return Scene(bar(0.1, 0.05, parts), CONCRETE, laws(peak=9e8))
+def broken_bar():
+    """Bar of twelve bodies that its blow breaks, as it comes back as tension."""
+    blow = effects.GasPressure("left", peak=9e8, rise=1e-5, decay_ratio=1.5)
+    bonds = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
+    acting = [blow, *bonds, effects.SphereContact(), effects.Friction(), effects.Fixed("right")]
+    return Scene(bar(0.1, 0.05, (2, 1, 1)), CONCRETE, acting)

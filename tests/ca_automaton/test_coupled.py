@@ -1,9 +1,9 @@
-"""The automaton in a container on its spring: rigid limit, momentum, energy."""
+"""The automaton in a container on its spring: rigid limit, momentum, energy, effects."""
 
 import numpy as np
 import pytest
 
-from ca_damper import Automaton, Batch, Oscillator, SceneTable
+from ca_damper import Automaton, Batch, Oscillator, SceneTable, needed_effects
 from ca_damper.plot import Box
 from taichi_dem.kit.allocation import assign, values
 from tests.paper import expected, paper
@@ -74,3 +74,20 @@ def test_energy_of_heavy_grains_never_grows():
     assert np.all(total[0] > 0.0)
     assert np.all(np.diff(total, axis=0) <= 1e-6 * total[0])
     assert np.all(total[-1] < 0.9 * total[0])
+
+
+def ran(filling, particles, amplitude):
+    """The report of three cycles of a container that stands still, or shakes."""
+    batch = Batch(filling, SceneTable(particles, 1, 1e-4, 6.0, amplitude))
+    with expected(batch):
+        batch.start()
+    batch.run(3, 0)
+    return batch.report()
+
+
+def test_one_particle_meets_the_floor_and_nobody_else():
+    report = ran(paper(), 1, 0.0)
+    assert needed_effects(report).inactive == ("pairs", "ejection", "static contact")
+    uses = {use.effect: use.events for use in report.effect_activity}
+    assert uses["landing"] > 0
+    assert needed_effects(ran(paper(), 40, 2e-3)).droppable == ()

@@ -6,7 +6,6 @@ from ca_damper.automaton.lattice import EMPTY, HELD, WALL
 from tests.ca_automaton.shaken import Shaken
 from tests.paper import paper
 
-GRAVITY, MASS, WIDTH = 10.0, 0.2e-3, 6e-3
 PARTICLES = [1, 10, 50, 100, 159]
 
 

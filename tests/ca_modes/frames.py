@@ -9,9 +9,9 @@ STIFFNESS = np.array([[900.0, -500.0, 0.0], [-500.0, 800.0, -300.0], [0.0, -300.
 RATIOS = np.array([0.01, 0.02, 0.03])
 
 
-def frame(modes=3, masses=MASSES, stiffness=STIFFNESS, ratios=RATIOS):
+def frame(modes=3, masses=MASSES):
     """Three storeys on a base."""
-    return ModalStructure.from_matrices(masses, stiffness, ratios[:modes], modes=modes)
+    return ModalStructure.from_matrices(masses, STIFFNESS, RATIOS[:modes], modes=modes)
 
 
 def two_storeys():

@@ -66,12 +66,12 @@ def test_blows_at_several_places_act_on_the_mobility_of_the_structure():
         assert found[:, 1] == pytest.approx(np.abs(mobility(carried)) @ rubbed, rel=1e-9, abs=1e-12)
 
 
-def batch_on(structure, places, filling=None, particles=1, seeds=1):
+def batch_on(structure, places):
     """A batch of one group without gravity, on a base that stands still."""
-    grains = Automaton(rules="place", gravity=0.0) if filling is None else filling
     mount = ModalMount(structure, places)
-    count = [particles] * len(places) + [0] * (mount.group - len(places))
+    count = [1] * len(places) + [0] * (mount.group - len(places))
     base = {"excitation": excitation.sines(1.0, 0.0, 1.0), "recorded_samples": 1}
-    batch = Batch(grains, SceneTable(count, seeds, 1e-4, 1.0), structure=mount, **base)
+    grains = Automaton(rules="place", gravity=0.0)
+    batch = Batch(grains, SceneTable(count, 1, 1e-4, 1.0), structure=mount, **base)
     batch.start()
     return batch

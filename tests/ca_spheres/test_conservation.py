@@ -1,4 +1,4 @@
-"""Momentum, angular momentum and energy of spheres in a container that moves as told."""
+"""Momentum and energy of spheres in a container that moves as told."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from ca_damper.spheres import Spheres
 from tests.ca_spheres.rig import Rig
 
-G, DT, MASS, RADIUS = 9.8, 2e-5, 0.2e-3, 3e-3
+G, DT, MASS = 9.8, 2e-5, 0.2e-3
 EPS = np.finfo(float).eps
 TILTED = (G * np.sin(0.5), G * np.cos(0.5))
 LAWS = [{}, {"friction_law": "history", "rotation": True, "gravity": TILTED}]

@@ -8,7 +8,7 @@ import pytest
 from ca_damper.spheres import Spheres
 from tests.ca_spheres.rig import Rig
 
-DT, NAN = 2e-5, math.nan
+DT = 2e-5
 
 
 def test_random_starts_fill_the_box_without_overlap():

@@ -2,8 +2,12 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from _meshes import group_area, mirrored_copies
+from _scaling import even_cuts, share_costs
 from _trust.blast import laws
 from ca_damper.theory.bouncing import Fall, RecordedFall
 from cost_of_accuracy_blast import SPLIT, displacement_error, energy_error, faces_error
@@ -11,18 +15,14 @@ from taichi_dem import CONCRETE, PAPER_BLOCK, read_mesh
 from taichi_dem.kit.study import Timing
 from taichi_dem.kit.study.work_precision import Point, answers, cheapest
 from taichi_dem.mesh.mesh import volumes
-from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.output.hole_monitor import Attenuation, attenuation_of
 from taichi_dem.state.model import Model
 
-EDGE, BAR = 2e-3, bar(0.2, 0.1, (2, 1, 1))
 
-
-def outcome(moved=((3.0, 0.0, 0.0), (0.0, 4.0, 0.0)), broken=(1, 2), failure="", **energy):
+def outcome(moved=((3.0, 0.0, 0.0), (0.0, 4.0, 0.0)), broken=(1, 2), **energy):
     terms = {**dict.fromkeys(SPLIT, 0.0), "load_work": 10.0, **energy}
-    figures = {"evaluations": 1, "cpu_s": 1.0, "reached_s": 1.0, "residual": 0.0}
-    return {"moved": moved, "broken": broken, "energy": terms, "failure": failure, **figures}
+    return {"moved": moved, "broken": broken, "energy": terms}
 
 
 def test_errors_of_a_blast_are_those_of_its_displacement_faces_and_energy():
@@ -120,3 +120,27 @@ def test_impacts_are_found_between_samples():
     late, high = RecordedFall.of(history, fall, mass).errors(4)
     assert np.abs(late).max() < 1e-12
     assert np.abs(high).max() <= 0.5 * 10.0 * (0.5 * 1.7e-3) ** 2
+
+
+# Whole numbers: their sums have no rounding, so bounds hold to the last bit.
+COSTS = arrays(float, st.integers(1, 60), elements=st.integers(0, 1000).map(float))
+
+
+@given(COSTS, st.integers(1, 70))
+def test_shares_hold_everything_once_and_no_more_than_the_mean_and_one_item(cost, workers):
+    """A cut lies less than an item before its place on the curve, the next at most on its own.
+
+    Rounding: the places on the curve are products and quotients of the total, exact to 2 eps.
+    """
+    cuts = even_cuts(cost, workers)
+    assert len(cuts) == workers + 1 and cuts[0] == 0 and cuts[-1] == len(cost)
+    assert (np.diff(cuts) >= 0).all()
+    slack = 4.0 * np.finfo(float).eps * cost.sum()
+    assert share_costs(cost, cuts).max() <= cost.sum() / workers + cost.max() + slack
+
+
+def test_the_papers_static_shares():
+    """Element i meets at most n - i others: with n = 5, half of 4 + 3 + 2 + 1 + 0 is 5."""
+    cost = np.arange(4, -1, -1)
+    cuts = even_cuts(cost, 2)
+    assert cuts.tolist() == [0, 1, 5] and share_costs(cost, cuts).tolist() == [4.0, 6.0]
