@@ -15,6 +15,7 @@ from taichi_dem import (
     checked_mesh,
     effects,
 )
+from taichi_dem.kit.validation import positive
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.stability.step_report import bond_steps
 from tests.fuzz.draws import Draws
@@ -95,7 +96,8 @@ class BlastScene:
         draws = self.draws
         if draws.chance(0.2):
             count = draws.one_of(1, 2, 3, 4)
-            return with_neighbours(size, {k: draws.near(1.0) for k in range(count)})[0]
+            heights = {k: positive("height", draws.near(1.0)) for k in range(count)}
+            return with_neighbours(size, heights)[0]
         if draws.chance(0.5):
             return single(draws.given(size))
         return pair(draws.given(size), draws.near(size))

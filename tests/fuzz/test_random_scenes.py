@@ -22,7 +22,6 @@ KINDS = (*blast_scene.KINDS, *damper_scene.KINDS)
 MENDED = {
     41: "0 times infinity where contacts have no damping, in the report of limited dashpots",
     3967: "a runaway overflowed the look for shared volume before it was named",
-    8586: "a neighbour of infinite height met a warning of NumPy before it was refused",
     313: "dashpots stopped the first motion within a step: heat was booked wrong, unsaid",
     6096: "grains by the rules of place that were pushed out of their box had no name",
     42037: "a search for bodies whose place was no number wrote where no cell is",
