@@ -90,6 +90,15 @@ def is_drawn(picture):
         return min(image.size) >= 300 and len(np.unique(np.asarray(image.convert("L")))) > 20
 
 
+@pytest.mark.slow
+def test_a_quick_bench_measures_waits_and_shares_of_the_floors(tmp_path):
+    done = start("bench", "--quick", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    content = json.loads((tmp_path / "bench.json").read_text())
+    assert content["first_scene_cold_seconds"] > content["second_scene_seconds"] > 0.0
+    assert any(one["share_of_floor"] for one in content["figures"])
+
+
 @QUICK
 def test_a_diverging_run_names_body_and_step_and_keeps_the_last_good_output(tmp_path):
     light = "--without", "body_contact,sticking_friction", "--out", tmp_path
