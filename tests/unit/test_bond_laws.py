@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, step_report
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform
 from taichi_dem.effects import MixedMode, ShearSlip, SlipWeakening, Softening
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.laws.base import NEAR, Effect
-from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.shapes import pair, single
 
 LAWS = {
     "paper": [Softening(), ShearSlip()],
@@ -135,17 +135,3 @@ def test_air_drag_is_a_load_of_one_class():
     np.testing.assert_allclose(velocity, expected, rtol=4 * steps * np.finfo(float).eps)
     account = simulation.energy_balance.account()
     assert abs(account["residual"]) < 1e-12 * simulation.energy_balance.start_energy
-
-
-def renamed(effect):
-    """The same law under another name, a class of the user's own."""
-    return type("Own", (type(effect),), {"name": "own"})(*vars(effect).get("arguments", ()))
-
-
-def test_laws_by_other_names_lose_no_criterion_of_the_step_report():
-    listed = [effects.BondDamping(), effects.SphereContact(), effects.Friction()]
-    mesh = bar(0.2, 0.1, (2, 1, 1))
-    known = step_report(Scene(mesh, CONCRETE, listed))
-    own = step_report(Scene(mesh, CONCRETE, [renamed(effect) for effect in listed]))
-    assert list(own.limits) == list(known.limits) and len(own.limits) == 4
-    assert all(np.array_equal(own.limits[name], known.limits[name]) for name in known.limits)

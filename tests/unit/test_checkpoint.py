@@ -6,14 +6,11 @@ import os
 
 import numpy as np
 import pytest
-import taichi as ti
 
 import ca_damper
 import taichi_dem
 from taichi_dem import Checkpoint, InputError
-from taichi_dem.kit.allocation import FieldTree
 from taichi_dem.kit.checkpoint import read_checkpoint, write_checkpoint
-from taichi_dem.kit.field_memory import FieldMemory, fields_of
 from taichi_dem.kit.restart import CheckpointWriter
 
 IDENTITY = {"version": "1", "mesh": "a cube"}
@@ -34,11 +31,6 @@ def test_what_is_written_comes_back_bit_by_bit(path):
     for name, array in ARRAYS.items():
         assert arrays[name].dtype == array.dtype
         assert np.array_equal(arrays[name], array)
-
-
-def test_another_identity_is_refused_by_name(path):
-    with pytest.raises(InputError, match="of another mesh: a cube, not mine"):
-        read_checkpoint(path, {**IDENTITY, "mesh": "mine"})
 
 
 #: Whose representation tells a checkpoint which run it is of.
@@ -131,43 +123,3 @@ def test_a_full_disk_leaves_the_last_good_checkpoint_and_says_so(tmp_path, monke
             writer.save()
         assert path.read_bytes() == good
         assert os.listdir(tmp_path) == ["run.npz"]
-
-
-@ti.dataclass
-class Grain:
-    size: ti.f64
-    place: ti.types.vector(2, ti.f64)
-    kind: ti.i32
-
-
-class Part:
-    """Fields of every kind, some of them in a list."""
-
-    def __init__(self):
-        self.listed = [ti.field(ti.i64, shape=()), {"deep": ti.field(ti.i32, shape=(2, 3))}]
-        self.matrix = ti.Matrix.field(3, 2, ti.f64, shape=4)
-        self.record = ti.field(ti.f64, shape=(2, 3, 4))
-        self.vector = ti.Vector.field(3, ti.f64, shape=5)
-        # Its members do not lie side by side.
-        self.grain = Grain.field(shape=6)
-
-
-def test_field_memory_reads_and_writes_what_taichi_does():
-    """Entries and components lie in the order of the arrays that Taichi makes of fields."""
-    with FieldTree():
-        part = Part()
-    random = np.random.default_rng(3)
-    fields = {one.name: one.field for one in fields_of(part)}
-    memory = FieldMemory(part)
-    first = {}
-    for name, field in fields.items():
-        values = random.integers(1, 1000, field.to_numpy().shape)
-        field.from_numpy(first.setdefault(name, values.astype(field.to_numpy().dtype)))
-    read = memory.read()
-    assert set(read) == set(first)
-    for name, field in fields.items():
-        assert np.array_equal(read[name], first[name])
-        field.from_numpy(np.full_like(first[name], 7))
-    memory.write(read)
-    for name, field in fields.items():
-        assert np.array_equal(field.to_numpy(), first[name])

@@ -11,29 +11,6 @@ import taichi_dem.step
 from taichi_dem.kit.kernel_source_cache import filled
 
 
-class Sum:
-    """A sum of a member and a number."""
-
-    def __init__(self):
-        self.first = 2
-
-    @ti.func
-    def of(self, x):
-        return self.first + x
-
-
-@ti.data_oriented
-class Sums:
-    """Sums in a kernel."""
-
-    def __init__(self):
-        self.one = Sum()
-
-    @ti.kernel
-    def of(self, x: ti.i32) -> ti.i32:
-        return self.one.of(x)
-
-
 @ti.func
 def _unknown(x):
     return x + _nowhere  # noqa: F821
@@ -45,10 +22,6 @@ def _calls_it():
         _unknown(i)
 
 
-def test_functions_in_a_class_are_its_methods():
-    assert Sums().of(3) == 5
-
-
 def test_an_error_names_its_place_in_every_function_on_the_way():
     for _ in range(2):
         with pytest.raises(ti.TaichiCompilationError) as caught:
@@ -56,13 +29,6 @@ def test_an_error_names_its_place_in_every_function_on_the_way():
         said = str(caught.value)
         assert re.findall(r"in (_\w+):\n", said) == ["_calls_it", "_unknown"], said
         assert "return x + _nowhere" in said and 'Name "_nowhere" is not defined' in said
-
-
-@pytest.mark.parametrize(
-    "line", ["\tx = 1  \n", "    y = '  a'\n", "  \n", "", "é = 2", 10000 * "a "]
-)
-def test_a_line_is_filled_as_by_textwrap(line):
-    assert filled(line, tabsize=4, width=9999) == textwrap.fill(line, tabsize=4, width=9999)
 
 
 def test_lines_of_the_package_are_filled_as_by_textwrap():

@@ -5,7 +5,6 @@ import sys
 
 import pytest
 
-from taichi_dem.kit import llvm_options
 from tests.processes import users_environment
 from tests.scenes import ROOT
 
@@ -45,8 +44,3 @@ def additions(folder, *words):
 @pytest.mark.skipif(sys.platform != "linux", reason="it is switched off on Linux alone")
 def test_a_session_leaves_loops_unrepeated(tmp_path):
     assert additions(tmp_path / "off", "off") < 8 <= additions(tmp_path / "on")
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="programs are ELF files on Linux")
-def test_a_file_without_the_names_has_no_addresses():
-    assert llvm_options.addresses(sys.executable, [b"no such name"]) == {}

@@ -5,7 +5,6 @@ Residual slip of bonds that hold: measured, reported, warned of.
 Estimates before a run judge each connected part by its own stress, motion and weight.
 """
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -16,87 +15,20 @@ from taichi_dem import (
     Scene,
     Simulation,
     Uniform,
-    checked_mesh,
     effects,
     estimated_effects,
     join,
     shapes,
 )
-from taichi_dem.kit.allocation import assign, values
-from taichi_dem.kit.certificate import NEEDED, NEGLIGIBLE, UNCLEAR
-from taichi_dem.mesh.shapes import bar, pair, single
-from taichi_dem.report.energy_balance import TERMS, injected_words, open_account, unexplained_share
-from taichi_dem.report.missing_effects import unserved
-from taichi_dem.report.resolution import MOST_SLIP
+from taichi_dem.kit.allocation import values
+from taichi_dem.kit.certificate import NEEDED, NEGLIGIBLE
+from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.state.model import Model
 from tests.probe import BondProbe
-from tests.scenes import beside
 
 EDGE, STEP = 0.05, 1e-7
-TWO = beside(single(EDGE), single(EDGE), [1.0, 0.0, 0.0])
-LOSSLESS = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0, friction=0.0)
-BONDS = (effects.BondDamping(), effects.Softening(), effects.ShearSlip())
-BROKEN_ONLY = effects.SphereContact(3, outer_faces=False)
-EPS = np.finfo(float).eps
 BLOCK = shapes.block(0.1, element=0.1)
 HALVES = join(BLOCK, BLOCK.moved(by=(0.101, 0.0, 0.0)), names=["left", "right"])
-
-
-@pytest.mark.parametrize(
-    ("material", "listed", "needs"),
-    [
-        (CONCRETE, [], {"tension", "shear", "dashpot", "contact", "bodies"}),
-        (LOSSLESS, [], {"tension", "shear", "contact", "bodies"}),
-        (CONCRETE, [*BONDS, BROKEN_ONLY], {"friction"}),
-        (LOSSLESS, [*BONDS, effects.SphereContact()], set()),
-        (CONCRETE, [*BONDS, effects.SphereContact(), effects.Friction()], {"creep"}),
-        (CONCRETE, [effects.Softening().silent(), *BONDS[::2]], {"tension", "contact", "bodies"}),
-    ],
-)
-def test_an_effect_is_watched_for_only_where_none_serves_the_material(material, listed, needs):
-    """And what to list is what a scene takes by default."""
-    found, usual = unserved(Model(pair(), material, listed)), Scene(pair(), material, "all").effects
-    assert set(found) == needs
-    assert {need.effect for need in found.values()} <= {type(effect).__name__ for effect in usual}
-
-
-def missed(mesh, moved, *listed, broken=False):
-    """What a report warns of where bodies stand elsewhere; no step is compiled.
-
-    moved: function of their centres (n, 3) [m].
-    """
-    simulation = Simulation(Scene(mesh, CONCRETE, listed), Uniform(STEP))
-    if broken:
-        assign(simulation.state.broken_tick, 0)
-    simulation.state.set_motion(moved(simulation.model.centre))
-    simulation._open_balance()
-    if broken:
-        simulation.missing_effects.sample(0.0)
-    return simulation.report().needs
-
-
-WITHIN = "pairs of bodies are within each other"
-SHARED = "bodies 0 and 1 share"
-RELEASED = "bodies overlap where a bond has been released"
-
-
-@pytest.mark.parametrize("listed", [(), (BROKEN_ONLY,)])
-@pytest.mark.parametrize(
-    ("shift", "met"), [([2.0 * EDGE, 0, 0], 0), ([0, 1.001 * EDGE, 0], 0), ([0.1 * EDGE, 0, 0], 1)]
-)
-def test_bodies_within_each_other_are_found_and_nearness_is_not(listed, shift, met):
-    said = missed(TWO, lambda centre: np.array([centre[0], centre[0] + shift]), *listed)
-    assert len([what for what in said if WITHIN in what or SHARED in what]) == met
-
-
-def test_a_solid_in_one_piece_overlaps_nothing_and_a_broken_one_does():
-    """Pressed together by a tenth: bodies that a bond holds together are no two pieces."""
-    whole = missed(bar(0.4, 0.1, (4, 1, 1)), lambda centre: 0.9 * centre)
-    assert not [what for what in whole if WITHIN in what or RELEASED in what]
-    for share in (0.9, 0.999):
-        parted = missed(pair(EDGE), lambda centre, share=share: share * centre, broken=True)
-        assert len([what for what in parted if WITHIN in what]) == (share == 0.9)
-        assert len([what for what in parted if RELEASED in what]) == 1
 
 
 def passed(probe):
@@ -153,86 +85,6 @@ def test_a_limit_passed_between_two_samples_is_seen():
     assert simulation.missing_effects.strain[0] < 1e-2
 
 
-@pytest.mark.parametrize(("speed", "missing"), [(0.0, ()), (0.1, ("BondDamping",))])
-def test_damping_is_missed_only_where_bonds_strain_beyond_rounding(speed, missing):
-    """At rest, wherever the solid lies; and pulled at one end."""
-    away = bar(0.5, 0.1, (5, 1, 1))
-    away = checked_mesh(away.points + 100.0, away.tetrahedra, away.groups)
-    found = pulled(away, speed).report().missing_effects
-    assert tuple(m.effect for m in found) == missing
-
-
-@pytest.mark.parametrize(
-    "terms",
-    [
-        {"load_work": 150.0, "support_work": -50.0, "friction": 100.0},
-        # Bodies that had 200 J at the start and have half of it.
-        {"friction": 100.0, "kinetic": 100.0},
-        {"load_work": 120.0, "kinetic": 180.0, "residual": 20.0},
-    ],
-)
-def test_the_share_is_of_work_and_of_the_energy_at_the_start(terms):
-    def told(injected):
-        account = {**dict.fromkeys(TERMS, 0.0), "injected": injected, **terms}
-        return injected_words({**account, "kinetic": account["kinetic"] + injected})
-
-    assert "2.01 J by overlaps" in told(2.01)
-    assert told(1.99) == told(0.0) == ""
-
-
-def test_an_open_account_is_said():
-    account = {"kinetic": 1.0, "bond_dashpot": -3.0, "residual": 2.1}
-    assert unexplained_share(account) == pytest.approx(2.1 / 4.0)
-    assert "2.1 J unexplained" in open_account(account, 0.0)[0]
-    assert open_account({**account, "residual": 1.9}, 0.0) == ()
-    assert open_account({"kinetic": 1e-20, "residual": 1e-19}, 1e-20) == ()
-    assert open_account({**account, "residual": math.nan}, 0.0)
-
-
-def slid(share):
-    """Simulation of the pair, sampled with a residual slip of a share of an edge in a unit."""
-    simulation = Simulation(Scene(pair(EDGE), CONCRETE, [effects.ShearSlip()]), Uniform(1e-8))
-    simulation.start()
-    write_slip(simulation, share)
-    simulation.sample()
-    return simulation
-
-
-def write_slip(simulation, share):
-    """Let the second unit of the bond have slipped by a share of an edge, oblique to the axes."""
-    field = simulation.state.fields()["shear_slip_slip"]
-    slip = values(field)
-    slip[1, :2] = share * EDGE * np.array([0.6, -0.8])
-    assign(field, slip)
-
-
-def test_share_is_that_of_the_shortest_edge():
-    """To the rounding of a length over another."""
-    report = slid(0.03).report()
-    (found,) = report.bond_slip
-    assert found.share == pytest.approx(0.03, abs=16 * EPS)
-    assert found.where == 0 and found.count == 0
-
-
-def test_far_slip_is_warned_of_and_an_effect_that_weakens_is_missed():
-    report = slid(2.0 * MOST_SLIP).report()
-    assert any("bond 0 " in need and "by 10 %" in need for need in report.needs)
-    advice = report.advice()
-    assert [one.effect for one in advice.missing] == ["SlipWeakening"]
-    table = advice.table()
-    assert table["effect"].tolist() == ["shear_slip", "SlipWeakening"]
-    assert table["advice"].tolist() == ["keep", "list it"] and table["where"][1] == "bond 0"
-
-
-def test_largest_of_all_recordings_is_kept():
-    """Not that of the end: bonds that slipped far are often released later."""
-    simulation = slid(0.1)
-    write_slip(simulation, 0.02)
-    simulation.sample()
-    (found,) = simulation.report().bond_slip
-    assert found.share == pytest.approx(0.1, abs=16 * EPS) and found.count == 1
-
-
 def groups(mesh=HALVES, **motion):
     found = estimated_effects(Scene(mesh, CONCRETE, "auto", **motion), 1e-3)
     return {one.effect: one.group for one in found}, {one.effect: one.verdict for one in found}
@@ -271,15 +123,6 @@ def test_weight_is_judged_by_what_it_breaks_also_beside_a_projectile(held, verdi
     scene = Scene(mesh, CONCRETE, "auto", loads=[effects.Fixed("held_left")], velocity=AWAY)
     found = {one.effect: one for one in estimated_effects(scene, 0.05)}["gravity"]
     assert found.verdict == verdict
-
-
-def test_a_part_at_rest_that_falls_needs_weight_beside_a_projectile():
-    """Nothing is known of what moves it: it may be hit; where it cannot be, weight is all."""
-    mesh = join(STUB, SHOT, names=["free", "shot"])
-    at_it = {"shot": (0.0, -300.0, 0.0)}
-    for velocity, verdict in ((at_it, UNCLEAR), (AWAY, NEEDED), (None, NEEDED)):
-        found = estimated_effects(Scene(mesh, CONCRETE, "auto", velocity=velocity), 0.05)
-        assert {one.effect: one.verdict for one in found}["gravity"] == verdict
 
 
 def test_a_part_keeps_its_estimates_beside_any_other():

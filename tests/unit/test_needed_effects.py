@@ -15,29 +15,23 @@ from taichi_dem import (
     Scene,
     Simulation,
     Uniform,
-    checked_mesh,
     effects,
-    join,
     needed_effects,
     simulate,
 )
 from taichi_dem.engine import ENGINES
 from taichi_dem.kit.allocation import assign
-from taichi_dem.mesh.shapes import bar, pair, single
-from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
+from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.report.effects import effect_uses
 from taichi_dem.report.energy_balance import TERMS
 from taichi_dem.report.readings import Run
-from taichi_dem.simulate import run_simulation
 from taichi_dem.state.model import Model
-from tests.scenes import apart
 
 #: Far below the strength of concrete: a block of some 1 kg that falls from rest for 1e-5 s.
 STEP, UNTIL = 1e-7, 1e-5
 GENTLE = effects.BondDamping, effects.Softening, effects.Gravity
 LAWS = effects.Softening, effects.ShearSlip, effects.BondDamping
 METHOD = Uniform(1e-7)
-TWO = join(single(), single().moved(by=(1.0, 0.0, 0.0)))
 module = sys.modules[needed_effects.__module__]
 
 
@@ -94,50 +88,12 @@ def used(listed, bits=0, marked=0, heat=0.0, **account):
     return {use.effect: use for use in effect_uses(run, balance, filled)}
 
 
-@pytest.mark.parametrize(
-    ("bits", "touched", "rubbed"), [(0, 0, 0), (CONTACT, 1, 0), (CONTACT | RUBBED, 1, 1)]
-)
-def test_contact_and_friction_are_idle_only_where_the_step_noted_neither(bits, touched, rubbed):
-    """With heat or without: the step sees every push."""
-    found = used([effects.SphereContact(), effects.Friction()], bits)
-    names = "sphere_contact", "friction"
-    assert [found[name].events for name in names] == [touched, rubbed]
-    assert [found[name].idle for name in names] == [not touched, not rubbed]
-
-
 @pytest.mark.parametrize("place", range(3))
 def test_every_load_and_support_has_a_bit_of_its_own(place):
     """Loads first, in the order of the list, then supports."""
     listed = [effects.Gravity(), effects.GasPressure("left"), effects.Fixed("right")]
     found = used(listed, 1 << place)
     assert [use.events for use in found.values()] == [int(k == place) for k in range(3)]
-
-
-def test_what_steers_is_never_negligible():
-    """It acted, and took a thousandth of a thousandth of the work put in."""
-    listed = [effects.Softening(), effects.SphereContact(), effects.Friction()]
-    found = used(listed, CONTACT | RUBBED, marked=1, load_work=1.0, softening=1e-9)
-    assert all(use.is_active and not use.negligible(1e-3) for use in found.values())
-
-
-@pytest.mark.parametrize("strain, share, negligible", [(0.0, 1.0, False), (1.0, 1e-6, True)])
-def test_dashpots_are_compared_with_what_bonds_hold_not_with_a_fall(strain, share, negligible):
-    """A body that falls far takes work by the joule: its vibration is damped all the same."""
-    account = {"bond_dashpot": 1e-6, "bond_strain": strain, "load_work": 1e6}
-    use = used([effects.BondDamping()], heat=1e-6, **account)["bond_damping"]
-    assert use.share == pytest.approx(share, rel=1e-5)
-    assert use.negligible(1e-3) == negligible
-
-
-def test_round_off_in_bonds_is_no_damping():
-    """A bar in free fall, far from the origin: its bonds shake by last digits only."""
-    mesh = bar(0.5, 0.1, (5, 1, 1))
-    mesh = checked_mesh(mesh.points + 100.0, mesh.tetrahedra, {})
-    scene = Scene(mesh, CONCRETE, [make() for make in GENTLE])
-    advice = needed_effects(simulate(scene, method=Uniform(STEP), until=1e-4, samples=1), 0.0)
-    (damping,) = [use for use in advice.uses if use.effect == "bond_damping"]
-    assert damping.energy_J > 0.0 and damping.rounding
-    assert "bond_damping" in advice.droppable and "bond_damping" not in advice.inactive
 
 
 def pulled(*listed, speed=2.0):
@@ -167,78 +123,3 @@ def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(scene
         assert frame.position.tobytes() == other.position.tobytes()
     assert silent.report.effects == without.report.effects
     assert silent.report.energy_balance == without.report.energy_balance
-
-
-def test_advice_tries_what_can_be_silent_on_the_engine_of_the_run():
-    """What is hardly moved needs no law of failure."""
-    result = result_of(pulled(*(law() for law in LAWS), speed=1e-9))
-    before = len(ENGINES._engines)
-    advice = needed_effects(result)
-    assert len(ENGINES._engines) == before
-    assert {"softening", "shear_slip"} <= set(advice.droppable)
-
-
-def recorded(energy=(1.0, 2.0), heat=(0.0, 1e-3), broken=(np.nan, 1e-5, 2e-5), speed=3.0, slow=1.0):
-    """A result of two samples and parts, one slow; of three bonds two broke, by default."""
-    history = {
-        "time_s": np.array([0.0, 1.0]),
-        "kinetic_J": np.array(energy),
-        "slip_J": np.array(heat),
-        "residual_J": np.random.default_rng().random(2),
-        "largest_speed_m_s": np.array([0.0, speed]),
-    }
-    report = SimpleNamespace(round_off_J=2e-10, until_s=1.0)
-    model = SimpleNamespace(body_mass=np.array([1.0, 4.0]), mesh=TWO)
-    return SimpleNamespace(
-        series=history,
-        peak_speed=np.array([speed, slow]),
-        broken_time=np.array(broken),
-        report=report,
-        model=model,
-    )
-
-
-@pytest.mark.parametrize(
-    ("other", "share"),
-    [
-        ({}, 0.0),
-        ({"energy": (1.0, 2.02)}, 0.01),
-        # Of energies, of the largest of them all; nothing that slipped is a joule.
-        ({"heat": (0.0, 3e-3)}, 1e-3),
-        ({"broken": (np.nan, 1e-5, 3e-5)}, 0.5),
-        ({"broken": (np.nan, 1e-5, np.nan)}, np.inf),
-        # 2e-10 J move 1 kg at 2e-5 m/s.
-        ({"speed": 3.0 + 1.9e-5}, 0.0),
-        ({"speed": 3.0 + 2.1e-5}, 7e-6),
-        # Beside a faster part a slow one is judged by its own speed.
-        ({"slow": 1.01}, 0.01),
-    ],
-)
-def test_difference_of_runs_is_a_share_of_what_was_recorded(other, share):
-    found = module.recorded_difference(recorded(), recorded(**other))
-    assert found == pytest.approx(share, rel=1e-4, abs=1e-15)
-
-
-def test_a_motion_that_was_set_is_set_again():
-    """Else the run without them would be at rest, and differ by all."""
-    idle = (effects.Softening(), effects.ShearSlip())
-    simulation = Simulation(Scene(apart(2), CONCRETE, idle), Uniform(STEP))
-    simulation.state.set_motion(simulation.model.centre, None, [[0, 0, 0], [5.0, 2.0, 1.0]])
-    thrown = run_simulation(simulation, until=1e-5, samples=2, progress=None)
-    assert set(needed_effects(thrown).droppable) == {effect.name for effect in idle}
-    # A report alone shows nothing of a run without them.
-    assert thrown.report.advice().droppable == ()
-
-
-def test_what_differs_is_kept_though_its_share_is_small():
-    """Dashpots of a bond that is pushed: what is shown is the difference of the two runs."""
-    listed = [effects.BondDamping(), effects.PrescribedMotion("left", (1.0, 0.0, 0.0))]
-    ways = {"method": Uniform(STEP), "until": 2e-6, "samples": 2, "progress": None}
-    result, without = (simulate(Scene(pair(), CONCRETE, of), **ways) for of in (listed, listed[1:]))
-    share = result.report.effect_activity[0].share
-    assert 0.0 < share < 0.999
-    advice = needed_effects(result, 0.999)
-    differs = module.recorded_difference(result, without)
-    assert advice.shown == {"bond_damping": differs} and differs > 0.0
-    assert ("bond_damping" in advice.droppable) == (differs <= 0.999)
-    assert needed_effects(result, 0.5 * share).shown == {}

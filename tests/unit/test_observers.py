@@ -1,6 +1,5 @@
 """An observer and a receiver see the run as its result tells it and change no bit."""
 
-import csv
 import os
 
 import numpy as np
@@ -15,7 +14,6 @@ from taichi_dem import (
     Every,
     Receivers,
     Scene,
-    SimulationDiverged,
     Uniform,
     simulate,
 )
@@ -32,20 +30,6 @@ def run(*observers, steps=200, **options):
     scene = Scene(BAR, CONCRETE, [], velocity=V, spin=W)
     options = {"method": Uniform(STEP), "until": steps * STEP, "samples": 4, **options}
     return simulate(scene, progress=None, observers=list(observers), **options)
-
-
-@pytest.mark.parametrize(
-    ("when", "steps"),
-    [
-        (Every(steps=6), [0, 6, 12, 18, 20]),
-        # 2.5 steps: the nearest of two equally near ones is the even one, as Python rounds.
-        (Every(time_s=2.5 * STEP), [0, 2, 5, 8, 10, 12, 15, 18, 20]),
-        (Every(samples=2), [0, 13, 20]),
-        (At((0.0, 7.4 * STEP, 20 * STEP)), [0, 7, 20]),
-    ],
-)
-def test_steps_of_calls(when, steps):
-    assert sorted(when.marks(20, STEP, 3)) == steps
 
 
 def test_an_observer_sees_the_run_as_its_result_tells_it_and_changes_no_bit():
@@ -84,13 +68,6 @@ def test_a_resumed_run_calls_for_what_is_left(tmp_path):
     assert left["step"].tolist() == [15, 20]
 
 
-def test_a_diverged_run_has_been_observed_until_then():
-    times = Collector(Every(samples=1), time=lambda view: view.time_s)
-    with pytest.raises(SimulationDiverged) as caught:
-        run(times, method=Uniform(2e-5), until=1e-2, samples=500)
-    assert times["time"].tolist() == caught.value.result.series["time_s"].tolist() != []
-
-
 @pytest.fixture(scope="module")
 def result(taichi_session):
     often = Receivers({"often": (0.1, 0.05, 0.05)}, when=Every(steps=10))
@@ -114,17 +91,6 @@ def test_points_of_a_turning_bar_move_on_their_circles(result):
         )
         assert not got.displacement[0].any()
         np.testing.assert_allclose(got.velocity[0], V + np.cross(W, arm), rtol=1e-12)
-
-
-def test_receivers_have_times_of_their_own_and_one_table(result, tmp_path):
-    result.write(tmp_path)
-    with open(tmp_path / "receivers.csv", encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == 2 * 5 + 21
-    often, last = result.receivers["often"], rows[-1]
-    assert (last["receiver"], float(last["time_s"])) == ("often", often.time_s[-1])
-    assert [float(last[f"v{a}_m_s"]) for a in "xyz"] == often.velocity[-1].tolist()
-    assert [float(last[f"u{a}_m"]) for a in "xyz"] == often.displacement[-1].tolist()
 
 
 def test_a_point_belongs_to_the_body_it_was_drawn_from():

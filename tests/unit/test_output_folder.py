@@ -8,9 +8,7 @@ import sys
 import pytest
 
 from taichi_dem import CONCRETE, At, Checkpoint, Collector, Scene, Uniform, simulate
-from taichi_dem.kit import files
 from taichi_dem.kit.checkpoint import Interrupted
-from taichi_dem.kit.files import output_folder
 from taichi_dem.mesh.shapes import pair
 from tests.bad_input.refusals import assert_refused
 from tests.processes import users_environment
@@ -23,13 +21,6 @@ with claiming():
     output_folder(sys.argv[1])
     print("held", flush=True)
     sys.stdin.read()
-"""
-KILLED = """
-import os, sys
-from taichi_dem.kit.files import renamed_when_done
-with renamed_when_done(sys.argv[1]) as temporary:
-    open(temporary, "w").write("half")
-    os.kill(os.getpid(), 9)
 """
 
 
@@ -51,17 +42,6 @@ def test_the_second_run_in_a_folder_is_refused_until_the_first_has_been_killed(t
     other.communicate()
     simulate(scene, output=tmp_path, **job)
     assert "report.json" in os.listdir(tmp_path)
-
-
-def test_what_a_killed_run_left_is_removed_and_nothing_else(tmp_path):
-    program(KILLED, tmp_path / "run.npz").communicate()
-    assert len(os.listdir(tmp_path)) == 1
-    # Those of a process that lives, and of another machine, may be at work.
-    kept = {f".a.{files._HOST}-{os.getpid()}.part.csv", ".a.elsewhere-1.part", "run.1.part"}
-    for name in kept:
-        (tmp_path / name).write_text("x")
-    output_folder(tmp_path)
-    assert set(os.listdir(tmp_path)) == kept
 
 
 def test_a_signal_saves_the_run_which_goes_on_with_the_bits_of_one_never_stopped(tmp_path):

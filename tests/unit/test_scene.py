@@ -4,15 +4,12 @@ A scene that begins in motion runs as one whose bodies were set in motion by han
 """
 
 import pickle
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from taichi_dem import (
     CONCRETE,
-    Checkpoint,
-    InputError,
     Multirate,
     Scene,
     Simulation,
@@ -21,7 +18,7 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem.mesh.shapes import bar, pair, placed_together
-from taichi_dem.scene import outer_faces_warnings, scene_warnings
+from taichi_dem.scene import outer_faces_warnings
 from taichi_dem.simulate import run_simulation
 from tests.scenes import beside
 
@@ -69,20 +66,6 @@ def test_parts_without_contact_are_told_where_they_may_come_to_meet(shift, liste
     assert told(shift, *listed, effects.SphereContact(outer_faces=False))
 
 
-@pytest.mark.parametrize(
-    ("friction", "damping", "count"),
-    [(effects.Friction, 0.0, 1), (effects.Friction, 1.0, 0), (effects.StickingFriction, 0.0, 0)],
-)
-@pytest.mark.parametrize("contact", [effects.SphereContact(), effects.BodyContact()])
-def test_friction_that_no_dashpot_carries_is_told_before_a_run(contact, friction, damping, count):
-    """A scene is damped by the dashpots of its contact, and no other."""
-    lossless = {"contact_damping": 0.0, "normal_damping": 0.0, "shear_damping": 0.0}
-    material = replace(CONCRETE, **{**lossless, contact.constants[1]: damping})
-    made = Scene(pair(), material, [contact, friction()])
-    assert len(scene_warnings(made)) == count
-    assert made.damped() == (damping > 0.0) and not made.damped(touching=False)
-
-
 def scene(**options):
     return Scene(START, CONCRETE, [], **options)
 
@@ -120,16 +103,6 @@ def test_a_reset_begins_with_the_motion_of_its_scene(by_hand):
     assert not simulation.state.motion()["velocity"].any()
 
 
-def test_a_checkpoint_belongs_to_the_motion_it_began_with(by_hand, tmp_path):
-    moving, path = scene(velocity=ROWS[0], spin=ROWS[1]), tmp_path / "half.npz"
-    options = {"method": METHOD, "samples": 2, "frames": 1, "progress": None}
-    simulate(moving, until=UNTIL / 2, checkpoint=Checkpoint(path), **options)
-    resumed = simulate(moving, until=UNTIL, resume=path, **options)
-    assert resumed.frames[-1].position.tobytes() == by_hand.frames[-1].position.tobytes()
-    with pytest.raises(InputError, match="is of another initial motion"):
-        simulate(scene(velocity=-ROWS[0], spin=ROWS[1]), until=UNTIL, resume=path, **options)
-
-
 def test_one_spin_turns_all_bodies_as_one_rigid_body():
     spin = np.array([0.0, 3.0, -4.0])
     motion = scene(velocity=(1.0, 0.0, 0.0), spin=spin).initial_motion
@@ -146,15 +119,6 @@ def test_body_groups_move_and_turn_each_for_itself():
     assert (motion["velocity"][:COUNT] == [1.0, 0.0, 0.0]).all()
     assert not motion["spin"][:COUNT].any()
     np.testing.assert_allclose(motion["velocity"][COUNT:], expected, atol=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("speed", "aside", "expected"), [(5.0, 0.0, True), (-5.0, 0.0, False), (5.0, 1.0, False)]
-)
-def test_parts_without_contact_are_told_where_they_may_meet(speed, aside, expected):
-    rows = np.repeat([[speed, 0.0, 0.0], [0.0, 0.0, 0.0]], COUNT, axis=0)
-    made = Scene(beside(START, START, [3.0, aside, 0.0]), CONCRETE, [], velocity=rows)
-    assert bool(outer_faces_warnings(made)) == expected
 
 
 @pytest.mark.parametrize("method", [Uniform(1e-6, 1e-8), Multirate(1e-6, 1e-8)])

@@ -11,7 +11,7 @@ from taichi_dem import CONCRETE, Scene, Simulation, SimulationDiverged, Uniform,
 from taichi_dem.kit.allocation import assign
 from taichi_dem.mesh.shapes import pair, placed_together, single
 from taichi_dem.mesh.tetrahedra import eighths
-from taichi_dem.report.shared_volume import DEEP, NOTABLE, SharedVolume
+from taichi_dem.report.shared_volume import DEEP, SharedVolume
 from tests.scenes import apart, quaternions
 
 EDGE = 1.0
@@ -125,20 +125,3 @@ def test_bodies_that_overlap_at_the_start_are_told_at_once_and_rest_as_they_are(
     for sentences in ([str(one.message) for one in told], report.needs):
         assert [words in sentence for sentence in sentences] == [True] * (share > 0.0)
     assert not any(report.energy_balance.values())
-
-
-def test_the_worst_pair_is_kept_and_survives_a_checkpoint():
-    looked = Looked(apart(4, EDGE))
-    centre = looked.model.centre
-    seen = []
-    for time_s, shift in ((1.0, 0.2), (2.0, 0.02), (3.0, 0.5)):
-        position = centre.copy()
-        position[1] = position[0] + [shift * EDGE, 0.0, 0.0]
-        position[3] = position[2] + [0.1 * EDGE, 0.0, 0.0]
-        seen.append(looked.shares(position, None, time_s))
-    worst = looked.volume.worst
-    assert (worst.bodies, worst.time_s, worst.deep) == ((0, 1), 2.0, 2)
-    assert worst.share == seen[1][0, 1] > NOTABLE
-    again = SharedVolume(looked.simulation.parts)
-    again.resume(looked.volume.saved())
-    assert again.worst == worst and np.array_equal(again.place, looked.volume.place)

@@ -31,21 +31,6 @@ from taichi_dem.step_control import CRITERIA
 EDGE = 0.05
 
 
-def test_the_limit_of_a_step_is_that_of_contacts_or_else_of_bonds():
-    """A bar with spheres of six a face: its contact dashpots bind; without them its bonds'.
-
-    Those of bodies are a bond's: on one face they allow more than the bonds on all faces.
-    """
-    mesh = bar(0.4, 0.1, (4, 1, 1))
-    spheres = step_report(Scene(mesh, CONCRETE, "all", loads=[effects.SphereContact()]))
-    assert set(spheres.binding) == {"contact_dashpot"}
-    assert set(step_report(Scene(mesh, CONCRETE, "all")).binding) == {"bond_dashpot"}
-    bonded = step_report(Scene(mesh, CONCRETE, [effects.BondDamping()]))
-    rates = bond_rates(mesh, topology_of(mesh), CONCRETE.density, dashpots_of(CONCRETE))
-    assert np.array_equal(bonded.step_s, dashpot_step(rates))
-    assert set(bonded.binding) == {"bond_dashpot"}
-
-
 def multiplier(dt, stiffness, damping):
     """Largest growth a step of the leapfrog v += -dt (k x + c v), x += dt v of a unit mass."""
     kept = 1.0 - dt * damping

@@ -19,7 +19,7 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem.kit.allocation import assign
-from taichi_dem.mesh.shapes import bar, single
+from taichi_dem.mesh.shapes import single
 from tests.turns import matrix, quaternion
 
 OBLIQUE = (1.0, 0.0, 0.0), (0.6, 0.8, 0.0), (0.2, -0.3, 0.9)
@@ -41,18 +41,6 @@ def motion_of(mesh, held, method, spin=(0.0, 0.0, 0.0)):
         Scene(mesh, CONCRETE, listed, spin=spin), method=method, until=2e-5, frames=1, progress=None
     )
     return result.frames[-1].velocity, result.frames[-1].rotation
-
-
-def test_the_order_of_rollers_changes_nothing_but_rounding():
-    names = ("left", "bottom", "back")
-    held = [effects.Roller(name, normal) for name, normal in zip(names, OBLIQUE)]
-    found = [
-        motion_of(bar(0.1, 0.1, (1, 1, 1)), order, Uniform(1e-8)) for order in permutations(held)
-    ]
-    scale = np.abs(found[0][0]).max()
-    for velocity, rotation in found[1:]:
-        assert np.abs(velocity - found[0][0]).max() < 1e-9 * scale
-        assert np.abs(rotation - found[0][1]).max() < 1e-9
 
 
 def on_planes(*normals, spin=(0.0, 0.0, 0.0)):
@@ -175,18 +163,3 @@ def test_a_delayed_pulse_is_the_same_run_later():
         for name in ("position", "velocity", "rotation"):
             assert getattr(frame, name).tobytes() == getattr(later, name).tobytes(), name
     assert frames[0][-1].velocity.any()
-
-
-def test_holes_fire_one_after_the_other_and_each_has_its_columns():
-    mesh, delay = bar(0.2, 0.1, (4, 1, 1)), 2.0**-20
-    first = effects.GasPressure("left", 1e7, 2.0**-21)
-    second = effects.GasPressure("right", 1e7, 2.0**-21, start=delay)
-    options = {"method": METHOD, "until": 2 * delay, "samples": 16, "progress": None}
-    both = simulate(Scene(mesh, CONCRETE, [first, second]), **options)
-    # Two pulses in one hole are one hole.
-    again = effects.GasPressure("left", 1e7, start=delay)
-    alone = simulate(Scene(mesh, CONCRETE, [first, again]), **options)
-    left, right = (both.series[f"{side}_radial_displacement_mm"] for side in ("left", "right"))
-    early = both.series["time_s"] <= delay
-    assert left[early].tobytes() == alone.series["hole_radial_displacement_mm"][early].tobytes()
-    assert left[early][-1] and not right[early].any() and right[-1]
