@@ -11,7 +11,6 @@ import pytest
 
 from docs.site.conf import CONTENTS
 from gallery import SMALL_PICTURES, fill_figures, pages
-from taichi_dem import InputError
 from taichi_dem.kit.study.results_page import markdown_table
 from tests.docs.pages import FOLDER, PAGES, anchors, headings, links, text_of, tokens, words
 
@@ -108,11 +107,6 @@ def test_figures_are_those_kept_of_full_runs(page):
     text = re.sub(r"```.*?```|^ *\|.*?$|<!-- figure.*?end -->", "", text, flags=re.DOTALL | re.M)
     typed = rf"[^\n]*\d (?:{WHOLE[page]})\b[^\n]*" if page in WHOLE else "(?!)"
     assert not re.findall(typed, text)
-
-
-def test_a_figure_that_no_run_has_kept_is_refused():
-    with pytest.raises(InputError, match="nobody"):
-        fill_figures("<!-- figure: nobody.steps, 2 digits -->4<!-- end -->", FOLDER)
 
 
 def test_the_table_of_the_first_page_is_that_of_the_gallery():

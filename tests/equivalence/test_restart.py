@@ -1,8 +1,6 @@
 """A run that goes on from a checkpoint has the bits of one that was never stopped."""
 
 import gc
-import os
-import sys
 
 import numpy as np
 import pytest
@@ -183,25 +181,6 @@ def test_simulate_goes_on_to_a_later_time(light, tmp_path):
     assert np.array_equal(rest.frames[-1].position, whole.frames[-1].position)
     for name, column in whole.series.items():
         assert rest.series[name][-1] == column[-1], name
-
-
-def test_a_full_disk_at_the_end_names_the_checkpoint(light, tmp_path, monkeypatch):
-    """The last good output stays: the run is saved before anything is written."""
-    path, job = light
-
-    def full(name, columns):
-        raise InputError(f"cannot write {name}: No space left on device")
-
-    monkeypatch.setattr(sys.modules["taichi_dem.result"], "write_csv", full)
-    keep = Checkpoint(tmp_path / "run.npz")
-    words = (
-        r"history.csv: No space left on device; checkpoint .*run.npz holds the run at t = 5e-06 s"
-    )
-    with pytest.raises(InputError, match=words):
-        simulate(
-            light_scene(), until=5e-6, resume=path, checkpoint=keep, output=tmp_path / "out", **job
-        )
-    assert os.listdir(tmp_path / "out") == []
 
 
 @pytest.mark.parametrize(

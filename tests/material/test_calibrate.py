@@ -24,15 +24,6 @@ def test_moduli_are_met_and_all_else_stays():
     }
 
 
-def test_a_poissons_ratio_that_the_mesh_cannot_show_is_said_with_what_it_shows():
-    """Boxes cut in six show 0.02 more than asked at the low end: at -0.2 they stop short."""
-    mesh = random_block(2, seed=0)
-    constants, _, matches = calibrate(mesh, ROCK, {"poisson": -0.2}, 1e-3, test=None)
-    assert constants["poisson"] == pytest.approx(-0.2)
-    said = matches[0].complaint(1e-3)
-    assert said.startswith("poisson of -0.2 is not met: the mesh shows -0.1")
-
-
 def made_up(name, constants, target):
     """Strengths of a made-up specimen that are not in proportion to the constants."""
     if name == "tension":
@@ -53,8 +44,3 @@ def test_strengths_are_met_by_constants_of_their_own():
     assert (said[0], said[2]) == ("", "") and "has not failed" in said[1]
     assert len(rounds) <= 4
     assert made_up("tension", constants, None) == pytest.approx(1.5e6, rel=0.01)
-
-
-def test_a_strength_that_is_never_seen_ends_the_search():
-    _, (rounds,), (match,) = calibrate(random_block(2, 0), ROCK, {"brazilian": 3e6}, 0.01, made_up)
-    assert len(rounds) == 1 and "has not failed" in match.complaint(0.01)

@@ -169,17 +169,6 @@ def test_bond_normal_points_from_master_to_slave(name):
     assert np.all(np.einsum("ij,ij->i", normal, centre[top.slave] - middle) > 0.0)
 
 
-@EACH
-def test_slots_of_the_bodies_name_their_bonds(name):
-    mesh, top = MESHES[name], topology_of(MESHES[name])
-    expected = np.full((mesh.body_count, 4), -1)
-    for bond in range(top.bond_count):
-        expected[top.master[bond], top.master_face[bond]] = bond
-        expected[top.slave[bond], top.slave_face[bond]] = bond
-    assert np.array_equal(top.body_bond, expected)
-    assert sorted(zip(top.outer_body, top.outer_face)) == sorted(zip(*np.nonzero(expected < 0)))
-
-
 @pytest.mark.parametrize("cells", [(1, 1, 1), (2, 3, 1)])
 def test_bodies_of_a_box_add_up_to_its_inertia(cells):
     # Parallel axes: sum of (I + m (r.r 1 - r r^T)) = m/12 diag(b2+c2, a2+c2, a2+b2) of the box.

@@ -21,7 +21,7 @@ from taichi_dem import (
     shapes,
 )
 from taichi_dem.kit.allocation import values
-from taichi_dem.kit.certificate import NEEDED, NEGLIGIBLE
+from taichi_dem.kit.certificate import NEEDED
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.state.model import Model
 from tests.probe import BondProbe
@@ -108,21 +108,6 @@ def test_a_solid_that_turns_has_the_stress_of_its_rim():
     rim = rate * np.sqrt((centre[:, :2] ** 2).sum(axis=1).max())
     stress = CONCRETE.density * rim**2
     assert found["softening"] == pytest.approx(stress / CONCRETE.tensile_strength, 1e-6)
-
-
-#: A beam of 8 m that breaks by its own weight, a stub that does not, and what flies away from them.
-BEAM, STUB = bar(8.0, 0.25, (16, 1, 1)), bar(0.5, 0.25, (2, 1, 1))
-SHOT = bar(0.1, 0.1, (1, 1, 1)).moved(by=(0.0, 100.0, 0.0))
-AWAY = {"shot": (0.0, 300.0, 0.0)}
-
-
-@pytest.mark.parametrize(("held", "verdict"), [(BEAM, NEEDED), (STUB, NEGLIGIBLE)])
-def test_weight_is_judged_by_what_it_breaks_also_beside_a_projectile(held, verdict):
-    """One end is held; a body of 300 m/s falls by nothing beside its flight."""
-    mesh = join(held, SHOT, names=["held", "shot"])
-    scene = Scene(mesh, CONCRETE, "auto", loads=[effects.Fixed("held_left")], velocity=AWAY)
-    found = {one.effect: one for one in estimated_effects(scene, 0.05)}["gravity"]
-    assert found.verdict == verdict
 
 
 def test_a_part_keeps_its_estimates_beside_any_other():

@@ -28,8 +28,6 @@ from taichi_dem.stability.body_limits import dashpot_limit, dashpot_step, spring
 from taichi_dem.stability.step_report import stable_together
 from taichi_dem.step_control import CRITERIA
 
-EDGE = 0.05
-
 
 def multiplier(dt, stiffness, damping):
     """Largest growth a step of the leapfrog v += -dt (k x + c v), x += dt v of a unit mass."""
@@ -177,20 +175,6 @@ def whole_system(mesh, coefficients):
 
 def rates(mesh, coefficients):
     return bond_rates(mesh, topology_of(mesh), CONCRETE.density, coefficients)
-
-
-@pytest.mark.parametrize(
-    ("coefficients", "factor"), [((1e7, 1e7), 20.0 / 3.0), ((1e7, 0.0), 10.0 / 3.0)]
-)
-def test_rate_of_a_regular_pair_is_that_of_its_fastest_turn(coefficients, factor):
-    """In units of c_n A/m: with c_t = c_n the spin about the face's normal, else the tilt.
-
-    Three units of area A/3 at radius edge/sqrt 3 against I = m edge^2/20 give 20/3; about an
-    in-plane axis A/3 times the sum of y^2 over the vertices, edge^2/2, gives 10/3.
-    """
-    mesh = pair(EDGE)
-    area, mass = np.sqrt(3.0) / 4.0 * EDGE**2, body_properties(mesh, CONCRETE.density)[0]
-    assert rates(mesh, coefficients) == pytest.approx(factor * 1e7 * area / mass)
 
 
 @pytest.mark.parametrize("law", [dashpots_of, springs_of])

@@ -28,7 +28,6 @@ EPS = np.finfo(float).eps
 PEAK, RISE, RATIO = 575e6, 2.0**-13, 2.75
 #: Whole numbers of steps to the peak and to the end of the pulse.
 STEP, TO_PEAK, TO_END = RISE / 64, 64, 240
-METHOD = Uniform(2.0**-23)
 #: One body, rotated against the axes, loaded on one face.
 POINTS = np.array([[0, 0, 0], [0.06, 0.01, 0], [0.01, 0.05, 0], [0.02, 0.01, 0.055]])
 FACE = [1, 2, 3]
@@ -146,20 +145,3 @@ def test_pressure_turns_with_the_body(body):
     assert np.abs(gained).max() < 4 * error * impulse * np.linalg.norm(torque)
     booked = body.values(body.state.load_impulse)[0]
     assert np.abs(booked[:3] - impulse * force).max() < error * impulse * np.linalg.norm(force)
-
-
-def test_a_delayed_pulse_is_the_same_run_later():
-    """Bit for bit: a body without bonds is at rest to the last bit, and times differ exactly."""
-    steps, delay, frames = 24, 8, []
-    for late in (0, delay):
-        gas = effects.GasPressure("base", 2e8, 2.0**-19, start=late * METHOD.dt0)
-        scene = Scene(single(), CONCRETE, [gas])
-        until = (steps + late) * METHOD.dt0
-        whole = {"samples": steps + late, "frames": steps + late, "progress": None}
-        frames.append(simulate(scene, method=METHOD, until=until, **whole).frames)
-    assert not any(frame.velocity.any() for frame in frames[1][:delay])
-    # At its beginning the cosine squared is not zero but 4e-33.
-    for frame, later in zip(frames[0][1:], frames[1][delay + 1 :]):
-        for name in ("position", "velocity", "rotation"):
-            assert getattr(frame, name).tobytes() == getattr(later, name).tobytes(), name
-    assert frames[0][-1].velocity.any()

@@ -11,10 +11,8 @@ import taichi as ti
 
 from taichi_dem import (
     CONCRETE,
-    ImplicitDashpots,
     Scene,
     Simulation,
-    SimulationDiverged,
     Uniform,
     checked_mesh,
     effects,
@@ -200,44 +198,6 @@ def test_bodies_that_collide_keep_their_energy(seed):
     assert account["kinetic"] + account["sphere_strain"] == pytest.approx(before, rel=error)
 
 
-def on_slope(angle, damping):
-    """A tetrahedron on a plate of 24 bodies that is inclined by an angle [degrees]."""
-    body, plate, tilt = mirrored(single(0.05)), bar(0.1, 0.2, (1, 2, 2)), np.radians(angle)
-    parts = {"plate": (plate, (-0.1, 0.0, 0.0)), "body": (body, (1e-9, 0.08, 0.08))}
-    mesh = placed_together(parts)
-    dashpots = {f"{name}_damping": damping * getattr(CONCRETE, f"{name}_damping") for name in PARTS}
-    listed = [
-        effects.BondDamping(),
-        effects.BodyContact(),
-        effects.StickingFriction(),
-        effects.Gravity((-9.81 * np.cos(tilt), 9.81 * np.sin(tilt), 0.0)),
-        effects.Fixed("plate_left"),
-    ]
-    material = replace(CONCRETE, friction=0.4, **dashpots)
-    simulation = Simulation(Scene(mesh, material, listed), ImplicitDashpots(2e-6))
-    simulation.start()
-    return simulation
-
-
-@pytest.mark.parametrize("damping", [0.05, 1.0])
-def test_a_body_rests_below_its_friction_angle(damping):
-    """Its springs bear the weight at some nanometres, and nothing creeps."""
-    simulation = on_slope(15.0, damping)
-    simulation.advance_to(20_000)
-    moved = simulation.motion()["position"][-1] - simulation.model.centre[-1]
-    assert np.abs(moved).max() < 1e-7
-    assert np.abs(simulation.motion()["velocity"][-1]).max() < 1e-9
-
-
-def test_a_body_slides_beyond_it_as_coulomb_says():
-    simulation = on_slope(30.0, 1.0)
-    simulation.advance_to(20_000)
-    rate = 9.81 * (np.sin(np.pi / 6) - 0.4 * np.cos(np.pi / 6))
-    velocity = simulation.motion()["velocity"][-1]
-    assert velocity[1] == pytest.approx(rate * 0.04, rel=2e-3)
-    assert np.abs(velocity[[0, 2]]).max() < 1e-3 * velocity[1]
-
-
 @pytest.mark.parametrize("size", [0.1, 1.0])
 def test_a_small_body_on_a_large_face_has_the_energy_of_its_own_face(size):
     """Wherever it lies: the rays of the large body are far apart."""
@@ -246,16 +206,6 @@ def test_a_small_body_on_a_large_face_has_the_energy_of_its_own_face(size):
     for x, z in np.random.default_rng(1).uniform(0.35, 0.65, (12, 2)):
         placed.put([x * size, size + INRADIUS - depth, z * size], DOWN)
         assert placed.energy() == pytest.approx(flat, rel=0.01)
-
-
-def test_the_force_is_continuous_where_a_body_slides_over_an_edge():
-    """A hundredth of a micrometre changes it by less than 1e-4."""
-    placed, forces = Placed(bar(0.2, 0.2, (2, 2, 2)), single(EDGE)), []
-    for way in np.arange(-200, 200) * 1e-8:
-        placed.put([0.1 + way, 0.2 + INRADIUS - 3e-4, 0.083], DOWN)
-        forces.append(placed.simulation.readings.contacts_now()[:, 6:9].sum(axis=0))
-    step = np.linalg.norm(np.diff(forces, axis=0), axis=1)
-    assert step.max() < 1e-4 * np.linalg.norm(forces, axis=1).max()
 
 
 def run(parts, until, turn=(1.0, 0.0, 0.0, 0.0), velocity=0.0):
@@ -282,12 +232,3 @@ def test_none_passes_another_that_it_hits_at_200_m_s():
     assert 0.01 < report.interpenetration.share < 0.1
     assert abs(report.energy_residual_fraction) < 1e-3
     assert (np.einsum("ni,ni->n", apart, away) > 0.0).all()
-
-
-def test_bodies_that_begin_in_each_other_get_no_energy_and_are_refused_beyond_a_half():
-    """Their overlap at the start is that at rest."""
-    first = {"first": (single(EDGE), 0.0 * X)}
-    report, motion = run({**first, "second": (single(EDGE), 0.01 * X)}, 1e-4)
-    assert np.abs(motion["velocity"]).max() == report.energy_balance["injected"] == 0.0
-    with pytest.raises(SimulationDiverged, match="body 0 shares"):
-        run({**first, "second": (single(EDGE), 0.001 * X)}, 1e-4)

@@ -10,7 +10,7 @@ from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, e
 from taichi_dem.elasticity.rates import bond_rates, contact_eigenvalues, dashpots_of, springs_of
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.mesh import checked_mesh
-from taichi_dem.mesh.shapes import pair, placed_together, single
+from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED, dashpot_step, spring_step
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL
@@ -285,17 +285,3 @@ def test_limited_bonds_leave_contacts_what_they_need():
         taken = shares(limits, 1.0) * x
         assert taken[1] >= min(x[1], FOR_CONTACTS) - rounding
         assert taken.sum() <= LIMITED + rounding
-
-
-def test_a_report_bounds_the_share_that_limited_dashpots_of_bodies_had():
-    """By one contact on a largest face: of bodies that meet head on that is the share itself."""
-    parts = {"flying": (single(), (-1e-4, 0.0, 0.0)), "met": (single(), (0.05, 0.0, 0.0))}
-    flying = {"mesh": placed_together(parts), "velocity": {"flying": (50.0, 0.0, 0.0)}}
-    scene = Scene(material=CONCRETE, effects=[effects.BodyContact()], **flying)
-    simulation = Simulation(scene, Uniform(1e-6, dashpot="limited"))
-    simulation.advance_to(370)
-    simulation.sample()
-    resolution = simulation.step_resolution
-    least = resolution.pair_share.min()
-    resolution.pair_share[:] = 1.0
-    assert resolution._contact_shares().min() == pytest.approx(least, rel=1e-3) and least < 0.9

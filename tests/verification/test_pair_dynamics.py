@@ -183,19 +183,6 @@ def test_action_is_reaction_at_the_middle_of_the_overlap(probe):
     assert np.abs(wrench[1, :3] - force).max() < error
 
 
-def test_force_of_i_on_j_is_that_of_j_on_i(probe):
-    """Which body comes first in the list changes no more than the rounding."""
-    position = placed(probe, OVERLAP)
-    velocity = np.array([[1.0, 0.5, -0.2], [-0.3, 0.4, 0.1]])
-    spin = np.array([[30.0, -20.0, 5.0], [10.0, 0.0, -40.0]])
-    quaternion = np.array([[1.0, 0, 0, 0], [1.0, 0, 0, 0]])
-    first, heat = probe.evaluate(SPHERES, position, quaternion, velocity, spin)
-    second, taken = probe.evaluate(SPHERES, position, quaternion, velocity, spin, swap=True)
-    error = 12 * FORCE_ERROR + 200 * EPS * C * 50.0 * 0.1
-    assert np.abs(first - second).max() < error
-    assert np.abs(heat - taken).max() < error * 10.0
-
-
 def test_heat_that_waits_in_a_pair_is_in_the_account(probe):
     """A pair keeps what its steps took until its first body books it [J]."""
     simulation = probe.simulation
