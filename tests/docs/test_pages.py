@@ -123,11 +123,6 @@ def test_the_site_lists_every_page_once():
     )
 
 
-def test_every_decision_has_a_line_on_the_first_page_of_decisions():
-    pages = [page.rpartition("/")[2] for page in PAGES if page.startswith("docs/decisions/0")]
-    assert pages == list(links("docs/decisions/README.md"))
-
-
 @pytest.mark.slow
 def test_the_site_is_built_without_a_warning(tmp_path):
     """Of a link that leads nowhere, a page that no list has, or a docstring that is no RST."""

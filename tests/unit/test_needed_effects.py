@@ -1,10 +1,11 @@
-"""A run says which of its effects acted, and which it could do without.
+"""A run says which of its effects acted, which it could do without, and which it lacked.
 
-A run with an effect silenced is exactly the run of a scene without it.
 An effect is called droppable only where a run without it has been made and is equal.
+Estimates before a run judge each connected part by its own stress and motion.
 """
 
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,16 +17,21 @@ from taichi_dem import (
     Simulation,
     Uniform,
     effects,
+    estimated_effects,
+    join,
     needed_effects,
+    shapes,
     simulate,
 )
 from taichi_dem.engine import ENGINES
-from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.certificate import NEEDED
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.report.effects import effect_uses
 from taichi_dem.report.energy_balance import TERMS
 from taichi_dem.report.readings import Run
 from taichi_dem.state.model import Model
+from tests.probe import BondProbe
 
 #: Far below the strength of concrete: a block of some 1 kg that falls from rest for 1e-5 s.
 STEP, UNTIL = 1e-7, 1e-5
@@ -117,9 +123,104 @@ def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(scene
     silent = result_of(pulled(*(law().silent() for law in LAWS)))
     assert len(ENGINES._engines) == before
     without = result_of(pulled())
-    for key, values in silent.series.items():
-        assert values.tobytes() == without.series[key].tobytes(), key
+    for key, column in silent.series.items():
+        assert column.tobytes() == without.series[key].tobytes(), key
     for frame, other in zip(silent.frames, without.frames):
         assert frame.position.tobytes() == other.position.tobytes()
     assert silent.report.effects == without.report.effects
     assert silent.report.energy_balance == without.report.energy_balance
+
+
+EDGE = 0.05
+BLOCK = shapes.block(0.1, element=0.1)
+HALVES = join(BLOCK, BLOCK.moved(by=(0.101, 0.0, 0.0)), names=["left", "right"])
+
+
+def passed(probe):
+    return [tick >= 0 for tick in values(probe.state.passed)[0]]
+
+
+@pytest.mark.parametrize(
+    ("pull", "slide", "expected"),
+    [
+        # Shares of the strength, and of the cohesion; friction lowers the limit in tension.
+        (0.999, 0.0, [False, False]),
+        (1.001, 0.0, [True, False]),
+        (-1.0, 1.57, [False, False]),
+        (-1.0, 1.59, [False, True]),
+        (0.5, 0.72, [False, True]),
+        (0.5, 0.70, [False, False]),
+    ],
+)
+def test_limits_are_those_of_the_laws(pull, slide, expected):
+    """Tension and slip are noted where Softening and ShearSlip would have acted, unit by unit.
+
+    Strength and cohesion of concrete are one number; the limit in shear is c - 0.58 of the pull.
+    """
+    tractions = CONCRETE.tensile_strength * np.array([pull, slide, 0.0])
+    probe = BondProbe(pair(EDGE), [])
+    opening = tractions / probe.model.bond_stiffness[0][[0, 1, 1]]
+    probe.open(opening)
+    assert passed(probe) == expected
+    acting = BondProbe(pair(EDGE), [effects.Softening(), effects.ShearSlip()])
+    acting.open(opening)
+    assert list(acting.simulation.readings.active_bonds()[0]) == expected
+
+
+def test_a_limit_passed_between_two_samples_is_seen():
+    """A bond is pulled past its strength and pushed back; at both samples it holds little.
+
+    The pull lasts half a period of 1e-5 s; in between it opens by v / (pi f), five times its onset.
+    """
+    speed, frequency = np.pi * 1e5 * 5.0 * CONCRETE.onset_opening, 1e5
+    pull = effects.PrescribedMotion("right", (speed, 0.0, 0.0), frequency)
+    scene = Scene(pair(EDGE), CONCRETE, [effects.Fixed("left"), pull])
+    simulation = Simulation(scene, Uniform(STEP))
+    simulation.advance_to(100)
+    simulation.sample()
+    found = {one.effect: one for one in simulation.report().missing_effects}["Softening"]
+    assert found.count == 1 and 0.0 < found.first_s < 5e-6
+    middle = pair(EDGE).points[simulation.model.topology.vertices[0]].mean(axis=0)
+    assert found.place_m == pytest.approx(tuple(middle), rel=1e-15)
+    assert simulation.missing_effects.strain[0] < 1e-2
+
+
+def groups(mesh=HALVES, **motion):
+    found = estimated_effects(Scene(mesh, CONCRETE, "auto", **motion), 1e-3)
+    return {one.effect: one.group for one in found}, {one.effect: one.verdict for one in found}
+
+
+def test_a_blow_has_the_stress_of_its_wave():
+    """Two equal blocks that meet at v: the wave in each carries v / 2."""
+    speed = 2.0
+    found, verdicts = groups(velocity={"left": (speed, 0.0, 0.0)})
+    model = Model(HALVES, CONCRETE, ())
+    wave = np.sqrt(CONCRETE.normal_stiffness * 2.0 * model.body_radius.mean() / CONCRETE.density)
+    stress = CONCRETE.density * wave * 0.5 * speed
+    assert found["softening"] == pytest.approx(stress / CONCRETE.tensile_strength, 1e-9)
+    assert verdicts["contact"] == NEEDED
+
+
+def test_a_solid_that_turns_has_the_stress_of_its_rim():
+    rate = 100.0
+    found, _ = groups(BLOCK, spin=(0.0, 0.0, rate))
+    centre = BLOCK.points[BLOCK.tetrahedra].mean(axis=1) - 0.05
+    rim = rate * np.sqrt((centre[:, :2] ** 2).sum(axis=1).max())
+    stress = CONCRETE.density * rim**2
+    assert found["softening"] == pytest.approx(stress / CONCRETE.tensile_strength, 1e-6)
+
+
+def test_a_part_keeps_its_estimates_beside_any_other():
+    """Of damping, too: a median over the bonds of all would hide the one bar that is damped."""
+    still = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0)
+    small, large = bar(2e-3, 5e-4, (4, 1, 1)), bar(4.0, 1.0, (8, 2, 2))
+    pulled = effects.Pressure("small_right", -1e5)
+    mesh = join(small, large.moved(by=(20.0, 0.0, 0.0)), names=["small", "large"])
+    beside = Scene(mesh, CONCRETE, "auto", loads=[pulled], materials={"large": still})
+    alone = Scene(small, CONCRETE, "auto", loads=[effects.Pressure("right", -1e5)])
+    found, own = (
+        {one.effect: one.group for one in estimated_effects(scene, 1e-3)}
+        for scene in (beside, alone)
+    )
+    for name in ("softening", "slip", "friction", "bond damping", "air drag"):
+        assert found[name] == pytest.approx(own[name], 1e-12), name

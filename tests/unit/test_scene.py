@@ -1,13 +1,15 @@
-"""A scene whose parts may meet or whose friction never acts is told so before a run.
+"""A scene whose parts may meet, or whose number has another unit, is told so before a run.
 
 A scene that begins in motion runs as one whose bodies were set in motion by hand.
 """
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
 
+from ca_damper import Spheres
 from taichi_dem import (
     CONCRETE,
     Multirate,
@@ -15,8 +17,10 @@ from taichi_dem import (
     Simulation,
     Uniform,
     effects,
+    shapes,
     simulate,
 )
+from taichi_dem.kit.likely_units import UnitWarning
 from taichi_dem.mesh.shapes import bar, pair, placed_together
 from taichi_dem.scene import outer_faces_warnings
 from taichi_dem.simulate import run_simulation
@@ -93,16 +97,6 @@ def test_a_moving_scene_has_the_bits_of_a_motion_set_by_hand(by_hand):
     assert_same(simulate(pickle.loads(pickle.dumps(moving)), **options), by_hand)
 
 
-def test_a_reset_begins_with_the_motion_of_its_scene(by_hand):
-    simulation = Simulation(scene(), METHOD)
-    simulation.advance_to(3)
-    simulation.reset(scene(velocity=ROWS[0], spin=ROWS[1]))
-    options = {"until": UNTIL, "samples": 2, "frames": 1, "progress": None}
-    assert_same(run_simulation(simulation, **options), by_hand)
-    simulation.reset(scene())
-    assert not simulation.state.motion()["velocity"].any()
-
-
 def test_one_spin_turns_all_bodies_as_one_rigid_body():
     spin = np.array([0.0, 3.0, -4.0])
     motion = scene(velocity=(1.0, 0.0, 0.0), spin=spin).initial_motion
@@ -133,3 +127,25 @@ def test_no_body_moves_further_than_the_distance_in_its_first_step(method):
     step = 1e-6 / 2.0 ** simulation.values(simulation.state.level)
     assert np.all(step * velocity[:, 0] <= 1e-8)
     assert np.all(2.0 * step.min() * velocity[0, 0] > 1e-8)
+
+
+#: Builder, a value in the wrong unit, how many of the unit it is read in are one of the likely one.
+CASES = {
+    "peak": (lambda x: effects.GasPressure(peak=x), 575.0, 1e6),
+    "rise": (lambda x: effects.GasPressure(rise=x), 0.133, 1e-3),
+    "element": (lambda x: shapes.block(4.0 * x, element=x), 100.0, 1e-3),
+    "particle_mass": (lambda x: Spheres(particle_mass=x), 0.2, 1e-3),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_number_in_the_likely_unit_is_warned_about_and_in_its_own_is_not(name):
+    build, value, factor = CASES[name]
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        try:
+            build(value)
+        except ValueError:
+            pass  # a wrong unit may lie out of the range of another option too
+    assert any(one.category is UnitWarning and name in str(one.message) for one in told)
+    build(value * factor)

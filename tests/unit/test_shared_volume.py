@@ -8,8 +8,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from taichi_dem import CONCRETE, Scene, Simulation, SimulationDiverged, Uniform, simulate
-from taichi_dem.kit.allocation import assign
-from taichi_dem.mesh.shapes import pair, placed_together, single
+from taichi_dem.mesh.shapes import placed_together, single
 from taichi_dem.mesh.tetrahedra import eighths
 from taichi_dem.report.shared_volume import DEEP, SharedVolume
 from tests.scenes import apart, quaternions
@@ -97,15 +96,6 @@ def test_shares_are_those_of_the_intersections_of_all_pairs():
             assert least <= PARTS * found[i, j] <= most
             missed, cuts = missed + PARTS * (found[i, j] - exact), cuts + most - least
     assert len(found) > 25 and abs(missed) < 5.0 * np.sqrt(0.25 * cuts)
-
-
-def test_bonded_bodies_are_left_out_until_their_bond_breaks():
-    """Pressed into each other by half; the bond holds them, or has been released."""
-    looked = Looked(pair(EDGE))
-    assert looked.shares(0.5 * looked.model.centre) == {}
-    assign(looked.state.broken_tick, 0)
-    ((bodies, share),) = looked.shares(0.49 * looked.model.centre).items()
-    assert bodies == (0, 1) and share > DEEP
 
 
 @pytest.mark.parametrize(("shift", "share"), [(0.7, 0.0), (0.4, 14.0), (0.05, 78.0)])

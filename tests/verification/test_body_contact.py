@@ -79,19 +79,6 @@ def test_flat_sides_that_overlap_have_the_energy_of_their_bond():
         assert (1.0 - depth / radius) ** 2 * flat <= placed.energy() <= (1.0 + 1e-9) * flat
 
 
-@pytest.mark.parametrize("turned, smaller", [(0.0, 1.0), (np.pi / 6, 1.183), (np.pi / 2, 1.0)])
-def test_energy_is_additive_in_the_area_of_contact(turned, smaller):
-    """A cube of 48 bodies on another, also turned on it, whatever faces meet; within 10 percent."""
-    cube, depth = bar(0.2, 0.2, (2, 2, 2)), 1e-4
-    placed = Placed(cube, cube)
-    middle = 0.5 * (cube.points.min(axis=0) + cube.points.max(axis=0))
-    way = placed.model.centre[~placed.moving].mean(axis=0) - middle
-    orientation = [np.cos(0.5 * turned), 0.0, np.sin(0.5 * turned), 0.0]
-    placed.put(middle + [0.0, 0.2 - depth, 0.0] + matrix(np.array(orientation)) @ way, orientation)
-    flat = 0.5 * STIFFNESS * 0.2**2 * depth**2 / smaller
-    assert placed.energy() == pytest.approx(flat, rel=0.1)
-
-
 def test_an_overlap_at_the_start_is_at_rest_until_it_shrinks():
     """Nothing is injected, and what the bodies part by counts when they come back."""
     body, depth = single(0.05), 1e-5

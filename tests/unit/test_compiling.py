@@ -1,0 +1,113 @@
+"""Kernels keep their size, are compiled without run-time unrolling, and errors name their place.
+
+Taichi walks through the trees of all functions that a kernel calls, 25 us a node, and LLVM works on
+what comes of it. The number of nodes is the same on every machine; its budget is that of the day on
+which it was last renewed, and a twentieth more.
+"""
+
+import re
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+import taichi as ti
+
+import taichi_dem.step
+from _bench_waits import sizes_of_kernels
+from taichi_dem.kit.kernel_source_cache import filled
+from taichi_dem.kit.study import call_in_process
+from tests.processes import users_environment
+from tests.scenes import ROOT
+
+#: Nodes on 27 November 2026 by kernel, of those with more than a thousand; of all others together.
+BUDGET = {
+    "Resident._steps": 26784,
+    "Resident._search": 10114,
+    "Readings._visit": 3528,
+    "Step.start": 3148,
+    "_find_pairs": 2266,
+    "Coupling.advance": 16068,
+    "Coupling.start": 1765,
+}
+OTHERS = 1500
+
+
+@pytest.fixture(scope="module")
+def nodes():
+    """Nodes of each kernel of the default scenes, read in a process of its own."""
+    return {name: count for name, count, *_ in call_in_process(sizes_of_kernels)}
+
+
+@pytest.mark.parametrize("name", BUDGET)
+def test_a_kernel_of_the_default_scenes_keeps_its_size(nodes, name):
+    assert 0 < nodes[name] <= 1.05 * BUDGET[name]
+
+
+def test_no_other_kernel_of_the_default_scenes_is_large(nodes):
+    assert sum(count for name, count in nodes.items() if name not in BUDGET) <= 1.05 * OTHERS
+
+
+_SUM = """
+import sys
+from taichi_dem import runtime
+if "off" in sys.argv:
+    runtime.start()
+    runtime.stop()
+import taichi as ti
+
+ti.init(ti.cpu, default_fp=ti.f64, offline_cache=False, print_kernel_llvm_ir_optimized=True)
+x = ti.field(ti.f64, 64)
+
+@ti.kernel
+def total(n: ti.i32) -> ti.f64:
+    found = 0.0
+    for _ in range(1):
+        for k in range(n):
+            found += x[k]
+    return found
+
+total(5)
+"""
+
+
+def additions(folder, *words):
+    """Additions in the optimised code of a sum."""
+    folder.mkdir()
+    (folder / "sum.py").write_text(_SUM)
+    line, environment = [sys.executable, "sum.py", *words], users_environment(PYTHONPATH=ROOT)
+    subprocess.run(line, check=True, capture_output=True, cwd=folder, env=environment)
+    (code,) = folder.glob("*optimized*.ll")
+    return code.read_text().count(" fadd ")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="it is switched off on Linux alone")
+def test_a_session_leaves_loops_unrepeated(tmp_path):
+    assert additions(tmp_path / "off", "off") < 8 <= additions(tmp_path / "on")
+
+
+@ti.func
+def _unknown(x):
+    return x + _nowhere  # noqa: F821
+
+
+@ti.kernel
+def _calls_it():
+    for i in range(2):
+        _unknown(i)
+
+
+def test_an_error_names_its_place_in_every_function_on_the_way():
+    for _ in range(2):
+        with pytest.raises(ti.TaichiCompilationError) as caught:
+            _calls_it()
+        said = str(caught.value)
+        assert re.findall(r"in (_\w+):\n", said) == ["_calls_it", "_unknown"], said
+        assert "return x + _nowhere" in said and 'Name "_nowhere" is not defined' in said
+
+
+def test_lines_of_the_package_are_filled_as_by_textwrap():
+    for path in Path(taichi_dem.step.__file__).parent.rglob("*.py"):
+        for line in path.read_text().splitlines(True):
+            assert filled(line, 4, 9999) == textwrap.fill(line, tabsize=4, width=9999), line
