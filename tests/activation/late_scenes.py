@@ -213,9 +213,9 @@ def in_boxes(centre, rows):
     return found
 
 
-def simulation(late, scene, method=METHOD, driver="resident"):
+def simulation(late, scene):
     """Simulation of a scene, with the motion that it begins with."""
-    made = Simulation(scene, method, driver)
+    made = Simulation(scene, METHOD, "resident")
     centre = made.model.centre
     velocity = in_boxes(centre, late.velocity)
     made.state.set_motion(centre, velocity=velocity)

@@ -8,8 +8,8 @@ import pytest
 from taichi_dem import Scene, checked_mesh
 from taichi_dem.state.timeline import NEVER
 from tests.activation.late_scenes import (
-    METHOD,
     SCENES,
+    STEP,
     Late,
     late_scene,
     loads,
@@ -41,15 +41,13 @@ class Run:
     each bond. misses: what the audit of sleep found.
     """
 
-    def __init__(self, name, word, needed=True, method=METHOD, driver="resident", **options):
+    def __init__(self, name, word, needed=True, **options):
         self.late = late_scene(name) if needed else late_scene(name).without()
         self.scene = scene_of(late_scene(name), word, needed, **options)
-        made = simulation(self.late, self.scene, method, driver)
-        self.before = None
-        if self.late.late > 0.0:
-            made.advance_to(int(self.late.late / method.dt0))
-            self.before = acting(made)
-        made.advance_to(round(self.late.until / method.dt0))
+        made = simulation(self.late, self.scene)
+        made.advance_to(int(self.late.late / STEP))
+        self.before = acting(made)
+        made.advance_to(round(self.late.until / STEP))
         self.fields = {key: made.values(field) for key, field in made.state.fields().items()}
         self.acting, self.report = acting(made), made.report(brief=True)
         self.moved = self.fields["position"] - made.model.centre
@@ -108,7 +106,7 @@ def test_without_sleep_all_bits_are_those_of_all_effects(name):
 def test_the_effect_acts_late_and_is_found(name):
     auto, role = run(name, sleep=0.0), late_scene(name).role
     assert NAMES[role] in auto.acting
-    assert auto.before is None or NAMES[role] not in auto.before
+    assert NAMES[role] not in auto.before
 
 
 @pytest.mark.parametrize("name", LIMITS)

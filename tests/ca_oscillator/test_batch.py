@@ -10,8 +10,6 @@ import pytest
 
 from ca_damper import (
     Batch,
-    InputError,
-    RigidMass,
     SceneTable,
     SimulationDiverged,
 )
@@ -55,26 +53,6 @@ def test_number_of_threads_changes_no_bit(tmp_path):
     command = [sys.executable, tmp_path / "script.py"]
     found = subprocess.check_output(command, text=True, env=environment)
     assert found.strip() == hashlib.sha256(kicked(range(5)).tobytes()).hexdigest()
-
-
-def test_driving_on_at_another_frequency():
-    batch = Batch(RigidMass(), SceneTable([0, 30], 1, 1e-4, 5.0, 0.6e-3), measured_cycles=2)
-    batch.start()
-    batch.run(1, 0)
-    before = batch.sample()
-    batch.drive(6.2)
-    after = batch.sample()
-    assert np.array_equal(before["x"], after["x"])
-    assert np.array_equal(before["v"], after["v"])
-    # The base goes faster at once, and pushes by its dashpot: C y0 2 pi (6.2 - 5) / (M + N m).
-    mass = 0.086 + 0.2e-3 * np.array([0, 30])
-    push = 0.08 * 0.6e-3 * 2.0 * np.pi * 1.2 / mass
-    assert after["a"] - before["a"] == pytest.approx(push, rel=1e-9)
-    batch.run(250, 0)
-    assert batch.sample()["time_s"] == pytest.approx(0.2 + 250 / 6.2, rel=1e-14)
-    batch.advance(10)
-    with pytest.raises(InputError, match="scene 0 stands at step 10 of 1613"):
-        batch.drive(5.0)
 
 
 def diverging(if_diverged="raise", **kicks):

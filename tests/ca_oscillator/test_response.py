@@ -63,13 +63,6 @@ def test_a_linear_system_answers_alike_on_the_way_up_and_down():
         assert way.rms[:, :, 0] == pytest.approx(wanted, rel=2.0 * left)
 
 
-def test_a_mean_that_still_grows_is_carried_on_and_shows_no_hysteresis():
-    # Without transient cycles the way up remembers rest, the way down the resonance.
-    asked = {"particles": 0, "ratios": [0.95, 1.0], "seeds": 1, "progress": None}
-    grows = sweep_up_and_down(RigidMass(), transient_cycles=0, measured_cycles=20, **asked)
-    assert np.abs(grows.hysteresis).max() > 0.1 and not grows.shows_hysteresis.any()
-
-
 def swept(up, down, error):
     """Sweep of one particle number from RMS (ratios, seeds) and their half-widths."""
     ratios, seeds = RATIOS[: len(up)], tuple(range(1, 1 + up.shape[1]))

@@ -1,4 +1,4 @@
-"""Kernels keep their size, are compiled without run-time unrolling, and errors name their place.
+"""Kernels of the default scenes keep their size, and errors of kernels name their place.
 
 Taichi walks through the trees of all functions that a kernel calls, 25 us a node, and LLVM works on
 what comes of it. The number of nodes is the same on every machine; its budget is that of the day on
@@ -6,8 +6,6 @@ which it was last renewed, and a twentieth more.
 """
 
 import re
-import subprocess
-import sys
 import textwrap
 from pathlib import Path
 
@@ -18,8 +16,6 @@ import taichi_dem.step
 from _bench_waits import sizes_of_kernels
 from taichi_dem.kit.kernel_source_cache import filled
 from taichi_dem.kit.study import call_in_process
-from tests.processes import users_environment
-from tests.scenes import ROOT
 
 #: Nodes on 27 November 2026 by kernel, of those with more than a thousand; of all others together.
 BUDGET = {
@@ -47,44 +43,6 @@ def test_a_kernel_of_the_default_scenes_keeps_its_size(nodes, name):
 
 def test_no_other_kernel_of_the_default_scenes_is_large(nodes):
     assert sum(count for name, count in nodes.items() if name not in BUDGET) <= 1.05 * OTHERS
-
-
-_SUM = """
-import sys
-from taichi_dem import runtime
-if "off" in sys.argv:
-    runtime.start()
-    runtime.stop()
-import taichi as ti
-
-ti.init(ti.cpu, default_fp=ti.f64, offline_cache=False, print_kernel_llvm_ir_optimized=True)
-x = ti.field(ti.f64, 64)
-
-@ti.kernel
-def total(n: ti.i32) -> ti.f64:
-    found = 0.0
-    for _ in range(1):
-        for k in range(n):
-            found += x[k]
-    return found
-
-total(5)
-"""
-
-
-def additions(folder, *words):
-    """Additions in the optimised code of a sum."""
-    folder.mkdir()
-    (folder / "sum.py").write_text(_SUM)
-    line, environment = [sys.executable, "sum.py", *words], users_environment(PYTHONPATH=ROOT)
-    subprocess.run(line, check=True, capture_output=True, cwd=folder, env=environment)
-    (code,) = folder.glob("*optimized*.ll")
-    return code.read_text().count(" fadd ")
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="it is switched off on Linux alone")
-def test_a_session_leaves_loops_unrepeated(tmp_path):
-    assert additions(tmp_path / "off", "off") < 8 <= additions(tmp_path / "on")
 
 
 @ti.func

@@ -127,16 +127,6 @@ def test_the_slow_decay_is_met_in_the_order_of_theta(rigs, theta, order):
     assert ratios == pytest.approx([2.0**order] * 2, rel=0.08)
 
 
-def test_velocities_at_the_end_of_the_step_bear_longer_ones(rigs):
-    """theta = 1: (w dt)^2 < 4 + 2 r dt from z = -1 in the recurrence, w, r of the normal mode."""
-    rig = rigs(1.0)
-    stiff, rate = damped(rig, 1.0)
-    exact = (rate + np.sqrt(rate**2 + 4.0 * stiff)) / stiff
-    assert exact > 5.0 * 2.0 / np.sqrt(stiff)
-    found = [openings(rig, part * exact, [400])[0] for part in (0.99, 1.01)]
-    assert abs(found[0]) < STRETCH < abs(found[1])
-
-
 def driven(velocity, step, steps, speed=0.0, frequency=0.0):
     """Places [m] of a pair after some steps, less those at the start; its left side is driven.
 

@@ -139,13 +139,6 @@ def test_normal_force_is_spring_less_dashpot_and_never_pulls(probe, factor):
     assert heat[0] == pytest.approx(taken, abs=6 * FORCE_ERROR * abs(rate))
 
 
-def test_spheres_apart_give_nothing(probe):
-    position = placed(probe, -1e-9)
-    wrench, heat = probe.evaluate(SPHERES, position, None, np.array([0 * NORMAL, -NORMAL]))
-    assert np.array_equal(wrench, np.zeros((2, 6)))
-    assert np.array_equal(heat, np.zeros(3))
-
-
 @pytest.mark.parametrize("factor", [0.5, 20.0])
 def test_friction_is_the_smaller_of_coulomb_and_dashpot(probe, factor):
     """min(mu F_n, c |v_t|) against the sliding; both meet at factor 1."""
