@@ -27,7 +27,7 @@ pytest_plugins = ("tests.compiler",)
 
 
 def pytest_addoption(parser):
-    """The architecture, as every experiment has it; how many seeds of the attacks, from which on."""
+    """The architecture, as every experiment has it; how many seeds, from which on."""
     parser.addoption("--arch", default="cpu", choices=runtime.ARCHITECTURES)
     group = parser.getgroup("attacks")
     group.addoption("--attacks", type=int, default=1, metavar="N", help="seeds of each attack")
@@ -60,8 +60,7 @@ class ByGroup(LoadScopeScheduling):
 
 #: Groups that take longest: begun first, so that workers end together.
 FIRST = ("verification", "unit", "ca", "activation")
-#: Files of the first group that run the paper's effects: side by side, as they share engines. The
-#: last of them gives all engines back.
+#: Files of the first group that run the paper's effects: side by side, as they share engines.
 OF_THE_BLOCK = """equivalence/test_bits.py verification/test_conservation.py
     equivalence/test_digests.py equivalence/test_restart.py verification/test_wake_up.py
     verification/test_convergence.py verification/test_implicit.py

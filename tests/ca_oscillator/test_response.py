@@ -1,4 +1,4 @@
-"""A linear system answers with its transfer function; results have the same numbers anywhere."""
+"""A linear system answers with its transfer function, up and down; chance is no hysteresis."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Dormand-Prince 5(4): order, tolerance, control of the step, the same in Python and in kernels."""
+"""Dormand-Prince 5(4): order, tolerance, the same in Python and in kernels."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The page of all experiments shows what was run: failures are named, quick runs say so."""
+"""The page of all experiments shows what was run: failures are named, without old figures."""
 
 import json
 import re

@@ -1,7 +1,4 @@
-"""Engines: a structure is compiled once; a scene in one has the bits of a scene alone.
-
-The last file of its folder, as ``runtime.clear`` gives all engines of the session back.
-"""
+"""Engines: a structure is compiled once; a scene in one has the bits of a scene alone."""
 
 from dataclasses import replace
 

@@ -1,7 +1,4 @@
-"""A material from what is measured gives bonds, dashpots and contacts by the bodies of a mesh.
-
-Concrete of the paper's Table 1 has the openings of the paper, and softens to its energy.
-"""
+"""A material from what is measured gives bonds, dashpots and contacts by the bodies of a mesh."""
 
 import numpy as np
 import pytest

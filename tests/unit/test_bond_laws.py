@@ -2,7 +2,6 @@
 
 Where ``begins`` says that a unit is far from its limits, the traction is stiffness times jump, no
 energy is spent, nothing fails, and the memory of the law stays as it was.
-A law of a user's own, by whatever name, acts and is accounted for like one of the package.
 """
 
 import numpy as np

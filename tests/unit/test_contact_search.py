@@ -1,6 +1,6 @@
 """The contact search against all pairs compared with all.
 
-Pairs that stay near keep their memory through every search; room of others serves again.
+Pairs that stay near keep their memory through every search.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""The dashpots of all bonds as a linear system in NumPy, against itself and the kernels."""
+"""The dashpots of all bonds as a linear system in NumPy: the kernels solve it."""
 
 import itertools
 

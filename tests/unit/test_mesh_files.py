@@ -1,6 +1,6 @@
 """Meshes come back from files as they were written, with the groups of their faces and bodies.
 
-Cells of mesh files are cut into tetrahedra that fit; where bonds are missing, it is told.
+Cells of mesh files are cut into tetrahedra that fit.
 """
 
 import meshio

@@ -1,4 +1,4 @@
-"""Every body and bond is visited when its own step ends: clock, lists and step rule alone."""
+"""Every body and bond is visited when its own step ends: lists and step rule alone."""
 
 import numpy as np
 import taichi as ti

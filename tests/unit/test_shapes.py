@@ -1,4 +1,4 @@
-"""Simple solids have their exact sizes, named sides and well-shaped elements."""
+"""Simple solids have their exact sizes and named sides."""
 
 import numpy as np
 import pytest

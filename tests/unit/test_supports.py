@@ -1,4 +1,4 @@
-"""Supports of one body act together whatever their order; a motion bears no contradiction.
+"""Supports of one body act together; a motion bears no contradiction.
 
 Gas pressure against eq. 4 of Konno et al. and against momentum.
 """

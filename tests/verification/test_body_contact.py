@@ -1,6 +1,6 @@
 """Contact of whole bodies: its energy, of which forces are the gradient; nothing from a break.
 
-Contact of bodies of different sizes, that hit fast, slide over edges, or begin in each other.
+Contact of bodies of different sizes, that hit fast, or begin in each other.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Solved dashpots on a bonded pair: the scheme to round-off, its order, where it is stable.
+"""Solved dashpots on a bonded pair: the scheme to round-off, its order.
 
 Solved dashpots against explicit ones with a tiny step: small scenes, side by side in a mesh.
 """
