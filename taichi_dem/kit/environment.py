@@ -20,11 +20,7 @@ from pathlib import Path
 #: Taichi's own switch of its kernel cache, and its folder.
 _CACHE, _CACHE_FOLDER = "TI_OFFLINE_CACHE", "TI_OFFLINE_CACHE_FILE_PATH"
 #: What Taichi finds instead: it would ask the network for a newer version, and talk.
-_OURS = {
-    "TI_SKIP_VERSION_CHECK": "ON",
-    "ENABLE_TAICHI_HEADER_PRINT": "0",
-    "TI_LOG_LEVEL": "error",
-}
+_OURS = {"TI_SKIP_VERSION_CHECK": "ON", "ENABLE_TAICHI_HEADER_PRINT": "0"}
 #: Free space below which kernels are not kept [bytes]: those of a scene take some megabytes.
 _LEAST_SPACE = 64e6
 #: Taichi holds the lock of its kernel cache for well under a second.
@@ -34,14 +30,14 @@ _own: list[Path] = []
 
 
 @contextlib.contextmanager
-def taichi_alone() -> Iterator[None]:
+def taichi_alone(**more: str) -> Iterator[None]:
     """In its block Taichi finds none of its variables but ours, and says and warns nothing.
 
-    Without HOME it would abort.
+    more: further variables. Without HOME it would abort.
     """
     before = dict(os.environ)
     hidden = [name for name in before if name.startswith("TI_") and name != "TI_VISIBLE_DEVICE"]
-    ours = {**_OURS, "HOME": before.get("HOME") or os.path.expanduser("~")}
+    ours = {**_OURS, "HOME": before.get("HOME") or os.path.expanduser("~"), **more}
     for name in hidden:
         del os.environ[name]
     os.environ.update(ours)
@@ -102,5 +98,6 @@ def _remove_stale_lock(folder):
             lock.unlink()
 
 
-with taichi_alone():
+# In Jupyter Taichi would say that it found a graphical shell.
+with taichi_alone(TI_LOG_LEVEL="error"):
     importlib.import_module("taichi")

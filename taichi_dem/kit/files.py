@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import FileName, folder_name, path_name
+from taichi_dem.kit.validation import FileName, path_name
 
 try:
     import fcntl
@@ -37,7 +37,7 @@ def output_folder(path: FileName) -> str:
     belongs to this process.
     Raises InputError when it cannot be made or written to, or belongs to another.
     """
-    path = folder_name("output folder", path)
+    path = path_name("output folder", path)
     try:
         os.makedirs(path, exist_ok=True)
         if _claims is not None and fcntl is not None:

@@ -26,8 +26,6 @@ SMALLEST, LARGEST = 1e-60, 1e60
 AUTO = "auto"
 #: Letters of a value that a sentence quotes.
 _QUOTED = 80
-#: Bytes of the name of a file beside its number and ending: file systems take 255.
-_STEM = 200
 # Digits by which any two numbers differ.
 _MOST_DIGITS = 17
 
@@ -87,14 +85,6 @@ def is_real(value: Any) -> bool:
 def is_whole(value: Any) -> bool:
     """Whether a value is a whole number."""
     return isinstance(value, numbers.Integral) and is_real(value)
-
-
-def float_array(values: Any) -> np.ndarray:
-    """A copy of real numbers in 64 bits. Raises TypeError or ValueError for anything else."""
-    given = np.asarray(values)
-    if given.dtype.kind not in "biufO":
-        raise TypeError(f"no real numbers: {given.dtype}")
-    return np.array(given, dtype=np.float64)
 
 
 def finite(value: Any) -> bool:
@@ -165,14 +155,6 @@ def choice(name: str, value: Any, allowed: Collection[str]) -> str:
     return value
 
 
-def choices(name: str, values: Any, allowed: Collection[str]) -> tuple[str, ...]:
-    """Words as a tuple; InputError unless they are a list or tuple of words allowed."""
-    several = isinstance(values, (list, tuple))
-    if not several or not all(isinstance(v, str) and v in tuple(allowed) for v in values):
-        raise InputError(f"{name} must be a tuple out of {', '.join(allowed)}, got {shown(values)}")
-    return tuple(values)
-
-
 def word(name: str, value: Any) -> str:
     """The value; InputError unless it is text that a mesh file can hold as a name."""
     if not isinstance(value, str) or not value or not value.isprintable() or '"' in value:
@@ -205,18 +187,9 @@ def path_name(name: str, value: Any) -> str:
 
     InputError unless it can be the name of a file or folder.
     """
-    return _path(name, value, "file")
-
-
-def folder_name(name: str, value: Any) -> str:
-    """The same of a folder."""
-    return _path(name, value, "folder")
-
-
-def _path(name, value, kind):
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else ""
     if not isinstance(text, str) or not text or "\0" in text:
-        raise InputError(f"{name} must be the name of a {kind}, got {shown(value)}")
+        raise InputError(f"{name} must be the name of a file or folder, got {shown(value)}")
     # Python's own text: os.path cannot join np.str_, which is text and bytes at once.
     return os.path.expanduser(str.__str__(text))
 
@@ -224,12 +197,10 @@ def _path(name, value, kind):
 def file_stem(name: str, value: Any) -> str:
     """The value; InputError unless it is a name for files of one folder, without their ending."""
     text = str.__str__(value) if isinstance(value, str) else ""
-    if not text.isprintable() or not text.strip(". ") or len(text.encode()) > _STEM:
-        text = ""
-    if not text or any(one in text for one in "/\\:") or text.startswith("."):
+    if not text.isprintable() or not text.strip() or text[0] == "." or {*text} & {*"/\\:"}:
         raise InputError(
             f"{name} must be a name for files of one folder, without /, \\, : and a leading dot, "
-            f"of at most {_STEM} bytes, got {shown(value)}"
+            f"got {shown(value)}"
         )
     return text
 

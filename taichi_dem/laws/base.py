@@ -21,7 +21,7 @@ from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.products import dot
 from taichi_dem.kit.types import real, vec3
-from taichi_dem.kit.validation import float_array, shown
+from taichi_dem.kit.validation import shown
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.materials.body_materials import MOST, BodyMaterials
 from taichi_dem.state.capacity import Capacity
@@ -308,7 +308,7 @@ def _checked_numbers(effect, material):
     """Numbers of an effect with a material, as an array; InputError unless all are numbers."""
     given = effect.numbers(material)
     try:
-        found = float_array(given)
+        found = np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
         found = np.array(np.nan)
     if found.shape != (effect._count,) or np.isnan(found).any():

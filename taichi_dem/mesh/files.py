@@ -13,10 +13,10 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from taichi_dem.kit.children import run_with_timeout
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done, write_text
 from taichi_dem.kit.likely_units import EDGE, in_unit
-from taichi_dem.kit.timeout import run_with_timeout
 from taichi_dem.kit.validation import FileName, path_name, positive
 from taichi_dem.mesh import cells
 from taichi_dem.mesh.check import checked_points, unbonded_places, weld_labels

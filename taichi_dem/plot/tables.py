@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from taichi_dem.kit.data_table import arrays_of, unit_of, without_unit
 from taichi_dem.kit.display import scale
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, SPARE_COLOURS, area_key, picture
-from taichi_dem.kit.validation import FileName, choices, positive, unit_vector
+from taichi_dem.kit.validation import FileName, choice, positive, unit_vector
 from taichi_dem.output.fragments import COLOURS, body_values, scale_end
 from taichi_dem.plot.series import ENERGY_TERMS
 from taichi_dem.plot.view import ALONG_Z, JOINT, View, draw_bodies, frame_block
@@ -53,7 +53,8 @@ def plot_columns(
     path: FileName | None, table: Mapping[str, np.ndarray], names: Sequence[str]
 ) -> Figure:
     """Draw columns of a table over its time_s; those of one unit share a panel."""
-    names = choices("names", names, [name for name in table if name != "time_s"])
+    known = [name for name in table if name != "time_s"]
+    names = [choice("names", name, known) for name in names]
     units = list(dict.fromkeys(map(unit_of, names)))
     factor, unit = scale(float(np.abs(table["time_s"]).max(initial=0.0)), "s")
     shape = {"size": (6.4, 1.0 + 2.2 * len(units)), "sharex": True, "squeeze": False}

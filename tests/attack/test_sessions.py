@@ -165,7 +165,7 @@ def test_an_interrupt_at_any_moment_leaves_the_session_whole(seed):
 
 
 _FORKED = """
-import os, sys
+import os
 from tests.attack.test_sessions import made
 from taichi_dem import InputError, runtime
 
@@ -178,7 +178,7 @@ if child == 0:
             call()
         except InputError as error:
             print(error, flush=True)
-    sys.exit(5)
+    os._exit(5)
 print(os.WEXITSTATUS(os.waitpid(child, 0)[1]))
 made(0).advance_to(1)
 print("survived")

@@ -45,7 +45,7 @@ def too_many(trial):
     drive(trial, filling(trial), filling(trial).capacity + 1, 1)
 
 
-@case(["automaton"], (SPHERES, "restitution must lie in"))
+@case(["automaton"], (SPHERES, "restitution must be"))
 def no_rebound(trial):
     """Restitution 0: a particle stays where it falls, at less than the speed of what rests."""
     what = filling(trial, automaton={"start": ((5, 15),)}, **NONE)

@@ -21,7 +21,7 @@ from taichi_dem.kit.files import older_files, write_csv, write_text
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.provenance import commit, processor
 from taichi_dem.kit.study.entries import MOST_FIGURES, Entry, key_figures
-from taichi_dem.kit.terminal import print_table, show_heading, show_paragraph
+from taichi_dem.kit.terminal import print_table, show_heading
 from taichi_dem.kit.version import __version__, taichi_version
 
 #: Most pictures of a list.
@@ -48,11 +48,10 @@ def finish(
     figures: Mapping[str, dict | tuple],
     runs: Iterable | tuple[float, float] | float,
     *,
-    caption: str = "",
     see: str = "",
     draw: Callable[[], None] | None = None,
 ) -> None:
-    """Write summary.json, and caption.txt where there is a caption; print them, and the pictures.
+    """Write summary.json; print its figures, and the pictures.
 
     figures: by name, as of ``figure``, or tuples of its arguments.
     runs: reports, objects with compile_seconds and run_seconds, or both sums as a pair of numbers;
@@ -64,10 +63,6 @@ def finish(
     entry = getattr(options, "entry", None)
     if made:
         print_figures(made, entry)
-    if caption:
-        write_text(os.path.join(options.out, "caption.txt"), caption + "\n")
-        print()
-        show_paragraph(caption)
     if draw:
         with ProgressBar(name):
             draw()

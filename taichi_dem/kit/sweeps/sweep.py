@@ -33,7 +33,7 @@ from taichi_dem.kit.validation import AUTO, FileName, whole
 
 #: File of the whole table in the folder of a sweep.
 RESULTS = "results.csv"
-_GUARD = 'if __name__ == "__main__":'
+_GUARD = 'if __name__ == "__main__"'
 #: Time without any worker after which none is expected any more [s].
 _NO_WORKER = 60.0
 #: Dask's on this machine: a row whose process is lost is run three times, and a worker whose kernel
@@ -158,6 +158,7 @@ def _run(work, jobs, client, count) -> Generator[tuple[Job, Record], None, None]
         raise InputError(
             'a sweep needs Dask: python -m pip install "taichi-dem[sweeps]", or distributed alone'
         ) from None
+    hint = f" (the call of sweep must stand below {_GUARD})" if client is None else ""
     try:
         with contextlib.ExitStack() as opened:
             if client is None:
@@ -167,10 +168,7 @@ def _run(work, jobs, client, count) -> Generator[tuple[Job, Record], None, None]
                 client = opened.enter_context(distributed.Client(client))
             yield from _records(work, jobs, client)
     except (OSError, RuntimeError) as error:
-        raise InputError(
-            f"workers of the sweep do not start, as the call of sweep must stand below {_GUARD}, "
-            f"or are lost: {error}"
-        ) from None
+        raise InputError(f"workers of the sweep do not start or are lost{hint}: {error}") from None
 
 
 @contextlib.contextmanager
@@ -187,7 +185,8 @@ def _here(count: int):
     ):
         yield client
         wait = [client.submit(runtime.stop, workers=[one], pure=False) for one in client.nthreads()]
-        distributed.wait(wait)
+        with contextlib.suppress(TimeoutError):
+            distributed.wait(wait, timeout=_NO_WORKER)
 
 
 def _records(work, jobs: Iterable[Job], client) -> Iterator[tuple[Job, Record]]:

@@ -49,8 +49,10 @@ def parameter_grid(**columns: Iterable) -> list[Row]:
     >>> parameter_grid(peak=[1.0, 2.0], rise=[3.0])
     [{'peak': 1.0, 'rise': 3.0}, {'peak': 2.0, 'rise': 3.0}]
     """
-    lists = [_values(name, values) for name, values in columns.items()]
-    return [dict(zip(columns, combination)) for combination in itertools.product(*lists)]
+    for name, values in columns.items():
+        if isinstance(values, str) or not isinstance(values, Iterable):
+            raise InputError(f"column {name} must be a list of values, got {shown(values)}")
+    return [dict(zip(columns, values)) for values in itertools.product(*columns.values())]
 
 
 def checked_rows(table: TableLike) -> list[Row]:
@@ -64,10 +66,6 @@ def checked_rows(table: TableLike) -> list[Row]:
                 f"a column of a table must have a name other than {', '.join(ADDED)}, "
                 f"got {shown(name)}"
             )
-    for k, row in enumerate(rows):
-        if row.keys() != rows[0].keys():
-            wanted, got = shown([*rows[0]]), shown([*row])
-            raise InputError(f"row {k} must have the columns of row 0, {wanted}, got {got}")
     return [
         {name: plain_value(f"{name} of row {k}", row[name]) for name in rows[0]}
         for k, row in enumerate(rows)
@@ -102,31 +100,16 @@ def plain_value(name: str, value: Any) -> Value:
 
 
 def _rows(table):
+    import pandas
+
     if isinstance(table, (str, os.PathLike)):
         return _read_rows(table)
-    if hasattr(table, "to_dict"):
-        return table.to_dict("records")
-    if isinstance(table, Mapping):
-        return _rows_of_columns({name: _values(name, column) for name, column in table.items()})
-    rows = list(table) if hasattr(table, "__iter__") else [table]
-    if not all(isinstance(row, Mapping) for row in rows):
+    try:
+        return pandas.DataFrame(table).to_dict("records")
+    except (TypeError, ValueError):
         raise InputError(
             f"a table must be rows, columns or the name of a CSV file, got {shown(table)}"
-        )
-    return rows
-
-
-def _rows_of_columns(columns):
-    lengths = {name: len(values) for name, values in columns.items()}
-    if len({*lengths.values()}) > 1:
-        raise InputError(f"columns of a table must be equally long, got {shown(lengths)}")
-    return [dict(zip(columns, values)) for values in zip(*columns.values())]
-
-
-def _values(name, values):
-    if isinstance(values, str) or not hasattr(values, "__iter__"):
-        raise InputError(f"column {name} must be a list of values, got {shown(values)}")
-    return list(values)
+        ) from None
 
 
 def _number_or_text(cell):
