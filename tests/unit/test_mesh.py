@@ -254,14 +254,6 @@ def test_spheres_sit_at_the_crossings(block):
         assert np.abs(fifths - np.round(fifths))[whole].max() < 1e-6
 
 
-def test_extent_holds_the_spheres_of_its_body_and_no_more(block):
-    """The ball around the centre touches the farthest sphere from outside."""
-    mesh, centre = block
-    spheres = spheres_of_faces(mesh, centre, 5)
-    reach = np.linalg.norm(spheres.centre, axis=-1) + spheres.radius
-    assert np.array_equal(spheres.extent, reach.reshape(len(reach), -1).max(axis=1))
-
-
 def is_proper(links, colours):
     """Whether no body has two links of one colour."""
     links, colours = np.asarray(links), np.asarray(colours)

@@ -152,39 +152,6 @@ def test_the_force_is_the_gradient_of_the_energy_and_conserves_momentum():
         assert np.abs(turning).max() < 1e-12 * size
 
 
-def drawn(random):
-    """Two tetrahedra of about 5 cm that turn and fly at each other at 5 m/s."""
-    way, points, velocity = random.standard_normal(3), [], []
-    way /= np.linalg.norm(way)
-    for sign in (-1.0, 1.0):
-        corners = random.uniform(-0.05, 0.05, (4, 3))
-        while abs(np.linalg.det(corners[1:] - corners[0])) < 1e-4:
-            corners = random.uniform(-0.05, 0.05, (4, 3))
-        points.append(corners - corners.mean(axis=0) + sign * 0.06 * way)
-        velocity.append(-2.5 * sign * way)
-    mesh = checked_mesh(np.vstack(points), [[0, 1, 2, 3], [4, 5, 6, 7]], {})
-    spin = random.uniform(-60.0, 60.0, (2, 3))
-    return Scene(mesh, LOSSLESS, [effects.BodyContact()], velocity=velocity, spin=spin)
-
-
-@pytest.mark.parametrize("seed", [0, 6])
-def test_bodies_that_collide_keep_their_energy(seed):
-    """To (w dt)^2 / 8 of it: that of a leapfrog where a spring of rate w begins to act."""
-    simulation = Simulation(drawn(np.random.default_rng(seed)), Uniform(2e-7))
-    simulation.start()
-    before = simulation.energy_balance.account()["kinetic"]
-    model = simulation.model
-    arm, least = model.body_radius, np.linalg.eigvalsh(model.body_inertia)[:, 0]
-    mobility = (1.0 / model.body_mass + arm**2 / least).sum()
-    area = values(simulation.contacts.law.face_area)[:2].min()
-    simulation.advance_to(80_000)
-    account = simulation.energy_balance.account()
-    turned_back = simulation.motion()["velocity"][0] - simulation.scene.velocity[0]
-    assert np.linalg.norm(turned_back) > 1.0
-    error = STIFFNESS * area * mobility * 2e-7**2 / 8.0
-    assert account["kinetic"] + account["sphere_strain"] == pytest.approx(before, rel=error)
-
-
 @pytest.mark.parametrize("size", [0.1, 1.0])
 def test_a_small_body_on_a_large_face_has_the_energy_of_its_own_face(size):
     """Wherever it lies: the rays of the large body are far apart."""
