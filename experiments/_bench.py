@@ -238,7 +238,7 @@ def sweep_bonds(solver: ti.template(), times: ti.i32):
     ti.loop_config(serialize=True)
     for _ in range(times):
         for g in range(solver.bonds.colour_first[BOND_COLOURS]):
-            solver.bonds_of(g)
+            solver.bonds.visit(g)
 
 
 def short_runs(quick):

@@ -81,7 +81,9 @@ def waits_of_scenes():
     """
     code = "import time, numpy, taichi; t = time.process_time(); import taichi_dem; "
     line = [sys.executable, "-c", code + "print(time.process_time() - t)"]
-    imported = float(subprocess.run(line, check=True, capture_output=True, text=True).stdout)
+    said = subprocess.run(line, check=True, capture_output=True, text=True).stdout
+    # Taichi names its version first.
+    imported = float(said.split()[-1])
     demo = {"method": ImplicitDashpots(STEP), "until": DEMO, "frames": 40, "progress": None}
     first = simulate(default_blast(), **demo).report.compile_seconds
     begun = clock()

@@ -153,6 +153,10 @@ class FrozenBatch:
     def __init__(self, filling, options, table):
         self.batch = batch_of(filling, options, **table)
         self.memory = FieldMemory(self.batch.engine)
+        # Places in the engine's list of fields differ with the options, their order does not.
+        fields = self.memory.fields
+        for k, name in enumerate([name for name in fields if name.startswith("table.made.")]):
+            fields[f"table.in_order.{k}"] = fields.pop(name)
 
     def states_of_run(self, count, transient, measured):
         """States of the run, at phases spread over the cycle: arrays by name of the field."""
