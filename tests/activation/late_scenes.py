@@ -284,6 +284,14 @@ def meeting_slips(draw):
     return Late("shear", rod(draw), both, start)
 
 
+def flight(draw):
+    """A bar flies and touches another late, or not where that is farther away."""
+    first, second, speed = rod(draw, 3), rod(draw, 4), draw.uniform(8.0, 12.0)
+    near, far = (in_a_row(first, second, gap) for gap in (1e-3, 6e-3))
+    moving = ((layer(-1.0, 3.2 * WIDE), (speed, 0.0, 0.0)),)
+    return Late("contact", near, loads(), 6e-5, moving, twin=(("mesh", far),))
+
+
 def fragment(draw):
     """The end of a bar is torn off and flies to another bar, or not as far."""
     torn, wall = rod(draw, 2), rod(draw, 3)
@@ -323,7 +331,7 @@ def hit(draw):
 
 KINDS = (
     *(far_end, far_end_slips, meeting_slips),
-    *(fragment, rubbing, damped, hit),
+    *(flight, fragment, rubbing, damped, hit),
 )
 #: Kind and seed by name.
 SCENES = {f"{kind.__name__} 0": (kind, 0) for kind in KINDS}
