@@ -71,13 +71,17 @@ class LinearBonds:
         along = np.outer(normal, normal) / (normal @ normal)
         across = np.eye(3) - along
         elastic, viscous = (normal * along + shear * across for normal, shear in laws)
+        rows = np.concatenate([np.arange(6 * body, 6 * body + 6) for body in bodies])
+        block = np.ix_(rows, rows)
         for corner in corners:
-            jacobian = np.zeros((3, len(self.mass)))
-            for sign, body in zip((-1.0, 1.0), bodies):
-                part = slice(6 * body, 6 * body + 6)
-                jacobian[:, part] = sign * carried(corner - centre[body])
-            self.stiffness += unit_area * jacobian.T @ elastic @ jacobian
-            self.damping += unit_area * jacobian.T @ viscous @ jacobian
+            master, slave = (carried(corner - centre[body]) for body in bodies)
+            jacobian = np.hstack([-master, slave])
+            self.stiffness[block] += unit_area * jacobian.T @ elastic @ jacobian
+            self.damping[block] += unit_area * jacobian.T @ viscous @ jacobian
+
+    def largest_rate(self, matrix):
+        """Largest eigenvalue of M^-1 times the stiffness [1/s^2] or the damping [1/s]."""
+        return np.linalg.eigvals(np.linalg.solve(self.mass, matrix)).real.max()
 
     def state_matrix(self):
         """Matrix A (12 n, 12 n) of x' = A x for displacements and turns, then their rates."""

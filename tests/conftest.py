@@ -1,7 +1,7 @@
 """A Taichi session for all tests of a worker; tests of starting and stopping use subprocesses.
 
 ``pytest --arch cuda`` runs all kernels of this process, and all experiments, on a CUDA device.
-Options of the attacks are those of ``tests/attacks.py``.
+A test marked ``attack`` that takes a seed is run once a seed.
 """
 
 import contextlib
@@ -16,17 +16,30 @@ from pathlib import Path
 import pytest
 from xdist.scheduler import LoadScopeScheduling
 
+from ca_damper.engine import damper_engine
 from taichi_dem import InputError, runtime
+from taichi_dem.engine import ENGINES
 from taichi_dem.kit.allocation import field_bytes, tree_count
 from taichi_dem.step.drivers import CPU_ONLY
 from tests import arch
 
-pytest_plugins = ("tests.attacks", "tests.compiler", "tests.own_engines")
+pytest_plugins = ("tests.compiler",)
 
 
 def pytest_addoption(parser):
-    """The architecture, as every experiment has it."""
+    """The architecture, as every experiment has it; how many seeds, from which on."""
     parser.addoption("--arch", default="cpu", choices=runtime.ARCHITECTURES)
+    group = parser.getgroup("attacks")
+    group.addoption("--attacks", type=int, default=1, metavar="N", help="seeds of each attack")
+    group.addoption("--attack-seed", type=int, default=0, metavar="S", help="the first of them")
+
+
+def pytest_generate_tests(metafunc):
+    """One test a seed."""
+    if metafunc.definition.get_closest_marker("attack") and "seed" in metafunc.fixturenames:
+        first = metafunc.config.getoption("--attack-seed")
+        seeds = range(first, first + metafunc.config.getoption("--attacks"))
+        metafunc.parametrize("seed", seeds)
 
 
 def pytest_configure(config):
@@ -47,8 +60,7 @@ class ByGroup(LoadScopeScheduling):
 
 #: Groups that take longest: begun first, so that workers end together.
 FIRST = ("verification", "unit", "ca", "activation")
-#: Files of the first group that run the paper's effects: side by side, as they share engines. The
-#: last of them gives all engines back.
+#: Files of the first group that run the paper's effects: side by side, as they share engines.
 OF_THE_BLOCK = """equivalence/test_bits.py verification/test_conservation.py
     equivalence/test_digests.py equivalence/test_restart.py verification/test_wake_up.py
     verification/test_convergence.py verification/test_implicit.py
@@ -171,6 +183,22 @@ def _give_back():
     gc.collect()
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
+
+
+@pytest.fixture
+def compiled_anew(monkeypatch):
+    """Engines of this test alone: for constants of kernels that a test changes; calls drop them."""
+    set_aside(monkeypatch)
+    return functools.partial(set_aside, monkeypatch)
+
+
+def set_aside(monkeypatch):
+    """Leave all pools without an engine until the patches are undone."""
+    for pool in (ENGINES, damper_engine._POOL):
+        # With its session: engines come back only while theirs goes on. One of an ended session
+        # ends the process, or writes into the fields of others.
+        monkeypatch.setattr(pool, "_session", None)
+        monkeypatch.setattr(pool, "_engines", {})
 
 
 def _skipping():

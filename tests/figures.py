@@ -13,8 +13,6 @@ import runpy
 import sys
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.legend import Legend
-from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 CODE_NAME = re.compile(r"[A-Za-z0-9]_[A-Za-z0-9]")
@@ -28,11 +26,9 @@ QUOTE = re.compile(r"“[^”]*”", re.DOTALL)
 
 
 def defects(figure):
-    """Sentences: names of the code, words cut off, lines without a legend, axes without a unit."""
-    found = [*code_names(figure), *clipped_words(figure), *unexplained_lines(figure)]
-    for axes in figure.axes:
-        found += [*missing_units(axes), *covered_lines(axes)]
-    return found
+    """Sentences: names of the code, words cut off, axes without a unit."""
+    units = [words for axes in figure.axes for words in missing_units(axes)]
+    return [*code_names(figure), *clipped_words(figure), *units]
 
 
 def texts_of(figure):
@@ -65,34 +61,6 @@ def clipped_words(figure):
         box = text.get_window_extent().padded(-1.0)
         if box.x0 < left or box.y0 < bottom or box.x1 > right or box.y1 > top:
             yield f"{text.get_text()!r} is cut off at the edge of the figure"
-
-
-def unexplained_lines(figure):
-    """Dashed and dotted lines that no legend of the figure names."""
-    legends = figure.findobj(Legend)
-    styles = {line.get_linestyle() for key in legends for line in key.findobj(Line2D)}
-    for axes in figure.axes:
-        for line in axes.lines:
-            look = line.get_linestyle()
-            drawn = line.get_visible() and len(line.get_xdata()) and look not in ("-", "None")
-            if drawn and look not in styles:
-                yield f"no legend says what a line {look} means, in {axes.get_title('left')!r}"
-
-
-def covered_lines(axes):
-    """Lines of data that a legend lies on; those from edge to edge are guides."""
-    lines = [line for line in axes.lines if line.get_transform() == axes.transData]
-    for legend in axes.findobj(Legend):
-        box = legend.get_window_extent()
-        if any(line.get_visible() and crosses(line, box) for line in lines):
-            yield f"a legend lies on data, in {axes.get_title('left')!r}"
-
-
-def crosses(line, box):
-    """Whether a line lies in a box of the display."""
-    path = line.get_transform().transform_path(line.get_path()).cleaned(remove_nans=True)
-    drawn = line.get_linestyle() != "None" and len(path.vertices) > 2
-    return drawn and path.intersects_bbox(box, filled=False)
 
 
 def missing_units(axes):

@@ -27,7 +27,7 @@ ROOT = HERE.parent
 #: A run that takes longer has a mutant that hangs, and so is noticed [s].
 MOST_SECONDS = 900
 
-Mutant = collections.namedtuple("Mutant", "area name path old new tests harmless")
+Mutant = collections.namedtuple("Mutant", "area name path old new tests")
 Verdict = collections.namedtuple("Verdict", "area name verdict by seconds")
 
 
@@ -38,11 +38,10 @@ def mutants(text):
         if block.startswith("#"):
             area = block.lstrip("# ")
             continue
-        name, path, old, new, tests, *harmless = (line.strip() for line in block.splitlines())
+        name, path, old, new, tests = (line.strip() for line in block.splitlines())
         if not (old.startswith("- ") and new.startswith("+ ")):
             raise ValueError(f"{name}: a mutant has a line after '- ' and one after '+ '")
-        reason = harmless[0].partition("harmless: ")[2] if harmless else ""
-        found.append(Mutant(area, name, path, old[2:], new[2:], tests.split(), reason))
+        found.append(Mutant(area, name, path, old[2:], new[2:], tests.split()))
     return found
 
 
@@ -135,8 +134,6 @@ def verdicts(chosen, whole_suite, jobs):
                     verdict = tested(folder, mutant, ["tests"])
             finally:
                 copies.put(folder)
-            if verdict.verdict == "survived" and mutant.harmless:
-                return verdict._replace(verdict="harmless", by=mutant.harmless)
             return verdict
 
         with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
@@ -145,14 +142,13 @@ def verdicts(chosen, whole_suite, jobs):
 
 
 def summary(found):
-    """Lines: killed of those that are not harmless, an area and in all."""
+    """Lines: killed of how many, an area and in all."""
     areas = {}
     for verdict in found:
         areas.setdefault(verdict.area, collections.Counter())[verdict.verdict] += 1
     areas["all"] = sum(areas.values(), collections.Counter())
     return [
         f"{area:24} {n['killed']:4} of {n['killed'] + n['survived']} killed"
-        + (f", {n['harmless']} harmless" if n["harmless"] else "")
         for area, n in areas.items()
     ]
 

@@ -128,17 +128,17 @@ class ContactProbe:
         self.centre = self.model.centre
         self.sphere = simulation.values(self.tables.sphere)
 
-    def evaluate(self, spheres, position, orientation=None, velocity=None, spin=None, swap=False):
+    def evaluate(self, spheres, position, orientation=None, velocity=None, spin=None):
         """Force [N] and torque [N m] on both bodies (2, 6), and the three heats per STEP [W].
 
-        spheres: sphere numbers on body 0 and body 1. swap: let body 1 be the first of the pair.
+        spheres: sphere numbers on body 0 and body 1.
         """
         still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
         self.state.set_motion(
             position, still if orientation is None else orientation, velocity, spin
         )
         wrench, heat = np.zeros((2, 6)), np.zeros(3)
-        self._evaluate(spheres[0], spheres[1], int(swap), wrench, heat)
+        self._evaluate(spheres[0], spheres[1], wrench, heat)
         return wrench / STEP, heat / STEP
 
     @ti.kernel
@@ -146,7 +146,6 @@ class ContactProbe:
         self,
         a: ti.i32,
         b: ti.i32,
-        swap: ti.i32,
         wrench: ti.types.ndarray(dtype=ti.f64, ndim=2),
         heat: ti.types.ndarray(dtype=ti.f64, ndim=1),
     ):
@@ -154,14 +153,10 @@ class ContactProbe:
             self.store.clear_slot(0)
             self.store.body[0] = [0, 1]
             self.store.sphere[0] = [a, b]
-            if swap == 1:
-                self.store.body[0] = [1, 0]
-                self.store.sphere[0] = [b, a]
             self.store.first[0], self.store.last[0] = 0, 1
             self.advance.contact(0)
             for side in ti.static(range(2)):
-                place = side if swap == 0 else 1 - side
                 for k in ti.static(range(6)):
-                    wrench[side, k] = self.store.impulse[place][k]
+                    wrench[side, k] = self.store.impulse[side][k]
             for k in ti.static(range(3)):
                 heat[k] = self.store.heat[0][k]

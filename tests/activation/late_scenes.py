@@ -4,14 +4,19 @@ Where a bond shall soften or slip, a run of elastic bonds that record their trac
 limit that one bond alone exceeds; the scene's twin is stronger.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+import taichi as ti
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.elementary import sine_and_cosine
+from taichi_dem.kit.types import vec3
+from taichi_dem.laws.base import Effect, ElasticShear, ElasticTension
 from taichi_dem.mesh.shapes import bar, pair, placed_together
-from tests.activation.late_effects import Mover, PeakShear, PeakTension, Push
 
 #: Step [s], and steps of a run.
 STEP = 4e-7
@@ -27,6 +32,121 @@ MATERIAL = replace(
     CONCRETE, normal_damping=2e5, shear_damping=1e5, contact_damping=1e2, contact_stiffness=1e8
 )
 
+NOWHERE = ((1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
+
+
+def within(model, box):
+    """1 for bodies with their centre in a box, lowest and highest corner, else 0."""
+    low, high = np.array(box)
+    inside = ((model.centre > low) & (model.centre < high)).all(axis=1)
+    return inside.astype(np.int32)
+
+
+@ti.data_oriented
+class Marked(Effect):
+    """Base of effects that act on bodies with their centre in a box."""
+
+    def __init__(self, box=NOWHERE, start=0.0, vector=(0.0, 0.0, 0.0)):
+        self.box, self.start, self.vector = box, start, vector
+
+    def declare(self, capacity):
+        """Marks of the bodies."""
+        self.marked = ti.field(ti.i32, shape=capacity.bodies)
+
+    def load(self, model):
+        """Mark the bodies."""
+        assign(self.marked, within(model, self.box))
+
+    @ti.func
+    def acts_on(self, i):
+        """1 for a marked body, else 0."""
+        return self.marked[i]
+
+
+@ti.data_oriented
+class Push(Marked):
+    """Acceleration of bodies in a box [m/s^2], a squared sine from a start for a duration [s]."""
+
+    role = "load"
+
+    def __init__(self, box=NOWHERE, start=0.0, vector=(0.0, 0.0, 0.0), duration=1.0):
+        super().__init__(box, start, vector)
+        self.duration = duration
+
+    def numbers(self, material):
+        """Acceleration, start and duration."""
+        return (*self.vector, self.start, self.duration)
+
+    @ti.func
+    def wrench(self, i, motion):
+        """Force [N] and no torque."""
+        share, phase = 0.0, (motion.time - self.law[3]) / self.law[4]
+        if 0.0 < phase and phase < 1.0:
+            swing, _ = sine_and_cosine(math.pi * phase)
+            share = swing * swing
+        push = share * self.tables.mass[i] * vec3(self.law[0], self.law[1], self.law[2])
+        return push, vec3(0.0)
+
+
+@ti.data_oriented
+class Mover(Marked):
+    """Bodies in a box are held, and from a start on move at a velocity [m/s]."""
+
+    role = "support"
+
+    def numbers(self, material):
+        """Velocity and start."""
+        return (*self.vector, self.start)
+
+    @ti.func
+    def held(self, i, t, step, rotation, velocity, angular_momentum):
+        """Velocity at a time and no spin."""
+        allowed = vec3(0.0)
+        if t > self.law[3]:
+            allowed = vec3(self.law[0], self.law[1], self.law[2])
+        return allowed, vec3(0.0)
+
+
+@ti.data_oriented
+class PeakTension(ElasticTension):
+    """Elastic, and every unit records its largest pull [Pa]."""
+
+    is_null = False
+    name = "peak_tension"
+
+    def declare(self, capacity):
+        """Largest pull of every unit."""
+        self.peak = ti.field(ti.f64, shape=capacity.units)
+
+    @ti.func
+    def traction(self, m, stiffness, u, opening):
+        """Linear traction [Pa]."""
+        self.peak[u] = ti.max(self.peak[u], stiffness * opening)
+        return stiffness * opening
+
+
+@ti.data_oriented
+class PeakShear(ElasticShear):
+    """Elastic, and every unit records the largest cohesion that it needed [Pa]."""
+
+    is_null = False
+    name = "peak_shear"
+
+    def numbers(self, material):
+        """Friction coefficient."""
+        return (material.friction,)
+
+    def declare(self, capacity):
+        """Largest cohesion needed by every unit."""
+        self.peak = ti.field(ti.f64, shape=capacity.units)
+
+    @ti.func
+    def traction(self, m, stiffness, u, sliding, pressure):
+        """Linear traction [Pa]; nothing slips."""
+        needed = stiffness * sliding.norm() - self.law[m, 0] * pressure
+        self.peak[u] = ti.max(self.peak[u], needed)
+        return stiffness * sliding, 0.0
+
 
 @dataclass(frozen=True, eq=False)
 class Late:
@@ -34,9 +154,8 @@ class Late:
 
     role: of the law that is needed. loads: Push, Push and Mover, so that all are compiled once.
     late: time before which the effect must not act [s]. velocity: of the bodies at the start, by
-    box. moved: how far they are from their place in the mesh, by box [m]. until [s]. tension: the
-    strength of bonds where another law is needed [Pa]. twin: what changes for the twin, in which
-    the effect is not needed; empty where it is just stronger.
+    box. until [s]. tension: the strength of bonds where another law is needed [Pa]. twin: what
+    changes for the twin, in which the effect is not needed; empty where it is just stronger.
     """
 
     role: str
@@ -44,7 +163,6 @@ class Late:
     loads: tuple
     late: float
     velocity: tuple = ()
-    moved: tuple = ()
     until: float = 3.2e-4
     tension: float = ENDLESS
     twin: tuple = ()
@@ -95,12 +213,12 @@ def in_boxes(centre, rows):
     return found
 
 
-def simulation(late, scene, method=METHOD, driver="resident"):
+def simulation(late, scene):
     """Simulation of a scene, with the motion that it begins with."""
-    made = Simulation(scene, method, driver)
+    made = Simulation(scene, METHOD, "resident")
     centre = made.model.centre
     velocity = in_boxes(centre, late.velocity)
-    made.state.set_motion(centre + in_boxes(centre, late.moved), velocity=velocity)
+    made.state.set_motion(centre, velocity=velocity)
     return made
 
 
@@ -211,23 +329,9 @@ def hit(draw):
     return Late("tension", mesh, loads(), 6e-5, moving)
 
 
-def support(draw):
-    """A support begins to move late."""
-    start = draw.uniform(6e-5, 1e-4)
-    mover = Mover(layer(7.5 * WIDE, 1.0), start, (draw.uniform(0.5, 1.0), 0.0, 0.0))
-    return Late("tension", rod(draw), loads(mover=mover), start)
-
-
-def strained(draw):
-    """All bodies are at rest at the start, and some bonds strained."""
-    hold = Mover(layer(7.5 * WIDE, 1.0), 1.0)
-    moved = ((layer(-1.0, draw.uniform(1.0, 4.0) * WIDE), (-2e-6, 0.0, 0.0)),)
-    return Late("tension", rod(draw), loads(mover=hold), 0.0, moved=moved)
-
-
 KINDS = (
-    *(far_end, far_end_slips, meeting_slips, flight, fragment),
-    *(rubbing, damped, hit, support, strained),
+    *(far_end, far_end_slips, meeting_slips),
+    *(flight, fragment, rubbing, damped, hit),
 )
 #: Kind and seed by name.
 SCENES = {f"{kind.__name__} 0": (kind, 0) for kind in KINDS}

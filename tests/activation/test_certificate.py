@@ -16,7 +16,6 @@ from taichi_dem import (
     simulate,
     solve,
 )
-from taichi_dem.kit.certificate import Audit
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.state.timeline import NEVER
 from tests.scenes import beside
@@ -44,44 +43,11 @@ def test_times_are_those_of_the_first_body_on_which_an_effect_acts(result):
     assert 0.0 < acting["softening"].since_s < np.nanmin(result.broken_time)
 
 
-def test_the_table_of_effects_has_the_figures_of_the_certificate(result):
-    found, certificate = result.effects, result.certificate
-    row = {name: k for k, name in enumerate(found["effect"])}
-    assert found["listed"].tolist() == [True] * len(certificate.acting) + [False] * 2
-    assert found["since_s"][row["softening"]] == np.nanmin(result.acting_since["softening"])
-    # Softening and slip are one law of bonds, asked once.
-    assert found["evaluations"].max() == certificate.law_evaluations
-    every = found["evaluations"] + found["skipped"]
-    assert every.max() == certificate.all_law_evaluations
-    assert found["left_out"][row["gravity"]] == certificate.left_out[0].group
-    assert found["advice"][row["gravity"]] == certificate.left_out[0].verdict
-
-
 def test_bodies_of_a_broken_bond_have_softened_before_it_broke(result):
     top, broken = result.model.topology, np.flatnonzero(np.isfinite(result.broken_time))
     assert len(broken)
     for side in (top.master, top.slave):
         assert (result.acting_since["softening"][side[broken]] < result.broken_time[broken]).all()
-
-
-def test_fewer_evaluations_are_made_than_there_are(result):
-    found, report = result.certificate, result.report
-    assert found.law_ratio == found.all_law_evaluations / found.law_evaluations > 1.0
-    assert found.all_law_evaluations <= 3 * (report.bond_evaluations + report.bond_count)
-
-
-def test_share_asleep_is_the_mean_time_until_bodies_wake(result):
-    awake = np.nan_to_num(result.acting_since["awake"], nan=result.report.until_s)
-    assert result.certificate.asleep == pytest.approx(awake.mean() / result.report.until_s, 1e-12)
-    assert 0.0 < result.certificate.asleep < 1.0
-
-
-def test_a_certificate_that_does_not_hold_says_so(result):
-    found = result.certificate
-    assert found.holds and "does not hold" not in str(found)
-    missed = replace(found, audits=(Audit(1000, 10, 1, "bonds asleep"),))
-    for wrong in (missed, replace(found, impulse=2.0 * found.sleep)):
-        assert not wrong.holds and "does not hold" in str(wrong)
 
 
 def test_a_resumed_run_has_the_bits_and_the_certificate_of_a_straight_one(result, tmp_path):

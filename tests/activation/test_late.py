@@ -4,15 +4,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-import taichi as ti
 
-from taichi_dem import ImplicitDashpots, Multirate, Scene, StepControl, checked_mesh
-from taichi_dem.kit.products import squared
+from taichi_dem import Scene, checked_mesh
 from taichi_dem.state.timeline import NEVER
-from taichi_dem.step import phases
-from taichi_dem.step.sleeping import Sleeping
 from tests.activation.late_scenes import (
-    METHOD,
     SCENES,
     STEP,
     Late,
@@ -46,15 +41,13 @@ class Run:
     each bond. misses: what the audit of sleep found.
     """
 
-    def __init__(self, name, word, needed=True, method=METHOD, driver="resident", **options):
+    def __init__(self, name, word, needed=True, **options):
         self.late = late_scene(name) if needed else late_scene(name).without()
         self.scene = scene_of(late_scene(name), word, needed, **options)
-        made = simulation(self.late, self.scene, method, driver)
-        self.before = None
-        if self.late.late > 0.0:
-            made.advance_to(int(self.late.late / method.dt0))
-            self.before = acting(made)
-        made.advance_to(round(self.late.until / method.dt0))
+        made = simulation(self.late, self.scene)
+        made.advance_to(int(self.late.late / STEP))
+        self.before = acting(made)
+        made.advance_to(round(self.late.until / STEP))
         self.fields = {key: made.values(field) for key, field in made.state.fields().items()}
         self.acting, self.report = acting(made), made.report(brief=True)
         self.moved = self.fields["position"] - made.model.centre
@@ -109,30 +102,11 @@ def test_without_sleep_all_bits_are_those_of_all_effects(name):
     check_bits(run(name, sleep=0.0), run(name, "all"))
 
 
-#: The largest steps are twice those of the uniform runs, and bodies take down to a sixteenth.
-METHODS = {
-    "implicit": ImplicitDashpots(STEP, refresh=1e-5),
-    "drifted": Multirate(2.0 * STEP, 1e-7, "drifted"),
-    "controlled": Multirate(
-        2.0 * STEP, 1e-6, control=StepControl(dashpot_floor=STEP / 8.0), dashpot="limited"
-    ),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", METHODS)
-def test_so_they_are_with_other_methods(method):
-    for name in ("far_end 0", "hit 0", "fragment 0"):
-        step = METHODS[method]
-        check_bits(run(name, method=step, sleep=0.0), run(name, "all", method=step))
-        assert run(name, method=step).report.certificate.holds
-
-
 @pytest.mark.parametrize("name", SCENES)
 def test_the_effect_acts_late_and_is_found(name):
     auto, role = run(name, sleep=0.0), late_scene(name).role
     assert NAMES[role] in auto.acting
-    assert auto.before is None or NAMES[role] not in auto.before
+    assert NAMES[role] not in auto.before
 
 
 @pytest.mark.parametrize("name", LIMITS)
@@ -203,20 +177,3 @@ def test_far_from_the_origin_bodies_at_rest_sleep():
     made = simulation(late, Scene(far, strengths(), "auto", loads=late.loads))
     made.advance_to(2)
     assert (made.values(made.schedule.sleeping.awake) == 0).sum() == 120
-
-
-@ti.func
-def too_deep(self, i, is_fast):
-    """Whether a body is a million times as fast as one that wakes others."""
-    return squared(self.state.velocity[i]) > 1e12 * self.bound2[self.part[i]]
-
-
-@pytest.mark.slow
-def test_sleep_that_is_too_deep_is_found(monkeypatch, compiled_anew):
-    """Every bond is audited in every substep, in engines of this test alone."""
-    monkeypatch.setattr(phases, "RATE", 1)
-    compiled_anew()
-    monkeypatch.setattr(Sleeping, "_opens", too_deep)
-    made = Run("far_end 0", "auto")
-    assert made.misses > 0
-    assert not made.report.certificate.holds

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_dem import CONCRETE, ImplicitDashpots, InputError, Scene, Simulation, Uniform, effects
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
 from taichi_dem.loads.history import History
-from taichi_dem.mesh.shapes import bar, pair
+from taichi_dem.mesh.shapes import pair
 
 STEP = 1e-6
 
@@ -70,12 +70,3 @@ def test_a_velocity_that_rises_moves_its_bodies_by_its_integral(method):
         assert np.abs(gone - np.array([2.0, 0.0, 1.0]) * way).max() < 1e-15
     account = simulation.energy_balance.account()
     assert abs(account["residual"]) < 0.01 * abs(account["support_work"])
-
-
-def test_motions_of_other_histories_must_not_share_bodies():
-    mesh, one = bar(0.1, 0.1, (1, 1, 1)), (1.0, 0.0, 0.0)
-    two = [effects.PrescribedMotion(name, one, ramp=t) for name, t in (("left", 1.0), ("top", 2.0))]
-    with pytest.raises(InputError, match="must not share bodies"):
-        Simulation(Scene(mesh, CONCRETE, two), Uniform(STEP))
-    same = [effects.PrescribedMotion(name, one, ramp=1.0) for name in ("left", "top")]
-    Simulation(Scene(mesh, CONCRETE, same), Uniform(STEP))

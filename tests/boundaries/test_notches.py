@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from _meshes import with_moved_nodes
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, in_space_order, read_mesh
-from taichi_dem.mesh.files import write_mesh
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, in_space_order
 from taichi_dem.mesh.mesh import with_cut, with_inner_group
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import parts_of, topology_of
-from taichi_dem.scene import outer_faces_warnings
 
 PAIR = with_inner_group(pair(), "middle", lambda x: x[:, 0] < 1.0)
 AREA = float(np.linalg.norm(area_vectors(PAIR.points, PAIR.groups["middle"])[0]))
@@ -32,14 +30,6 @@ def test_a_cut_divides_the_bodies_on_both_sides_of_a_plane():
         assert np.array_equal(part == part[centre.argmax()], centre > 0.5)
 
 
-def test_a_file_keeps_groups_of_inner_faces(tmp_path):
-    """A surface inside a solid, as Gmsh writes it: triangles that two tetrahedra share."""
-    write_mesh(tmp_path / "notched.msh", BLOCK)
-    found = read_mesh(tmp_path / "notched.msh")
-    assert found.inner_groups == ("notch",)
-    assert np.array_equal(found.groups["notch"], BLOCK.groups["notch"])
-
-
 def test_unbonded_faces_are_free_on_both_sides():
     mesh = in_space_order(BLOCK)
     before = topology_of(mesh)
@@ -48,15 +38,6 @@ def test_unbonded_faces_are_free_on_both_sides():
     assert after.outer_count == before.outer_count + 8 and after.is_open.sum() == 8
     # A scene decides on its own: another one of the same mesh has all bonds.
     assert topology_of(Scene(mesh, CONCRETE).mesh).bond_count == before.bond_count
-
-
-def test_the_least_share_of_several_groups_counts():
-    mesh = with_inner_group(BLOCK, "joint", lambda x: np.abs(x[:, 0] - 0.1) < 1e-9)
-    both = Scene(mesh, CONCRETE, unbonded=["notch"], weaker={"joint": 0.25})
-    share = topology_of(both.mesh).bonded_share
-    assert (share == 0.25).sum() == 4 and (share == 1.0).sum() == len(share) - 4
-    again = Scene(mesh, CONCRETE, weaker={"joint": 0.25, "notch": 0.75})
-    assert (topology_of(again.mesh).bonded_share == 0.25).sum() == 8
 
 
 #: Contact spheres without dashpots.
@@ -116,10 +97,3 @@ def test_a_weaker_bond_has_a_share_of_strength_and_energy():
     spent = account["softening"] + account["release"]
     assert spent == pytest.approx(share * AREA * CONCRETE.fracture_energy, rel=1e-5)
     assert account["support_work"] == pytest.approx(spent, rel=0.01)
-
-
-def test_contact_that_nothing_lists_is_warned_of():
-    said = outer_faces_warnings(Scene(BLOCK, CONCRETE, unbonded=["notch"]))
-    assert len(said) == 1 and "faces of the mesh are unbonded, and no contact is listed" in said[0]
-    contact = effects.SphereContact(outer_faces=False)
-    assert not outer_faces_warnings(Scene(BLOCK, CONCRETE, [contact], unbonded=["notch"]))

@@ -62,11 +62,6 @@ def test_error_falls_with_the_fourth_power_of_the_signal_s_step():
     assert (ratios > 2.0**3.5).all(), errors
 
 
-def test_rigid_mass_hangs_on_the_structure_like_a_larger_one():
-    made = shaken(two_sines(), particles=40)
-    assert worst(made, response(PAPER, made.time_s, TWO, mass=40 * 0.2e-3)[0]) < 1e-7
-
-
 @pytest.mark.parametrize("form", ["sine", "signal"])
 def test_force_moves_the_container_as_the_exact_solution(form):
     of_force = (5.7, 3e-2, 0.7)
@@ -79,29 +74,6 @@ def test_force_moves_the_container_as_the_exact_solution(form):
     # A sine in closed form is integrated to the tolerance of RK45, 1e-9 a step, 60 of them.
     assert worst(made, wanted) < (1e-6 if form == "sine" else 41 * 3e-6) * static
     assert made.base == pytest.approx(0.0, abs=0.0)
-
-
-def test_force_acts_beside_the_table_s_sine():
-    table = SceneTable(0, 1, 1e-4, [5.0, 8.0], 0.6e-3)
-    force = Excitation(force=SineForce(1e-2, [6.5, 3.0], [0.3, 0.0]))
-    batch = Batch(RigidMass(), table, excitation=force)
-    batch.start()
-    batch.run(3, 0)
-    now = batch.sample()
-    for s, (base, forced) in enumerate(((5.0, (6.5, 1e-2, 0.3)), (8.0, (3.0, 1e-2, 0.0)))):
-        times = np.array([0.0, now["time_s"][s]])
-        x, v = response(PAPER, times, [(base, 0.6e-3, 0.0)], [forced])
-        assert now["x"][s] == pytest.approx(x[1], abs=1e-9)
-        assert now["v"][s] == pytest.approx(v[1], abs=1e-7)
-
-
-def test_a_container_on_a_moving_base_moves_as_the_signal():
-    motion = two_sines()
-    made = shaken(motion, mount="base", interval=7e-3)
-    value, slope, _ = motion.at(np.minimum(made.time_s, motion.duration))
-    assert made.x[:, 0, 0] == pytest.approx(value, abs=1e-15)
-    assert made.v[:, 0, 0] == pytest.approx(slope, abs=1e-12)
-    assert made.base == pytest.approx(value, abs=1e-15)
 
 
 def test_a_container_let_go_decays_as_the_closed_form():
@@ -122,31 +94,6 @@ def grains(particles, motion, **options):
     return batch
 
 
-def test_scenes_may_have_a_signal_each_and_share_no_bit():
-    both = two_sines(0.4), excitation.sweep(3.0, 9.0, 5e-4, 0.4)
-    options = {"measured_cycles": 1, "recorded_samples": 1}
-    together = grains([3, 3], both, **options).run(0, 1).record
-    for k, motion in enumerate(both):
-        assert np.array_equal(grains(3, motion, **options).run(0, 1).record[0], together[k])
-
-
-def test_samples_are_those_of_a_run_in_pieces():
-    motion = two_sines(0.4)
-    made = shake(Automaton(), motion, particles=[5, 20], seeds=[7], interval=2e-3)
-    assert made.x.shape == (201, 2, 1) and made.time_s[-1] == pytest.approx(0.4)
-    batch = grains([5, 20], motion, recorded_samples=1)
-    for k in range(1, 4):
-        pushed = np.zeros(2)
-        for _ in range(20):
-            batch.advance(1)
-            now = batch.sample()
-            pushed = pushed + now["force"]
-        for name, given in (("x", made.x), ("v", made.v)):
-            assert np.array_equal(now[name], given[k, :, 0])
-        assert now["y"] == pytest.approx(made.base[k], abs=1e-15)
-        assert made.force[k, :, 0] == pytest.approx(pushed / 20, rel=1e-12)
-
-
 def test_forces_between_samples_leave_none_out_and_recording_changes_no_bit():
     """Seven steps to a sample and some at the end: their impulse is that of every step."""
     impulses, records = [], []
@@ -158,19 +105,6 @@ def test_forces_between_samples_leave_none_out_and_recording_changes_no_bit():
         assert batch.report().momentum_error < 1e-9
     assert impulses[0] == pytest.approx(impulses[1], rel=1e-12) and impulses[0] < -1e-4
     assert np.array_equal(*records)
-
-
-def test_a_dashpot_s_work_is_read_as_damping():
-    """The work on a rigid mass is its energy at the end."""
-    motion = two_sines(1.5)
-    made = shaken(motion, particles=40, interval=1e-4)
-    at_end = 0.5 * 40 * 0.2e-3 * made.v[-1, 0, 0] ** 2
-    speed = made.v[:, 0, 0] - motion.at(np.minimum(made.time_s, motion.duration))[1]
-    moved = np.trapezoid(speed**2, made.time_s)
-    assert made.relative_rms[0, 0] == pytest.approx((made.x[:, 0, 0] - made.base).std())
-    assert made.added_damping[0, 0] == pytest.approx(at_end / moved, rel=1e-3)
-    ratio = PAPER.damping_ratio * (1.0 + made.added_damping[0, 0] / PAPER.damping)
-    assert made.damping_ratio[0, 0] == pytest.approx(ratio)
 
 
 def test_an_interrupted_run_goes_on_to_the_same_bits(tmp_path):
@@ -286,25 +220,6 @@ def test_a_dropped_box_falls_and_rebounds_with_its_restitution():
     speed = math.sqrt(2.0 * G * height)
     gravity = 4.0 * G / (OMEGA * speed)
     assert math.sqrt(rise / height) == pytest.approx(restitution(0.2), rel=gravity)
-
-
-def test_a_box_at_rest_lies_on_its_weight():
-    """And on that of what it carries: x = -(M + m) g / K."""
-    batch = box(particles=20)
-    batch.start()
-    batch.advance(20_000)
-    heavy = MASS + 20 * RigidMass().particle_mass
-    assert batch.sample()["x"][0] == pytest.approx(-heavy * G / STIFFNESS, rel=1e-6)
-
-
-@pytest.mark.parametrize("share", [0.9, 1.2])
-def test_it_lifts_once_the_floor_falls_faster_than_it(share):
-    """A w^2 = g is the limit; below it, the box stays within its static sag or so."""
-    batch = box(amplitude=share * G / (2.0 * math.pi * 10.0) ** 2)
-    batch.start()
-    _, x, y = motion(batch, 5)
-    settled = (x - y)[len(x) // 5 :]
-    assert (settled.max() > 1e-5) == (share > 1.0)
 
 
 def response(oscillator, time_s, base=(), force=(), mass=0.0, start=(0.0, 0.0)):

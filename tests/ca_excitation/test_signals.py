@@ -5,15 +5,8 @@ import pytest
 
 from ca_damper import InputError, excitation
 from ca_damper.excitation.signal import integral, spline
-from taichi_dem.kit.elementary import sine_and_cosine, sines_and_cosines
 
 OMEGA = 2.0 * np.pi * 3.0
-
-
-def test_sines_of_arrays_have_the_bits_of_single_ones():
-    angles = np.random.default_rng(1).uniform(-1e5, 1e5, 2000)
-    single = np.array([sine_and_cosine(angle) for angle in angles.tolist()]).T
-    assert np.array_equal(np.stack(sines_and_cosines(angles)), single)
 
 
 def test_spline_converges_with_the_orders_four_three_and_two():
@@ -95,25 +88,3 @@ def test_a_file_is_read_by_the_units_of_its_columns(tmp_path):
     assert pull.bend == pytest.approx([9.80665 * y for _, y in GOOD])
     with pytest.raises(InputError, match="column must say which"):
         excitation.from_csv(both)
-
-
-def changed(k, row):
-    return [*GOOD[:k], row, *GOOD[k + 1 :]]
-
-
-NOISE = np.random.default_rng(3).normal(size=200)
-
-
-@pytest.mark.parametrize(
-    ("rows", "words"),
-    [
-        (changed(50, (0.5, "nan")), "finite number in column displacement_mm of line 52"),
-        (GOOD[:50] + GOOD[55:], "no gaps in steps of 0.01 s, got 0.55 s after 0.49 s in sample 51"),
-        (changed(50, (0.5015, 0.3)), "even to 0.1 of their step of 0.01 s, got 0.5015 s"),
-        ([(t, y) for (t, _), y in zip(GOOD, NOISE)], "step of the samples must be at most 0.00"),
-    ],
-)
-def test_a_file_that_cannot_be_a_motion_is_refused(tmp_path, rows, words):
-    with pytest.raises(InputError, match=r"motion\.csv") as error:
-        excitation.from_csv(written(tmp_path / "motion.csv", rows))
-    assert words in str(error.value)

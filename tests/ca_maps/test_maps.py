@@ -8,7 +8,6 @@ import pytest
 from ca_damper import (
     ImpactDamper,
     Oscillator,
-    RigidMass,
     Spheres,
     collect_and_collide,
     damper_map,
@@ -49,17 +48,6 @@ def test_spheres_without_gravity_jump_where_theory_does():
     energy, theory = made.energy[0, 0, :, 0, 0], made.theory.energy[0, 0]
     assert made.gaps[0, 0] == pytest.approx(gap) and energy[0] < 1.0
     assert energy[1:] == pytest.approx(theory[1:], rel=0.15)
-
-
-def test_a_rigid_mass_is_mass_and_no_loss_on_all_axes():
-    made = damper_map(
-        RigidMass(), amplitudes=[1e-3, 2e-3], particles=[5, 10, 20], **{**FEW, "frequencies": 7.0}
-    )
-    assert made.loss.shape == (1, 3, 2, 1, 1)
-    assert made.mass_share == pytest.approx(1.0, rel=1e-6)
-    assert made.loss == pytest.approx(0.0, abs=1e-6)
-    assert np.isnan(made.gaps).all()
-    assert made.columns()["particles"].tolist() == [5, 5, 10, 10, 20, 20]
 
 
 STRUCTURE = Oscillator()

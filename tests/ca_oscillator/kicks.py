@@ -18,14 +18,13 @@ CODE = 7
 class Kicks:
     """strength: largest impulse [N s]. mass: carried in every other hundred steps [kg].
 
-    diverges_at, lost_at: step from which the scene of BAD_SEED reports CODE, or hits with NaN.
+    diverges_at: step from which the scene of BAD_SEED reports CODE.
     traced: steps of which motion and action are kept.
     """
 
     strength: float = 0.0
     mass: float = 0.0
     diverges_at: int = -1
-    lost_at: int = -1
     traced: int = 450
 
     label: ClassVar[str] = "kicks"
@@ -55,17 +54,17 @@ class DeviceKicks:
     def __init__(self, table):
         self.table = table
         self.numbers = ti.field(ti.f64, shape=2)
-        self.steps = ti.field(ti.i32, shape=3)
+        self.steps = ti.field(ti.i32, shape=2)
         self.trace = table.vector(5, ti.f64, "traced")
         self.now = table.field(ti.i32)
 
     def load(self, kicks):
         assign(self.numbers, np.array([kicks.strength, kicks.mass]))
-        assign(self.steps, np.array([kicks.diverges_at, kicks.lost_at, kicks.traced]))
+        assign(self.steps, np.array([kicks.diverges_at, kicks.traced]))
 
     def trace_of(self, s):
         """Motion and action in the steps that were to be kept, (traced, 5)."""
-        return self.table.row(self.trace, s)[: self.steps[2]]
+        return self.table.row(self.trace, s)[: self.steps[1]]
 
     @ti.func
     def reset(self, s):
@@ -74,12 +73,10 @@ class DeviceKicks:
     @ti.func
     def advance(self, s, step, motion):
         impulse = self.numbers[0] * ti.sin(1.7 * step + self.table.seed[s])
-        if step == self.steps[1] and self.table.seed[s] == BAD_SEED:
-            impulse = ti.math.nan
         carried = 0.0
         if (step // 100) % 2 == 1:
             carried = self.numbers[1]
-        if step < self.steps[2]:
+        if step < self.steps[1]:
             self.trace[s, step] = ti.Vector([motion.x, motion.v, motion.a, impulse, carried])
         self.now[s] = step
         return Action(impulse, carried)

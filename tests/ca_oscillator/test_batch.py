@@ -10,14 +10,9 @@ import pytest
 
 from ca_damper import (
     Batch,
-    InputError,
-    RigidMass,
     SceneTable,
     SimulationDiverged,
-    film,
 )
-from ca_damper.engine.recorder import ROOM
-from ca_damper.scenes.clock import steps_per_cycle
 from taichi_dem import Checkpoint
 from tests.ca_oscillator.kicks import BAD_SEED, Kicks
 from tests.scenes import ROOT
@@ -60,61 +55,6 @@ def test_number_of_threads_changes_no_bit(tmp_path):
     assert found.strip() == hashlib.sha256(kicked(range(5)).tobytes()).hexdigest()
 
 
-def test_a_straight_run_equals_one_in_parts():
-    table = SceneTable(3, 1, 5e-4, 6.0, 0.6e-3)
-    straight, parted = Batch(KICKS, table), Batch(KICKS, table)
-    steps = 3 * straight.steps_per_cycle[0]
-    for batch in (straight, parted):
-        batch.start()
-    straight.advance(steps)
-    for part in (1, 0, 17, steps - 18):
-        parted.advance(part)
-    for name, value in straight.sample().items():
-        assert np.array_equal(value, parted.sample()[name]), name
-
-
-def test_a_refused_change_leaves_the_batch_and_a_new_start_repeats_its_run():
-    batch = Batch(KICKS, SceneTable(3, 1, 5e-4, 6.0, 0.6e-3), measured_cycles=1)
-    batch.start("rigid")
-    first = batch.run(1, 1).record
-    with pytest.raises(InputError, match="mass must be"):
-        batch.change(seed=7, mass=-1.0)
-    batch.start("rigid")
-    assert np.array_equal(batch.run(1, 1).record, first)
-
-
-def test_steps_make_whole_cycles_and_never_grow():
-    assert [steps_per_cycle(f, 1e-4) for f in (6.0, 5.0, 1.0 / 0.1667)] == [1667, 2000, 1667]
-    frequency = np.linspace(4.0, 8.0, 50)
-    batch = Batch(RigidMass(), SceneTable(0, 1, 1e-4, frequency))
-    dt = batch.table.column("dt")
-    assert (dt <= 1e-4 * (1.0 + 1e-12)).all()
-    assert batch.steps_per_cycle * dt * frequency == pytest.approx(1.0, rel=1e-15)
-    batch.start()
-    batch.advance(batch.steps_per_cycle)
-    assert (batch.sample()["y"] == 0.0).all()
-
-
-def test_driving_on_at_another_frequency():
-    batch = Batch(RigidMass(), SceneTable([0, 30], 1, 1e-4, 5.0, 0.6e-3), measured_cycles=2)
-    batch.start()
-    batch.run(1, 0)
-    before = batch.sample()
-    batch.drive(6.2)
-    after = batch.sample()
-    assert np.array_equal(before["x"], after["x"])
-    assert np.array_equal(before["v"], after["v"])
-    # The base goes faster at once, and pushes by its dashpot: C y0 2 pi (6.2 - 5) / (M + N m).
-    mass = 0.086 + 0.2e-3 * np.array([0, 30])
-    push = 0.08 * 0.6e-3 * 2.0 * np.pi * 1.2 / mass
-    assert after["a"] - before["a"] == pytest.approx(push, rel=1e-9)
-    batch.run(250, 0)
-    assert batch.sample()["time_s"] == pytest.approx(0.2 + 250 / 6.2, rel=1e-14)
-    batch.advance(10)
-    with pytest.raises(InputError, match="scene 0 stands at step 10 of 1613"):
-        batch.drive(5.0)
-
-
 def diverging(if_diverged="raise", **kicks):
     table = SceneTable([4, 5, 6], [1, BAD_SEED, 2], 1e-3, 6.0, 0.6e-3)
     batch = Batch(Kicks(**kicks), table, measured_cycles=3, if_diverged=if_diverged)
@@ -133,13 +73,6 @@ def test_a_scene_that_diverges_is_named_with_the_time_and_a_step_that_helps():
     assert error.time_s == pytest.approx(error.step * dt)
     assert error.dt == pytest.approx(dt)
     assert error.dt_allowed == pytest.approx(0.25 * dt)
-
-
-def test_nan_in_the_container_s_motion_is_divergence():
-    with pytest.raises(SimulationDiverged, match="lost its container") as caught:
-        diverging(lost_at=200).run(10, 0)
-    assert caught.value.step == 201
-    assert caught.value.scene["seed"] == BAD_SEED
 
 
 ONE_OF_THREE = "1 of 3 scenes diverged; their results are nan.*particles = 5 and seed 13 at 6 Hz"
@@ -165,39 +98,3 @@ def test_the_end_of_a_scene_does_not_end_the_others(tmp_path):
     assert batch.diverged.tolist() == [False, True, False]
     for name, values in batch.sample().items():
         assert np.isfinite(values).tolist() == [True, name == "time_s", True]
-
-
-def test_a_film_has_the_bits_of_single_samples():
-    """More samples than find room at once, frames between them, and a scene that diverges."""
-    kicks = {"strength": 1e-3, "diverges_at": 340}
-    batch, single = diverging("nan", **kicks), diverging("nan", **kicks)
-    with pytest.warns(UserWarning, match=ONE_OF_THREE):
-        batch.advance(3)
-        found = film(batch, 703, sample_every=7, frame_every=50, progress=None)
-        single.advance(3)
-        rows = []
-        for _ in range(101):
-            rows.append(single.sample())
-            single.advance(7)
-    assert len(rows) > ROOM
-    for name, values in found.history.items():
-        assert np.array_equal(values, [row[name] for row in rows], equal_nan=True), name
-    for s, frames in enumerate(found.frames):
-        assert len(frames) == 15
-        for k in (0, 7, 14):
-            frame, row = frames[k], rows[50 * k // 7]
-            shown = frame.time_s, frame.x, frame.y
-            wanted = row["time_s"][s], row["x"][s], row["y"][s]
-            assert np.array_equal(shown, wanted, equal_nan=True)
-
-
-def test_steps_after_a_recorded_run_are_not_recorded():
-    """They would be written where there is no room for them."""
-    batch = Batch(RigidMass(), SceneTable(3, 1, 1e-3, 6.0, 0.6e-3), recorded_samples=167)
-    batch.start()
-    batch.run(1, 0, record_every=1)
-    last, steps = batch.time_series()["x"], batch.steps_per_cycle[0]
-    batch.advance(10 * steps)
-    assert np.array_equal(batch.engine.recorder.read_series(0, steps)["x"], last[:-1])
-    with pytest.raises(InputError, match="record_every of a run must be at least 1"):
-        batch.time_series()

@@ -85,14 +85,6 @@ def test_blows_and_carried_mass_act_over_their_step():
     assert (np.abs(trace[:, :3] - course) < 450 * 1e-9 * scale).all()
 
 
-def test_a_step_takes_one_attempt_at_the_paper_s_numbers():
-    # A slope kept although the load has changed would show as an error of h times the jump.
-    batch = batch_of(Kicks(2e-5, 0.01), 0, RATIOS)
-    batch.start("rest")
-    batch.advance(1000)
-    assert (batch.attempts() == 1000).all()
-
-
 def test_long_steps_are_divided_and_the_error_follows_the_tolerance():
     # dt = 1 / (41 f) is far too long for one attempt here. The step goes like the tolerance^(1/5),
     # the error like its fifth power: halving the tolerance halves the error.

@@ -45,24 +45,6 @@ def test_response_of_two_harmonics_and_a_mean():
     assert cycles.energy == pytest.approx(4.5)
 
 
-def test_a_motion_of_half_the_frequency_counts_about_the_mean_of_all_cycles():
-    """The mean of each cycle takes half of it away; that of all cycles takes nothing."""
-    cycles = cycles_of(lambda t: 0.2 + np.sin(0.5 * OMEGA * t), nothing, nothing)
-    assert cycles.rms_about_all == pytest.approx(math.sqrt(0.5), rel=1e-6)
-    # Mean of half a wave: 2 / pi.
-    assert cycles.rms == pytest.approx(math.sqrt(0.5 - (2.0 / math.pi) ** 2), rel=1e-4)
-
-
-def test_a_mean_that_drifts_from_cycle_to_cycle_is_no_response():
-    def x(t):
-        return np.floor(OMEGA * t / (2.0 * math.pi) + 1e-9) + 2.0 * np.sin(OMEGA * t)
-
-    cycles = cycles_of(x, nothing, nothing)
-    assert cycles.rms == pytest.approx(math.sqrt(2.0), rel=1e-13)
-    # Quarter cycles are steps here, so the extremes are samples.
-    assert cycles.amplitude == pytest.approx(2.0, rel=1e-13)
-
-
 def test_apparent_mass_and_damping_are_those_of_a_mass_and_a_dashpot():
     # f = -(m a + c v); its mean over a step is that of the differences of v and x.
     mass, damping = -0.002, 0.05
@@ -140,11 +122,6 @@ def test_peak_of_an_oscillator_from_a_grid_of_one_percent(damping, offset):
     ratios = 0.95 + 0.01 * (np.arange(11) + offset)
     found = peak(ratios, o.rms(ratios * o.natural_frequency))
     assert found == pytest.approx(o.peak(), rel=4.0 * damping**2 + 0.02**3)
-
-
-@pytest.mark.parametrize("response", [[3.0, 2.0, 1.0], [2.0, 2.0, 2.0], [1.0, 2.0, math.nan]])
-def test_a_peak_at_an_end_or_beside_nan_is_outside(response):
-    assert np.isnan(peak([0.9, 1.0, 1.1], response)).all()
 
 
 def test_noise_is_no_resonance_between_the_points():

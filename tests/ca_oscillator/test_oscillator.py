@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ca_damper import InputError, Oscillator
+from ca_damper import Oscillator
 from ca_damper.engine import rk45
 from ca_damper.oscillator import sine_and_cosine
 from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE
@@ -46,15 +46,3 @@ def test_series_of_sine_and_cosine_reach_round_off():
     sine, cosine = sine_and_cosine(angle)
     assert np.abs(sine - np.sin(angle)).max() < 1e-16
     assert np.abs(cosine - np.cos(angle)).max() < 4e-16
-
-
-def test_without_damping_nothing_bounds_the_motion_at_the_natural_frequency():
-    """K - M w^2 is zero there but for rounding: no amplitude is finite, and no state is steady."""
-    rng = np.random.default_rng(1)
-    for mass, stiffness, added in 10.0 ** rng.uniform(-3.0, 3.0, (100, 3)):
-        o = Oscillator(mass, stiffness, 0.0)
-        own = o.natural_frequency
-        assert o.peak(added)[1] == o.rms(own) == np.inf
-        assert np.isinf(o.rms([0.5 * own, own])).tolist() == [False, True]
-        with pytest.raises(InputError, match=r"^an oscillator without damping has no steady"):
-            o.steady_state(own)

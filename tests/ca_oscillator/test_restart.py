@@ -64,37 +64,6 @@ def test_an_interrupted_batch_goes_on_to_the_same_bits(tmp_path):
         batch.checkpointed(None, checkpoint.path, {"job": "another"}).__enter__()
 
 
-def larger():
-    """Engine of a batch with another number everywhere, which has run."""
-    blows = {"restitution": 0.9, "wall_restitution": 0.6, "static_threshold": 3.0, "friction": 0.2}
-    grain = {"particle_mass": 0.3e-3, "width": 7e-3, "gravity": 11.0, "v_max": 4.0}
-    table = SceneTable([9] * 70, 5, 1.1e-3, 7.0, 2e-3, 0.1, 90.0, 0.05)
-    made = Batch(Automaton(columns=20, rows=20, **blows, **grain), table, measured_cycles=40)
-    made.start()
-    made.run(1, 0)
-    return made.engine
-
-
-def test_a_checkpoint_goes_on_in_an_engine_with_more_room(tmp_path, compiled_anew):
-    """As in another session, where a larger batch of other numbers came first."""
-    checkpoint = Checkpoint(tmp_path / "run.npz")
-    made = Batch(Automaton(), TABLE, measured_cycles=2)
-    made.start()
-    made.run(1, 0)
-    with made.checkpointed(checkpoint, None, IDENTITY) as writer:
-        writer.save()
-        straight = made.run(0, 2).record
-    used = made.engine
-    compiled_anew()
-    large = larger()
-    again = Batch(Automaton(), TABLE, measured_cycles=2)
-    assert again.engine is large is not used
-    again.start()
-    with again.checkpointed(None, checkpoint.path, IDENTITY):
-        again.going_on = False
-        assert again.run(0, 2).record.tobytes() == straight.tobytes()
-
-
 #: Of a container with a rigid mass: little to compile.
 JOB = {"particles": 3, "ratios": [0.9, 1.0], "seeds": 2, "dt": 1e-3, "measured_cycles": 2}
 

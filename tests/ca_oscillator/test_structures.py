@@ -3,9 +3,8 @@
 import hashlib
 
 import numpy as np
-import pytest
 
-from ca_damper import Batch, InputError, RigidMass, SceneTable, Spheres, runtime
+from ca_damper import Batch, SceneTable, Spheres
 
 
 def some_spheres(draw):
@@ -78,51 +77,3 @@ def test_batches_that_live_at_once_have_an_engine_each_and_their_bits_as_alone()
             one.advance(37)
     assert one.engine is not other.engine
     assert [digest(one), digest(other)] == alone
-
-
-def test_a_batch_goes_on_from_a_state_that_was_kept_aside_while_another_had_the_engine():
-    batch = some_batch(1)
-    engine = batch.engine
-    batch.advance(5 * 37)
-    aside = batch.aside()
-    batch.advance(5 * 37)
-    alone = digest(batch)
-    del batch
-    other = some_batch(2)
-    other.advance(37)
-    assert other.engine is engine
-    del other
-    again = some_batch(1)
-    again.take_up(aside)
-    again.advance(5 * 37)
-    assert digest(again) == alone and again.engine is engine
-
-
-def small_batch():
-    """Of a rigid mass, started."""
-    batch = Batch(RigidMass(), SceneTable([1, 2], 1, 1e-4))
-    batch.start()
-    return batch
-
-
-def uses(batch):
-    """What one can ask a batch to do."""
-    return (
-        *(batch.start, lambda: batch.change(dt=1e-4), lambda: batch.drive(6.0)),
-        *(lambda: batch.run(1, 1), lambda: batch.advance(1), batch.sample),
-        *(lambda: batch.snapshot(0), batch.attempts, batch.report),
-    )
-
-
-def test_a_batch_whose_memory_was_given_back_or_session_stopped_is_refused():
-    batch, settings = small_batch(), runtime.settings()
-    runtime.clear()
-    for use in uses(batch):
-        with pytest.raises(InputError, match=r"given back by runtime\.clear"):
-            use()
-    batch = small_batch()
-    runtime.stop()
-    runtime.start(settings.arch, settings.threads)
-    for use in uses(batch):
-        with pytest.raises(InputError, match="Taichi session that has been stopped"):
-            use()

@@ -102,21 +102,6 @@ def test_the_integrator_gains_energy_by_its_factor(left_by):
     assert left["leapfrog"] / left["leapfrog"][0] == pytest.approx(1.0, rel=swing)
 
 
-def test_the_accounting_gives_the_container_the_weight_and_landings_do_not(left_by):
-    """m g of a particle at rest, to the momentum of 4 g dt at both ends of two seconds."""
-    force, weight = left_by("docs/add_a_damper_accounting.md")["force"], 2e-3
-    assert force["walls"] == pytest.approx(-weight, rel=8 * 1e-4 / 2.0)
-    assert force["landing"] == 0.0
-
-
-def test_the_blocks_of_the_tutorial_keep_their_momentum(left_by):
-    """v1 + v2 = 2 m/s of equal masses."""
-    left = left_by("docs/tutorial.md", 1)
-    moved = left["result"].frames[-1].velocity[:, 0] * left["result"].model.body_mass
-    mass = left["result"].model.body_mass.sum()
-    assert moved.sum() / mass == pytest.approx(1.0, rel=1e-9)
-
-
 def test_the_hard_case_of_the_page_passes(left_by):
     (case,) = left_by("docs/hard_cases.md")["CASES"]
     assert assess(case, "implicit", quick=True).status == "passed"

@@ -1,4 +1,4 @@
-"""The page of all experiments shows what was run: failures are named, quick runs say so."""
+"""The page of all experiments shows what was run: failures are named, without old figures."""
 
 import json
 import re
@@ -6,7 +6,6 @@ import re
 import pytest
 
 import gallery
-from taichi_dem.kit.study import results_page
 from taichi_dem.kit.study.results_page import Entry
 
 #: A stand-in for an experiment: writes what one writes, or fails as one fails.
@@ -22,7 +21,6 @@ made = {"figures": figures, "quick": "--quick" in sys.argv, "seconds": {"compile
         "versions": {"taichi": "1", "numpy": "2"}}
 json.dump(made, open(os.path.join(folder, "summary.json"), "w"))
 """
-NOTE = "Quick run: the text describes the full one."
 
 
 @pytest.fixture
@@ -55,21 +53,3 @@ def test_a_failed_experiment_is_named_and_leaves_no_old_figures(stand_ins, capsy
     assert "bad: exit code 1: diverged at t = 1 s" in said and "good" not in said
     assert "No result: exit code 1" in card(out, "bad") and "&lt;it&gt;" in card(out, "bad")
     assert "1.93" in card(out, "good") and not (out / "bad" / "summary.json").exists()
-
-
-def test_a_quick_result_says_so_however_the_page_is_made(stand_ins):
-    """It is known from the result: a page may show both, and be made anew without running."""
-    out = stand_ins("one", "two")
-    assert gallery.main(["--out", str(out), "--only", "one", "--quick"]) == 0
-    assert gallery.main(["--out", str(out), "--only", "two"]) == 0
-    assert gallery.main(["--out", str(out), "--reuse", "--quick"]) == 0
-    assert NOTE in card(out, "one") and NOTE not in card(out, "two")
-
-
-def test_figures_with_a_papers_value_are_never_folded_away():
-    """15 figures that match, the last alone with a paper's value: it comes first of 12."""
-    figures = {f"f{k}": {"value": k, "unit": "1", "paper": None} for k in range(14)}
-    figures["known"] = {"value": 2702.0, "unit": "s", "paper": 3897}
-    key, rest = results_page.figure_rows(figures, ("f*",))
-    assert key[0] == ("known", "2702 s", "3,897 s")
-    assert len(key) == 12 and len(rest) == 3

@@ -1,17 +1,10 @@
-"""Engines: a structure is compiled once; a scene in one has the bits of a scene alone.
+"""Engines: a structure is compiled once; a scene in one has the bits of a scene alone."""
 
-The last file of its folder, as ``runtime.clear`` gives all engines of the session back.
-"""
-
-import contextlib
-import gc
-import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import taichi as ti
-from taichi.lang import impl
 
 from taichi_dem import (
     CONCRETE,
@@ -21,10 +14,8 @@ from taichi_dem import (
     Simulation,
     Uniform,
     effects,
-    runtime,
 )
 from taichi_dem.engine import ENGINES
-from taichi_dem.kit import allocation
 from taichi_dem.kit.types import vec3
 from taichi_dem.laws.base import Effect
 from taichi_dem.mesh.shapes import bar, single
@@ -117,28 +108,6 @@ def test_reset_begins_again_with_another_scene_and_compiles_nothing(alone, compi
     assert same(outcome(simulation), alone[0])
 
 
-@pytest.mark.slow
-def test_nothing_is_compiled_in_the_time_of_steps(compilations, compiled_anew, monkeypatch):
-    """Readings of contacts are compiled between steps, once a bar has broken."""
-    simulation = Simulation(*drawn(1))
-    counts, timed = [], simulation._timed
-
-    @contextlib.contextmanager
-    def counted():
-        before = len(compilations)
-        with timed():
-            yield
-        counts.append(len(compilations) - before)
-
-    monkeypatch.setattr(simulation, "_timed", counted)
-    simulation.start()
-    started = len(compilations)
-    simulation.advance_to(2 * STEPS)
-    assert simulation.state.broken().any()
-    assert len(compilations) > started and set(counts) == {0}
-    assert simulation.run_cpu_seconds > 0.0
-
-
 def falling():
     """A body at rest."""
     return Simulation(Scene(single(), CONCRETE), Uniform())
@@ -156,33 +125,6 @@ def test_an_engine_goes_on_to_the_next_when_its_simulation_is_gone_or_closed():
     for call in (lambda: second.time_s, lambda: second.advance_to(1), second.close):
         with pytest.raises(InputError, match="this simulation has been closed"):
             call()
-
-
-def test_a_simulation_frees_its_engine_without_a_collection_of_garbage():
-    """Which takes longer than to load a scene."""
-    gc.disable()
-    try:
-        engine = falling().engine
-        simulation = ran(*drawn(1))
-        simulation.report()
-        engines = engine, simulation.engine
-        del simulation
-        assert all(one.is_idle for one in engines)
-    finally:
-        gc.enable()
-
-
-def test_a_simulation_that_an_exception_keeps_alive_frees_its_engine():
-    def failed():
-        simulation = falling()
-        error = ValueError("in a cycle with the frame that it was raised in")
-        try:
-            raise error
-        except ValueError:
-            return simulation.engine
-
-    engine = failed()
-    assert falling().engine is engine
 
 
 @ti.data_oriented
@@ -222,38 +164,3 @@ def test_a_number_that_a_kernel_read_as_a_constant_is_never_another_scenes():
         del simulation
     assert speeds == pytest.approx([1.0, 2.0, 2.0, 5.0], rel=1e-12)
     assert ENGINES.count == before + 3
-
-
-def test_another_thread_is_refused_in_words():
-    simulation, said = Simulation(Scene(single(), CONCRETE), Uniform()), []
-
-    def work():
-        for call in (lambda: simulation.advance_to(1), runtime.clear):
-            try:
-                call()
-            except InputError as error:
-                said.append(str(error))
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-    assert len(said) == 2
-    assert all("on the thread that called runtime.start()" in sentence for sentence in said)
-    simulation.advance_to(1)
-
-
-def test_clear_gives_memory_back_and_refuses_what_was_made_before():
-    before = allocation.field_bytes()
-    simulation = Simulation(Scene(bar(1.0, 0.1, (400, 1, 1)), CONCRETE), Uniform())
-    simulation.start()
-    assert allocation.field_bytes() > before
-    runtime.clear()
-    assert ENGINES.count == 0
-    # Taichi frees no kernel while its program lives.
-    assert impl.get_runtime().get_num_compiled_functions() == 0
-    for call in (lambda: simulation.advance_to(1), simulation.report, simulation.reset):
-        with pytest.raises(InputError, match=r"simulation has been given back by runtime.clear"):
-            call()
-    again = Simulation(Scene(single(), CONCRETE), Uniform())
-    again.advance_to(1)
-    assert again.time_s == 1e-8

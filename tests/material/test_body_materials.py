@@ -11,8 +11,6 @@ from taichi_dem.materials.bond_rules import bond_geometry
 from taichi_dem.materials.material import bond_moduli
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import body_properties, topology_of
-from taichi_dem.methods import Uniform
-from taichi_dem.simulate import run_identity
 from taichi_dem.state.model import Model
 from tests.material.blocks import NU, ORE, E, random_block, rock
 
@@ -78,18 +76,6 @@ def test_masses_and_contacts_are_those_of_each_material():
     assert laid.pairs[0][1].contact_stiffness == 2.0 * first * second / (first + second)
 
 
-def test_a_checkpoint_belongs_to_materials_in_any_order_and_equal_ones_are_one():
-    mesh = bar(1.0, 0.25, (8, 1, 1)).body_group("a", lambda x: x[:, 0] < 0.3)
-    mesh = mesh.body_group("b", lambda x: x[:, 0] > 0.6)
-
-    def identity(**given):
-        return run_identity(Scene(mesh, CONCRETE, materials=given), Uniform(1e-8))
-
-    light = replace(ORE, density=1000.0)
-    assert identity(a=ORE, b=light) == identity(b=light, a=ORE) != identity(a=light, b=ORE)
-    assert identity() == identity(a=replace(CONCRETE))
-
-
 def test_steps_are_those_of_the_stricter_material():
     """Away from the seam each body has the limits that it has in a mesh of its material alone."""
     scene = halves(CONCRETE, ORE, [effects.BondDamping(), effects.SphereContact()])
@@ -115,10 +101,3 @@ def test_a_body_in_two_groups_of_different_materials_is_refused():
     mesh = mesh.body_group("low", lambda x: x[:, 1] < 0.13)
     with pytest.raises(InputError, match="is in the groups half and low, which have different"):
         Scene(mesh, CONCRETE, materials={"half": ORE, "low": CONCRETE})
-
-
-def test_a_bond_of_two_materials_must_be_tough_enough_for_both():
-    """Each is tough enough for itself: 1e12 / 2e9 = 500 J/m2, and 49 for the concrete."""
-    soft = replace(CONCRETE, normal_stiffness=1e9, tensile_strength=1e6, fracture_energy=1e3)
-    with pytest.raises(InputError, match=r"at bond .* and of two materials"):
-        halves(CONCRETE, soft)

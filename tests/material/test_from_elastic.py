@@ -1,14 +1,9 @@
-"""A material from what is measured gives bonds, dashpots and contacts by the bodies of a mesh.
-
-Concrete of the paper's Table 1 has the openings of the paper, and softens to its energy.
-"""
-
-import dataclasses
+"""A material from what is measured gives bonds, dashpots and contacts by the bodies of a mesh."""
 
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, effects, elastic_report
+from taichi_dem import Scene, Simulation, Uniform, effects
 from taichi_dem.materials.bond_rules import bond_geometry
 from taichi_dem.materials.material import bond_moduli
 from taichi_dem.mesh.shapes import pair, single
@@ -65,46 +60,3 @@ def test_all_spheres_of_a_face_are_as_stiff_as_its_bond():
         assert 6.0 * material.contact_stiffness == pytest.approx(whole, rel=1e-12)
         critical = 2.0 * np.sqrt(material.contact_stiffness * float(bonds.pair_mass[0]))
         assert material.contact_damping == pytest.approx(RATIO * critical, rel=1e-12)
-
-
-def test_elements_too_large_for_the_fracture_energy_are_refused_by_bond():
-    """A bond fails beyond its strength if h < 2 E_n G_f / sigma^2; the largest h decides."""
-    mesh = random_block(2, seed=3)
-    bonds = bond_geometry(mesh, topology_of(mesh), DENSITY)
-    largest = int(bonds.distance.argmax())
-    least = 3e6**2 * bonds.distance[largest] / (2.0 * bond_moduli(E, NU)[0])
-    Scene(mesh, rock(fracture_energy=1.001 * least))
-    words = rf"^fracture_energy must be larger than .* J/m2 at bond {largest}, whose bodies are"
-    with pytest.raises(InputError, match=words):
-        Scene(mesh, rock(fracture_energy=0.999 * least))
-
-
-def test_the_report_shows_what_was_asked_and_warns_of_large_elements():
-    """Characteristic length E G_f / sigma^2 = 0.36 m; boxes of 0.33 m have elements of 0.36 m."""
-    report = elastic_report(Scene(random_block(3, seed=0), rock(), "all"))
-    assert report.asked == pytest.approx((E, NU), rel=1e-6)
-    assert report.crack_length == pytest.approx(report.stiffness.young * 100.0 / 9e12)
-    assert "less than 4 elements at" in report.warnings[0]
-
-
-def test_concrete_reaches_its_strength_at_the_onset():
-    # Linear up to the onset: k_n u_E = sigma_f; the paper's figures give u_E = 14.80 um.
-    assert CONCRETE.normal_stiffness * CONCRETE.onset_opening == pytest.approx(6.66e6)
-    assert CONCRETE.onset_opening == pytest.approx(14.80e-6, abs=0.005e-6)
-
-
-def test_area_under_the_traction_curve_is_the_fracture_energy():
-    # A triangle of base u_f and height sigma_f, whatever the onset; and u_f = 29.93 um.
-    area = 0.5 * CONCRETE.failure_opening * CONCRETE.tensile_strength
-    assert area == pytest.approx(99.67)
-    assert CONCRETE.failure_opening == pytest.approx(29.93e-6, abs=0.005e-6)
-    fall = CONCRETE.softening_slope * (CONCRETE.failure_opening - CONCRETE.onset_opening)
-    assert fall == pytest.approx(CONCRETE.tensile_strength)
-
-
-def test_failure_before_the_strength_is_refused_with_the_least_energy():
-    # u_f > u_E means G_f > sigma_f^2 / (2 k_n) = 49.284 J/m2 for the concrete.
-    least = CONCRETE.tensile_strength**2 / (2.0 * CONCRETE.normal_stiffness)
-    assert dataclasses.replace(CONCRETE, fracture_energy=1.001 * least).softening_slope > 0.0
-    with pytest.raises(InputError, match=r"fracture_energy must be larger .* 49\.284 J/m2"):
-        dataclasses.replace(CONCRETE, fracture_energy=least)

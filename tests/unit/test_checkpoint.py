@@ -1,20 +1,24 @@
-"""Checkpoint files, what they refuse, and the fields that go into them."""
+"""A checkpoint and a folder of output are whole or refused, whatever ends a run from outside."""
 
 import builtins
 import errno
 import os
+import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
-import taichi as ti
 
 import ca_damper
 import taichi_dem
-from taichi_dem import Checkpoint, InputError
-from taichi_dem.kit.allocation import FieldTree
-from taichi_dem.kit.checkpoint import read_checkpoint, write_checkpoint
-from taichi_dem.kit.field_memory import FieldMemory, fields_of
+from taichi_dem import CONCRETE, At, Checkpoint, Collector, InputError, Scene, Uniform, simulate
+from taichi_dem.kit.checkpoint import Interrupted, read_checkpoint, write_checkpoint
 from taichi_dem.kit.restart import CheckpointWriter
+from taichi_dem.mesh.shapes import pair
+from tests.bad_input.refusals import assert_refused
+from tests.processes import users_environment
+from tests.scenes import ROOT
 
 IDENTITY = {"version": "1", "mesh": "a cube"}
 ARRAYS = {"field/a.b": np.arange(12.0).reshape(4, 3), "part/none": np.zeros((0, 2))}
@@ -34,11 +38,6 @@ def test_what_is_written_comes_back_bit_by_bit(path):
     for name, array in ARRAYS.items():
         assert arrays[name].dtype == array.dtype
         assert np.array_equal(arrays[name], array)
-
-
-def test_another_identity_is_refused_by_name(path):
-    with pytest.raises(InputError, match="of another mesh: a cube, not mine"):
-        read_checkpoint(path, {**IDENTITY, "mesh": "mine"})
 
 
 #: Whose representation tells a checkpoint which run it is of.
@@ -133,41 +132,48 @@ def test_a_full_disk_leaves_the_last_good_checkpoint_and_says_so(tmp_path, monke
         assert os.listdir(tmp_path) == ["run.npz"]
 
 
-@ti.dataclass
-class Grain:
-    size: ti.f64
-    place: ti.types.vector(2, ti.f64)
-    kind: ti.i32
+HOLD = """
+import sys
+from taichi_dem.kit.files import claiming, output_folder
+with claiming():
+    output_folder(sys.argv[1])
+    print("held", flush=True)
+    sys.stdin.read()
+"""
 
 
-class Part:
-    """Fields of every kind, some of them in a list."""
-
-    def __init__(self):
-        self.listed = [ti.field(ti.i64, shape=()), {"deep": ti.field(ti.i32, shape=(2, 3))}]
-        self.matrix = ti.Matrix.field(3, 2, ti.f64, shape=4)
-        self.record = ti.field(ti.f64, shape=(2, 3, 4))
-        self.vector = ti.Vector.field(3, ti.f64, shape=5)
-        # Its members do not lie side by side.
-        self.grain = Grain.field(shape=6)
+def program(text, *arguments):
+    line = [sys.executable, "-c", text, *map(str, arguments)]
+    options = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "cwd": ROOT}
+    return subprocess.Popen(line, env=users_environment(), **options)
 
 
-def test_field_memory_reads_and_writes_what_taichi_does():
-    """Entries and components lie in the order of the arrays that Taichi makes of fields."""
-    with FieldTree():
-        part = Part()
-    random = np.random.default_rng(3)
-    fields = {one.name: one.field for one in fields_of(part)}
-    memory = FieldMemory(part)
-    first = {}
-    for name, field in fields.items():
-        values = random.integers(1, 1000, field.to_numpy().shape)
-        field.from_numpy(first.setdefault(name, values.astype(field.to_numpy().dtype)))
-    read = memory.read()
-    assert set(read) == set(first)
-    for name, field in fields.items():
-        assert np.array_equal(read[name], first[name])
-        field.from_numpy(np.full_like(first[name], 7))
-    memory.write(read)
-    for name, field in fields.items():
-        assert np.array_equal(field.to_numpy(), first[name])
+def test_the_second_run_in_a_folder_is_refused_until_the_first_has_been_killed(tmp_path):
+    other, scene = program(HOLD, tmp_path), Scene(pair(), CONCRETE)
+    assert other.stdout.readline() == "held\n"
+    job = {"method": Uniform(1e-8), "until": 2e-8, "samples": 1, "progress": None}
+    for more in ({"output": tmp_path}, {"checkpoint": Checkpoint(tmp_path / "run.npz")}):
+        call = lambda: simulate(scene, **job, **more)  # noqa: B023, E731
+        assert_refused(call, str(tmp_path), "another one is writing there")
+    assert os.listdir(tmp_path) == []
+    other.kill()
+    other.communicate()
+    simulate(scene, output=tmp_path, **job)
+    assert "report.json" in os.listdir(tmp_path)
+
+
+def test_a_signal_saves_the_run_which_goes_on_with_the_bits_of_one_never_stopped(tmp_path):
+    def end(view):
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    scene, path = (
+        Scene(pair(), CONCRETE, [], velocity=(1, 0, 0), spin=(0, 0, 9)),
+        tmp_path / "run.npz",
+    )
+    job = {"method": Uniform(1e-8), "until": 1e-6, "samples": 4, "progress": None}
+    observers = [Collector(At((5e-7,)), end=end)]
+    with pytest.raises(Interrupted, match="interrupted at t = "):
+        simulate(scene, checkpoint=Checkpoint(path), observers=observers, **job)
+    resumed, alone = simulate(scene, resume=path, **job), simulate(scene, **job)
+    for name, column in alone.series.items():
+        assert column.tobytes() == resumed.series[name].tobytes(), name

@@ -1,6 +1,6 @@
 """The contact search against all pairs compared with all.
 
-Pairs that stay near keep their memory through every search; room of others serves again.
+Pairs that stay near keep their memory through every search.
 """
 
 import numpy as np
@@ -377,15 +377,3 @@ def test_sphere_pairs_that_stay_keep_their_columns(thrown, packed):
         came += len(set(after) - set(before))
         moved += sum(before.get(spheres, k) != k for spheres, k in after.items())
     assert stayed > 1000 and came > 100 and moved > 100
-
-
-def test_slots_that_are_freed_serve_again(thrown):
-    """Each near pair has a slot and no other pair has; the most at a time are all that are used."""
-    thrown.start()
-    most = 0
-    for seed in range(20):
-        thrown.throw(seed)
-        near = int(thrown.store.near_count[None])
-        most = max(most, near)
-        assert thrown.store.used_end[None] - thrown.store.free_count[None] == near
-    assert most <= thrown.store.used_end[None] <= 2 * most

@@ -8,14 +8,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE
 from taichi_dem.kit.fixed_order import length
-from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.tetrahedra import area_vectors, signed_volumes
-from taichi_dem.output.cracks import rose_of, strike_and_dip
+from taichi_dem.output.cracks import strike_and_dip
 from taichi_dem.output.fragments import fragment_of_body, rigid_motion, vectors_of
-from taichi_dem.state.model import Model
-from tests.made_result import made_result, moved_rigidly, turned
+from tests.made_result import made_result, moved_rigidly
 
 SEED = 2
 
@@ -71,24 +68,6 @@ def test_pieces_that_move_rigidly_have_their_motion():
     assert centre == pytest.approx(vectors_of(found, "centre"), abs=1e-15)
 
 
-def test_sizes_of_a_cuboid_are_its_own():
-    """The sieve takes its middle edge, whichever way it lies; the diameter is that of a ball."""
-    flat = bar(0.4, 0.1, (4, 1, 1))
-    flat = dataclasses.replace(flat, points=flat.points * [1.0, 1.0, 2.5])
-    result = made_result(mesh=flat, share=0.0)
-    found = result.fragments()
-    sides = np.sort(np.ptp(result.model.mesh.points, axis=0))
-    assert found["sieve_m"][0] == pytest.approx(sides[1], rel=1e-12)
-    volume = sides.prod()
-    assert np.pi / 6.0 * found["diameter_m"][0] ** 3 == pytest.approx(volume, rel=1e-12)
-
-
-def test_bonds_that_break_later_still_join():
-    result = made_result()
-    counts = [len(result.fragments(k)) for k in range(len(result.frames))]
-    assert counts[0] == 1 and counts == sorted(counts) and counts[-1] > 1
-
-
 @pytest.fixture(scope="module")
 def result():
     return made_result()
@@ -112,31 +91,6 @@ def test_crack_area_is_that_of_the_broken_bonds(result):
     for time_s, area in zip(over_time["time_s"], over_time["crack_area_m2"]):
         wanted = areas_of(result.model)[result.broken_time <= time_s].sum()
         assert area == pytest.approx(wanted, rel=1e-12, abs=1e-18)
-
-
-def test_of_a_face_that_is_half_bonded_half_breaks(result):
-    model = Model(result.scene.mesh, CONCRETE, result.scene.effects)
-    half = np.full(model.bond_count, 0.5)
-    model.topology = dataclasses.replace(model.topology, bonded_share=half)
-    weak = dataclasses.replace(result, model=model)
-    whole = result.cracks()["crack_area_m2"]
-    assert np.array_equal(weak.cracks()["crack_area_m2"], 0.5 * whole)
-    half_rose = weak.rose()["area_m2"].to_numpy()
-    assert half_rose == pytest.approx(0.5 * result.rose()["area_m2"].to_numpy(), rel=1e-13)
-
-
-@pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0)])
-@pytest.mark.parametrize("steps", [1, 7])
-def test_a_turned_block_has_a_turned_rose(result, axis, steps):
-    """By whole sectors, counter-clockwise as seen along the axis."""
-    mesh, broken = result.scene.mesh, np.isfinite(result.broken_time)
-    turn = turned(np.array([axis], dtype=float), np.radians([5.0 * steps]))[0]
-    model = Model(
-        dataclasses.replace(mesh, points=mesh.points @ turn.T), CONCRETE, result.scene.effects
-    )
-    first, second = result.rose(axis), rose_of(model, broken, axis)
-    assert second["area_m2"].to_numpy() == pytest.approx(np.roll(first["area_m2"], steps), rel=1e-9)
-    assert np.array_equal(second["faces"], np.roll(first["faces"], steps))
 
 
 @pytest.mark.parametrize(

@@ -3,27 +3,34 @@
 Bonds, outer faces and mass properties of bodies are those of the mesh, whatever its order.
 Contact spheres against their definition, face by face (Konno et al., 2.2, Fig. 5).
 Colours of bonds: links of one colour share no body.
+Faces may lie on each other without a bond, and then touch: joints of blocks, cracks in one.
 """
-
-import itertools
 
 import numpy as np
 import pytest
 
 from _meshes import group_area
-from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, join, read_mesh
+from taichi_dem import (
+    CONCRETE,
+    PAPER_BLOCK,
+    InputError,
+    Scene,
+    Simulation,
+    Uniform,
+    effects,
+    join,
+    read_mesh,
+)
 from taichi_dem.mesh import tetrahedra as geometry
-from taichi_dem.mesh.contact_spheres import interior_crossings, spheres_of_faces
-from taichi_dem.mesh.mesh import Mesh, volumes
-from taichi_dem.mesh.shapes import bar, in_space_order, pair, single
+from taichi_dem.mesh.contact_spheres import spheres_of_faces
+from taichi_dem.mesh.mesh import checked_mesh, volumes
+from taichi_dem.mesh.shapes import bar, placed_together
 from taichi_dem.mesh.topology import (
     body_properties,
     edge_colours,
     face_vertices,
-    faces_of_group,
     topology_of,
 )
-from tests.meshes import with_neighbours
 from tests.turns import matrix, quaternion
 
 # Two tetrahedra on both sides of the triangle 0 1 2, apexes 3 (z > 0) and 4 (z < 0).
@@ -92,15 +99,6 @@ def test_points_are_welded_within_the_tolerance_only():
     assert built(*doubled(1e-5), weld_tolerance=0.9e-5).point_count == 8
 
 
-def test_close_pairs_are_those_of_the_plain_double_loop():
-    rng = np.random.default_rng(5)
-    points = rng.integers(0, 5, (300, 3)) * 0.1 + rng.uniform(-0.01, 0.01, (300, 3))
-    gap = np.linalg.norm(points[:, None] - points, axis=-1)
-    expected = np.argwhere(np.triu(gap <= 0.02, k=1))
-    assert len(expected) > 0
-    assert np.array_equal(geometry.close_pairs(points, 0.02), expected)
-
-
 def test_loose_points_are_dropped_and_groups_keep_their_faces():
     points = [[9.0, 9.0, 9.0], *POINTS, [8.0, 8.0, 8.0]]
     mesh = built(points, np.array(BODIES) + 1, {"top": [[2, 3, 4]]})
@@ -108,34 +106,9 @@ def test_loose_points_are_dropped_and_groups_keep_their_faces():
     assert sorted(mesh.group_faces("top")[0]) == [1, 2, 3]
 
 
-def test_parts_that_share_no_face_are_counted():
-    # The second body touches the first in the point 0 only, the third in an edge only.
-    points = [*POINTS[:4], [-1, 0, 0], [0, -1, 0], [0, 0, -1], [0.5, 0.5, -1], [1.5, 1.5, -1]]
-    mesh = built(points, [[0, 1, 2, 3], [0, 4, 5, 6], [1, 2, 7, 8]])
-    assert "the mesh has 3 parts that share no face with each other" in mesh.notes
-
-
 def test_a_group_of_faces_inside_is_refused():
     words = refused(groups={"wall": [[0, 1, 2], [1, 2, 3]]})
     assert "group 'wall': 1 of its 2 faces are not outer faces" in words
-
-
-@pytest.mark.parametrize("face", list(itertools.permutations([1, 2, 3])))
-def test_group_faces_look_outward_however_they_were_given(face):
-    mesh = built(groups={"wall": [face]})
-    outward = geometry.area_vectors(mesh.points, mesh.group_faces("wall"))[0]
-    away = mesh.points[list(face)].mean(axis=0) - mesh.points[[0, 1, 2, 3]].mean(axis=0)
-    assert outward @ away > 0.0
-
-
-def test_a_mesh_keeps_its_arrays_whatever_becomes_of_the_callers():
-    points = np.array(POINTS, dtype=float)
-    mesh = built(points, groups={"top": [[1, 2, 3]]})
-    points[:] = np.nan
-    assert np.array_equal(mesh.points, POINTS)
-    for array in (mesh.points, mesh.tetrahedra, mesh.groups["top"]):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 0
 
 
 def test_bar_fills_its_box_with_equal_bodies():
@@ -147,25 +120,6 @@ def test_bar_fills_its_box_with_equal_bodies():
     for axis, names in enumerate((ends, ("bottom", "top"), ("back", "front"))):
         for name, value in zip(names, (0.0, np.ptp(mesh.points[:, axis]))):
             assert np.all(mesh.points[mesh.group_faces(name)][..., axis] == value), name
-
-
-def test_single_is_regular_and_pair_its_own_mirror_image():
-    # Volume of a regular tetrahedron: edge^3 / (6 sqrt 2).
-    assert volumes(single(0.2)) == pytest.approx([0.2**3 / (6.0 * np.sqrt(2.0))])
-    mesh = pair(0.1)
-    centres = mesh.points[mesh.tetrahedra].mean(axis=1)
-    assert centres[0] == pytest.approx(centres[1] * [-1, 1, 1]) and centres[0, 0] < 0
-    assert np.all(mesh.points[mesh.group_faces("left")].min(axis=1)[:, 0] < 0)
-
-
-def test_neighbours_stand_on_the_faces_opposite_to_corners_as_high_as_told():
-    mesh, outward = with_neighbours(0.1, {0: 1.0, 2: 0.5})
-    own, full, half = volumes(mesh)
-    assert full == pytest.approx(own) and half == pytest.approx(0.5 * own)
-    assert topology_of(mesh).bond_count == 2
-    centre = mesh.points[mesh.tetrahedra].mean(axis=1)
-    away = centre[1:] - centre[0]
-    assert outward == pytest.approx(away / np.linalg.norm(away, axis=1)[:, None])
 
 
 def test_the_papers_block_has_its_size_and_its_hole():
@@ -184,23 +138,6 @@ def test_the_papers_block_has_its_size_and_its_hole():
     assert np.all(mesh.points[mesh.group_faces("right")][..., 0] == 2.0)
 
 
-def test_bodies_in_space_order_are_the_same_with_neighbours_near_in_number():
-    """In a shuffled row two numbers differ by n (1 - 1 / sqrt 2) in the median, 0.29 n.
-
-    On the curve half of all bonds lie inside cells of 6 bodies, or of 48: no further than that.
-    """
-    mesh = bar(1.0, 1.0, (8, 8, 8))
-    order = np.random.default_rng(0).permutation(mesh.body_count)
-    shuffled = Mesh(mesh.points, mesh.tetrahedra[order], mesh.groups)
-    made = in_space_order(shuffled)
-    rows = [sorted(map(tuple, one.tetrahedra.tolist())) for one in (shuffled, made)]
-    assert rows[0] == rows[1]
-    assert group_area(made, "left") == group_area(shuffled, "left")
-    top, before = topology_of(made), topology_of(shuffled)
-    assert np.median(top.slave - top.master) < 48
-    assert np.median(before.slave - before.master) > 0.25 * mesh.body_count
-
-
 def test_a_moved_mesh_turns_about_its_middle_and_keeps_its_groups():
     named = BAR.body_group("half", lambda x: x[:, 0] < 0.1)
     turned = named.moved(turned=(30.0, -40.0, 70.0), by=(1.0, 2.0, 3.0))
@@ -213,13 +150,6 @@ def test_a_moved_mesh_turns_about_its_middle_and_keeps_its_groups():
     assert all((turned.groups[name] == BAR.groups[name]).all() for name in BAR.groups)
 
 
-def test_meshes_apart_keep_their_groups_under_their_names():
-    both = join(BAR, single(0.05).moved(by=(0.0, 0.5, 0.0)), names=["beam", "weight"])
-    assert topology_of(both).bond_count == topology_of(BAR).bond_count
-    assert both.body_groups["weight"].tolist() == [BAR.body_count]
-    assert group_area(both, "beam_left") == pytest.approx(group_area(BAR, "left"))
-
-
 def test_meshes_that_touch_are_bonded_only_where_asked():
     after = BAR.moved(by=(0.2, 0.0, 0.0))
     apart, bonded = join(BAR, after), join(BAR, after, bonded=True)
@@ -229,16 +159,6 @@ def test_meshes_that_touch_are_bonded_only_where_asked():
     assert topology_of(bonded).bond_count == 2 * single_bonds + 2
     assert set(bonded.inner_groups) == {"first_right", "second_left"}
     assert group_area(bonded, "left") == pytest.approx(0.01)
-
-
-def shuffled(mesh, seed):
-    """The same mesh with points, bodies and corners in another order."""
-    rng = np.random.default_rng(seed)
-    place = rng.permutation(mesh.point_count)  # old point -> new point
-    points = np.empty_like(mesh.points)
-    points[place] = mesh.points
-    bodies = rng.permuted(place[mesh.tetrahedra][rng.permutation(mesh.body_count)], axis=1)
-    return checked_mesh(points, bodies, {name: place[f] for name, f in mesh.groups.items()})
 
 
 @EACH
@@ -258,27 +178,6 @@ def test_bond_normal_points_from_master_to_slave(name):
     centre = mesh.points[mesh.tetrahedra].mean(axis=1)
     assert np.all(np.einsum("ij,ij->i", normal, middle - centre[top.master]) > 0.0)
     assert np.all(np.einsum("ij,ij->i", normal, centre[top.slave] - middle) > 0.0)
-
-
-@EACH
-def test_slots_of_the_bodies_name_their_bonds(name):
-    mesh, top = MESHES[name], topology_of(MESHES[name])
-    expected = np.full((mesh.body_count, 4), -1)
-    for bond in range(top.bond_count):
-        expected[top.master[bond], top.master_face[bond]] = bond
-        expected[top.slave[bond], top.slave_face[bond]] = bond
-    assert np.array_equal(top.body_bond, expected)
-    assert sorted(zip(top.outer_body, top.outer_face)) == sorted(zip(*np.nonzero(expected < 0)))
-
-
-def test_faces_of_a_group_are_its_own_in_its_order():
-    mesh = shuffled(MESHES["block"], 4)
-    top = topology_of(mesh)
-    for name, wanted in mesh.groups.items():
-        body, face = faces_of_group(mesh, top, name)
-        found = face_vertices(mesh, body, face)
-        assert np.array_equal(np.sort(found, axis=1), np.sort(wanted, axis=1))
-        assert np.all(top.body_bond[body, face] == -1)
 
 
 @pytest.mark.parametrize("cells", [(1, 1, 1), (2, 3, 1)])
@@ -318,17 +217,6 @@ def plane_distances(mesh, points):
     return np.stack(distances, axis=-1)
 
 
-@pytest.mark.parametrize(("divisions", "count"), [(3, 1), (5, 6)])
-def test_lines_through_n_parts_cross_at_their_number_of_points(divisions, count):
-    """(n - 1)(n - 2) / 2 crossings, all inside, all multiples of 1 / n; the paper has six."""
-    crossings = interior_crossings(divisions)
-    assert crossings.shape == (count, 3)
-    assert len(np.unique(crossings, axis=0)) == count
-    assert crossings.min() > 0.0
-    assert np.abs(crossings.sum(axis=1) - 1.0).max() < 4 * EPS
-    assert np.array_equal(crossings * divisions, np.round(crossings * divisions))
-
-
 def test_spheres_touch_their_face_and_another_and_stay_inside(block):
     """Distance r from the own face, at least r from the others, r from one of them.
 
@@ -366,57 +254,11 @@ def test_spheres_sit_at_the_crossings(block):
         assert np.abs(fifths - np.round(fifths))[whole].max() < 1e-6
 
 
-def test_extent_holds_the_spheres_of_its_body_and_no_more(block):
-    """The ball around the centre touches the farthest sphere from outside."""
-    mesh, centre = block
-    spheres = spheres_of_faces(mesh, centre, 5)
-    reach = np.linalg.norm(spheres.centre, axis=-1) + spheres.radius
-    assert np.array_equal(spheres.extent, reach.reshape(len(reach), -1).max(axis=1))
-
-
-def test_cluster_holds_the_spheres_of_its_face(block):
-    mesh, centre = block
-    spheres = spheres_of_faces(mesh, centre, 5)
-    middle, reach = spheres.cluster[:, :, None, :3], spheres.cluster[:, :, None, 3]
-    outermost = np.linalg.norm(spheres.centre - middle, axis=-1) + spheres.radius
-    assert (outermost <= reach * (1.0 + 4 * EPS)).all()
-
-
-def random_links(random, body_count, tries):
-    """Links of a random graph without doubles in which no body has more than DEGREE."""
-    degree, links = [0] * body_count, {}
-    for i, j in np.sort(random.integers(0, body_count, (tries, 2)), axis=1).tolist():
-        if i != j and (i, j) not in links and max(degree[i], degree[j]) < DEGREE:
-            degree[i], degree[j] = degree[i] + 1, degree[j] + 1
-            links[i, j] = None
-    return list(links)
-
-
 def is_proper(links, colours):
     """Whether no body has two links of one colour."""
     links, colours = np.asarray(links), np.asarray(colours)
     seen = np.concatenate([1000 * links[:, 0] + colours, 1000 * links[:, 1] + colours])
     return len(np.unique(seen)) == len(seen)
-
-
-@pytest.fixture(scope="module")
-def graphs():
-    """Random graphs, from a few links to as many as there can be, as (body_count, links)."""
-    random = np.random.default_rng(0)
-    sizes = [(int(n), int(t) * int(n)) for n, t in random.integers([5, 1], [40, 12], (150, 2))]
-    listed = [(n, random_links(random, n, tries)) for n, tries in sizes]
-    return [(n, links) for n, links in listed if links]
-
-
-def test_links_of_a_colour_share_no_body(graphs):
-    """At most five colours for four links a body (Vizing), none left out."""
-    most = 0
-    for body_count, links in graphs:
-        colours = edge_colours(links, body_count)
-        assert is_proper(links, colours)
-        assert sorted(set(colours.tolist())) == list(range(colours.max() + 1))
-        most = max(most, colours.max() + 1)
-    assert most == 5
 
 
 def test_the_block_of_the_paper_takes_five_colours_at_most():
@@ -426,3 +268,73 @@ def test_the_block_of_the_paper_takes_five_colours_at_most():
     colours = edge_colours(links, mesh.body_count)
     assert is_proper(links, colours)
     assert DEGREE <= colours.max() + 1 <= 5
+
+
+EDGE = 0.05
+CUBE = bar(EDGE, EDGE, (1, 1, 1))
+BLOCKS = {"left": (CUBE, (0.0, 0.0, 0.0)), "right": (CUBE, (EDGE, 0.0, 0.0))}
+
+
+def cracked():
+    """A bar of two by two boxes, a crack across its lower half: points, bodies and their welding.
+
+    The bodies right of the middle take new points for those below the tip.
+    """
+    whole = bar(2 * EDGE, 2 * EDGE, (2, 2, 1))
+    on_crack = np.isclose(whole.points[:, 0], EDGE) & (whole.points[:, 1] < EDGE - 1e-6)
+    old = np.flatnonzero(on_crack)
+    points = np.vstack([whole.points, whole.points[old]])
+    new = np.arange(len(whole.points))
+    new[old] = len(whole.points) + np.arange(len(old))
+    bodies = whole.tetrahedra.copy()
+    right = whole.points[bodies].mean(axis=1)[:, 0] > EDGE
+    bodies[right] = new[bodies[right]]
+    return whole, points, bodies
+
+
+def test_blocks_that_touch_are_refused_unless_kept_apart():
+    with pytest.raises(InputError, match=r"weld_tolerance=.* or keep_coincident=True"):
+        placed_together(BLOCKS)
+    made = placed_together(BLOCKS, keep_coincident=True)
+    assert made.point_count == 16
+    assert topology_of(made).bond_count == 2 * topology_of(CUBE).bond_count
+
+
+def test_a_crack_has_two_free_faces_for_each_bond_it_cuts():
+    whole, points, bodies = cracked()
+    made = checked_mesh(points, bodies, {}, keep_coincident=True)
+    before, after = topology_of(whole), topology_of(made)
+    cut = before.bond_count - after.bond_count
+    assert cut == 2 and after.outer_count == before.outer_count + 2 * cut
+
+
+def touching_blocks(speed):
+    """Simulation of two blocks that touch, the left one moving along x."""
+    mesh = placed_together(BLOCKS, keep_coincident=True)
+    listed = [effects.BondDamping(), effects.SphereContact(outer_faces=True)]
+    velocity = np.zeros((12, 3))
+    velocity[:6, 0] = speed
+    return Simulation(Scene(mesh, CONCRETE, listed, velocity=velocity), Uniform(2e-9))
+
+
+def test_blocks_at_rest_stay_and_blocks_that_part_go_free():
+    """Spheres touch at a gap of zero: what rounding overlaps pushes less than 1e-12 m/s."""
+    resting = touching_blocks(0.0)
+    resting.advance_to(500)
+    assert np.abs(resting.values(resting.state.velocity)).max() < 1e-12
+    parting = touching_blocks(-0.5)
+    parting.advance_to(500)
+    velocity = parting.values(parting.state.velocity)
+    assert np.abs(velocity[6:]).max() < 1e-12
+    assert np.abs(velocity[:6, 0] + 0.5).max() < 1e-12
+
+
+def test_a_block_pushes_the_one_it_touches():
+    """Half of the momentum has gone over when both are as fast; none is lost."""
+    simulation = touching_blocks(0.5)
+    simulation.advance_to(5000)
+    velocity, mass = simulation.values(simulation.state.velocity), simulation.model.body_mass
+    momentum = mass[:, None] * velocity
+    assert momentum[6:, 0].sum() > 0.4 * 0.5 * mass[:6].sum()
+    assert momentum[:, 0].sum() == pytest.approx(0.5 * mass[:6].sum(), rel=1e-12)
+    assert simulation.report().missing_effects == ()

@@ -1,10 +1,11 @@
-"""A run says which of its effects acted, and which it could do without.
+"""A run says which of its effects acted, which it could do without, and which it lacked.
 
-A run with an effect silenced is exactly the run of a scene without it.
 An effect is called droppable only where a run without it has been made and is equal.
+Estimates before a run judge each connected part by its own stress and motion.
 """
 
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,29 +16,28 @@ from taichi_dem import (
     Scene,
     Simulation,
     Uniform,
-    checked_mesh,
     effects,
+    estimated_effects,
     join,
     needed_effects,
+    shapes,
     simulate,
 )
 from taichi_dem.engine import ENGINES
-from taichi_dem.kit.allocation import assign
-from taichi_dem.mesh.shapes import bar, pair, single
-from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
+from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.certificate import NEEDED
+from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.report.effects import effect_uses
 from taichi_dem.report.energy_balance import TERMS
 from taichi_dem.report.readings import Run
-from taichi_dem.simulate import run_simulation
 from taichi_dem.state.model import Model
-from tests.scenes import apart
+from tests.probe import BondProbe
 
 #: Far below the strength of concrete: a block of some 1 kg that falls from rest for 1e-5 s.
 STEP, UNTIL = 1e-7, 1e-5
 GENTLE = effects.BondDamping, effects.Softening, effects.Gravity
 LAWS = effects.Softening, effects.ShearSlip, effects.BondDamping
 METHOD = Uniform(1e-7)
-TWO = join(single(), single().moved(by=(1.0, 0.0, 0.0)))
 module = sys.modules[needed_effects.__module__]
 
 
@@ -94,50 +94,12 @@ def used(listed, bits=0, marked=0, heat=0.0, **account):
     return {use.effect: use for use in effect_uses(run, balance, filled)}
 
 
-@pytest.mark.parametrize(
-    ("bits", "touched", "rubbed"), [(0, 0, 0), (CONTACT, 1, 0), (CONTACT | RUBBED, 1, 1)]
-)
-def test_contact_and_friction_are_idle_only_where_the_step_noted_neither(bits, touched, rubbed):
-    """With heat or without: the step sees every push."""
-    found = used([effects.SphereContact(), effects.Friction()], bits)
-    names = "sphere_contact", "friction"
-    assert [found[name].events for name in names] == [touched, rubbed]
-    assert [found[name].idle for name in names] == [not touched, not rubbed]
-
-
 @pytest.mark.parametrize("place", range(3))
 def test_every_load_and_support_has_a_bit_of_its_own(place):
     """Loads first, in the order of the list, then supports."""
     listed = [effects.Gravity(), effects.GasPressure("left"), effects.Fixed("right")]
     found = used(listed, 1 << place)
     assert [use.events for use in found.values()] == [int(k == place) for k in range(3)]
-
-
-def test_what_steers_is_never_negligible():
-    """It acted, and took a thousandth of a thousandth of the work put in."""
-    listed = [effects.Softening(), effects.SphereContact(), effects.Friction()]
-    found = used(listed, CONTACT | RUBBED, marked=1, load_work=1.0, softening=1e-9)
-    assert all(use.is_active and not use.negligible(1e-3) for use in found.values())
-
-
-@pytest.mark.parametrize("strain, share, negligible", [(0.0, 1.0, False), (1.0, 1e-6, True)])
-def test_dashpots_are_compared_with_what_bonds_hold_not_with_a_fall(strain, share, negligible):
-    """A body that falls far takes work by the joule: its vibration is damped all the same."""
-    account = {"bond_dashpot": 1e-6, "bond_strain": strain, "load_work": 1e6}
-    use = used([effects.BondDamping()], heat=1e-6, **account)["bond_damping"]
-    assert use.share == pytest.approx(share, rel=1e-5)
-    assert use.negligible(1e-3) == negligible
-
-
-def test_round_off_in_bonds_is_no_damping():
-    """A bar in free fall, far from the origin: its bonds shake by last digits only."""
-    mesh = bar(0.5, 0.1, (5, 1, 1))
-    mesh = checked_mesh(mesh.points + 100.0, mesh.tetrahedra, {})
-    scene = Scene(mesh, CONCRETE, [make() for make in GENTLE])
-    advice = needed_effects(simulate(scene, method=Uniform(STEP), until=1e-4, samples=1), 0.0)
-    (damping,) = [use for use in advice.uses if use.effect == "bond_damping"]
-    assert damping.energy_J > 0.0 and damping.rounding
-    assert "bond_damping" in advice.droppable and "bond_damping" not in advice.inactive
 
 
 def pulled(*listed, speed=2.0):
@@ -161,84 +123,104 @@ def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(scene
     silent = result_of(pulled(*(law().silent() for law in LAWS)))
     assert len(ENGINES._engines) == before
     without = result_of(pulled())
-    for key, values in silent.series.items():
-        assert values.tobytes() == without.series[key].tobytes(), key
+    for key, column in silent.series.items():
+        assert column.tobytes() == without.series[key].tobytes(), key
     for frame, other in zip(silent.frames, without.frames):
         assert frame.position.tobytes() == other.position.tobytes()
     assert silent.report.effects == without.report.effects
     assert silent.report.energy_balance == without.report.energy_balance
 
 
-def test_advice_tries_what_can_be_silent_on_the_engine_of_the_run():
-    """What is hardly moved needs no law of failure."""
-    result = result_of(pulled(*(law() for law in LAWS), speed=1e-9))
-    before = len(ENGINES._engines)
-    advice = needed_effects(result)
-    assert len(ENGINES._engines) == before
-    assert {"softening", "shear_slip"} <= set(advice.droppable)
+EDGE = 0.05
+BLOCK = shapes.block(0.1, element=0.1)
+HALVES = join(BLOCK, BLOCK.moved(by=(0.101, 0.0, 0.0)), names=["left", "right"])
 
 
-def recorded(energy=(1.0, 2.0), heat=(0.0, 1e-3), broken=(np.nan, 1e-5, 2e-5), speed=3.0, slow=1.0):
-    """A result of two samples and parts, one slow; of three bonds two broke, by default."""
-    history = {
-        "time_s": np.array([0.0, 1.0]),
-        "kinetic_J": np.array(energy),
-        "slip_J": np.array(heat),
-        "residual_J": np.random.default_rng().random(2),
-        "largest_speed_m_s": np.array([0.0, speed]),
-    }
-    report = SimpleNamespace(round_off_J=2e-10, until_s=1.0)
-    model = SimpleNamespace(body_mass=np.array([1.0, 4.0]), mesh=TWO)
-    return SimpleNamespace(
-        series=history,
-        peak_speed=np.array([speed, slow]),
-        broken_time=np.array(broken),
-        report=report,
-        model=model,
-    )
+def passed(probe):
+    return [tick >= 0 for tick in values(probe.state.passed)[0]]
 
 
 @pytest.mark.parametrize(
-    ("other", "share"),
+    ("pull", "slide", "expected"),
     [
-        ({}, 0.0),
-        ({"energy": (1.0, 2.02)}, 0.01),
-        # Of energies, of the largest of them all; nothing that slipped is a joule.
-        ({"heat": (0.0, 3e-3)}, 1e-3),
-        ({"broken": (np.nan, 1e-5, 3e-5)}, 0.5),
-        ({"broken": (np.nan, 1e-5, np.nan)}, np.inf),
-        # 2e-10 J move 1 kg at 2e-5 m/s.
-        ({"speed": 3.0 + 1.9e-5}, 0.0),
-        ({"speed": 3.0 + 2.1e-5}, 7e-6),
-        # Beside a faster part a slow one is judged by its own speed.
-        ({"slow": 1.01}, 0.01),
+        # Shares of the strength, and of the cohesion; friction lowers the limit in tension.
+        (0.999, 0.0, [False, False]),
+        (1.001, 0.0, [True, False]),
+        (-1.0, 1.57, [False, False]),
+        (-1.0, 1.59, [False, True]),
+        (0.5, 0.72, [False, True]),
+        (0.5, 0.70, [False, False]),
     ],
 )
-def test_difference_of_runs_is_a_share_of_what_was_recorded(other, share):
-    found = module.recorded_difference(recorded(), recorded(**other))
-    assert found == pytest.approx(share, rel=1e-4, abs=1e-15)
+def test_limits_are_those_of_the_laws(pull, slide, expected):
+    """Tension and slip are noted where Softening and ShearSlip would have acted, unit by unit.
+
+    Strength and cohesion of concrete are one number; the limit in shear is c - 0.58 of the pull.
+    """
+    tractions = CONCRETE.tensile_strength * np.array([pull, slide, 0.0])
+    probe = BondProbe(pair(EDGE), [])
+    opening = tractions / probe.model.bond_stiffness[0][[0, 1, 1]]
+    probe.open(opening)
+    assert passed(probe) == expected
+    acting = BondProbe(pair(EDGE), [effects.Softening(), effects.ShearSlip()])
+    acting.open(opening)
+    assert list(acting.simulation.readings.active_bonds()[0]) == expected
 
 
-def test_a_motion_that_was_set_is_set_again():
-    """Else the run without them would be at rest, and differ by all."""
-    idle = (effects.Softening(), effects.ShearSlip())
-    simulation = Simulation(Scene(apart(2), CONCRETE, idle), Uniform(STEP))
-    simulation.state.set_motion(simulation.model.centre, None, [[0, 0, 0], [5.0, 2.0, 1.0]])
-    thrown = run_simulation(simulation, until=1e-5, samples=2, progress=None)
-    assert set(needed_effects(thrown).droppable) == {effect.name for effect in idle}
-    # A report alone shows nothing of a run without them.
-    assert thrown.report.advice().droppable == ()
+def test_a_limit_passed_between_two_samples_is_seen():
+    """A bond is pulled past its strength and pushed back; at both samples it holds little.
+
+    The pull lasts half a period of 1e-5 s; in between it opens by v / (pi f), five times its onset.
+    """
+    speed, frequency = np.pi * 1e5 * 5.0 * CONCRETE.onset_opening, 1e5
+    pull = effects.PrescribedMotion("right", (speed, 0.0, 0.0), frequency)
+    scene = Scene(pair(EDGE), CONCRETE, [effects.Fixed("left"), pull])
+    simulation = Simulation(scene, Uniform(STEP))
+    simulation.advance_to(100)
+    simulation.sample()
+    found = {one.effect: one for one in simulation.report().missing_effects}["Softening"]
+    assert found.count == 1 and 0.0 < found.first_s < 5e-6
+    middle = pair(EDGE).points[simulation.model.topology.vertices[0]].mean(axis=0)
+    assert found.place_m == pytest.approx(tuple(middle), rel=1e-15)
+    assert simulation.missing_effects.strain[0] < 1e-2
 
 
-def test_what_differs_is_kept_though_its_share_is_small():
-    """Dashpots of a bond that is pushed: what is shown is the difference of the two runs."""
-    listed = [effects.BondDamping(), effects.PrescribedMotion("left", (1.0, 0.0, 0.0))]
-    ways = {"method": Uniform(STEP), "until": 2e-6, "samples": 2, "progress": None}
-    result, without = (simulate(Scene(pair(), CONCRETE, of), **ways) for of in (listed, listed[1:]))
-    share = result.report.effect_activity[0].share
-    assert 0.0 < share < 0.999
-    advice = needed_effects(result, 0.999)
-    differs = module.recorded_difference(result, without)
-    assert advice.shown == {"bond_damping": differs} and differs > 0.0
-    assert ("bond_damping" in advice.droppable) == (differs <= 0.999)
-    assert needed_effects(result, 0.5 * share).shown == {}
+def groups(mesh=HALVES, **motion):
+    found = estimated_effects(Scene(mesh, CONCRETE, "auto", **motion), 1e-3)
+    return {one.effect: one.group for one in found}, {one.effect: one.verdict for one in found}
+
+
+def test_a_blow_has_the_stress_of_its_wave():
+    """Two equal blocks that meet at v: the wave in each carries v / 2."""
+    speed = 2.0
+    found, verdicts = groups(velocity={"left": (speed, 0.0, 0.0)})
+    model = Model(HALVES, CONCRETE, ())
+    wave = np.sqrt(CONCRETE.normal_stiffness * 2.0 * model.body_radius.mean() / CONCRETE.density)
+    stress = CONCRETE.density * wave * 0.5 * speed
+    assert found["softening"] == pytest.approx(stress / CONCRETE.tensile_strength, 1e-9)
+    assert verdicts["contact"] == NEEDED
+
+
+def test_a_solid_that_turns_has_the_stress_of_its_rim():
+    rate = 100.0
+    found, _ = groups(BLOCK, spin=(0.0, 0.0, rate))
+    centre = BLOCK.points[BLOCK.tetrahedra].mean(axis=1) - 0.05
+    rim = rate * np.sqrt((centre[:, :2] ** 2).sum(axis=1).max())
+    stress = CONCRETE.density * rim**2
+    assert found["softening"] == pytest.approx(stress / CONCRETE.tensile_strength, 1e-6)
+
+
+def test_a_part_keeps_its_estimates_beside_any_other():
+    """Of damping, too: a median over the bonds of all would hide the one bar that is damped."""
+    still = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0)
+    small, large = bar(2e-3, 5e-4, (4, 1, 1)), bar(4.0, 1.0, (8, 2, 2))
+    pulled = effects.Pressure("small_right", -1e5)
+    mesh = join(small, large.moved(by=(20.0, 0.0, 0.0)), names=["small", "large"])
+    beside = Scene(mesh, CONCRETE, "auto", loads=[pulled], materials={"large": still})
+    alone = Scene(small, CONCRETE, "auto", loads=[effects.Pressure("right", -1e5)])
+    found, own = (
+        {one.effect: one.group for one in estimated_effects(scene, 1e-3)}
+        for scene in (beside, alone)
+    )
+    for name in ("softening", "slip", "friction", "bond damping", "air drag"):
+        assert found[name] == pytest.approx(own[name], 1e-12), name

@@ -1,20 +1,17 @@
-"""A result is shown whatever became of the run, and its files tell what it holds and no more.
-
-The record of bodies' motion has the energy and momentum of a free flight in closed form.
-"""
+"""Files of a result, also those for other programs, tell what it holds and no more."""
 
 import csv
 import dataclasses
+import re
 
+import h5py
+import meshio
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, Simulation, Uniform, read_mesh, simulate
-from taichi_dem.mesh.shapes import bar, placed_together, single
-from taichi_dem.simulate import run_simulation
+from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, Uniform, read_mesh, simulate, write_paraview
+from taichi_dem.mesh.shapes import bar
 from tests.made_result import made_result
-from tests.motion_record import MotionRecord
-from tests.notebook import shown
 
 NAN = float("nan")
 
@@ -27,35 +24,6 @@ def flown(taichi_session):
     time = np.linspace(1e-6, 4e-6, made.model.bond_count)
     time[np.arange(len(time)) % 3 > 0] = NAN
     return dataclasses.replace(made, broken_time=time)
-
-
-def test_a_notebook_shows_picture_and_figures(flown):
-    page, pixels = shown(flown)
-    assert pixels.shape[1] > 600 and pixels.std() > 5.0
-    assert str(flown.report) in page.text and "24 bodies" in page.text
-
-
-def nothing_but_nan(result):
-    history = {name: np.full(len(column), NAN) for name, column in result.series.items()}
-    ledger = dict.fromkeys(result.report.energy_balance, NAN)
-    report = dataclasses.replace(result.report, energy_balance=ledger, run_seconds=NAN)
-    frame = dataclasses.replace(
-        result.frames[-1], displacement=NAN * result.frames[-1].displacement
-    )
-    speed = np.full(result.model.body_count, NAN)
-    more = {"series": history, "report": report, "frames": (frame,), "peak_speed": speed}
-    return dataclasses.replace(result, **more)
-
-
-def without_rows(result):
-    history = {name: column[:0] for name, column in result.series.items()}
-    return dataclasses.replace(result, series=history, frames=())
-
-
-@pytest.mark.parametrize("how", [nothing_but_nan, without_rows])
-def test_an_odd_result_is_shown_all_the_same(flown, how):
-    """Warnings are errors here: nothing is divided by zero on the way."""
-    shown(how(flown))
 
 
 def test_times_of_breaking_are_written(flown, tmp_path):
@@ -98,15 +66,6 @@ def test_fragments_hold_the_kinetic_energy_of_the_account(flown):
     assert flown.fragments(2)["kinetic_J"].sum() == pytest.approx(energy[2], rel=1e-12)
 
 
-@pytest.mark.parametrize(("size", "words"), [(1e-3, "round-off"), (1e3, "% of the energy held")])
-def test_energy_not_explained_is_a_share_only_where_there_is_some(flown, size, words):
-    """Without work and motion all energies are round-off, and a share of them says nothing."""
-    unit = flown.report.round_off_J
-    ledger = dict.fromkeys(flown.report.energy_balance, 0.0)
-    ledger.update(kinetic=size * unit, residual=0.3 * unit)
-    assert words in dataclasses.replace(flown.report, energy_balance=ledger).unexplained
-
-
 def test_attenuation_is_fitted_to_what_there_is():
     """Velocities that fall as 30 r^-1.5 around the paper's hole: the law is found."""
     made = made_result(mesh=read_mesh(PAPER_BLOCK), frames=1)
@@ -117,20 +76,64 @@ def test_attenuation_is_fitted_to_what_there_is():
     assert np.isnan(fall.attenuation().power_law(4.0)).all()
 
 
-def test_two_free_bodies_are_recorded_as_they_move_and_turn():
-    velocity = np.array([[3.0, 0.0, 0.0], [0.0, -1.0, 2.0]])
-    mesh = placed_together({"a": (single(), np.zeros(3)), "b": (single(), np.ones(3))})
-    spin = np.array([[0.0, 0.0, 50.0], [0.0, 0.0, 0.0]])
-    simulation = Simulation(Scene(mesh, CONCRETE, velocity=velocity, spin=spin), Uniform(1e-6))
-    both, second = made = MotionRecord(), MotionRecord(slice(1, 2))
-    run_simulation(simulation, until=1e-4, samples=5, progress=None, observers=made)
-    # A hundred steps round a place near 1 m.
-    assert both.moved == pytest.approx(np.multiply.outer(both.time_s, velocity), abs=2e-14)
-    assert second.kinetic_energy == pytest.approx(0.5 * second.mass[0] * 5.0, rel=1e-12)
-    # A regular tetrahedron turns about any axis as a ball does.
-    spun = 0.5 * both.inertia[0, 0, 0] * 50.0**2
-    assert both.rotational_energy == pytest.approx(spun, rel=1e-9)
-    assert both.momentum == pytest.approx(np.tile(both.mass @ velocity, (6, 1)), rel=1e-12)
-    orbit = np.cross([1.0, 1.0, 1.0], both.mass[1] * velocity[1])
-    whole = orbit + np.array([0.0, 0.0, 50.0 * both.inertia[0, 0, 0]])
-    assert both.angular_momentum == pytest.approx(np.tile(whole, (6, 1)), rel=1e-9)
+@pytest.fixture(scope="module")
+def result():
+    made = made_result()
+    since = np.where(np.arange(made.model.body_count) % 2, 1.5e-5, np.nan)
+    return dataclasses.replace(made, acting_since={"softening": since})
+
+
+def test_vtkhdf_holds_what_the_pvd_series_holds(result, tmp_path):
+    result.write_vtkhdf(tmp_path / "run.vtkhdf")
+    write_paraview(tmp_path, result.model, result.frames, "run", result.acting_since)
+    with h5py.File(tmp_path / "run.vtkhdf") as file:
+        root, count = file["VTKHDF"], result.model.body_count
+        steps = root["Steps"]
+        assert steps["Values"][:].tolist() == [frame.time_s for frame in result.frames]
+        cells = root["Connectivity"][:].reshape(-1, 4)
+        for k in range(len(result.frames)):
+            vtu = meshio.read(tmp_path / f"run_{k:04d}.vtu")
+            start, number = steps["PointOffsets"][k], root["NumberOfPoints"][0]
+            assert np.array_equal(root["Points"][start : start + number], vtu.points)
+            assert np.array_equal(cells, vtu.cells[0].data)
+            assert set(vtu.cell_data) == set(root["CellData"])
+            for name, (values,) in vtu.cell_data.items():
+                start = steps["CellDataOffsets"][name][k]
+                found = root["CellData"][name][start : start + count]
+                assert np.array_equal(found, values, equal_nan=True), name
+
+
+def read_xyz(path):
+    """Frames of an extended XYZ file: (what the second line says, columns by name)."""
+    lines, frames = path.read_text().splitlines(), []
+    while lines:
+        count, head, rows = int(lines[0]), lines[1], lines[2 : 2 + int(lines[0])]
+        about = {k: v.strip('"') for k, v in re.findall(r'(\w+)=("[^"]*"|\S+)', head)}
+        names = about["Properties"].split(":")
+        cells, at, columns = [row.split() for row in rows], 0, {}
+        for name, kind, width in zip(names[::3], names[1::3], map(int, names[2::3])):
+            part = [row[at : at + width] for row in cells]
+            at += width
+            columns[name] = part if kind == "S" else np.array(part, dtype=float)
+        frames.append((about, columns))
+        lines = lines[2 + count :]
+    return frames
+
+
+def test_xyz_holds_places_sizes_velocities_and_fragments(result, tmp_path):
+    """To the ten digits that are written."""
+    result.write_xyz(tmp_path / "run.xyz")
+    frames = read_xyz(tmp_path / "run.xyz")
+    assert len(frames) == len(result.frames)
+    for k, (frame, (about, found)) in enumerate(zip(result.frames, frames)):
+        fragments = result.fragments(k)
+        assert float(about["Time"]) == pytest.approx(frame.time_s)
+        alike = {"rel": 1e-9, "abs": 1e-9}
+        numbers = result.fragment_of_body(k)
+        wanted = frame.position, frame.velocity, result.model.body_mass, numbers
+        for name, values in zip(("pos", "velo", "mass", "fragment"), wanted):
+            values = np.reshape(values, (len(values), -1))
+            assert found[name] == pytest.approx(values, **alike), name
+        volume = 4.0 / 3.0 * np.pi * found["radius"] ** 3
+        assert volume.sum() == pytest.approx(fragments["volume_m3"].sum(), rel=1e-8)
+        assert np.linalg.norm(found["orientation"], axis=1) == pytest.approx(1.0, rel=1e-8)

@@ -1,27 +1,28 @@
-"""A scene whose parts may meet or whose friction never acts is told so before a run.
+"""A scene whose parts may meet, or whose number has another unit, is told so before a run.
 
 A scene that begins in motion runs as one whose bodies were set in motion by hand.
 """
 
 import pickle
-from dataclasses import replace
+import warnings
 
 import numpy as np
 import pytest
 
+from ca_damper import Spheres
 from taichi_dem import (
     CONCRETE,
-    Checkpoint,
-    InputError,
     Multirate,
     Scene,
     Simulation,
     Uniform,
     effects,
+    shapes,
     simulate,
 )
+from taichi_dem.kit.likely_units import UnitWarning
 from taichi_dem.mesh.shapes import bar, pair, placed_together
-from taichi_dem.scene import outer_faces_warnings, scene_warnings
+from taichi_dem.scene import outer_faces_warnings
 from taichi_dem.simulate import run_simulation
 from tests.scenes import beside
 
@@ -69,20 +70,6 @@ def test_parts_without_contact_are_told_where_they_may_come_to_meet(shift, liste
     assert told(shift, *listed, effects.SphereContact(outer_faces=False))
 
 
-@pytest.mark.parametrize(
-    ("friction", "damping", "count"),
-    [(effects.Friction, 0.0, 1), (effects.Friction, 1.0, 0), (effects.StickingFriction, 0.0, 0)],
-)
-@pytest.mark.parametrize("contact", [effects.SphereContact(), effects.BodyContact()])
-def test_friction_that_no_dashpot_carries_is_told_before_a_run(contact, friction, damping, count):
-    """A scene is damped by the dashpots of its contact, and no other."""
-    lossless = {"contact_damping": 0.0, "normal_damping": 0.0, "shear_damping": 0.0}
-    material = replace(CONCRETE, **{**lossless, contact.constants[1]: damping})
-    made = Scene(pair(), material, [contact, friction()])
-    assert len(scene_warnings(made)) == count
-    assert made.damped() == (damping > 0.0) and not made.damped(touching=False)
-
-
 def scene(**options):
     return Scene(START, CONCRETE, [], **options)
 
@@ -110,26 +97,6 @@ def test_a_moving_scene_has_the_bits_of_a_motion_set_by_hand(by_hand):
     assert_same(simulate(pickle.loads(pickle.dumps(moving)), **options), by_hand)
 
 
-def test_a_reset_begins_with_the_motion_of_its_scene(by_hand):
-    simulation = Simulation(scene(), METHOD)
-    simulation.advance_to(3)
-    simulation.reset(scene(velocity=ROWS[0], spin=ROWS[1]))
-    options = {"until": UNTIL, "samples": 2, "frames": 1, "progress": None}
-    assert_same(run_simulation(simulation, **options), by_hand)
-    simulation.reset(scene())
-    assert not simulation.state.motion()["velocity"].any()
-
-
-def test_a_checkpoint_belongs_to_the_motion_it_began_with(by_hand, tmp_path):
-    moving, path = scene(velocity=ROWS[0], spin=ROWS[1]), tmp_path / "half.npz"
-    options = {"method": METHOD, "samples": 2, "frames": 1, "progress": None}
-    simulate(moving, until=UNTIL / 2, checkpoint=Checkpoint(path), **options)
-    resumed = simulate(moving, until=UNTIL, resume=path, **options)
-    assert resumed.frames[-1].position.tobytes() == by_hand.frames[-1].position.tobytes()
-    with pytest.raises(InputError, match="is of another initial motion"):
-        simulate(scene(velocity=-ROWS[0], spin=ROWS[1]), until=UNTIL, resume=path, **options)
-
-
 def test_one_spin_turns_all_bodies_as_one_rigid_body():
     spin = np.array([0.0, 3.0, -4.0])
     motion = scene(velocity=(1.0, 0.0, 0.0), spin=spin).initial_motion
@@ -148,15 +115,6 @@ def test_body_groups_move_and_turn_each_for_itself():
     np.testing.assert_allclose(motion["velocity"][COUNT:], expected, atol=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("speed", "aside", "expected"), [(5.0, 0.0, True), (-5.0, 0.0, False), (5.0, 1.0, False)]
-)
-def test_parts_without_contact_are_told_where_they_may_meet(speed, aside, expected):
-    rows = np.repeat([[speed, 0.0, 0.0], [0.0, 0.0, 0.0]], COUNT, axis=0)
-    made = Scene(beside(START, START, [3.0, aside, 0.0]), CONCRETE, [], velocity=rows)
-    assert bool(outer_faces_warnings(made)) == expected
-
-
 @pytest.mark.parametrize("method", [Uniform(1e-6, 1e-8), Multirate(1e-6, 1e-8)])
 def test_no_body_moves_further_than_the_distance_in_its_first_step(method):
     """dt_i <= l / |v_i| (Konno et al., 3.1): 1 m/s and 10 nm give 10 ns, below dt0 / 2^6.
@@ -169,3 +127,25 @@ def test_no_body_moves_further_than_the_distance_in_its_first_step(method):
     step = 1e-6 / 2.0 ** simulation.values(simulation.state.level)
     assert np.all(step * velocity[:, 0] <= 1e-8)
     assert np.all(2.0 * step.min() * velocity[0, 0] > 1e-8)
+
+
+#: Builder, a value in the wrong unit, how many of the unit it is read in are one of the likely one.
+CASES = {
+    "peak": (lambda x: effects.GasPressure(peak=x), 575.0, 1e6),
+    "rise": (lambda x: effects.GasPressure(rise=x), 0.133, 1e-3),
+    "element": (lambda x: shapes.block(4.0 * x, element=x), 100.0, 1e-3),
+    "particle_mass": (lambda x: Spheres(particle_mass=x), 0.2, 1e-3),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_number_in_the_likely_unit_is_warned_about_and_in_its_own_is_not(name):
+    build, value, factor = CASES[name]
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        try:
+            build(value)
+        except ValueError:
+            pass  # a wrong unit may lie out of the range of another option too
+    assert any(one.category is UnitWarning and name in str(one.message) for one in told)
+    build(value * factor)

@@ -1,58 +1,17 @@
-"""Every body and bond is visited when its own step ends: clock, lists and step rule alone."""
+"""Every body and bond is visited when its own step ends: lists and step rule alone."""
 
 import numpy as np
 import taichi as ti
 
-from taichi_dem.state import timeline
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL
 from taichi_dem.step.multirate.lists import ActiveList, Everyone
 from taichi_dem.step_control import Displacement
-
-
-def ticks_in_step(level):
-    """Ticks in a step of a level, in plain integers."""
-    return 1 << (MAX_LEVEL - level)
 
 
 def coarsest_level(tick):
     """Lowest level active at a tick, in plain integers."""
     rest = tick % MACRO_TICKS
     return 0 if rest == 0 else MAX_LEVEL - ((rest & -rest).bit_length() - 1)
-
-
-def random_ticks(count=20000):
-    """Ticks on every grid: random multiples of random steps, and zero."""
-    random = np.random.default_rng(7)
-    level = random.integers(0, MAX_LEVEL + 1, count)
-    ticks = random.integers(0, 1 << 30, count) << (MAX_LEVEL - level)
-    return np.concatenate([[0, MACRO_TICKS, MACRO_TICKS - 1], ticks]).astype(np.int64)
-
-
-def test_a_tick_lies_on_the_grid_of_the_coarsest_due_level_and_on_no_coarser():
-    """Definition: level k is due where the tick is a multiple of its step."""
-    for tick in random_ticks().tolist():
-        low = coarsest_level(tick)
-        assert tick % ticks_in_step(low) == 0
-        assert low == 0 or tick % ticks_in_step(low - 1) != 0
-
-
-@ti.kernel
-def _mirror(
-    ticks: ti.types.ndarray(dtype=ti.i64, ndim=1), low: ti.types.ndarray(dtype=ti.i64, ndim=2)
-):
-    for k in range(ticks.shape[0]):
-        low[k, 0] = timeline.coarsest_active(ticks[k])
-        low[k, 1] = timeline.ticks_of(ti.cast(low[k, 0], ti.i32))
-
-
-def test_kernels_keep_the_same_time():
-    """The device functions mirror the Python ones, number for number."""
-    ticks = random_ticks()
-    got = np.zeros((len(ticks), 2), dtype=np.int64)
-    _mirror(ticks, got)
-    low = [coarsest_level(tick) for tick in ticks.tolist()]
-    assert got[:, 0].tolist() == low
-    assert got[:, 1].tolist() == [ticks_in_step(level) for level in low]
 
 
 @ti.data_oriented

@@ -8,10 +8,9 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from taichi_dem import CONCRETE, Scene, Simulation, SimulationDiverged, Uniform, simulate
-from taichi_dem.kit.allocation import assign
-from taichi_dem.mesh.shapes import pair, placed_together, single
+from taichi_dem.mesh.shapes import placed_together, single
 from taichi_dem.mesh.tetrahedra import eighths
-from taichi_dem.report.shared_volume import DEEP, NOTABLE, SharedVolume
+from taichi_dem.report.shared_volume import DEEP, SharedVolume
 from tests.scenes import apart, quaternions
 
 EDGE = 1.0
@@ -99,15 +98,6 @@ def test_shares_are_those_of_the_intersections_of_all_pairs():
     assert len(found) > 25 and abs(missed) < 5.0 * np.sqrt(0.25 * cuts)
 
 
-def test_bonded_bodies_are_left_out_until_their_bond_breaks():
-    """Pressed into each other by half; the bond holds them, or has been released."""
-    looked = Looked(pair(EDGE))
-    assert looked.shares(0.5 * looked.model.centre) == {}
-    assign(looked.state.broken_tick, 0)
-    ((bodies, share),) = looked.shares(0.49 * looked.model.centre).items()
-    assert bodies == (0, 1) and share > DEEP
-
-
 @pytest.mark.parametrize(("shift", "share"), [(0.7, 0.0), (0.4, 14.0), (0.05, 78.0)])
 def test_bodies_that_overlap_at_the_start_are_told_at_once_and_rest_as_they_are(shift, share):
     """Nothing of their overlap becomes energy; one within the other is refused."""
@@ -125,20 +115,3 @@ def test_bodies_that_overlap_at_the_start_are_told_at_once_and_rest_as_they_are(
     for sentences in ([str(one.message) for one in told], report.needs):
         assert [words in sentence for sentence in sentences] == [True] * (share > 0.0)
     assert not any(report.energy_balance.values())
-
-
-def test_the_worst_pair_is_kept_and_survives_a_checkpoint():
-    looked = Looked(apart(4, EDGE))
-    centre = looked.model.centre
-    seen = []
-    for time_s, shift in ((1.0, 0.2), (2.0, 0.02), (3.0, 0.5)):
-        position = centre.copy()
-        position[1] = position[0] + [shift * EDGE, 0.0, 0.0]
-        position[3] = position[2] + [0.1 * EDGE, 0.0, 0.0]
-        seen.append(looked.shares(position, None, time_s))
-    worst = looked.volume.worst
-    assert (worst.bodies, worst.time_s, worst.deep) == ((0, 1), 2.0, 2)
-    assert worst.share == seen[1][0, 1] > NOTABLE
-    again = SharedVolume(looked.simulation.parts)
-    again.resume(looked.volume.saved())
-    assert again.worst == worst and np.array_equal(again.place, looked.volume.place)

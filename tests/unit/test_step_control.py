@@ -23,27 +23,11 @@ from taichi_dem import (
 )
 from taichi_dem.elasticity.rates import bond_rates, dashpots_of, springs_of
 from taichi_dem.mesh.shapes import bar, pair
-from taichi_dem.mesh.topology import body_properties, faces_of_group, topology_of
+from taichi_dem.mesh.topology import faces_of_group, topology_of
 from taichi_dem.stability.body_limits import dashpot_limit, dashpot_step, spring_limit, spring_step
 from taichi_dem.stability.step_report import stable_together
 from taichi_dem.step_control import CRITERIA
-
-EDGE = 0.05
-
-
-def test_the_limit_of_a_step_is_that_of_contacts_or_else_of_bonds():
-    """A bar with spheres of six a face: its contact dashpots bind; without them its bonds'.
-
-    Those of bodies are a bond's: on one face they allow more than the bonds on all faces.
-    """
-    mesh = bar(0.4, 0.1, (4, 1, 1))
-    spheres = step_report(Scene(mesh, CONCRETE, "all", loads=[effects.SphereContact()]))
-    assert set(spheres.binding) == {"contact_dashpot"}
-    assert set(step_report(Scene(mesh, CONCRETE, "all")).binding) == {"bond_dashpot"}
-    bonded = step_report(Scene(mesh, CONCRETE, [effects.BondDamping()]))
-    rates = bond_rates(mesh, topology_of(mesh), CONCRETE.density, dashpots_of(CONCRETE))
-    assert np.array_equal(bonded.step_s, dashpot_step(rates))
-    assert set(bonded.binding) == {"bond_dashpot"}
+from tests.closed_forms import LinearBonds
 
 
 def multiplier(dt, stiffness, damping):
@@ -159,60 +143,12 @@ def test_kernels_and_arrays_share_the_formulas_of_the_stable_step():
     assert found.min() > 1e90 and np.isinf([dashpot_step(0.0), spring_step(0.0)]).all()
 
 
-def whole_system(mesh, coefficients):
-    """Largest eigenvalue of M^-1 G of all bodies moving together, assembled unit by unit.
-
-    G is the Hessian of half the power (or energy) of all units, (A/3) (c_n u_n^2 + c_t u_t^2),
-    u the velocity of the slave's vertex relative to the master's.
-    """
-    top = topology_of(mesh)
-    mass, centre, inertia = body_properties(mesh, CONCRETE.density)
-    big = np.zeros((6 * mesh.body_count,) * 2)
-    for bond in range(top.bond_count):
-        corners = mesh.points[top.vertices[bond]]
-        vector = np.cross(corners[1] - corners[0], corners[2] - corners[0]) / 2.0
-        area = np.linalg.norm(vector)
-        for point in corners:
-            jump = np.zeros((3, 6 * mesh.body_count))
-            for body, sign in ((top.slave[bond], 1.0), (top.master[bond], -1.0)):
-                jump[:, 6 * body : 6 * body + 3] = sign * np.eye(3)
-                for axis in range(3):
-                    turned = np.cross(np.eye(3)[axis], point - centre[body])
-                    jump[:, 6 * body + 3 + axis] = sign * turned
-            normal = vector / area @ jump
-            big += area / 3.0 * (coefficients[0] - coefficients[1]) * np.outer(normal, normal)
-            big += area / 3.0 * coefficients[1] * jump.T @ jump
-    weight = np.zeros_like(big)
-    for body in range(mesh.body_count):
-        start = 6 * body
-        weight[start : start + 3, start : start + 3] = mass[body] * np.eye(3)
-        weight[start + 3 : start + 6, start + 3 : start + 6] = inertia[body]
-    return np.linalg.eigvals(np.linalg.solve(weight, big)).real.max()
-
-
-def rates(mesh, coefficients):
-    return bond_rates(mesh, topology_of(mesh), CONCRETE.density, coefficients)
-
-
-@pytest.mark.parametrize(
-    ("coefficients", "factor"), [((1e7, 1e7), 20.0 / 3.0), ((1e7, 0.0), 10.0 / 3.0)]
-)
-def test_rate_of_a_regular_pair_is_that_of_its_fastest_turn(coefficients, factor):
-    """In units of c_n A/m: with c_t = c_n the spin about the face's normal, else the tilt.
-
-    Three units of area A/3 at radius edge/sqrt 3 against I = m edge^2/20 give 20/3; about an
-    in-plane axis A/3 times the sum of y^2 over the vertices, edge^2/2, gives 10/3.
-    """
-    mesh = pair(EDGE)
-    area, mass = np.sqrt(3.0) / 4.0 * EDGE**2, body_properties(mesh, CONCRETE.density)[0]
-    assert rates(mesh, coefficients) == pytest.approx(factor * 1e7 * area / mass)
-
-
-@pytest.mark.parametrize("law", [dashpots_of, springs_of])
+@pytest.mark.parametrize(("law", "name"), [(dashpots_of, "damping"), (springs_of, "stiffness")])
 @pytest.mark.parametrize("mesh", [pair(0.05, 0.02), bar(0.2, 0.05, (2, 1, 1))])
-def test_largest_rate_of_the_whole_mesh_is_bounded_by_the_report(mesh, law):
+def test_largest_rate_of_the_whole_mesh_is_bounded_by_the_report(mesh, law, name):
     # |a - b|^2 <= 2 |a|^2 + 2 |b|^2 in every unit: the whole cannot be faster than twice its
     # fastest body; and it cannot be slower than that body between neighbours at rest.
-    fastest = rates(mesh, law(CONCRETE)).max()
-    whole = whole_system(mesh, law(CONCRETE))
+    bonds, top = LinearBonds(mesh, CONCRETE), topology_of(mesh)
+    fastest = bond_rates(mesh, top, CONCRETE.density, law(CONCRETE)).max()
+    whole = bonds.largest_rate(getattr(bonds, name))
     assert fastest * (1.0 - 1e-9) <= whole <= 2.0 * fastest * (1.0 + 1e-9)

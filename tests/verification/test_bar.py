@@ -8,6 +8,7 @@ import pytest
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import faces_of_group
+from tests.closed_forms import LinearBonds
 
 EPS = np.finfo(float).eps
 LENGTH, WIDTH, CELLS = 4.0, 0.1, 40
@@ -17,41 +18,9 @@ DISPERSION = (2.0 * np.pi * 0.1 / 0.76) ** 2 / 24.0
 STILL = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def stiffness_matrix(model):
-    """Forces on all bodies against their small displacements and turns, (6 n, 6 n), from scratch.
-
-    Every contact unit is a spring at its vertex between two rigid bodies.
-    """
-    top, points, n = model.topology, model.mesh.points, model.body_count
-    matrix = np.zeros((6 * n, 6 * n))
-    for b in range(top.bond_count):
-        corners = points[top.vertices[b]]
-        area = 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0])
-        size = np.linalg.norm(area)
-        normal = area / size
-        spring = CONCRETE.shear_stiffness * np.eye(3)
-        spring += (CONCRETE.normal_stiffness - CONCRETE.shear_stiffness) * np.outer(normal, normal)
-        at = np.r_[
-            6 * top.master[b] : 6 * top.master[b] + 6, 6 * top.slave[b] : 6 * top.slave[b] + 6
-        ]
-        for corner in corners:
-            move = np.hstack(
-                [
-                    sign * np.hstack([np.eye(3), -_cross(corner - model.centre[body])])
-                    for sign, body in ((-1, top.master[b]), (1, top.slave[b]))
-                ]
-            )
-            matrix[np.ix_(at, at)] += size / 3 * move.T @ spring @ move
-    return matrix
-
-
-def _cross(a):
-    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
-
-
 def axial_stiffness(model):
     """E A of a bar [N]: held at its left, pulled at its right; strain of the middle half."""
-    matrix = stiffness_matrix(model)
+    matrix = LinearBonds(model.mesh, CONCRETE).stiffness
     left, _ = faces_of_group(model.mesh, model.topology, "left")
     right, _ = faces_of_group(model.mesh, model.topology, "right")
     free = np.setdiff1d(np.arange(model.body_count), left)

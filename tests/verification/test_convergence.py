@@ -133,22 +133,6 @@ def test_drifted_neighbours_keep_the_second_order(bars):
     check_order(moving, moving.mixed, False, 2.0)
 
 
-def test_all_schemes_approach_one_answer(bars):
-    """Extrapolated to no step at all they agree, to what the last halving still moved by it.
-
-    Errors C dt^p: the limit is x_fine + (x_fine - x_coarse) / (2^p - 1), known to the next term.
-    """
-    held, drifted = bars["held"], bars["drifted"]
-    kinds = [(held, np.zeros_like(held.mixed), 2), (held, held.mixed, 1), (drifted, held.mixed, 2)]
-    limits, doubts = [], []
-    for moving, levels, order in kinds:
-        coarse, fine = (moving.position_after(n, levels, False) for n in STEPS[-2:])
-        limits.append(fine + (fine - coarse) / (2**order - 1))
-        doubts.append(slack(moving, False) * np.linalg.norm(fine - coarse))
-    for k in (1, 2):
-        assert np.linalg.norm(limits[k] - limits[0]) < doubts[k] + doubts[0]
-
-
 @pytest.mark.parametrize("neighbour", ["held", "drifted"])
 def test_explicit_dashpots_are_of_first_order(bars, neighbour):
     """A dashpot takes the velocity before the kick, half a step old, in every scheme."""

@@ -1,4 +1,4 @@
-"""Solved dashpots on a bonded pair: the scheme to round-off, its order, where it is stable.
+"""Solved dashpots on a bonded pair: the scheme to round-off, its order.
 
 Solved dashpots against explicit ones with a tiny step: small scenes, side by side in a mesh.
 """
@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
-from taichi_dem.elasticity.rates import dashpots_of, springs_of
 from taichi_dem.kit.allocation import assign
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.state.timeline import MACRO_TICKS
-from tests.verification.test_limits import Rig, bisected, pair_eigenvalue
+from tests.verification.test_limits import Rig
 
 EPS = np.finfo(float).eps
 #: So tight that the sweeps add nothing to what is measured.
@@ -126,55 +125,6 @@ def test_the_slow_decay_is_met_in_the_order_of_theta(rigs, theta, order):
     assert rate * 4e-6 > 5.0 and 1e-5 < abs(errors[0]) < (slow * 4e-6) ** order
     ratios = np.array(errors[:-1]) / errors[1:]
     assert ratios == pytest.approx([2.0**order] * 2, rel=0.08)
-
-
-def test_all_modes_are_damped_at_twenty_times_the_explicit_limit(rigs):
-    """Forward Euler bears 2 / rate of the fastest mode of the pair, 12 x 12; here 40 / rate."""
-    rig = rigs(0.5)
-    damped(rig, 10.0)
-    rate = 10.0 * pair_eigenvalue(rig.simulation.model, dashpots_of(CONCRETE))
-    random = np.random.default_rng(3)
-    velocity, spin = 1e-7 * random.standard_normal((2, 3)), 1e-6 * random.standard_normal((2, 3))
-    after = rig.speeds(40.0 / rate, 3000, rig.centre, velocity, spin)
-    drift = velocity.mean(axis=0)
-    # The pair as a whole flies and turns on; what it turns with is below its first spins.
-    free = np.linalg.norm(np.tile(drift, (2, 1))) + 2e-6 * 2 * 0.05
-    assert after < free + 1e-9
-
-
-@pytest.mark.parametrize("share", [0.0, 0.02])
-def test_springs_bound_the_step_whatever_the_dashpots(rigs, share):
-    """2 / w of the fastest mode: at z = -1 the mean of both velocities is none, so C drops out.
-
-    The fastest turns the bodies against each other about the normal. Growth too slow to see, and
-    bisection, as in ``test_limits``. What has grown is looked at early too: bodies that turn far
-    swing slower, and dashpots then calm them.
-    """
-    rig = rigs(0.5)
-    damped(rig, share)
-    exact = 2.0 / np.sqrt(pair_eigenvalue(rig.simulation.model, springs_of(CONCRETE)))
-    random = np.random.default_rng(3)
-    velocity, spin = 1e-7 * random.standard_normal((2, 3)), 1e-6 * random.standard_normal((2, 3))
-
-    def calm(step):
-        for steps in (20, 50, 100, 200, 400):
-            speed = rig.speeds(step, steps, rig.centre, velocity, spin)
-            if not speed < 1e-3 or np.abs(rig.state.motion()["spin"]).max() > 1e-3:
-                return False
-        return True
-
-    found = bisected(calm, 0.5 * exact, 1.5 * exact)
-    assert found == pytest.approx(exact, rel=0.007), found / exact
-
-
-def test_velocities_at_the_end_of_the_step_bear_longer_ones(rigs):
-    """theta = 1: (w dt)^2 < 4 + 2 r dt from z = -1 in the recurrence, w, r of the normal mode."""
-    rig = rigs(1.0)
-    stiff, rate = damped(rig, 1.0)
-    exact = (rate + np.sqrt(rate**2 + 4.0 * stiff)) / stiff
-    assert exact > 5.0 * 2.0 / np.sqrt(stiff)
-    found = [openings(rig, part * exact, [400])[0] for part in (0.99, 1.01)]
-    assert abs(found[0]) < STRETCH < abs(found[1])
 
 
 def driven(velocity, step, steps, speed=0.0, frequency=0.0):

@@ -10,10 +10,11 @@ from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, e
 from taichi_dem.elasticity.rates import bond_rates, contact_eigenvalues, dashpots_of, springs_of
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.mesh import checked_mesh
-from taichi_dem.mesh.shapes import pair, placed_together, single
+from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED, dashpot_step, spring_step
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL
+from tests.closed_forms import LinearBonds, carried
 
 STILL = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
 #: Steps of a run that must grow: at 1.004 of a limit a mode grows by 1.008 a step, 1e10 in all.
@@ -59,29 +60,6 @@ def bisected(stable, low, high):
     return 0.5 * (low + high)
 
 
-def pair_eigenvalue(model, coefficients):
-    """Largest eigenvalue of both bodies against each other: J of 12 columns, masses of both."""
-    mesh, top = model.mesh, model.topology
-    corners = mesh.points[top.vertices[0]]
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    area = 0.5 * np.linalg.norm(normal)
-    normal /= 2.0 * area
-    along = np.outer(normal, normal)
-    law = area / 3.0 * (coefficients[1] * np.eye(3) + (coefficients[0] - coefficients[1]) * along)
-    mass, block = np.zeros((12, 12)), np.zeros((12, 12))
-    for body in range(2):
-        mass[6 * body : 6 * body + 3, 6 * body : 6 * body + 3] = model.body_mass[body] * np.eye(3)
-        mass[6 * body + 3 : 6 * body + 6, 6 * body + 3 : 6 * body + 6] = model.body_inertia[body]
-    for corner in corners:
-        row = np.zeros((3, 12))
-        for body, sign in ((0, -1.0), (1, 1.0)):
-            arm = corner - model.centre[body]
-            row[:, 6 * body : 6 * body + 3] = sign * np.eye(3)
-            row[:, 6 * body + 3 : 6 * body + 6] = sign * np.cross(np.eye(3), arm).T
-        block += row.T @ law @ row
-    return np.linalg.eigvals(np.linalg.solve(mass, block)).real.max()
-
-
 def grown(rig, seed):
     """A test whether tiny random motion of a bonded pair stays small at a step."""
     random = np.random.default_rng(seed)
@@ -105,7 +83,8 @@ def test_bond_limits_are_where_motion_begins_to_grow(kind):
     rig = Rig(pair(), listed, material=material)
     model = rig.simulation.model
     of, limit = (springs_of, spring_step) if kind == "springs" else (dashpots_of, dashpot_step)
-    rate = pair_eigenvalue(model, of(material))
+    bonds = LinearBonds(model.mesh, material)
+    rate = bonds.largest_rate(bonds.stiffness if kind == "springs" else bonds.damping)
     exact = 2.0 / np.sqrt(rate) if kind == "springs" else 2.0 / rate
     found = bisected(grown(rig, 3), 0.5 * exact, 1.5 * exact)
     # Bisection to 1 / 512 of the bracket, and growth too slow to see within 0.4 % of the limit.
@@ -168,21 +147,14 @@ def meeting(divisions, material, **gas):
 
 
 def contact_eigenvalue(model, spheres):
-    """As ``pair_eigenvalue``, for frictionless contacts of unit stiffness base against base."""
-    mass, block = np.zeros((12, 12)), np.zeros((12, 12))
-    for body in range(2):
-        mass[6 * body : 6 * body + 3, 6 * body : 6 * body + 3] = model.body_mass[body] * np.eye(3)
-        mass[6 * body + 3 : 6 * body + 6, 6 * body + 3 : 6 * body + 6] = model.body_inertia[body]
-    normal = np.array([1.0, 0.0, 0.0])
+    """Largest rate of both bodies by frictionless contacts of unit stiffness, base on base."""
+    bodies, block = LinearBonds(model.mesh, CONCRETE), np.zeros((12, 12))
     for first in spheres:
-        row = np.zeros(12)
         # In the world both touch the plane between the bases, opposite each other.
-        for body, sign in ((0, -1.0), (1, 1.0)):
-            arm = np.array([-model.centre[body, 0], first[1], first[2]])
-            row[6 * body : 6 * body + 3] = sign * normal
-            row[6 * body + 3 : 6 * body + 6] = sign * np.cross(arm, normal)
+        arms = [np.array([-centre[0], *first[1:3]]) for centre in model.centre]
+        row = np.hstack([-carried(arms[0])[0], carried(arms[1])[0]])
         block += np.outer(row, row)
-    return np.linalg.eigvals(np.linalg.solve(mass, block)).real.max()
+    return bodies.largest_rate(block)
 
 
 @pytest.mark.parametrize("divisions, contacts", [(3, 1), (5, 6)])
@@ -256,7 +228,8 @@ def test_limited_dashpots_of_a_bond_are_stable_at_any_step():
     material = replace(CONCRETE, **soft)
     rig = Rig(pair(), [effects.BondDamping()], Uniform(1e-9, dashpot="limited"), material)
     table = rig.simulation.schedule.limits.dashpot_table
-    known, rate = values(table), pair_eigenvalue(rig.simulation.model, dashpots_of(material))
+    bonds = LinearBonds(rig.simulation.model.mesh, material)
+    known, rate = values(table), bonds.largest_rate(bonds.damping)
     calm = grown(rig, 3)
 
     def wild(factor):
@@ -285,17 +258,3 @@ def test_limited_bonds_leave_contacts_what_they_need():
         taken = shares(limits, 1.0) * x
         assert taken[1] >= min(x[1], FOR_CONTACTS) - rounding
         assert taken.sum() <= LIMITED + rounding
-
-
-def test_a_report_bounds_the_share_that_limited_dashpots_of_bodies_had():
-    """By one contact on a largest face: of bodies that meet head on that is the share itself."""
-    parts = {"flying": (single(), (-1e-4, 0.0, 0.0)), "met": (single(), (0.05, 0.0, 0.0))}
-    flying = {"mesh": placed_together(parts), "velocity": {"flying": (50.0, 0.0, 0.0)}}
-    scene = Scene(material=CONCRETE, effects=[effects.BodyContact()], **flying)
-    simulation = Simulation(scene, Uniform(1e-6, dashpot="limited"))
-    simulation.advance_to(370)
-    simulation.sample()
-    resolution = simulation.step_resolution
-    least = resolution.pair_share.min()
-    resolution.pair_share[:] = 1.0
-    assert resolution._contact_shares().min() == pytest.approx(least, rel=1e-3) and least < 0.9

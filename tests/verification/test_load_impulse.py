@@ -1,8 +1,5 @@
 """A load gives its whole impulse, and a prescribed motion its whole way, at any step."""
 
-import math
-import warnings
-
 import numpy as np
 import pytest
 
@@ -15,7 +12,6 @@ from taichi_dem import (
     StepControl,
     Uniform,
     effects,
-    simulate,
 )
 from taichi_dem.kit.allocation import assign
 from taichi_dem.mesh.mesh import checked_mesh
@@ -109,21 +105,3 @@ def test_a_prescribed_motion_goes_its_whole_way():
     simulation.advance_to(STEPS)
     way = simulation.values(simulation.state.position)[0, 0] - simulation.model.centre[0, 0]
     assert way == pytest.approx(3.0 * 1e-8 * shares[1][1::3].sum(), abs=STEPS * EPS * 0.1)
-
-
-@pytest.mark.parametrize(
-    ("listed", "change"),
-    [
-        (effects.Pressure.triangle("face", 1e6, 2e-8, 3e-8), 2e-8),
-        # Pieces in which nothing changes do not count.
-        (effects.Pressure("face", [0.0, 0.0, 1e6], times=[0.0, 1e-9, 1e-3]), math.inf),
-        (effects.GasPressure("face", rise=8e-8, decay_ratio=0.5), 4e-8),
-        (effects.PrescribedMotion("face", (1.0, 0.0, 0.0), frequency=1e7), 5e-8),
-    ],
-)
-def test_a_history_that_the_step_cannot_follow_is_named_once_before_the_run(listed, change):
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        simulate(Scene(MESH, CONCRETE, [listed]), method=Uniform(STEP), until=STEP, progress=None)
-    wanted = f"changes within {change:.3g} s, less than the largest step, {STEP:.3g} s"
-    assert [wanted in str(one.message) for one in told] == [True] * math.isfinite(change)

@@ -13,7 +13,7 @@ line falls no steeper than K where x_1 is at least 2 x_0.
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, InputError, effects
+from taichi_dem import CONCRETE, effects
 from taichi_dem.mesh import shapes as mesh_shapes
 from tests.probe import BondProbe
 from tests.verification.test_bond_law import EDGE, OPENING_ERROR
@@ -91,14 +91,3 @@ def test_damage_never_heals_in_whatever_direction_the_unit_is_moved(pair):
         expected = left * np.array([K_N, K_S, K_S]) * jump
         assert np.abs(pair.open(jump) - expected).max() < 2.0 * ERROR
     assert pair.open([-5e-6, 0, 0])[0] == pytest.approx(-K_N * 5e-6, abs=ERROR)
-
-
-def test_what_is_asked_in_vain_is_refused():
-    with pytest.raises(InputError, match=r"exponent must be .* got 1\.9"):
-        effects.MixedMode(500.0, 1.9)
-    with pytest.raises(InputError, match="leave out softening"):
-        BondProbe(mesh_shapes.pair(EDGE), [effects.MixedMode(500.0), effects.Softening()])
-    with pytest.raises(
-        InputError, match=r"shear_energy of mixed_mode must be larger .* got 1e-0?9"
-    ):
-        BondProbe(mesh_shapes.pair(EDGE), [effects.MixedMode(1e-9)])

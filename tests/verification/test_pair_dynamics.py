@@ -139,13 +139,6 @@ def test_normal_force_is_spring_less_dashpot_and_never_pulls(probe, factor):
     assert heat[0] == pytest.approx(taken, abs=6 * FORCE_ERROR * abs(rate))
 
 
-def test_spheres_apart_give_nothing(probe):
-    position = placed(probe, -1e-9)
-    wrench, heat = probe.evaluate(SPHERES, position, None, np.array([0 * NORMAL, -NORMAL]))
-    assert np.array_equal(wrench, np.zeros((2, 6)))
-    assert np.array_equal(heat, np.zeros(3))
-
-
 @pytest.mark.parametrize("factor", [0.5, 20.0])
 def test_friction_is_the_smaller_of_coulomb_and_dashpot(probe, factor):
     """min(mu F_n, c |v_t|) against the sliding; both meet at factor 1."""
@@ -181,19 +174,6 @@ def test_action_is_reaction_at_the_middle_of_the_overlap(probe):
     force = push * NORMAL - rub * slide
     error = 6 * FORCE_ERROR + 100 * EPS * C * np.linalg.norm(spin, axis=1).max() * 0.1
     assert np.abs(wrench[1, :3] - force).max() < error
-
-
-def test_force_of_i_on_j_is_that_of_j_on_i(probe):
-    """Which body comes first in the list changes no more than the rounding."""
-    position = placed(probe, OVERLAP)
-    velocity = np.array([[1.0, 0.5, -0.2], [-0.3, 0.4, 0.1]])
-    spin = np.array([[30.0, -20.0, 5.0], [10.0, 0.0, -40.0]])
-    quaternion = np.array([[1.0, 0, 0, 0], [1.0, 0, 0, 0]])
-    first, heat = probe.evaluate(SPHERES, position, quaternion, velocity, spin)
-    second, taken = probe.evaluate(SPHERES, position, quaternion, velocity, spin, swap=True)
-    error = 12 * FORCE_ERROR + 200 * EPS * C * 50.0 * 0.1
-    assert np.abs(first - second).max() < error
-    assert np.abs(heat - taken).max() < error * 10.0
 
 
 def test_heat_that_waits_in_a_pair_is_in_the_account(probe):

@@ -6,9 +6,8 @@ Errors of an opening, and of a traction, are those of ``test_bond_law``.
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Uniform, effects, simulate
+from taichi_dem import CONCRETE, effects
 from taichi_dem.kit.allocation import assign, values
-from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.shapes import pair as pair_mesh
 from tests.probe import BondProbe
 from tests.verification.test_bond_law import EDGE, OPENING_ERROR, SHEAR_ERROR
@@ -150,20 +149,3 @@ def test_energy_stored_plus_spent_is_the_work_done_on_any_way(bonded):
         bonded.open([normal, *sliding])
     size = bonded.area * 60 * SHEAR_ERROR * np.abs(way).max()
     assert bonded.stored() + bonded.heat[1] == pytest.approx(work, abs=size)
-
-
-def sheared(step, law):
-    """A damped bar that is pressed a little, and sheared between its ends at 8 m/s."""
-    held = [effects.Fixed("left"), effects.PrescribedMotion("right", (-0.02, 8.0, 0.0))]
-    scene = Scene(bar(0.15, 0.05, (3, 1, 1)), CONCRETE, [effects.BondDamping(), law, *held])
-    return simulate(scene, method=Uniform(step), until=4e-4, samples=1, frames=1, progress=None)
-
-
-def test_account_closes_in_the_limit_of_short_steps_and_decohered_faces_open():
-    """The residual is of first order in the step: half the step, half of it."""
-    whole, half = (sheared(dt, effects.SlipWeakening(300.0)) for dt in (4e-8, 2e-8))
-    residual, smaller = (abs(run.report.energy_balance["residual"]) for run in (whole, half))
-    assert smaller < 0.6 * residual
-    assert half.report.broken_faces == whole.report.broken_faces > 0
-    assert half.report.energy_balance["slip"] > 10.0 * smaller
-    assert half.report.linear_momentum_error < 1e-12

@@ -90,12 +90,6 @@ def _notice(limits: ti.template(), body: ti.i32):
         limits.notice(body, 1)
 
 
-@ti.kernel
-def _release(advance: ti.template(), bond: ti.i32):
-    for _ in range(1):
-        advance._release(bond, advance.tables.bond_slots[bond])
-
-
 class Sleepers:
     """The pair at rest, opened along its normal; three bodies, the last one ticks."""
 
@@ -157,34 +151,3 @@ def test_a_bond_applies_no_impulse_to_a_woken_body_twice():
     paid = made.force_per_opening * opening * DT0 / 4.0 / made.mass
     assert velocity[0] == pytest.approx(speed + gained + paid, rel=ROUND)
     assert made.simulation.schedule.limits.woken[None] == 1
-
-
-def test_a_released_bond_pays_sleeping_bodies_nothing_more():
-    """What it had paid ahead, F dt0, they take at their time; nothing asks to wake them."""
-    made = Sleepers()
-    made.quarters(1)
-    # Take the bond out, as one with a failed unit is; what failed it is no matter here.
-    _release(made.simulation.advance, 0)
-    velocity = made.quarters(8)
-    gained = made.force_per_opening * OPENING * DT0 / made.mass
-    assert velocity == pytest.approx([gained, -gained], rel=ROUND)
-    assert made.simulation.schedule.limits.woken[None] == 0
-
-
-def test_a_pressure_that_sets_in_while_a_body_sleeps_moves_it_by_no_more_than_the_way():
-    """A free body, a pressure that rises within dt0: its way then is P A / m dt0^2 / 6.
-
-    Each step goes no further than l, and each of the ten halvings of the step shifts the leapfrog
-    by no more than l. Asleep the body would take p(0) = 0 for all of dt0 and stay where it is.
-    """
-    dt0, way, peak = 4e-6, 1e-7, 575e6
-    mesh = checked_mesh(single().points, [[0, 1, 2, 3]], {"hole": [[1, 2, 3]]})
-    rising = effects.Pressure("hole", [0.0, peak], times=[0.0, dt0])
-    method = Multirate(dt0, way, control=StepControl())
-    simulation = Simulation(Scene(mesh, CONCRETE, [rising]), method)
-    simulation.advance_to(1)
-    area = 0.05**2 * 3.0**0.5 / 4.0
-    exact = peak * area / simulation.model.body_mass[0] * dt0**2 / 6.0
-    moved = np.linalg.norm(simulation.state.motion()["position"][0] - simulation.model.centre[0])
-    assert exact > 100.0 * way
-    assert abs(moved - exact) < 10.0 * way

@@ -1,7 +1,9 @@
-"""A page of a block or a damper holds what was recorded, to half a step of its quantisation."""
+"""A page of a block holds what was recorded, to half a step of its quantisation."""
 
-import dataclasses
+import base64
+import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,12 +11,75 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from ca_damper.plot import Box
 from taichi_dem.kit.viewer import quantise
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.mesh.tetrahedra import LOCAL_FACES
+from taichi_dem.mesh.topology import topology_of
+from taichi_dem.output.record import Frame
+from taichi_dem.result import Result
 from tests.bad_input.refusals import steady
-from tests.viewer.made import MESH, block, damper, data_of, of_frames, unpacked
+from tests.turns import matrix, quaternion
+
+MESH = bar(0.4, 0.1, (4, 1, 1))
+UNTIL_S = 4e-6
+
+
+def block(count=5, mesh=MESH, breaks=True):
+    """Result of a bar with so many frames: it moves, turns, and every third bond breaks."""
+    draw, topology = np.random.default_rng(1), topology_of(mesh)
+    centre = mesh.points[mesh.tetrahedra].mean(axis=1)
+    model = SimpleNamespace(
+        **{"mesh": mesh, "topology": topology, "centre": centre},
+        **{"body_count": mesh.body_count, "bond_count": topology.bond_count},
+    )
+    broken = np.linspace(1e-6, UNTIL_S, topology.bond_count)
+    broken[np.arange(len(broken)) % 3 >= int(breaks)] = np.nan
+    since = {"slip": np.where(draw.random(mesh.body_count) < 0.5, 2e-6, np.nan)}
+    frames = tuple(block_frame(centre, time_s, draw) for time_s in np.linspace(0.0, UNTIL_S, count))
+    report = SimpleNamespace(outcome="implicit, 4e-06 s simulated, <10> of 30 bonds broken")
+    method, peak = SimpleNamespace(dt0=4e-7), np.zeros(mesh.body_count)
+    parts = None, method, model, {}, frames, broken, peak, report
+    return Result(*parts, acting_since=since)
+
+
+def block_frame(centre, time_s, draw):
+    """Bodies moved and turned by amounts that grow with time."""
+    count, share = len(centre), time_s / UNTIL_S
+    displacement = 0.02 * share * draw.normal(size=(count, 3))
+    turns = [quaternion(draw.normal(size=3), 2.0 * share) for _ in range(count)]
+    return Frame(
+        time_s=float(time_s),
+        position=centre + displacement,
+        rotation=np.array([matrix(turn) for turn in turns]),
+        displacement=displacement,
+        velocity=30.0 * share * draw.normal(size=(count, 3)),
+        angular_momentum=np.zeros((count, 3)),
+        level=draw.integers(0, 4, count),
+        damage=draw.random(count),
+        bound=np.zeros(count, dtype=int),
+    )
+
+
+def data_of(page):
+    """Data of a page by name."""
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page.text)
+    return json.loads(found[1], parse_constant=no_number)
+
+
+def no_number(text):
+    """JSON has no infinity and no NaN: a browser refuses them."""
+    raise AssertionError(text)
+
+
+def unpacked(packed):
+    """Array of what ``pack`` made."""
+    kind = np.dtype(packed["kind"]).newbyteorder("<")
+    return np.frombuffer(base64.b64decode(packed["data"], validate=True), kind)
+
+
+def of_frames(packed):
+    """Values of what ``quantise`` made, (frames, n), and half a step of each frame, (frames, 1)."""
+    scale = np.array(packed["scale"])[:, None]
+    return unpacked(packed).reshape(len(scale), -1) * scale, 0.5 * scale
 
 
 @steady
@@ -47,19 +112,6 @@ def test_motion_on_a_page_is_that_of_the_frames(shown):
     assert (np.abs(place - [frame.position for frame in frames]) <= bound).all()
 
 
-def test_colours_on_a_page_are_those_of_the_frames(shown):
-    result, made = shown
-    modes = {mode["name"]: mode for mode in data_of(made)["modes"]}
-    for name in ("speed", "damage"):
-        found, half = of_frames(modes[name]["values"])
-        expected = [getattr(frame, name) for frame in result.frames]
-        assert (np.abs(found - expected) <= half * (1.0 + 1e-9)).all()
-    levels = unpacked(modes["level of the step"]["values"])
-    assert np.array_equal(levels, np.concatenate([frame.level for frame in result.frames]))
-    since = unpacked(modes["since when: slip of a bond"]["values"])
-    assert since == pytest.approx(1e6 * result.acting_since["slip"], nan_ok=True)
-
-
 def test_faces_show_from_when_their_bond_breaks(shown):
     result, made = shown
     data, top = data_of(made), result.model.topology
@@ -79,58 +131,9 @@ def test_faces_show_from_when_their_bond_breaks(shown):
         }
 
 
-def test_edges_are_cracked_from_the_first_break_at_them(shown):
-    """By looking at each bond for each edge."""
-    result, made = shown
-    data, top = data_of(made), result.model.topology
-    body, face = unpacked(data["faceBody"]), unpacked(data["faceLocal"])
-    found = unpacked(data["edgeBreaks"]).reshape(-1, 3)
-    for row, corners in enumerate(MESH.tetrahedra[body[:, None], LOCAL_FACES[face]]):
-        for k in range(3):
-            edge = set(np.delete(corners, k))
-            at = [edge <= set(vertices) for vertices in top.vertices]
-            expected = np.fmin.reduce(result.broken_time[at], initial=np.nan)
-            assert found[row, k] == pytest.approx(1e6 * expected if expected > 0.0 else 3e38)
-
-
-def test_bodies_that_never_show_are_left_out(tmp_path):
-    mesh = bar(0.3, 0.3, (3, 3, 3))
-    made = data_of(block(2, mesh, breaks=False).show(tmp_path / "view.html"))
-    count = len(unpacked(made["centres"])) // 3
-    assert count < mesh.body_count
-    assert set(unpacked(made["faceBody"])) == set(range(count))
-    assert len(unpacked(made["displacement"])) == 3 * count * len(made["times"])
-
-
-def test_grains_on_a_page_are_those_of_the_film(tmp_path):
-    film = damper()
-    data = data_of(film.show(tmp_path / "damper.html"))
-    assert data["times"] == pytest.approx([1e3 * frame.time_s for frame in film.frames[0]])
-    for one, frames in zip(data["containers"], film.frames):
-        place, half = of_frames(one["position"])
-        expected = np.array([1e3 * frame.position for frame in frames]).reshape(len(frames), -1)
-        assert (np.abs(place - expected) <= half * (1.0 + 1e-9)).all()
-        speed, half = of_frames(one["speed"])
-        expected = [frame.velocity[:, 1] for frame in frames]
-        assert (np.abs(speed - expected) <= half * (1.0 + 1e-9)).all()
-        assert one["base"] == pytest.approx([1e3 * frame.y for frame in frames])
-        assert one["outline"] == pytest.approx(1e3 * Box.of(film.filling).outline())
-    assert data["curves"][1]["values"] == pytest.approx([1e3 * f.x for f in film.frames[1]])
-
-
 def test_a_page_asks_for_nothing_from_elsewhere(shown):
     _, made = shown
     # The name of the format of drawings is no address that anything is fetched from.
     text = made.text.replace("http://www.w3.org/2000/svg", "")
     assert not re.search(r"https?://|//cdn|@import|url\(", text)
     assert not re.search(r"<(link|script|img)[^>]*(src|href)=(?!\"data:)", text)
-
-
-def test_frames_that_are_not_finite_are_left_out_and_it_is_said(tmp_path):
-    """JSON has no infinity: a browser would show nothing at all."""
-    result = block(3)
-    bad = dataclasses.replace(result.frames[1], velocity=np.full((MESH.body_count, 3), np.inf))
-    frames = (result.frames[0], bad, result.frames[2])
-    made = dataclasses.replace(result, frames=frames).show(tmp_path / "view.html")
-    assert len(data_of(made)["times"]) == 2
-    assert "1 frame with infinite values left out." in made.text

@@ -1,13 +1,20 @@
-"""Kernels of the default scenes keep their size: what is added to them, all wait for at each start.
+"""Kernels of the default scenes keep their size, and errors of kernels name their place.
 
 Taichi walks through the trees of all functions that a kernel calls, 25 us a node, and LLVM works on
 what comes of it. The number of nodes is the same on every machine; its budget is that of the day on
 which it was last renewed, and a twentieth more.
 """
 
-import pytest
+import re
+import textwrap
+from pathlib import Path
 
+import pytest
+import taichi as ti
+
+import taichi_dem.step
 from _bench_waits import sizes_of_kernels
+from taichi_dem.kit.kernel_source_cache import filled
 from taichi_dem.kit.study import call_in_process
 
 #: Nodes on 27 November 2026 by kernel, of those with more than a thousand; of all others together.
@@ -36,3 +43,29 @@ def test_a_kernel_of_the_default_scenes_keeps_its_size(nodes, name):
 
 def test_no_other_kernel_of_the_default_scenes_is_large(nodes):
     assert sum(count for name, count in nodes.items() if name not in BUDGET) <= 1.05 * OTHERS
+
+
+@ti.func
+def _unknown(x):
+    return x + _nowhere  # noqa: F821
+
+
+@ti.kernel
+def _calls_it():
+    for i in range(2):
+        _unknown(i)
+
+
+def test_an_error_names_its_place_in_every_function_on_the_way():
+    for _ in range(2):
+        with pytest.raises(ti.TaichiCompilationError) as caught:
+            _calls_it()
+        said = str(caught.value)
+        assert re.findall(r"in (_\w+):\n", said) == ["_calls_it", "_unknown"], said
+        assert "return x + _nowhere" in said and 'Name "_nowhere" is not defined' in said
+
+
+def test_lines_of_the_package_are_filled_as_by_textwrap():
+    for path in Path(taichi_dem.step.__file__).parent.rglob("*.py"):
+        for line in path.read_text().splitlines(True):
+            assert filled(line, 4, 9999) == textwrap.fill(line, tabsize=4, width=9999), line
