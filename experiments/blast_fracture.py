@@ -41,8 +41,6 @@ bonds.csv (when each bond broke), bodies.csv, the mesh used, summary.json and a 
 import sys
 from functools import partial
 
-import pandas as pd
-
 import taichi_dem as dem
 from _blast import EFFECTS, blast_parser, print_quality, run_options
 from _blast import METHODS as BLAST_METHODS
@@ -161,6 +159,9 @@ def run_with_spheres(options, method):
 
 def show_both(bodies, spheres):
     """Print what the contacts of two runs differ in."""
+    # Imported here: the default run needs no table, and pandas takes half a second.
+    import pandas as pd
+
     runs = {"whole bodies": bodies, "the paper's spheres": spheres}
     table = {
         f"{name}, diverged" if run.diverged else name: {

@@ -212,8 +212,10 @@ def shake_structure(
         )
     boxed = _checked_boxes(boxes, filling.capacity)
     modal = ModalMount(structure, [box.place for box in boxed], force_place)
-    if modal.group * len(numbered) > MOST_SCENES:
-        raise InputError(f"(boxes + empty places) x seeds must be at most {MOST_SCENES}")
+    scenes = modal.group * len(numbered)
+    if scenes > MOST_SCENES:
+        words = "(boxes + empty places) x seeds must be at most"
+        raise InputError(f"{words} {MOST_SCENES}, got {scenes}")
     window = _window(excitation, duration, _longest_step(filling, structure, dt), interval)
     start = {
         name: np.tile(_of_places(name, value, structure)[[*modal.scene_places]], len(numbered))

@@ -19,8 +19,8 @@ from taichi_dem.mesh.topology import skin
 from taichi_dem.output.fragments import (
     fragment_of_body,
     fragments_of,
+    quaternions_of,
     rigid_motion,
-    rotations_of,
     shares_of_scale,
     vectors_of,
 )
@@ -104,7 +104,7 @@ def _colours(values):
 def _motions(model, frames, of_body):
     """Translations (frames, fragments, 3) and quaternions x, y, z, w (frames, fragments, 4)."""
     places, rotations = zip(*(rigid_motion(model, frame, of_body) for frame in frames))
-    turns = np.array([rotations_of(one).as_quat() for one in rotations])
+    turns = np.array(list(map(quaternions_of, rotations)))
     # q and -q are one rotation; between two frames the shorter way is meant.
     for before, turn in itertools.pairwise(turns):
         turn *= np.where((turn * before).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]
@@ -238,7 +238,7 @@ def write_particles(path: FileName, result: Any, of: str) -> None:
 
 def _table(place, radius, velocity, rotation, mass, fragment):
     """Columns of the particles in a frame, by name."""
-    turns = {"orientation": rotations_of(rotation).as_quat(), "mass": mass, "fragment": fragment}
+    turns = {"orientation": quaternions_of(rotation), "mass": mass, "fragment": fragment}
     return {"pos": place, "radius": radius, "velo": velocity, **turns}
 
 

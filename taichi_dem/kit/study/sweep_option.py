@@ -16,7 +16,8 @@ from taichi_dem.kit import children, runtime
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, write_text
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study.costly_work import cached
+from taichi_dem.kit.study.costly_work import cached, digest
+from taichi_dem.kit.sweeps.table import ADDED
 from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.validation import shown
 
@@ -24,8 +25,6 @@ from taichi_dem.kit.validation import shown
 _OWN, _LOUDNESS = ("sweep", "workers", "out"), ("quiet", "json", "help")
 #: Cells of a column that is an option without a value.
 _SWITCH = {"yes": True, "true": True, "1": True, "no": False, "false": False, "0": False}
-#: Columns that sweep.csv has beside those of the table and the figures.
-_ADDED = ("error", "version", "commit", "machine", "seconds")
 
 
 def add_sweep(made: ArgumentParser, count: Callable[[str], int]) -> None:
@@ -48,9 +47,13 @@ def run_sweep(
     count = options.workers or runtime.usable_cores()
     lines = _lines(made, table, options, arguments, count)
     script, folder = os.path.abspath(getfile(unwrap(run))), output_folder(options.out)
+    beside = {
+        str(path): path.read_bytes().hex() for path in sorted(Path(script).parent.glob("*.py"))
+    }
+    sources = digest(beside, ("taichi_dem", "ca_damper"))
     with ThreadPoolExecutor(count) as pool, ProgressBar("sweep") as bar:
         places = (os.path.join(folder, f"row_{k}") for k in range(len(lines)))
-        jobs = [pool.submit(_run_row, script, *job) for job in zip(lines, places)]
+        jobs = [pool.submit(_run_row, script, sources, *job) for job in zip(lines, places)]
         try:
             for done, _ in enumerate(as_completed(jobs), 1):
                 bar.count(done, len(jobs))
@@ -73,15 +76,14 @@ def _rows(path):
     return rows
 
 
-def _run_row(script, line, folder):
+def _run_row(script, sources, line, folder):
     """Figures of a row's summary.json, and what computed them; or why it failed, in error."""
     words = [word for text in line for word in text.split("=")]
-    files = [*Path(script).parent.glob("*.py"), *filter(os.path.isfile, words)]
-    content = {str(name): Path(name).read_bytes().hex() for name in sorted(map(str, files))}
-    packages, begun = ("taichi_dem", "ca_damper"), time.perf_counter()
+    files = {name: Path(name).read_bytes().hex() for name in filter(os.path.isfile, words)}
+    begun = time.perf_counter()
     try:
         run = partial(_figures, [sys.executable, script, *line, f"--out={folder}"], folder)
-        return cached(folder, "sweep", (line, content), packages, run)[0]
+        return cached(folder, "sweep", (line, sources, files), (), run)[0]
     except RuntimeError as error:
         return {"error": str(error), "seconds": time.perf_counter() - begun}
 
@@ -96,12 +98,12 @@ def _figures(line, folder):
     write_text(os.path.join(folder, "output.txt"), done.stdout)
     summary = json.loads(Path(folder, "summary.json").read_text(encoding="utf-8"))
     figures = {
-        f"{name}_figure" if name in _ADDED else name: one["value"]
+        f"{name}_figure" if name in ADDED else name: one["value"]
         for name, one in summary["figures"].items()
     }
     versions, place = summary["versions"], summary["machine"]["processor"]
     made = "", versions["taichi-dem"], versions["commit"], place, time.perf_counter() - begun
-    return {**figures, **dict(zip(_ADDED, made))}
+    return {**figures, **dict(zip(ADDED, made))}
 
 
 def _lines(made, table, options, arguments, count):
@@ -143,9 +145,9 @@ def _show(table, found, folder):
     import pandas
 
     made, given = pandas.DataFrame(found), pandas.DataFrame(table)
-    figures = made.drop(columns=[name for name in _ADDED if name in made])
+    figures = made.drop(columns=[name for name in ADDED if name in made])
     figures.columns = [f"{name}_figure" if name in given else name for name in figures]
-    whole = pandas.concat([given, figures, made.reindex(columns=_ADDED)], axis="columns")
+    whole = pandas.concat([given, figures, made.reindex(columns=ADDED)], axis="columns")
     path = os.path.join(folder, "sweep.csv")
     write_text(path, whole.to_csv(index=False, na_rep="nan"))
     ends = [(f"{one['seconds']:.1f} s", one["error"] or "done") for one in found]
