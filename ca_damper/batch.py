@@ -41,7 +41,6 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import identity_of, version_text
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import claiming
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import choice, instance, positive, shown, whole
@@ -433,10 +432,7 @@ class Batch(LoadedScenes):
         own = {"version": version_text(), "filling": identity_of(self.filling)}
         if self.excitation != Excitation():
             own["excitation"] = self.excitation.identity()
-        with claiming():
-            yield from self._checkpointed(checkpoint, resume, {**own, **identity}, owners)
-
-    def _checkpointed(self, checkpoint, resume, identity, owners):
+        identity = {**own, **identity}
         arrays = opened(checkpoint, resume, lambda: identity)
         self._compile()
         saved = RunSnapshot(identity, self.memory, {"batch": self, **dict(owners)})

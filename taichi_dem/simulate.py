@@ -11,7 +11,7 @@ from taichi_dem.kit.checkpoint import Checkpoint, digest, identity_of, version_t
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.field_memory import FieldMemory
-from taichi_dem.kit.files import claiming, output_folder
+from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress import Listener, Pace, Progress, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, Owner, RunSnapshot, opened
@@ -39,7 +39,6 @@ from taichi_dem.state.timeline import MACRO_TICKS
 _REPORT_SECONDS = 0.2
 
 
-@claiming()
 def simulate(
     scene: Scene,
     *,
