@@ -101,7 +101,7 @@ class VerletList:
         self.first[i + 1] = self._visit(i, 0, False) + ti.max(near, SPARE)
 
     @ti.func
-    def allot(self):
+    def allot(self, one):
         """Allot a row of the list to every body."""
         self.first[0] = 0
         for i in range(self.tables.body_count[None]):

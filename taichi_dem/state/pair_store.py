@@ -126,10 +126,6 @@ class PairStore:
         counts = values(self.last, slots) - values(self.first, slots)
         return values(self.body, slots), counts, values(self.deepest, slots)
 
-    def near_bodies(self) -> np.ndarray:
-        """Both bodies of every near pair, in order, (n, 2)."""
-        return values(self.body, values(self.near_slot, slice(int(values(self.near_count)))))
-
     @ti.func
     def allocate(self, i, j):
         """Slot for a pair of two bodies, all of it zero; -1 where none is left."""
