@@ -72,12 +72,6 @@ class BroadPhase:
         self.neighbours.load(model, method)
         self.breaks.load(model)
 
-    def clear(self) -> None:
-        """Forget all pairs; the next search finds those present then."""
-        self.store.clear()
-        self.neighbours.clear()
-        assign(self.contacts.search_requested, 0)
-
     def ask(self, everywhere: bool = False) -> None:
         """Request a search before the next step."""
         assign(self.everywhere, int(everywhere))

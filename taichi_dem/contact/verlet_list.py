@@ -61,12 +61,6 @@ class VerletList:
         each = model.contact.neighbours_per_body
         assign(self.limit, model.body_count * each + SPARE_NEIGHBOURS)
 
-    def clear(self) -> None:
-        """Forget all neighbours; the next search rebuilds the list."""
-        for field in (self.first, self.last):
-            assign(field, 0)
-        assign(self.stale, STALE)
-
     @ti.func
     def begin(self):
         """Decide whether so many bodies have left their reach that the list is rebuilt."""

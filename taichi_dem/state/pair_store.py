@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import real, vec3
 
@@ -112,13 +112,6 @@ class PairStore:
     def sphere_column(self, name: str, kind: Any, width: int = 0) -> ti.Field:
         """The same with an entry a sphere pair."""
         return self.sphere_columns.declare(name, kind, width)
-
-    def clear(self) -> None:
-        """Free all slots; for a run that begins again."""
-        for field in (self.first, self.last, self.first_of, self.second_start, self.free_count):
-            assign(field, 0)
-        for field in (self.used_end, self.sphere_count, self.sphere_end, self.near_count):
-            assign(field, 0)
 
     def near_table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Near pairs in order: both bodies (n, 2), number of sphere pairs (n,) and deepest (n,)."""
