@@ -41,9 +41,8 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import identity_of, version_text
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import claiming
 from taichi_dem.kit.progress.progress import Listener
-from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
+from taichi_dem.kit.restart import CheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import choice, instance, positive, shown, whole
 
 _MOST_STEPS = 2**31 - 1
@@ -147,7 +146,7 @@ class Batch(LoadedScenes):
         self.launches, self.compile_seconds = Launches(self.count), 0.0
         # Whether the present run goes on from a checkpoint.
         self.going_on = False
-        self.writer: CheckpointWriter | NoCheckpointWriter = NoCheckpointWriter()
+        self.writer = CheckpointWriter()
         self._take_engine(*tolerances)
 
     def _take_engine(self, rtol: float, atol: float) -> None:
@@ -433,23 +432,17 @@ class Batch(LoadedScenes):
         own = {"version": version_text(), "filling": identity_of(self.filling)}
         if self.excitation != Excitation():
             own["excitation"] = self.excitation.identity()
-        with claiming():
-            yield from self._checkpointed(checkpoint, resume, {**own, **identity}, owners)
-
-    def _checkpointed(self, checkpoint, resume, identity, owners):
+        identity = {**own, **identity}
         arrays = opened(checkpoint, resume, lambda: identity)
         self._compile()
         saved = RunSnapshot(identity, self.memory, {"batch": self, **dict(owners)})
         if arrays:
             saved.restore(arrays, resume)
-        writer: CheckpointWriter | NoCheckpointWriter = NoCheckpointWriter()
-        if checkpoint:
-            writer = CheckpointWriter(checkpoint, saved, self._now)
-        with writer as self.writer:
+        with CheckpointWriter(checkpoint, saved, self._now) as self.writer:
             try:
                 yield self.writer
             finally:
-                self.writer = NoCheckpointWriter()
+                self.writer = CheckpointWriter()
 
     def _now(self) -> tuple[int, float]:
         """Mean step and time [s] of the scenes."""

@@ -36,7 +36,8 @@ from taichi_dem.state.model import Model
 class Result:
     """Result of a run.
 
-    As the last line of a notebook's cell it shows a picture and the report.
+    As the last line of a notebook's cell it shows its history, the block in the last frame, and the
+    report.
 
     Parameters
     ----------
@@ -87,13 +88,13 @@ class Result:
         return in_brief(self, self.report.outcome, samples, frames, early)
 
     def _repr_html_(self):
-        # Imported here, so that matplotlib loads only where a picture is shown.
-        from taichi_dem.plot.summary import picture_of_run
-
-        words = "The block, its energy and what happened in it over time"
+        drawn = {"What happened over time": self.plot.history()}
+        if self.frames:
+            picture = self.plot.cracks if self.report.broken_faces else self.plot.block
+            drawn["The block"] = picture()
         title = f"Result: {counted(self.model.body_count, 'body')}, {self.report.outcome}"
-        shown = embedded(picture_of_run(self), words), verbatim(str(self.report))
-        return titled(title, *shown, warning=self.diverged)
+        shown = [embedded(figure._repr_png_(), words) for words, figure in drawn.items()]
+        return titled(title, *shown, verbatim(str(self.report)), warning=self.diverged)
 
     @property
     def certificate(self) -> Certificate | None:

@@ -11,10 +11,10 @@ from taichi_dem.kit.checkpoint import Checkpoint, digest, identity_of, version_t
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.field_memory import FieldMemory
-from taichi_dem.kit.files import claiming, output_folder
+from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress import Listener, Pace, Progress, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, Owner, RunSnapshot, opened
+from taichi_dem.kit.restart import CheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import (
     AUTO,
     FileName,
@@ -39,7 +39,6 @@ from taichi_dem.state.timeline import MACRO_TICKS
 _REPORT_SECONDS = 0.2
 
 
-@claiming()
 def simulate(
     scene: Scene,
     *,
@@ -162,7 +161,7 @@ def run_simulation(
     with reporting(progress, title) as tell:
         simulation, recorder = _started(simulation)
         more = {"brief": brief, "start": simulation.first_motion}
-        result, error = _result(simulation, recorder, NoCheckpointWriter(), plan, tell, **more)
+        result, error = _result(simulation, recorder, CheckpointWriter(), plan, tell, **more)
     if error is not None:
         raise error
     return result
@@ -358,23 +357,21 @@ def arrays_of(
 
 def writer_of(
     simulation: Simulation, recorder: Recorder, checkpoint: Any, resume: Any, arrays: Any
-) -> CheckpointWriter | NoCheckpointWriter:
+) -> CheckpointWriter:
     """Writer of checkpoints, after a resumed run has been restored."""
-    if arrays:
-        saved_run(simulation, recorder).restore(arrays, resume)
-    if checkpoint is None:
-        return NoCheckpointWriter()
+    if checkpoint is None and not arrays:
+        return CheckpointWriter()
     run = saved_run(simulation, recorder)
+    if arrays:
+        run.restore(arrays, resume)
     return CheckpointWriter(checkpoint, run, lambda: (simulation.macro_step, simulation.time_s))
 
 
 def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
     """All that a checkpoint holds of a started simulation, a ``restart.RunSnapshot``."""
-    parts: dict[str, Owner] = {"simulation": simulation, **simulation.followed}
-    parts["recorder"] = recorder
-    return RunSnapshot(
-        run_identity(simulation.scene, simulation.method), FieldMemory(simulation.engine), parts
-    )
+    parts = {"simulation": simulation, **simulation.followed, "recorder": recorder}
+    identity = run_identity(simulation.scene, simulation.method)
+    return RunSnapshot(identity, FieldMemory(simulation.engine), parts)
 
 
 def run_identity(scene: Scene, method: Method) -> dict[str, str]:

@@ -5,7 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from taichi_dem import Simulation
+from taichi_dem.contact.verlet_list import STALE
+from taichi_dem.kit.allocation import assign
 from taichi_dem.state.timeline import MACRO_TICKS
+
+#: Fields of the pair store that say which slots and places are in use.
+SLOTS = (
+    *("first", "last", "first_of", "second_start", "free_count"),
+    *("used_end", "sphere_count", "sphere_end", "near_count"),
+)
 
 
 class Again:
@@ -31,8 +39,12 @@ class Again:
 
     def search_anew(self):
         """Forget all contacts and find those that there are now."""
-        self.simulation.broad_phase.clear()
-        self.simulation.broad_phase.search()
+        search = self.simulation.broad_phase
+        for part, names in ((search.store, SLOTS), (search.neighbours, ("first", "last"))):
+            for name in names:
+                assign(getattr(part, name), 0)
+        assign(search.neighbours.stale, STALE)
+        search.search()
 
     def run(self, steps, look=None):
         """Go on to a number of steps since the start; look() is called after steps with a search.

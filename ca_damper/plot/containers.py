@@ -9,10 +9,10 @@ import numpy as np
 from ca_damper.plot.boxes import SPEEDS, Box, Hanging
 from ca_damper.report.record import Frame
 from ca_damper.spheres import Spheres
-from taichi_dem.kit.display import counted, listed
+from taichi_dem.kit.display import counted, listed, scale
 from taichi_dem.kit.plot_style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, table_of
 from taichi_dem.kit.validation import FileName
-from taichi_dem.kit.viewer import WebPage, pack, quantise, select_frames, show_page, time_unit
+from taichi_dem.kit.viewer import WebPage, pack, quantise, select_frames, show_page
 
 #: Scenes that a page shows at most, and the colours of their curves.
 MOST_SCENES = 6
@@ -72,7 +72,7 @@ def show_containers(
     rows = list(zip(*(one.frames for one in containers)))
     size = 6 * sum(len(frame.position) for frame in rows[0]) + 24 * len(containers)
     frames, left_out = select_frames(rows, [_is_finite(row) for row in rows], size, 10_000)
-    unit, factor = time_unit(frames[-1][0].time_s)
+    factor, unit = scale(frames[-1][0].time_s, "s")
     fastest = _fastest(frames)
     data = {
         "unit": unit,

@@ -92,7 +92,7 @@ class CellGrid:
         self.largest = ti.field(real, shape=())
 
     @ti.func
-    def fill(self):
+    def fill(self, one):
         """Sort the bodies into cells about as wide as one of their balls."""
         self._size()
         counts = self.counts[None]

@@ -62,11 +62,6 @@ class Contacts:
         assign(self.store.slot_limit, n * effect.pairs_per_body + SPARE_PAIRS)
         assign(self.store.sphere_limit, n * effect.spheres_per_body + SPARE_SPHERES)
 
-    def forget_gaps(self) -> None:
-        """Forget how far bodies may go before they touch: they have been moved by hand."""
-        if self.law.meets_bodies:
-            assign(self.clear_until, 0.0)
-
     @ti.func
     def gap(self, i, j, a, b):
         """Gap between bodies i and j by an entry (a, b) of the pair store [m]."""

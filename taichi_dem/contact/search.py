@@ -72,17 +72,12 @@ class BroadPhase:
         self.neighbours.load(model, method)
         self.breaks.load(model)
 
-    def clear(self) -> None:
-        """Forget all pairs; the next search finds those present then."""
-        self.store.clear()
-        self.neighbours.clear()
-        assign(self.contacts.search_requested, 0)
-
     def ask(self, everywhere: bool = False) -> None:
         """Request a search before the next step."""
         assign(self.everywhere, int(everywhere))
-        if everywhere:
-            self.contacts.forget_gaps()
+        if everywhere and self.contacts.law.meets_bodies:
+            # Bodies may have been moved by hand.
+            assign(self.contacts.clear_until, 0.0)
         assign(self.contacts.search_requested, 1)
 
     def renew(self) -> None:
@@ -116,9 +111,9 @@ class BroadPhase:
             (self._free_bodies, self._choose),
             (self._once, self._begin),
             (self._all_anew, self.neighbours.list_anew),
-            (self.neighbours.making, self._sort),
+            (self.neighbours.making, self.neighbours.grid.fill),
             (self._all_anew, self.neighbours.count),
-            (self.neighbours.making, self._allot),
+            (self.neighbours.making, self.neighbours.allot),
             (self._all_anew, self.neighbours.fill),
             (self._all_amended, self.neighbours.amend),
             (self._free_bodies, self._visit),
@@ -164,14 +159,6 @@ class BroadPhase:
         self.neighbours.begin()
         self.searched[None] = self.state.tick[None]
         self.store.pack_if_sparse()
-
-    @ti.func
-    def _sort(self, one):
-        self.neighbours.grid.fill()
-
-    @ti.func
-    def _allot(self, one):
-        self.neighbours.allot()
 
     @ti.func
     def _end(self, one):

@@ -61,12 +61,6 @@ class VerletList:
         each = model.contact.neighbours_per_body
         assign(self.limit, model.body_count * each + SPARE_NEIGHBOURS)
 
-    def clear(self) -> None:
-        """Forget all neighbours; the next search rebuilds the list."""
-        for field in (self.first, self.last):
-            assign(field, 0)
-        assign(self.stale, STALE)
-
     @ti.func
     def begin(self):
         """Decide whether so many bodies have left their reach that the list is rebuilt."""
@@ -101,7 +95,7 @@ class VerletList:
         self.first[i + 1] = self._visit(i, 0, False) + ti.max(near, SPARE)
 
     @ti.func
-    def allot(self):
+    def allot(self, one):
         """Allot a row of the list to every body."""
         self.first[0] = 0
         for i in range(self.tables.body_count[None]):

@@ -31,7 +31,6 @@ _SHARE = 0.9
 _FIELDS = ("global_vars", "grad_vars", "dual_vars", "matrix_fields")
 
 
-#: Taichi's lists of fields without a place.
 class CapacityError(InputError):
     """The machine's memory, or Taichi's room for field trees, is used up."""
 

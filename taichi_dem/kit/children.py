@@ -1,14 +1,11 @@
-"""Processes that a program starts and waits for, which end with it; calls that may never return."""
+"""Processes that a program starts and waits for, which end with it."""
 
 import contextlib
-import ctypes
 import signal
 import subprocess
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, TypeVar, cast
-
-from taichi_dem.kit.errors import InputError
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 #: What batch systems, process managers and closed terminals send.
 _SIGNALS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
@@ -83,40 +80,3 @@ def _pass_on(number, _):
     for process in tuple(_running):
         process.terminate()
     raise Terminated(number)
-
-
-#: Result of the function.
-Value = TypeVar("Value")
-
-
-class _Ended(Exception):
-    """Raised in a thread that has run for too long."""
-
-
-def run_with_timeout(seconds: float, call: Callable[[], Value], sentence: str) -> Value:
-    """Return or raise as call() does; InputError with a sentence where it takes longer [s].
-
-    It runs in a thread of its own, which is ended then: code that spins in Python ends at once,
-    other code when it comes back to Python.
-    """
-    values: list[Value] = []
-    errors: list[BaseException] = []
-
-    def work():
-        """Keep the result or exception; SystemExit too, as some readers end a program."""
-        try:
-            values.append(call())
-        except (Exception, SystemExit) as error:
-            errors.append(error)
-
-    thread = threading.Thread(target=work, daemon=True)
-    thread.start()
-    thread.join(seconds)
-    if thread.is_alive():
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(
-            ctypes.c_ulong(cast(int, thread.ident)), ctypes.py_object(_Ended)
-        )
-        raise InputError(sentence)
-    if errors:
-        raise errors[0]
-    return values[0]

@@ -3,9 +3,8 @@
 import contextlib
 import csv
 import os
-import platform
 import re
-import threading
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
@@ -14,97 +13,24 @@ from numpy.typing import ArrayLike
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, path_name
 
-try:
-    import fcntl
-except ImportError:  # not on Windows: there folders are not claimed
-    fcntl = None  # type: ignore[assignment]
-
-#: This machine in the names of temporary files: a process number says nothing on another.
-_HOST = re.sub(r"[^A-Za-z0-9]", "", platform.node())[:32] or "here"
-_TEMPORARY = re.compile(rf"\..*\.{_HOST}-(\d+)\.part(\.[^.]*)?")
-
 #: Endings of what experiments write.
 _WRITTEN = tuple(".csv .gif .glb .html .json .msh .npz .png .pvd .txt .vtkhdf .vtu .xyz".split())
-
-#: Locks of folders by path, inside ``claiming``.
-_claims: dict[str, int] | None = None
 
 
 def output_folder(path: FileName) -> str:
     """Make a folder for output and return its path, with a leading "~" as the user's home.
 
-    Temporary files that a killed run has left there are removed. Inside ``claiming`` the folder
-    belongs to this process.
-    Raises InputError when it cannot be made or written to, or belongs to another.
+    Raises InputError when it cannot be made or written to.
     """
     path = path_name("output folder", path)
     try:
         os.makedirs(path, exist_ok=True)
-        if _claims is not None and fcntl is not None:
-            _claim(path, _claims)
-        # Runs that begin at once must not take away each other's file.
-        probe = os.path.join(path, f".write-{threading.get_ident()}.{_HOST}-{os.getpid()}.part")
-        with open(probe, "w") as handle:
-            handle.write("x")
-        os.remove(probe)
-        _remove_leftovers(path)
+        with tempfile.TemporaryFile(dir=path) as probe:
+            probe.write(b"x")
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"output folder {path} must be writable: {reason}") from None
     return path
-
-
-@contextlib.contextmanager
-def claiming() -> Iterator[None]:
-    """In its block folders that ``output_folder`` gives belong to this process alone.
-
-    Blocks may nest; the outermost counts. A folder is free again when its process ends, however.
-    """
-    global _claims
-    if _claims is not None:
-        yield
-        return
-    _claims = {}
-    try:
-        yield
-    finally:
-        for lock in _claims.values():
-            os.close(lock)
-        _claims = None
-
-
-def _claim(path: str, claims: dict[str, int]) -> None:
-    """Claim a folder, where it can be locked; InputError where another process has it."""
-    place = os.path.realpath(path)
-    if place in claims:
-        return
-    lock = os.open(place, os.O_RDONLY)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        claims[place] = lock
-    except BlockingIOError:
-        os.close(lock)
-        raise InputError(
-            f"output folder {path} must be of one run alone: another one is writing there"
-        ) from None
-    except OSError:
-        os.close(lock)
-
-
-def _remove_leftovers(folder):
-    """Remove temporary files of processes of this machine that are no more."""
-    for name in os.listdir(folder):
-        found = _TEMPORARY.fullmatch(name)
-        if found and not _is_alive(int(found[1])):
-            os.remove(os.path.join(folder, name))
-
-
-def _is_alive(process):
-    try:
-        os.kill(process, 0)
-    except OSError as error:
-        return not isinstance(error, ProcessLookupError)
-    return True
 
 
 @contextlib.contextmanager
@@ -113,7 +39,7 @@ def renamed_when_done(path: FileName) -> Iterator[str]:
     path = path_name("file", path)
     folder, name = os.path.split(path)
     root, ending = os.path.splitext(name)  # kept, since some writers derive the format from it
-    temporary = os.path.join(folder, f".{root}.{_HOST}-{os.getpid()}.part{ending}")
+    temporary = os.path.join(folder, f".{root}.{os.getpid()}.part{ending}")
     try:
         yield temporary
         os.replace(temporary, path)

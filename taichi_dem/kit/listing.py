@@ -19,7 +19,6 @@ from taichi_dem.kit.version import __version__
 
 _ROOT = Path(__file__).resolve().parents[2]
 _IS_CHECKOUT = (_ROOT / "experiments" / "_gallery_pages.txt").is_file()
-_PACKAGES = ("taichi_dem", "ca_damper")
 
 
 def run(
@@ -27,7 +26,7 @@ def run(
     parts: Mapping[str, ModuleType],
     arguments: Sequence[str] | None = None,
 ) -> int:
-    """Print what a package offers, its experiments and where its documentation is.
+    """Print what a package offers, and its experiments.
 
     parts: modules by title, whose names come before the package's own. With "demo" as first
     argument, run the module of that name with the others instead. Returns the exit code.
@@ -49,11 +48,7 @@ def run(
             show_names(title, _rows(module))
         show_names("Scenes, runs and results", _rows(package))
         show_names("Demonstration", [(f"python -m {package.__name__} demo", demo)])
-        where = f", in {_ROOT}" if _IS_CHECKOUT else ""
-        show_names(f"Experiments{where}", _experiments())
-        others = [name for name in _PACKAGES if name != package.__name__]
-        rows = [(f"python -m {name}", "the same list for that package") for name in others]
-        show_names(f"Documentation{where}", [*rows, *_documentation()])
+        show_names(f"Experiments, in {_ROOT}", _experiments())
     return 0
 
 
@@ -77,20 +72,6 @@ def _experiments():
     """Rows of the scripts of a checkout, none elsewhere; they are read, not run."""
     paths = sorted((_ROOT / "experiments").glob("[a-z]*.py")) if _IS_CHECKOUT else ()
     return [(f"python experiments/{path.name}", _docstring(path)) for path in paths]
-
-
-def _documentation():
-    """Rows of pages by their first headings, of a checkout or of an installation."""
-    yield "python -m pydoc NAME", "all that a name above does: arguments, units, errors"
-    if not _IS_CHECKOUT:
-        for page in _ROOT.glob("taichi_dem-*.dist-info/METADATA"):
-            yield str(page), "README, below the lines on the package"
-        return
-    for page in [*sorted(_ROOT.glob("*.md")), *sorted((_ROOT / "docs").glob("*.md"))]:
-        lines = page.read_text(encoding="utf-8").splitlines()
-        heading = next((line[2:] for line in lines if line.startswith("# ")), "")
-        yield page.relative_to(_ROOT).as_posix(), heading
-    yield "make docs", "a site of all pages, the API and the gallery"
 
 
 def _docstring(path):

@@ -3,7 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -19,24 +19,15 @@ from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.validation import FileName
 
 
-class Owner(Protocol):
-    """Part of a run that holds changing values on the host."""
-
-    def saved(self) -> dict[str, np.ndarray]:
-        """Data for a checkpoint beside the fields, arrays by name."""
-
-    def resume(self, saved: Mapping[str, np.ndarray], /) -> None:
-        """Restore the data that ``saved`` returned."""
-
-
 class RunSnapshot:
     """All changing data of a run: fields on the device, and data of its owners on the host.
 
     identity: what two runs must share for one to go on from the other, words by name. memory: of
-    the fields, as ``FieldMemory``. owners: by name.
+    the fields, as ``FieldMemory``. owners: by name; each gives its arrays by ``saved()`` and takes
+    them by ``resume(arrays)``.
     """
 
-    def __init__(self, identity: Mapping[str, str], memory: Any, owners: Mapping[str, Owner]):
+    def __init__(self, identity: Mapping[str, str], memory: Any, owners: Mapping[str, Any]):
         self.identity, self.memory, self.owners = identity, memory, owners
 
     def write(self, path: FileName) -> None:
@@ -71,12 +62,16 @@ def _under(part, arrays):
 class CheckpointWriter:
     """Saves a run when its checkpoint is due, and on a stop signal within its block.
 
-    checkpoint: a Checkpoint. snapshot: of the run, a ``RunSnapshot``. now: gives its present step
-    and time [s]. All methods are called between two steps only.
+    checkpoint: a Checkpoint, None for a run that is not to be saved. snapshot: of the run, a
+    ``RunSnapshot``. now: gives its present step and time [s]. All methods are called between two
+    steps only.
     """
 
     def __init__(
-        self, checkpoint: Checkpoint, snapshot: RunSnapshot, now: Callable[[], tuple[int, float]]
+        self,
+        checkpoint: Checkpoint | None = None,
+        snapshot: Any = None,
+        now: Callable[[], tuple[int, float]] = lambda: (0, 0.0),
     ):
         self.checkpoint, self.snapshot, self.now = checkpoint, snapshot, now
         self.stop = StopRequests()
@@ -84,7 +79,8 @@ class CheckpointWriter:
         self._last = (*now(), time.perf_counter())
 
     def __enter__(self) -> "CheckpointWriter":
-        self.stop.__enter__()
+        if self.checkpoint is not None:
+            self.stop.__enter__()
         return self
 
     def __exit__(self, *error):
@@ -92,17 +88,18 @@ class CheckpointWriter:
 
     def marks(self, last: int, dt: float) -> set[int]:
         """Steps of dt [s] up to the last at which a save may be due, a set."""
-        return self.checkpoint.marks(last, dt)
+        return set() if self.checkpoint is None else self.checkpoint.marks(last, dt)
 
     def save_if_needed(self) -> None:
         """Save the run if a save is due. Raises Interrupted after a stop signal, InputError."""
-        if self.stop.asked or self._is_due():
+        if self.checkpoint is None:
+            return
+        if self.stop.asked or self._is_due(self.checkpoint):
             self.save()
         if self.stop.asked:
             raise Interrupted(self.now()[1], self.checkpoint.path, self.stop.asked)
 
-    def _is_due(self):
-        given = self.checkpoint
+    def _is_due(self, given):
         every = given.every_steps, given.every_s, given.every_wall_s
         passed = zip(every, (*self.now(), time.perf_counter()), self._last)
         return any(
@@ -112,6 +109,8 @@ class CheckpointWriter:
 
     def save(self) -> None:
         """Save the run. Raises InputError that names the last good checkpoint."""
+        if self.checkpoint is None:
+            return
         try:
             self.snapshot.write(self.checkpoint.path)
         except InputError as error:
@@ -121,34 +120,12 @@ class CheckpointWriter:
 
     def last_good(self) -> str:
         """The last good checkpoint, as the end of a sentence."""
+        if self.checkpoint is None:
+            return ""
         if self.saved_s is None:
             return "; this run has saved no checkpoint before"
         path = os.fspath(self.checkpoint.path)
         return f"; checkpoint {path} holds the run at t = {self.saved_s:.6g} s"
-
-
-class NoCheckpointWriter:
-    """Stands where a run is not to be saved."""
-
-    def __enter__(self) -> "NoCheckpointWriter":
-        return self
-
-    def __exit__(self, *error):
-        """Nothing to end."""
-
-    def marks(self, last: int, dt: float) -> set[int]:
-        """None."""
-        return set()
-
-    def save_if_needed(self) -> None:
-        """Nothing to do."""
-
-    def save(self) -> None:
-        """Nothing to save."""
-
-    def last_good(self) -> str:
-        """No words."""
-        return ""
 
 
 def opened(

@@ -47,7 +47,6 @@ class Settings:
     debug: bool
 
 
-_current: Settings | None = None
 _session: Optional["Session"] = None
 _on_clear: list[Callable[[], object]] = []
 
@@ -57,6 +56,8 @@ class Session:
 
     Attributes
     ----------
+    settings : Settings
+        Settings in force.
     program : object
         Taichi's own object of the session.
     thread : int
@@ -67,9 +68,9 @@ class Session:
         Whether its engines have been given back since.
     """
 
-    def __init__(self):
-        self.program, self.thread = impl.get_runtime().prog, threading.get_ident()
-        self.process = os.getpid()
+    def __init__(self, settings: Settings):
+        self.settings, self.program = settings, impl.get_runtime().prog
+        self.thread, self.process = threading.get_ident(), os.getpid()
         self.cleared = False
 
     def _is_running(self) -> bool:
@@ -105,18 +106,18 @@ def start(arch: str = "cpu", threads: int | None = None, debug: bool = False) ->
     >>> from taichi_dem import runtime
     >>> runtime.start(threads=2)  # doctest: +SKIP
     """
-    global _current, _session
+    global _session
     wanted = _checked(arch, threads, debug)
     _check_process()
-    if _current and _session and _session._is_running():
-        if wanted != _current:
+    if _session and _session._is_running():
+        if wanted != _session.settings:
             raise InputError(
-                f"Taichi already runs with {_current}, asked for {wanted}: call stop()"
+                f"Taichi already runs with {_session.settings}, asked for {wanted}: call stop()"
             )
-        return _current
+        return _session.settings
     _initialise(wanted)
-    _current, _session = wanted, Session()
-    return _current
+    _session = Session(wanted)
+    return wanted
 
 
 def stop() -> None:
@@ -127,7 +128,7 @@ def stop() -> None:
     InputError
         Another thread started Taichi and is still alive.
     """
-    global _current, _session
+    global _session
     _check_process()
     here = threading.get_ident()
     others = {thread.ident for thread in threading.enumerate()} - {here}
@@ -136,7 +137,7 @@ def stop() -> None:
     if _session is not None and _session.thread == here and _session._is_running():
         _free_engines()
     _reset()
-    _current = _session = None
+    _session = None
 
 
 def clear() -> None:
@@ -146,14 +147,14 @@ def clear() -> None:
     your own become invalid too. Does nothing before the first start.
     """
     global _session
-    if _session is None or _current is None:
+    if _session is None:
         return
     check_session(_session, "session")
     _free_engines()
     _session.cleared = True
     _reset()
-    _initialise(_current)
-    _session = Session()
+    _initialise(_session.settings)
+    _session = Session(_session.settings)
 
 
 def _free_engines():
@@ -256,7 +257,7 @@ def settings() -> Settings | None:
     Settings or None
         None before the first start.
     """
-    return _current
+    return _session.settings if _session else None
 
 
 def usable_cores() -> int:

@@ -1,4 +1,4 @@
-"""The look of all programs: with style on a terminal, plain text in a pipe or a file."""
+"""The look of all programs: headings in bold on a terminal, plain text in a pipe or a file."""
 
 import contextlib
 import os
@@ -31,21 +31,9 @@ def show_paragraph(text: str) -> None:
 
 
 def print_table(rows: Sequence[Sequence[Any]], header: Sequence[str]) -> None:
-    """Print rows of cells under a header; blanks as a dash, wide cells folded on a terminal."""
+    """Print rows of cells under a header; blanks as a dash."""
     cells = [["-" if str(cell) in _BLANK else str(cell) for cell in row] for row in rows]
-    console = _console()
-    if console is None:
-        print(*aligned([[*header], *cells]), sep="\n")
-        return
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, _GAP, 0, 0))
-    for name in header:
-        table.add_column(Text(name), overflow="fold")
-    for row in cells:
-        table.add_row(*map(Text, row))
-    console.print(table)
+    print(*aligned([[*header], *cells]), sep="\n")
 
 
 def aligned(cells: Sequence[Sequence[str]]) -> list[str]:
@@ -58,21 +46,9 @@ def aligned(cells: Sequence[Sequence[str]]) -> list[str]:
 def show_names(title: str, rows: Iterable[tuple[str, str]]) -> None:
     """Print a title and, below it, names with a line on each; nothing where there are none."""
     rows = [(f"  {name}", line) for name, line in rows]
-    if not rows:
-        return
-    show_heading(f"\n{title}")
-    console = _console()
-    if console is None:
+    if rows:
+        show_heading(f"\n{title}")
         print(*aligned(rows), sep="\n")
-        return
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table.grid(padding=(0, _GAP, 0, 0))
-    table.add_column(no_wrap=True)
-    for row in rows:
-        table.add_row(*map(Text, row))
-    console.print(table)
 
 
 def _console():

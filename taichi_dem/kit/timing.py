@@ -35,11 +35,6 @@ class Timing:
             raise InputError("a timing must have at least one measurement, got none")
         return cls(statistics.median(values), values[0], values[-1], len(values))
 
-    @property
-    def spread(self) -> float:
-        """Width of the measurements as a share of their median."""
-        return (self.high - self.low) / self.median if self.median > 0.0 else 0.0
-
     def __str__(self) -> str:
         """Median, and the extremes where there is more than one run."""
         if self.count == 1:

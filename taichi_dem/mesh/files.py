@@ -13,7 +13,6 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from taichi_dem.kit.children import run_with_timeout
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done, write_text
 from taichi_dem.kit.likely_units import EDGE, in_unit
@@ -23,10 +22,6 @@ from taichi_dem.mesh.check import checked_points, unbonded_places, weld_labels
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import edge_lengths
 
-#: Time that a reader may take [s], and what it reads at the slowest [byte/s]: some of meshio's wait
-#: for ever for the rest of a file that was cut off.
-_PATIENCE_S = 20.0
-_SLOWEST_BYTES_PER_S = 1e5
 _SPLIT = "split them into tetrahedra, for example by ParaView's filter Tetrahedralize"
 _REMEDY = (
     "mesh in three dimensions (gmsh -3) with a physical group of the volume too, without which "
@@ -180,11 +175,9 @@ def _read_raw(path):
     if not os.path.isfile(path):
         raise InputError(f"mesh file {path} does not exist, or is no file")
     said = io.StringIO()
-    seconds = _PATIENCE_S + os.path.getsize(path) / _SLOWEST_BYTES_PER_S
-    sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            return run_with_timeout(seconds, lambda: _meshio_read(path), sentence), said.getvalue()
+            return _meshio_read(path), said.getvalue()
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
         reason = " ".join(f"{type(error).__name__} {error} {said.getvalue()}".split())
         raise InputError(f"mesh file {path} cannot be read: {reason}") from None

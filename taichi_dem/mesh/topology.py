@@ -86,11 +86,6 @@ def topology_of(mesh: Mesh) -> Topology:
     )
 
 
-def bonded_bodies(mesh: Mesh) -> np.ndarray:
-    """Pairs of bodies that a bond joins, (n, 2)."""
-    return _bonded_faces(mesh)[0] // 4
-
-
 def _bonded_faces(mesh):
     """Pairs of faces 4 * body + f with a bond, (n, 2), and the share of each that is bonded, (n,).
 
@@ -200,7 +195,7 @@ def body_at(mesh: Mesh, name: str, point: np.ndarray) -> int:
 
 def parts_of(mesh: Mesh) -> np.ndarray:
     """Number of the part of each body, from 0, (body_count,)."""
-    joined = geometry.components(mesh.body_count, bonded_bodies(mesh))
+    joined = geometry.components(mesh.body_count, _bonded_faces(mesh)[0] // 4)
     return np.unique(joined, return_inverse=True)[1].reshape(-1)
 
 

@@ -26,8 +26,6 @@ ENERGY_COLUMNS = tuple(
     "friction injected residual".split()
 )
 
-#: End of the name of a column with the mean displacement of a hole's bodies outward.
-_OUTWARD = "_radial_displacement_mm"
 #: Letters of a series' name.
 _LONGEST_NAME = 50
 
@@ -111,7 +109,9 @@ class Recorder:
         row = {"time_s": sim.time_s}
         for group, hole in self.holes.items():
             name, body = ("hole", "") if len(self.holes) == 1 else (group, f"{group}_")
-            row[f"{name}{_OUTWARD}"] = 1e3 * hole.radial_displacement(motion["position"])
+            row[f"{name}_radial_displacement_mm"] = 1e3 * hole.radial_displacement(
+                motion["position"]
+            )
             way = hole.monitored_displacement(motion["position"])
             row[f"{body}monitor_displacement_mm"] = 1e3 * way
         row["broken_faces"] = int(sim.state.broken().sum())
@@ -183,12 +183,6 @@ class Recorder:
         tick = values(self.simulation.state.broken_tick, bonds)
         seconds = tick * (self.simulation.method.dt0 / 2.0**MAX_LEVEL)
         return np.where(tick == NEVER, np.nan, seconds)
-
-
-def outward_columns(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Mean displacements outward [mm] in a time series, by the name of the hole."""
-    found = (name for name in history if name.endswith(_OUTWARD))
-    return {name[: -len(_OUTWARD)]: history[name] for name in found}
 
 
 def body_corners(model: Model, frame: Frame) -> np.ndarray:

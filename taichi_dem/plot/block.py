@@ -30,7 +30,6 @@ from taichi_dem.plot.view import (
     surface,
     traces,
 )
-from taichi_dem.state.model import Model
 
 _INSIDE = "#B5AD9C"
 _EDGE = "#00000030"
@@ -74,7 +73,7 @@ def plot_cracks(
     view, model = View(unit_vector("axis", axis).tolist()), result.model
     broken_time = np.where(result.broken_time <= now.time_s, result.broken_time, np.nan)
     with picture(path, 1, 3, size=(9.2, 3.6)) as (figure, panels):
-        drawn = draw_breaks(panels[0], view, model, broken_time)
+        drawn = _draw_breaks(panels[0], view, model, broken_time)
         panels[0].set_title(f"{np.sum(~np.isnan(broken_time))} broken faces, block at rest")
         for axes, factor in ((panels[1], magnify), (panels[2], 1.0)):
             lines = _deformed(axes, view, model, displaced(model, now, factor), broken_time)
@@ -94,7 +93,7 @@ def plot_cracks(
     return figure
 
 
-def draw_breaks(axes: Any, view: View, model: Model, broken_time: np.ndarray) -> Any:
+def _draw_breaks(axes, view, model, broken_time):
     """Every broken face of the block at rest, also inside it; the earliest on top."""
     draw_stone(axes, view, model)
     broken = np.flatnonzero(~np.isnan(broken_time))

@@ -58,7 +58,7 @@ class Creep(Kept):
         """Bodies that creep at a recording time [s]."""
         count = self.run.model.body_count
         force, bound, power = self.run.readings.contacts_now()[:, 14:17].T
-        bodies = self.run.contacts.store.near_bodies()
+        bodies = self.run.contacts.store.near_table()[0]
         slides = (force > 0.0) & (force < _HELD * bound)
         bodies, force, bound = bodies[slides], force[slides], bound[slides]
         place = values(self.run.state.position, slice(count))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import real, vec3
 
@@ -113,22 +113,11 @@ class PairStore:
         """The same with an entry a sphere pair."""
         return self.sphere_columns.declare(name, kind, width)
 
-    def clear(self) -> None:
-        """Free all slots; for a run that begins again."""
-        for field in (self.first, self.last, self.first_of, self.second_start, self.free_count):
-            assign(field, 0)
-        for field in (self.used_end, self.sphere_count, self.sphere_end, self.near_count):
-            assign(field, 0)
-
     def near_table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Near pairs in order: both bodies (n, 2), number of sphere pairs (n,) and deepest (n,)."""
         slots = values(self.near_slot, slice(int(values(self.near_count))))
         counts = values(self.last, slots) - values(self.first, slots)
         return values(self.body, slots), counts, values(self.deepest, slots)
-
-    def near_bodies(self) -> np.ndarray:
-        """Both bodies of every near pair, in order, (n, 2)."""
-        return values(self.body, values(self.near_slot, slice(int(values(self.near_count)))))
 
     @ti.func
     def allocate(self, i, j):

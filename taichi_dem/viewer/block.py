@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.display import counted
+from taichi_dem.kit.display import counted, scale
 from taichi_dem.kit.plot_style import colour_table, table_of
 from taichi_dem.kit.validation import FileName
-from taichi_dem.kit.viewer import WebPage, pack, quantise, select_frames, show_page, time_unit
+from taichi_dem.kit.viewer import WebPage, pack, quantise, select_frames, show_page
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
 from taichi_dem.output.fragments import quaternions_of
 from taichi_dem.output.record import Frame
@@ -36,7 +36,7 @@ def show_block(result: Any, path: FileName | None, open_browser: bool | None) ->
     size = _BODY_BYTES * len(bodies)
     finite = list(map(_is_finite, result.frames))
     frames, notes = select_frames(result.frames, finite, _FRAME_BYTES * len(bodies), size)
-    time = time_unit(frames[-1].time_s)
+    time = scale(frames[-1].time_s, "s")[::-1]
     data = {
         **_motion(model, frames, bodies, time),
         **_shape(model, bodies),

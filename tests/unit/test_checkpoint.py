@@ -4,8 +4,6 @@ import builtins
 import errno
 import os
 import signal
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -16,9 +14,6 @@ from taichi_dem import CONCRETE, At, Checkpoint, Collector, InputError, Scene, U
 from taichi_dem.kit.checkpoint import Interrupted, read_checkpoint, write_checkpoint
 from taichi_dem.kit.restart import CheckpointWriter
 from taichi_dem.mesh.shapes import pair
-from tests.bad_input.refusals import assert_refused
-from tests.processes import users_environment
-from tests.scenes import ROOT
 
 IDENTITY = {"version": "1", "mesh": "a cube"}
 ARRAYS = {"field/a.b": np.arange(12.0).reshape(4, 3), "part/none": np.zeros((0, 2))}
@@ -130,36 +125,6 @@ def test_a_full_disk_leaves_the_last_good_checkpoint_and_says_so(tmp_path, monke
             writer.save()
         assert path.read_bytes() == good
         assert os.listdir(tmp_path) == ["run.npz"]
-
-
-HOLD = """
-import sys
-from taichi_dem.kit.files import claiming, output_folder
-with claiming():
-    output_folder(sys.argv[1])
-    print("held", flush=True)
-    sys.stdin.read()
-"""
-
-
-def program(text, *arguments):
-    line = [sys.executable, "-c", text, *map(str, arguments)]
-    options = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "cwd": ROOT}
-    return subprocess.Popen(line, env=users_environment(), **options)
-
-
-def test_the_second_run_in_a_folder_is_refused_until_the_first_has_been_killed(tmp_path):
-    other, scene = program(HOLD, tmp_path), Scene(pair(), CONCRETE)
-    assert other.stdout.readline() == "held\n"
-    job = {"method": Uniform(1e-8), "until": 2e-8, "samples": 1, "progress": None}
-    for more in ({"output": tmp_path}, {"checkpoint": Checkpoint(tmp_path / "run.npz")}):
-        call = lambda: simulate(scene, **job, **more)  # noqa: B023, E731
-        assert_refused(call, str(tmp_path), "another one is writing there")
-    assert os.listdir(tmp_path) == []
-    other.kill()
-    other.communicate()
-    simulate(scene, output=tmp_path, **job)
-    assert "report.json" in os.listdir(tmp_path)
 
 
 def test_a_signal_saves_the_run_which_goes_on_with_the_bits_of_one_never_stopped(tmp_path):

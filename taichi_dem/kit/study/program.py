@@ -19,7 +19,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
 from taichi_dem.kit.children import Terminated, ending_children
 from taichi_dem.kit.errors import InputError, SimulationDiverged
-from taichi_dem.kit.files import claiming, older_files, output_folder
+from taichi_dem.kit.files import older_files, output_folder
 from taichi_dem.kit.progress.progress_bar import showing
 from taichi_dem.kit.study.entries import Entry, entry_of, show_opening
 from taichi_dem.kit.study.sweep_option import add_sweep, run_sweep
@@ -241,8 +241,7 @@ def main(
         options.command = [*made.prog.split()[1:], *given]
         runtime.start(options.arch, options.threads)
         show_opening(made.description, options.entry, options.quick)
-        with claiming():
-            run(options)
+        run(options)
         older = older_files(options.out, options.began)
         if older:
             print(f"Not of this run, in {options.out}: {', '.join(older)}")

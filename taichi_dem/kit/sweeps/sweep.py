@@ -13,7 +13,7 @@ from typing import Any
 from taichi_dem.kit import runtime
 from taichi_dem.kit.data_table import arrays_of
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import claiming, write_csv
+from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.progress.progress import Listener, Progress
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.sweeps.dependencies import Dependencies
@@ -45,7 +45,6 @@ _SETTINGS = {
 }
 
 
-@claiming()
 def sweep(
     function: Work,
     table: TableLike,

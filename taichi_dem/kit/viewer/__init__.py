@@ -26,7 +26,6 @@ from taichi_dem.kit.validation import FileName, flag, path_name, told_apart
 MOST_BYTES, _BASE64 = 30_000_000, 4.0 / 3.0
 #: Largest magnitude of a quantised value.
 _MOST = 32767
-_UNITS = (("s", 1.0), ("ms", 1e3), ("µs", 1e6), ("ns", 1e9))
 _HERE = Path(__file__).resolve().parent
 #: Height of the page in the cell of a notebook [pixels].
 _CELL_HEIGHT = 680
@@ -136,12 +135,6 @@ def quantise(frames: Sequence[np.ndarray]) -> dict[str, Any]:
     scale = np.abs(rows).max(axis=1, initial=0.0) / _MOST
     whole = np.rint(rows / np.where(scale > 0.0, scale, 1.0)[:, None])
     return {**pack(whole, "int16"), "scale": scale.tolist()}
-
-
-def time_unit(until: float) -> tuple[str, float]:
-    """Unit in which a time [s] is at least one, from s to ns, and how many of it a second has."""
-    found = (unit for unit in _UNITS if until * unit[1] >= 1.0)
-    return next(found, _UNITS[-1])
 
 
 def select_frames(
