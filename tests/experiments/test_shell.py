@@ -77,7 +77,7 @@ def test_interrupted_blast_goes_on_to_the_same_files(monkeypatch, capsys, tmp_pa
     assert run("straight") == (0, "")
     assert not [*tmp_path.glob("*/*.png"), *tmp_path.glob("*/*.gif"), *tmp_path.glob("*/*.html")]
     with monkeypatch.context() as patched:
-        patched.setattr("taichi_dem.kit.progress.progress_bar.ProgressBar", CtrlC)
+        patched.setattr("taichi_dem.kit.progress_bar.ProgressBar", CtrlC)
         code, said = run("stopped")
     path = tmp_path / "stopped" / "checkpoint.npz"
     assert code == 130 and os.listdir(path.parent) == [path.name]

@@ -14,7 +14,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.data_table import data_frame
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import output_folder, write_text
-from taichi_dem.kit.progress.progress_bar import hide_bars
+from taichi_dem.kit.progress_bar import hide_bars
 from taichi_dem.kit.provenance import commit, machine
 from taichi_dem.kit.sweeps.dependencies import Dependencies, named_file
 from taichi_dem.kit.sweeps.table import ADDED, SEED, Row, Value, column_of, plain_value

@@ -15,8 +15,8 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.data_table import arrays_of
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import claiming, write_csv
-from taichi_dem.kit.progress.progress import Listener, Progress
-from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.progress import Listener, Progress
+from taichi_dem.kit.progress_bar import reporting
 from taichi_dem.kit.sweeps.dependencies import Dependencies
 from taichi_dem.kit.sweeps.jobs import (
     Job,
