@@ -27,8 +27,8 @@ from ca_damper.theory.collect_and_collide import CollectAndCollide, collect_and_
 from ca_damper.theory.decay import logarithmic_decrement
 from ca_damper.theory.impact_damper import ImpactDamper
 from taichi_dem.kit.bars.answer import Answer, Branch
-from taichi_dem.kit.progress.progress import Progress
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress import Progress
+from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.kit.sweeps.sweep import sweep
 from taichi_dem.kit.sweeps.table import parameter_grid
 from taichi_dem.kit.version import __version__

@@ -41,7 +41,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import identity_of, version_text
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import Listener
+from taichi_dem.kit.progress import Listener
 from taichi_dem.kit.restart import CheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import choice, instance, positive, shown, whole
 

@@ -47,7 +47,7 @@ from ca_damper.scenes.table import SceneTable
 from ca_damper.spheres import Spheres
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.kit.study.entries import Entry
 from taichi_dem.kit.terminal import show_paragraph
 

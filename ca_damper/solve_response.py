@@ -35,8 +35,8 @@ from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.bars.step import step_part
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import Listener
-from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.progress import Listener
+from taichi_dem.kit.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive, several, shown
 
 # A run that diverges is repeated at a shorter step so often.

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from taichi_dem.kit.plot_style import STYLE, filming, picture, styles_of, write_gif
-from taichi_dem.kit.progress.progress import drawing
+from taichi_dem.kit.progress import drawing
 from taichi_dem.plot.view import ALONG_Z, View, draw_bodies, frame_block, move_bodies
 
 #: Pixels an inch that are drawn; the GIF has half as many each way.

@@ -27,7 +27,7 @@ from _strength_tests import TESTS
 from taichi_dem import InputError, Material, mesh_stiffness, read_mesh
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import GREY, picture
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.materials.material import POISSON
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.stability.step_report import element_sizes

@@ -34,7 +34,7 @@ from _effects import KNOWN_LISTS, ORDER, absent, blast, costs_of_blast, costs_of
 from ca_damper.report.measures import curve_distance
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, SKY, area_key, line_key, picture
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.kit.timing import median_interval
 
 NAME = "cost_of_effects"

@@ -22,7 +22,7 @@ import numpy as np
 from ca_damper import Automaton, Spheres, collect_and_collide, damper_map
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, picture, styles_of
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_maps"
 SETTINGS = {

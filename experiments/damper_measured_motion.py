@@ -26,7 +26,7 @@ from ca_damper import Automaton, Empty, Spheres, excitation, shake
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_measured_motion"
 RECORD = Path(__file__).with_name("base_motion.csv")

@@ -24,7 +24,7 @@ from ca_damper.plot import Box, FilmMeasures, animate_films, picture_cycle, pict
 from ca_damper.report.progress import Stages
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import styles_of
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_patterns"
 SETTINGS = {

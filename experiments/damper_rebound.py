@@ -27,7 +27,7 @@ from ca_damper.automaton.transport import READINGS
 from ca_damper.theory.bouncing import Fall, RecordedFall
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, VIOLET, picture, styles_of
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_rebound"
 SETTINGS = {

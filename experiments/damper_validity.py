@@ -25,7 +25,7 @@ from _damper_validity import FILLINGS, JUMP, PARTS, Effort, trust_of
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.plot_style import BLACK, picture, styles_of
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_validity"
 SETTINGS = {

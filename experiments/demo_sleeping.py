@@ -22,7 +22,7 @@ import pandas as pd
 import taichi_dem as dem
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLUE, GREY, ORANGE, picture
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.mesh.shapes import bar
 
 NAME = "demo_sleeping"

@@ -8,7 +8,7 @@
 Open results/index.html: it needs no server. Ends with exit code 1 and a list when an experiment
 failed or is missing from the page. A new experiment gets an entry in _gallery_pages.txt; --readme
 then renews the table of README.md. --pictures takes small pictures and figures of full runs into
-docs; --readme writes these figures into the sentences of the pages.
+docs; --readme writes these figures into the pages.
 """
 
 import json
@@ -40,9 +40,11 @@ TOOLS = {
 }
 #: Small pictures for the repository: widest side [pixels] and colours.
 SMALL_PICTURES, SMALL = "docs/pictures", (960, 256)
-#: Figures by experiment, with the command, the machine and the versions of its run.
+#: Figures by experiment, lines of the table that it writes for a page, if any, and the command, the
+#: machine and the versions of its run.
 KEPT = "docs/figures.json"
 _MARK = re.compile(r"(<!-- figure: ([^>]+?), (\d) digits -->)(.*?)(<!-- end -->)", re.DOTALL)
+_TABLE = re.compile(r"(<!-- table: (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 FLAGS = {
     "quick": "run smaller jobs of under a minute",
     "reuse": "run only what has no result yet",
@@ -113,14 +115,16 @@ def keep_figures(out, root, names):
             made_by = {key: summary[key] for key in ("command", "machine", "versions")}
             # Where its files lay is of no use to a reader.
             made_by["command"] = made_by["command"].partition(" --out ")[0]
+            for page in Path(out, name).glob("*.md"):
+                made_by["table"] = page.read_text(encoding="utf-8").splitlines()
             kept[name] = {"figures": values, **made_by}
     write_text(path, json.dumps(kept, indent=1, sort_keys=True) + "\n")
 
 
 def fill_figures(text, root):
-    """A page's text with the kept figures between its marks.
+    """A page's text with the kept figures and tables between its marks.
 
-    Raises InputError where a mark names a figure that is not kept.
+    Raises InputError where a mark names one that is not kept.
     """
     kept = read_json(Path(root, KEPT))
     names = {name: SimpleNamespace(**one["figures"]) for name, one in kept.items()}
@@ -136,7 +140,13 @@ def fill_figures(text, root):
         whole = rounded >= 10 ** (int(digits) - 1)
         return f"{begin}{rounded:,.0f}{end}" if whole else f"{begin}{rounded:.{digits}g}{end}"
 
-    return _MARK.sub(fill, text)
+    def fill_table(mark):
+        begin, name, _, end = mark.groups()
+        if "table" not in kept.get(name, ()):
+            raise InputError(f"table {name!r} must be one kept in {KEPT}")
+        return "\n".join([begin, *kept[name]["table"], "", end])
+
+    return _TABLE.sub(fill_table, _MARK.sub(fill, text))
 
 
 def shrink_pictures(out, folder):

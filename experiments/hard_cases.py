@@ -24,7 +24,7 @@ import pytest
 from _hard_cases_pictures import picture_cases, picture_margins
 from taichi_dem.kit import study
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "hard_cases"
 #: Of a quick run, which compile little; the tests ask all, at quick size.

@@ -24,7 +24,7 @@ from _trust.waves import bar_wave, spall
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.plot_style import picture
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.kit.validation import choice
 
 NAME = "trust"

@@ -23,8 +23,8 @@ from taichi_dem.goals import Goal
 from taichi_dem.kit.bars.answer import Answer, Branch
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.errors import InputError, SimulationDiverged
-from taichi_dem.kit.progress.progress import Progress
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress import Progress
+from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.kit.sweeps.sweep import sweep
 from taichi_dem.kit.sweeps.table import parameter_grid
 from taichi_dem.kit.version import __version__

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.data_table import arrays_of, data_frame
-from taichi_dem.kit.display import counted, embedded, in_brief, titled, verbatim
+from taichi_dem.kit.display import Pictured, counted, embedded, in_brief, titled, verbatim
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, remove_files, write_csv, write_text
-from taichi_dem.kit.pictures import drawn_by
 from taichi_dem.kit.validation import FileName, whole
 from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
@@ -415,5 +414,4 @@ def picture_of(thing: Mesh | Scene) -> bytes:
     return picture_of_groups(thing.mesh if isinstance(thing, Scene) else thing, acting)
 
 
-drawn_by(Mesh, picture_of)
-drawn_by(Scene, picture_of)
+Pictured.png = picture_of

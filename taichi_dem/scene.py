@@ -7,12 +7,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from taichi_dem.kit.data_table import locked
-from taichi_dem.kit.display import counted, embedded, in_brief, titled
+from taichi_dem.kit.display import Pictured, counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length
-from taichi_dem.kit.pictures import png, write_picture
 from taichi_dem.kit.validation import (
-    FileName,
     between,
     direction,
     finite,
@@ -38,7 +36,7 @@ SLEEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(Pictured):
     """A block of bonded bodies and the effects that act in it; checked once, here.
 
     Parameters
@@ -150,24 +148,6 @@ class Scene:
         effects = ", ".join(effect.name or type(effect).__name__ for effect in self.effects)
         words = f"effects {effects}" if effects else "no effects"
         return in_brief(self, counted(self.mesh.body_count, "body"), words)
-
-    def picture(self, path: FileName) -> None:
-        """Write a PNG picture of the outer faces, coloured by group, with what acts on each.
-
-        Parameters
-        ----------
-        path : path
-            File; its name ends in .png.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
-        """
-        write_picture(self, path)
-
-    def _repr_html_(self) -> str:
-        return titled(repr(self), embedded(png(self), "The mesh, coloured by group"))
 
     @property
     def on_demand(self) -> bool:

@@ -12,8 +12,8 @@ from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.files import output_folder
-from taichi_dem.kit.progress.progress import Listener, Pace, Progress, compiling
-from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.progress import Listener, Pace, Progress, compiling
+from taichi_dem.kit.progress_bar import reporting
 from taichi_dem.kit.restart import CheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import (
     AUTO,

@@ -15,7 +15,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import compiling
+from taichi_dem.kit.progress import compiling
 from taichi_dem.kit.validation import choice, flag, instance, shown, whole
 from taichi_dem.methods import Method
 from taichi_dem.report.divergence import DivergenceCheck

@@ -6,8 +6,8 @@ from taichi_dem.accuracy.runs import Job
 from taichi_dem.accuracy.search import Search
 from taichi_dem.goals import Goal
 from taichi_dem.kit.bars.answer import Answer, Plan, known_partings
-from taichi_dem.kit.progress.progress import Listener
-from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.progress import Listener
+from taichi_dem.kit.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive, whole
 from taichi_dem.scene import Scene, kind_of
 

@@ -19,7 +19,7 @@ from ca_damper.report.steady_state import BATCHES, SteadyPart, steady_part
 from ca_damper.runs.response import measures_of
 from ca_damper.scenes.clock import steps_per_cycle
 from ca_damper.scenes.table import SceneTable
-from taichi_dem.kit.progress.progress import Listener
+from taichi_dem.kit.progress import Listener
 
 #: Scenes of a batch and cycles of a run: an engine has room for so many at least, so that further
 #: batches of the same filling compile nothing.

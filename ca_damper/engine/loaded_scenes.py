@@ -19,7 +19,7 @@ from ca_damper.scenes.scene_fields import SceneMemory
 from ca_damper.scenes.scene_numbers import SceneNumbers
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import compiling
+from taichi_dem.kit.progress import compiling
 from taichi_dem.kit.validation import whole
 
 #: Parts in which the kernels of a batch are compiled.

@@ -20,7 +20,7 @@ from taichi_dem.kit.plot_style import (
     styles_of,
     write_gif,
 )
-from taichi_dem.kit.progress.progress import drawing
+from taichi_dem.kit.progress import drawing
 from taichi_dem.kit.validation import FileName
 
 #: Vertical speed of particles: falling, at rest, rising.

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from taichi_dem.kit.display import prefixed
-from taichi_dem.kit.progress.progress import Listener, Pace, Progress
+from taichi_dem.kit.progress import Listener, Pace, Progress
 
 #: Calls of a progress callback keep this distance [s] when stages are short.
 _LEAST_SECONDS = 0.1

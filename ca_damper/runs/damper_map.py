@@ -19,8 +19,8 @@ from ca_damper.scenes.table import SceneTable
 from ca_damper.theory.collect_and_collide import CollectAndCollide, collect_and_collide
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import Listener
-from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.progress import Listener
+from taichi_dem.kit.progress_bar import reporting
 from taichi_dem.kit.validation import (
     AUTO,
     positive,

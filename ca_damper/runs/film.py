@@ -14,8 +14,8 @@ from taichi_dem.kit.data_table import dataset
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.extended_xyz import XyzFrame, write_extended_xyz
-from taichi_dem.kit.progress.progress import Listener
-from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.progress import Listener
+from taichi_dem.kit.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, FileName, several, shown, whole
 from taichi_dem.kit.viewer import WebPage
 

@@ -22,8 +22,8 @@ from ca_damper.scenes.checks import check_run
 from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import in_brief
-from taichi_dem.kit.progress.progress import Listener
-from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.progress import Listener
+from taichi_dem.kit.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, FileName
 
 # Half-width of the RMS by its cycles, beside the measures.

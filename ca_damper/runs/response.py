@@ -21,8 +21,8 @@ from taichi_dem.kit.checkpoint import Checkpoint, identity_of
 from taichi_dem.kit.data_table import Tabulated, unit_of
 from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import Listener
-from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.progress import Listener
+from taichi_dem.kit.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, whole
 
 #: Particle numbers that a notebook shows, evenly over those there are.

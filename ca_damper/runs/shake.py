@@ -20,8 +20,8 @@ from ca_damper.scenes.table import SceneTable
 from ca_damper.structure import Box, ModalStructure
 from taichi_dem.kit.checkpoint import Checkpoint, identity_of
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import Listener
-from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.progress import Listener
+from taichi_dem.kit.progress_bar import reporting
 from taichi_dem.kit.validation import (
     AUTO,
     FileName,

@@ -10,7 +10,7 @@ import numpy as np
 from taichi_dem.elasticity.rates import bond_rates, springs_of
 from taichi_dem.goals import Goal
 from taichi_dem.kit.display import counted
-from taichi_dem.kit.progress.progress import Listener, Progress
+from taichi_dem.kit.progress import Listener, Progress
 from taichi_dem.kit.timing import clock
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.methods import ImplicitDashpots, Method, Uniform

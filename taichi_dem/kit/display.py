@@ -6,14 +6,16 @@ Nothing here reads a field: an object may be shown after its Taichi session has 
 import base64
 import html
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import fields
 from inspect import signature
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from taichi_dem.kit.validation import shown
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import write_bytes
+from taichi_dem.kit.validation import FileName, path_name, shown
 
 #: Letters of a representation at a prompt.
 _LONGEST = 400
@@ -121,3 +123,32 @@ def unfolded(title: str, text: str) -> str:
 def verbatim(text: str) -> str:
     """HTML of text as it stands."""
     return f"<pre>{html.escape(text)}</pre>"
+
+
+class Pictured:
+    """Base of what layers above draw, which set ``png``: the picture of such an object."""
+
+    png: ClassVar[Callable[[Any], bytes]]
+
+    def picture(self, path: FileName) -> None:
+        """Write a PNG picture of the outer faces, coloured by group, with axes in m.
+
+        Of a scene it shows what acts on each group.
+
+        Parameters
+        ----------
+        path : path
+            File; its name ends in .png.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        name = path_name("path", path)
+        if not name.lower().endswith(".png"):
+            raise InputError(f"path must end in .png, got {name}")
+        write_bytes(name, Pictured.png(self))
+
+    def _repr_html_(self) -> str:
+        return titled(repr(self), embedded(Pictured.png(self), "The mesh, coloured by group"))

@@ -18,7 +18,7 @@ from matplotlib.ticker import LogFormatterSciNotation
 from PIL import Image
 
 from taichi_dem.kit.files import write_bytes, write_whole
-from taichi_dem.kit.progress.progress import drawing
+from taichi_dem.kit.progress import drawing
 from taichi_dem.kit.validation import FileName
 
 STYLE = {

@@ -9,12 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_dem.kit import pictures
-from taichi_dem.kit.display import counted, embedded, in_brief, titled
+from taichi_dem.kit.display import Pictured, counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot
 from taichi_dem.kit.validation import (
-    FileName,
     direction,
     flag,
     fraction,
@@ -33,7 +31,7 @@ _DIGITS = 15
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(Pictured):
     """Tetrahedra and named groups of faces; immutable.
 
     Made from arrays it is checked and mended as ``checked_mesh`` says; ``dataclasses.replace``
@@ -298,24 +296,6 @@ class Mesh:
         if any(turned):
             points = origin + ((points - origin)[:, None, :] * turn).sum(axis=2)
         return replace(self, points=points + shift)
-
-    def picture(self, path: FileName) -> None:
-        """Write a PNG picture of the outer faces, coloured by group, with axes in m.
-
-        Parameters
-        ----------
-        path : path
-            File; its name ends in .png.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
-        """
-        pictures.write_picture(self, path)
-
-    def _repr_html_(self) -> str:
-        return titled(repr(self), embedded(pictures.png(self), "The mesh, coloured by group"))
 
 
 def volumes(mesh: Mesh) -> np.ndarray:

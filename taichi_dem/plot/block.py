@@ -11,7 +11,7 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 
 from taichi_dem.kit.plot_style import STYLE, area_key, filming, picture, write_gif
-from taichi_dem.kit.progress.progress import drawing
+from taichi_dem.kit.progress import drawing
 from taichi_dem.kit.validation import FileName, positive, unit_vector
 from taichi_dem.output.record import Frame
 from taichi_dem.plot.series import level_look, level_names

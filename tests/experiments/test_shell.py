@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import subprocess
 import time
 
 import pytest
@@ -12,6 +13,7 @@ import blast_fracture
 from taichi_dem.kit import study
 from taichi_dem.kit.study import cached, digest
 from tests.experiments.contract import command
+from tests.processes import users_environment
 from tests.terminal import phases_of, run_in_terminal
 
 pytestmark = pytest.mark.experiment
@@ -46,6 +48,15 @@ def test_a_kept_result_is_computed_once_for_the_same_settings_and_sources(tmp_pa
     assert digest(1, ("ca_damper",)) != digest(1, ("taichi_dem",))
 
 
+def test_a_blast_with_its_pictures_imports_neither_scipy_nor_pandas(tmp_path):
+    python, *line = command("blast_fracture", "--quick", "--until", "4e-5", "--out", tmp_path)
+    line = [python, "-X", "importtime", *line]
+    done = subprocess.run(line, capture_output=True, text=True, env=users_environment())
+    assert done.returncode == 0 and (tmp_path / "cracks.png").is_file()
+    imported = {said.split()[-1] for said in done.stderr.splitlines() if "import time:" in said}
+    assert "matplotlib" in imported and not {"scipy", "pandas"} & imported
+
+
 class CtrlC:
     """Stands for the progress bar, and for a user who presses Ctrl-C while it runs."""
 
@@ -77,7 +88,7 @@ def test_interrupted_blast_goes_on_to_the_same_files(monkeypatch, capsys, tmp_pa
     assert run("straight") == (0, "")
     assert not [*tmp_path.glob("*/*.png"), *tmp_path.glob("*/*.gif"), *tmp_path.glob("*/*.html")]
     with monkeypatch.context() as patched:
-        patched.setattr("taichi_dem.kit.progress.progress_bar.ProgressBar", CtrlC)
+        patched.setattr("taichi_dem.kit.progress_bar.ProgressBar", CtrlC)
         code, said = run("stopped")
     path = tmp_path / "stopped" / "checkpoint.npz"
     assert code == 130 and os.listdir(path.parent) == [path.name]

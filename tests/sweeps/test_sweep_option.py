@@ -47,10 +47,11 @@ def start(folder, table):
 def test_each_row_runs_once_in_a_folder_of_its_own(tmp_path):
     folder = tmp_path / "o"
     assert start(tmp_path, "mass,loud\n1.5,yes\n0.1,no\n2,0\n") == 1
-    with open(folder / "sweep.csv", newline="") as file:
+    with open(folder / "results.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["twice"] for row in rows] == ["3.0", "nan", "4.0"]
     assert [row["mass"] for row in rows] == ["1.5", "0.1", "2"]
+    assert "seed" not in rows[0]
     assert [row["mass_figure"] for row in rows] == ["1.0", "nan", "1.0"]
     assert [row["error"] for row in rows] == ["", "mass is too small for this beam", ""]
     command = json.loads((folder / "row_2" / "summary.json").read_text())["command"]

@@ -93,3 +93,9 @@ def test_only_a_lock_left_by_a_killed_process_is_removed(tmp_path, age_s, remove
     assert lock.exists() != removed
     # With the lock free, the next process finds this one's kernels compiled.
     assert bool(list(lock.parent.glob("*.tic"))) == removed
+
+
+@pytest.mark.parametrize("package", ["taichi_dem", "ca_damper"])
+def test_importing_a_package_imports_nothing_that_few_runs_need(package, tmp_path):
+    loaded = answers(tmp_path, f"import json, sys, {package}; print(json.dumps([*sys.modules]))")
+    assert not {"scipy", "pandas", "matplotlib", "rich", "argparse"} & {*loaded}

@@ -20,7 +20,7 @@ from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
 from taichi_dem.kit.children import Terminated, ending_children
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import older_files, output_folder
-from taichi_dem.kit.progress.progress_bar import showing
+from taichi_dem.kit.progress_bar import showing
 from taichi_dem.kit.study.entries import Entry, entry_of, show_opening
 from taichi_dem.kit.study.sweep_option import add_sweep, run_sweep
 from taichi_dem.kit.terminal import lasting_output

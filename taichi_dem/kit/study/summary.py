@@ -18,7 +18,7 @@ import numpy as np
 from taichi_dem.kit import runtime
 from taichi_dem.kit.bars.answer import Answer
 from taichi_dem.kit.files import older_files, write_csv, write_text
-from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.kit.provenance import commit, processor
 from taichi_dem.kit.study.entries import MOST_FIGURES, Entry, key_figures
 from taichi_dem.kit.terminal import print_table, show_heading

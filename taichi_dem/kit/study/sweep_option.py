@@ -2,11 +2,11 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
-import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from functools import partial
 from inspect import getfile, unwrap
@@ -14,10 +14,11 @@ from pathlib import Path
 
 from taichi_dem.kit import children, runtime
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import output_folder, write_text
-from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study.costly_work import cached, digest
-from taichi_dem.kit.sweeps.table import ADDED
+from taichi_dem.kit.files import write_text
+from taichi_dem.kit.study.costly_work import digest
+from taichi_dem.kit.sweeps.jobs import Job, run_job
+from taichi_dem.kit.sweeps.sweep import RESULTS, Ended, swept
+from taichi_dem.kit.sweeps.table import ADDED, Row, checked_rows
 from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.validation import shown
 
@@ -37,77 +38,30 @@ def add_sweep(made: ArgumentParser, count: Callable[[str], int]) -> None:
 def run_sweep(
     run: Callable, made: ArgumentParser, options: Namespace, arguments: Sequence[str]
 ) -> int:
-    """Run all rows that are missing, gather their figures in sweep.csv; returns the exit code.
+    """Sweep over the rows of a table, each a run of the script of ``run``; returns the exit code.
 
-    A row is done where an earlier sweep ran it with the same options, files and sources.
+    A row runs again where options, files that they name or sources have changed.
     """
     if options.json:
-        raise InputError("json must be left out with --sweep, which writes sweep.csv")
-    table = _rows(options.sweep)
+        raise InputError(f"json must be left out with --sweep, which writes {RESULTS}")
+    table = [{name: str(cell) for name, cell in row.items()} for row in checked_rows(options.sweep)]
     count = options.workers or runtime.usable_cores()
-    lines = _lines(made, table, options, arguments, count)
-    script, folder = os.path.abspath(getfile(unwrap(run))), output_folder(options.out)
-    beside = {
-        str(path): path.read_bytes().hex() for path in sorted(Path(script).parent.glob("*.py"))
-    }
-    sources = digest(beside, ("taichi_dem", "ca_damper"))
-    with ThreadPoolExecutor(count) as pool, ProgressBar("sweep") as bar:
-        places = (os.path.join(folder, f"row_{k}") for k in range(len(lines)))
-        jobs = [pool.submit(_run_row, script, sources, *job) for job in zip(lines, places)]
-        try:
-            for done, _ in enumerate(as_completed(jobs), 1):
-                bar.count(done, len(jobs))
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-    return _show(table, [job.result() for job in jobs], folder)
+    common = _common(table, options, arguments, count)
+    titles = (f"row {k} of table {options.sweep}" for k in range(len(table)))
+    lines = [_line(made, common, *one) for one in zip(table, titles)]
+    script = os.path.abspath(getfile(unwrap(run)))
+    sources = _sources(script, common)
+    rows: list[Row] = []
+    for k, (cells, line) in enumerate(zip(table, lines)):
+        made_by = {"command": shlex.join([script, *line]), "sources": sources}
+        rows.append({**cells, **made_by, "out": os.path.join(options.out, f"row_{k}")})
+    found = swept(run_program, rows, partial(_run, count), options.out)
+    _show(table, found, os.path.join(options.out, RESULTS))
+    return int(any(found["error"]))
 
 
-def _rows(path):
-    """Rows of a CSV file, texts by column name."""
-    import pandas
-
-    try:
-        rows = pandas.read_csv(path, dtype=str, keep_default_na=False).to_dict("records")
-    except (OSError, ValueError) as error:
-        raise InputError(f"table {shown(path)} must be a CSV file: {error}") from None
-    if not rows:
-        raise InputError(f"table {shown(path)} must have at least one row, got none")
-    return rows
-
-
-def _run_row(script, sources, line, folder):
-    """Figures of a row's summary.json, and what computed them; or why it failed, in error."""
-    words = [word for text in line for word in text.split("=")]
-    files = {name: Path(name).read_bytes().hex() for name in filter(os.path.isfile, words)}
-    begun = time.perf_counter()
-    try:
-        run = partial(_figures, [sys.executable, script, *line, f"--out={folder}"], folder)
-        return cached(folder, "sweep", (line, sources, files), (), run)[0]
-    except RuntimeError as error:
-        return {"error": str(error), "seconds": time.perf_counter() - begun}
-
-
-def _figures(line, folder):
-    """Run a job and return its figures by name; RuntimeError with its last words."""
-    begun = time.perf_counter()
-    done = children.run(line, stdin=subprocess.DEVNULL)
-    if done.returncode != 0:
-        said = done.stderr.strip().splitlines()
-        raise RuntimeError(said[-1] if said else f"exit code {done.returncode}")
-    write_text(os.path.join(folder, "output.txt"), done.stdout)
-    summary = json.loads(Path(folder, "summary.json").read_text(encoding="utf-8"))
-    figures = {
-        f"{name}_figure" if name in ADDED else name: one["value"]
-        for name, one in summary["figures"].items()
-    }
-    versions, place = summary["versions"], summary["machine"]["processor"]
-    made = "", versions["taichi-dem"], versions["commit"], place, time.perf_counter() - begun
-    return {**figures, **dict(zip(ADDED, made))}
-
-
-def _lines(made, table, options, arguments, count):
-    """Arguments of each row, all of which the parser takes. Raises InputError otherwise."""
+def _common(table, options, arguments, count):
+    """Arguments of every row: those given that are not of the sweep, and a share of the cores."""
     own = ArgumentParser(allow_abbrev=False, add_help=False)
     for name in _OWN:
         own.add_argument(f"--{name}")
@@ -115,16 +69,19 @@ def _lines(made, table, options, arguments, count):
         own.add_argument(f"--{name}", action="store_true")
     common = own.parse_known_args(arguments)[1]
     if "threads" not in table[0] and options.threads is None:
-        common = [*common, f"--threads={max(1, runtime.usable_cores() // count)}"]
-    lines = []
-    for k, row in enumerate(table):
-        try:
-            given = [_argument(made, name, cell) for name, cell in row.items()]
-            lines.append([*common, *filter(None, given)])
-            made.parse_args(lines[-1])
-        except InputError as error:
-            raise InputError(f"row {k} of table {options.sweep}: {error}") from None
-    return lines
+        common.append(f"--threads={max(1, runtime.usable_cores() // count)}")
+    return common
+
+
+def _line(made, common, row, title):
+    """Arguments of a row, which the parser takes. Raises InputError with the title otherwise."""
+    try:
+        given = [_argument(made, name, cell) for name, cell in row.items()]
+        line = [*common, *filter(None, given)]
+        made.parse_args(line)
+    except InputError as error:
+        raise InputError(f"{title}: {error}") from None
+    return line
 
 
 def _argument(made, name, cell):
@@ -140,18 +97,50 @@ def _argument(made, name, cell):
     return f"--{name}" if _SWITCH[cell.lower()] else ""
 
 
-def _show(table, found, folder):
-    """Write sweep.csv and print what became of each row; 1 where one has failed."""
-    import pandas
+def _sources(script, common):
+    """Digest of the packages, of the scripts in a folder, and of files among common arguments."""
+    words = [word for text in common for word in text.split("=")]
+    paths = [*sorted(Path(script).parent.glob("*.py")), *filter(os.path.isfile, words)]
+    contents = {str(path): Path(path).read_bytes().hex() for path in paths}
+    return digest(contents, ("taichi_dem", "ca_damper"))
 
-    made, given = pandas.DataFrame(found), pandas.DataFrame(table)
-    figures = made.drop(columns=[name for name in ADDED if name in made])
-    figures.columns = [f"{name}_figure" if name in given else name for name in figures]
-    whole = pandas.concat([given, figures, made.reindex(columns=ADDED)], axis="columns")
-    path = os.path.join(folder, "sweep.csv")
-    write_text(path, whole.to_csv(index=False, na_rep="nan"))
-    ends = [(f"{one['seconds']:.1f} s", one["error"] or "done") for one in found]
-    rows = [[*row.values(), *end] for row, end in zip(table, ends)]
-    print_table(rows, [*given, "time", "end"])
+
+def run_program(row: Row) -> Row:
+    """Figures of a run of a script, and the file with all on it. Raises InputError if it fails."""
+    out, command = str(row["out"]), shlex.split(str(row["command"]))
+    line = [sys.executable, *command, f"--out={out}"]
+    done = children.run(line, stdin=subprocess.DEVNULL)
+    if done.returncode != 0:
+        said = done.stderr.strip().splitlines()
+        raise InputError(said[-1] if said else f"exit code {done.returncode}")
+    write_text(os.path.join(out, "output.txt"), done.stdout)
+    path = os.path.join(out, "summary.json")
+    figures = json.loads(Path(path).read_text(encoding="utf-8"))["figures"]
+    found: Row = {"summary": path}
+    for name, one in figures.items():
+        key = f"{name}_figure" if name in (*row, *ADDED, *found) else name
+        found[key] = float("nan") if one["value"] in (None, "") else one["value"]
+    return found
+
+
+def _run(count: int, jobs: Iterable[Job]) -> Ended:
+    """Jobs and their records as their programs end, some side by side.
+
+    A program may fail for what no digest sees, such as a full disk: it always runs again.
+    """
+    with ThreadPoolExecutor(count) as pool:
+        running = {pool.submit(run_job, run_program, job.row): job for job in jobs}
+        try:
+            for one in as_completed(running):
+                record = one.result()
+                yield running[one], record._replace(final=not record.error)
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _show(table, found, path):
+    """Print what became of each row, and where all figures are."""
+    ends = zip(table, found["seconds"], found["error"])
+    cells = [[*row.values(), f"{seconds:.1f} s", error or "done"] for row, seconds, error in ends]
+    print_table(cells, [*table[0], "time", "end"])
     print(f"\nFigures of all rows are in {path}, their pictures and tables in row_0, row_1, ...")
-    return int(any(one["error"] for one in found))

@@ -14,7 +14,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.data_table import data_frame
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import output_folder, write_text
-from taichi_dem.kit.progress.progress_bar import hide_bars
+from taichi_dem.kit.progress_bar import hide_bars
 from taichi_dem.kit.provenance import commit, machine
 from taichi_dem.kit.sweeps.dependencies import Dependencies, named_file
 from taichi_dem.kit.sweeps.table import ADDED, SEED, Row, Value, column_of, plain_value
@@ -67,13 +67,15 @@ def identity_of(work: Any) -> str:
     return f"{module}:{name}"
 
 
-def jobs_of(work: Any, rows: Sequence[Row], seed: int) -> list[Job]:
-    """A job for each row; a row without a column seed gets one from the sweep's and its number."""
+def jobs_of(work: Any, rows: Sequence[Row], seed: int | None) -> list[Job]:
+    """A job for each row; one without a seed gets it from the sweep's, if any, and its number."""
     seen = Dependencies(work)
     depends = [identity_of(work), seen.digest, __version__]
     known, jobs = dict(seen.files), []
     for number, given in enumerate(rows):
-        row = {**given, SEED: given.get(SEED, seed_of(seed, number))}
+        row = dict(given)
+        if seed is not None:
+            row.setdefault(SEED, seed_of(seed, number))
         own: dict[str, str] = {}
         for value in row.values():
             own.update(named_file(value, known) if isinstance(value, str) else {})
@@ -130,7 +132,8 @@ def table_of(
     for name in dict.fromkeys(name for record in records for name in record.values):
         columns[name] = [record.values.get(name) for record in records]
     columns["error"] = [record.error for record in records]
-    columns.setdefault(SEED, [job.row[SEED] for job in jobs])
+    if SEED in jobs[0].row:
+        columns.setdefault(SEED, [job.row[SEED] for job in jobs])
     for name in ADDED[1:]:
         columns[name] = [getattr(record, name) for record in records]
     arrays = {name: column_of(values) for name, values in columns.items()}
@@ -182,24 +185,27 @@ class Journal:
     def read(self, jobs: Iterable[Job]) -> dict[str, Record]:
         """Records of those jobs that are finished, by digest.
 
-        Damaged files do not count, nor those of a job that names a file which has changed.
+        Damaged files do not count, nor those of a job that names a file which has changed or whose
+        results name one that is gone.
         """
         found = {}
         for job in jobs if self.folder else ():
             with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
                 with open(self._path(job), encoding="utf-8") as file:
                     kept = json.load(file)
-                record, files = Record(**kept["record"]), kept["files"]
-                sound = kept["check"] == _digest([kept["record"], files])
-                if sound and _is_current(record, files, job):
+                record, files, made = Record(**kept["record"]), kept["files"], kept["made"]
+                sound = kept["check"] == _digest([kept["record"], files, made])
+                if sound and _is_current(record, files, job) and all(map(os.path.isfile, made)):
                     found[job.digest] = record
         return found
 
     def write(self, job: Job, record: Record) -> None:
         """Keep the record of a job that is final. Raises InputError where there is no space."""
         if self.folder and record.final:
-            check = _digest([record._asdict(), job.files])
-            kept = {"record": record._asdict(), "files": job.files, "check": check}
+            texts = (value for value in record.values.values() if isinstance(value, str))
+            made = [path for text in texts for path in named_file(text, {})]
+            kept = {"record": record._asdict(), "files": job.files, "made": made}
+            kept["check"] = _digest([*kept.values()])
             write_text(self._path(job), json.dumps(kept))
 
     def _path(self, job):

@@ -7,15 +7,16 @@ import os
 import sys
 import time
 from collections import deque
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 from taichi_dem.kit import runtime
 from taichi_dem.kit.data_table import arrays_of
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.progress.progress import Listener, Progress
-from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.progress import Listener, Progress
+from taichi_dem.kit.progress_bar import reporting
 from taichi_dem.kit.sweeps.dependencies import Dependencies
 from taichi_dem.kit.sweeps.jobs import (
     Job,
@@ -31,6 +32,9 @@ from taichi_dem.kit.sweeps.jobs import (
 from taichi_dem.kit.sweeps.table import SEED, TableLike, checked_rows
 from taichi_dem.kit.validation import AUTO, FileName, whole
 
+#: Jobs and their records as they end, and what runs jobs.
+Ended = Generator[tuple[Job, Record], None, None]
+Start = Callable[[Sequence[Job]], Ended]
 #: File of the whole table in the folder of a sweep.
 RESULTS = "results.csv"
 _GUARD = 'if __name__ == "__main__"'
@@ -77,7 +81,8 @@ def sweep(
     out : path, optional
         Folder that keeps each finished row. The same call later runs only rows that are missing
         or changed, or for which the function changed, what it calls, names or closes over in the
-        user's files, a file that it or the row names, or the version of the package.
+        user's files, a file that it or the row names, or the version of the package; and those
+        whose results name a file that is gone.
     seed : int
         Seed from which those of the rows follow, a whole number from 0 to 2^63.
     progress : "auto", function or None
@@ -108,11 +113,24 @@ def sweep(
     >>> table = sweep(blast, parameter_grid(peak=[4e8, 5e8, 6e8]), out="results/peaks")
     ... # doctest: +SKIP
     """
-    rows = checked_rows(table)
     count = runtime.usable_cores() if workers is None else whole("workers", workers, 1, 1024)
+    start = partial(_run, function, client=client, count=count)
+    return swept(function, table, start, out, whole("seed", seed, 0, 2**63), progress)
+
+
+def swept(
+    function: Work,
+    table: TableLike,
+    start: Start,
+    out: FileName | None = None,
+    seed: int | None = None,
+    progress: Listener | str | None = AUTO,
+) -> Any:
+    """As ``sweep``, for whatever runs jobs; rows get no seeds where there is none."""
+    rows = checked_rows(table)
     journal = Journal(out, identity_of(function))
-    jobs = jobs_of(function, rows, whole("seed", seed, 0, 2**63))
-    records = _run_missing(function, jobs, journal, count, client, progress)
+    jobs = jobs_of(function, rows, seed)
+    records = _run_missing(start, jobs, journal, progress)
     made = table_of(jobs, records, SEED in rows[0], Dependencies(function).unseen)
     if journal.folder:
         write_csv(os.path.join(journal.folder, RESULTS), arrays_of(made))
@@ -120,14 +138,9 @@ def sweep(
 
 
 def _run_missing(
-    function: Work,
-    jobs: Sequence[Job],
-    journal: Journal,
-    count: int,
-    client: Any,
-    progress: Listener | str | None,
+    start: Start, jobs: Sequence[Job], journal: Journal, progress: Listener | str | None
 ) -> list[Record]:
-    """Records of jobs, of which those that the journal lacks are run; count: of processes here."""
+    """Records of jobs, of which those that the journal lacks are run."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         # A worker imports the main script, which starts the sweep again.
         sys.exit(1)
@@ -137,7 +150,7 @@ def _run_missing(
     if missing:
         with (
             reporting(progress, "sweeping") as listen,
-            contextlib.closing(_run(function, missing, client, count)) as ended,
+            contextlib.closing(start(missing)) as ended,
         ):
             for done, (job, record) in enumerate(ended):
                 records[job.digest] = record
@@ -149,8 +162,11 @@ def _run_missing(
     return [records[job.digest] for job in jobs]
 
 
-def _run(work, jobs, client, count) -> Generator[tuple[Job, Record], None, None]:
-    """Jobs and their records as they end. Raises InputError where no more can be run."""
+def _run(work, jobs, client, count) -> Ended:
+    """Jobs and their records by Dask; count: of processes here, where there is no client.
+
+    Raises InputError where no more can be run.
+    """
     try:
         import distributed
     except ImportError:

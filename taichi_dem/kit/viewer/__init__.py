@@ -19,7 +19,7 @@ import numpy as np
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_text
-from taichi_dem.kit.progress.progress import drawing
+from taichi_dem.kit.progress import drawing
 from taichi_dem.kit.validation import FileName, flag, path_name, told_apart
 
 #: Largest page [bytes], and letters of base64 for a byte.

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from taichi_dem.kit.progress.progress import Listener, Pace, Progress, listening
+from taichi_dem.kit.progress import Listener, Pace, Progress, listening
 from taichi_dem.kit.validation import fraction, instance, progress_option, shown, whole
 
 #: Least time between two updates of a cell in Jupyter [s].

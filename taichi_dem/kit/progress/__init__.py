@@ -1,1 +1,0 @@
-"""Progress of compiling and running: reports, and the bar that shows them."""
