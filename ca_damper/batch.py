@@ -75,9 +75,9 @@ class Batch(LoadedScenes):
     effects : str, default "listed"
         ``"listed"``: effects that the options of the filling ask for. ``"auto"``: effects that an
         estimate shows to be negligible are left out; see ``certificate``.
-    excitation : Signal, sequence of Signal or Excitation, optional
-        Base motion [m], one for all scenes or one for each, or an Excitation. None: the sine of the
-        table. Under a Signal, a cycle is a window of 1 / frequency and base_amplitude is not used.
+    excitation : Signal or Excitation, optional
+        Base motion [m] of all scenes, or an Excitation. None: the sine of the table. Under a
+        Signal, a cycle is a window of 1 / frequency and base_amplitude is not used.
     recorded_samples : int, default 0
         Largest number of samples that a run may record for ``time_series``.
     structure : ModalMount, optional
@@ -141,7 +141,6 @@ class Batch(LoadedScenes):
         self.numbers = self._checked(SceneNumbers(self.filling, table, has_box))
         self.excitation = checked_excitation(excitation, mount)
         self.recorded_samples = checked_samples(recorded_samples, self.count)
-        self._more_sizes = self.excitation.sizes(self.count)
         self.time_origin = np.zeros(self.count)
         self.periods: Periods | None = None
         self.launches, self.compile_seconds = Launches(self.count), 0.0
@@ -154,7 +153,7 @@ class Batch(LoadedScenes):
         """Borrow an engine and write the numbers of the batch to it."""
         counts = self.count, self.measured_cycles, self.recorded_samples
         kind = self.mount if self.modal is None else self.modal.kind
-        asked = self.filling, kind, self.excitation.kind, counts, self._more_sizes
+        asked = self.filling, kind, self.excitation.kind, counts, self.excitation.sizes
         self._engine = borrow(*asked, owner=self)
         self._tell_compiling("set-up", 1)
         engine = self.engine

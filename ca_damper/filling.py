@@ -7,12 +7,11 @@ batch of a filling with the same ``Structure``. ``fixed_mass.py`` has a complete
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import taichi as ti
 
-from ca_damper.scenes.contracts import check_members, members_of
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
@@ -97,6 +96,7 @@ class Structure:
     sizes: dict[str, int] = field(default_factory=dict)
 
 
+@runtime_checkable
 class Filling(Protocol):
     """Contract of a filling of the container.
 
@@ -230,13 +230,11 @@ class DeviceFilling(Protocol):
 
 def check_filling(filling: Any) -> Any:
     """Return the filling; InputError unless it has all members of the contract."""
-    members = members_of(Filling)
-    if isinstance(filling, type) or not any(hasattr(filling, name) for name in members):
+    if isinstance(filling, type) or not isinstance(filling, Filling):
         raise InputError(
-            f"filling must be one such as Automaton(), Spheres() or RigidMass(), "
-            f"got {shown(filling)}"
+            "filling must be one such as Automaton(), Spheres() or RigidMass(), with all members "
+            f"of ca_damper.filling.Filling, got {shown(filling)}"
         )
-    check_members("filling", filling, members)
     return filling
 
 
@@ -247,15 +245,6 @@ def check_places(scenes: int, places: int) -> None:
             f"scenes x places for particles must be at most {_MOST_PLACES} in one batch, got "
             f"{scenes} x {places}: run fewer scenes at a time"
         )
-
-
-def check_device(filling: Any, device: Any) -> Any:
-    """Return the device of a filling; InputError unless it has all members of the contract."""
-    members = members_of(DeviceFilling)
-    if hasattr(filling, "structure"):
-        members = {**members, "load": "Take over the numbers of a filling of the same structure."}
-    check_members("what bind of a filling returns", device, members)
-    return device
 
 
 def structure_of(filling: Any) -> Structure:

@@ -33,7 +33,7 @@ class Container:
     def load(self, gravity: float, rtol: float, atol: float) -> None:
         """Take over the numbers of a batch."""
 
-    def excite(self, excitation: Excitation, scenes: int) -> None:
+    def excite(self, excitation: Excitation) -> None:
         """Take over the excitation of a batch, where it is no single sine of the base."""
 
     @ti.func
@@ -213,10 +213,10 @@ class ExcitedContainer(SpringContainer):
         self.lifts, self.elapsed = lifts, table.field(ti.i32)
         self.excited_base, self.force = BASES[kind.base](table, clock), FORCES[kind.force](table)
 
-    def excite(self, excitation: Excitation, scenes: int) -> None:
+    def excite(self, excitation: Excitation) -> None:
         """Take over the excitation of a batch."""
-        self.excited_base.load(excitation, scenes)
-        self.force.load(excitation, scenes)
+        self.excited_base.load(excitation)
+        self.force.load(excitation)
 
     @ti.func
     def base(self, s):
@@ -317,9 +317,9 @@ class ShakenContainer(PrescribedContainer):
         self.table, self.excited_base = table, BASES[kind.base](table, clock)
         self.elapsed = table.field(ti.i32)
 
-    def excite(self, excitation: Excitation, scenes: int) -> None:
+    def excite(self, excitation: Excitation) -> None:
         """Take over the base motions of a batch."""
-        self.excited_base.load(excitation, scenes)
+        self.excited_base.load(excitation)
 
     @ti.func
     def start(self, s, x, v):

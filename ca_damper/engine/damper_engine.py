@@ -11,7 +11,7 @@ from ca_damper.engine.modal_container import ModalContainer
 from ca_damper.engine.modal_mount import ModalKind
 from ca_damper.engine.recorder import ROOM, Recorder
 from ca_damper.excitation.excitation import Excitation, ExcitationKind
-from ca_damper.filling import LEAST_PLACES, check_device, check_places, structure_of
+from ca_damper.filling import LEAST_PLACES, check_places, structure_of
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.gravity import gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
@@ -63,8 +63,7 @@ class DamperEngine(Engine):
             coupling = GroupCoupling
         else:
             self.container = container_of(mount, self.table, self.clock, kind)
-        filling = self.structure.filling
-        self.device = check_device(filling, filling.bind(self.table))
+        self.device = self.structure.filling.bind(self.table)
         parts = self.container, self.device, self.account, self.recorder
         self.coupling = coupling(self.table, self.clock, *parts)
         self.is_compiled = False
@@ -76,7 +75,7 @@ class DamperEngine(Engine):
         self.table.load(table)
         gravity = gravity_along(filling)
         self.container.load(gravity, rtol, atol)
-        self.container.excite(excitation, table.count)
+        self.container.excite(excitation)
         assign(self.coupling.gravity, gravity)
         assign(self.account.weight, filling.particle_mass * gravity)
         if hasattr(filling, "structure"):

@@ -52,10 +52,10 @@ class ModalContainer(IntegratedContainer):
         self.struck, self.rubbed = table.field(ti.f64), table.field(ti.f64)
         self.speed_gain, self.shared = table.field(ti.f64), table.field(ti.f64)
 
-    def excite(self, excitation: Excitation, scenes: int) -> None:
+    def excite(self, excitation: Excitation) -> None:
         """Take over the excitation of a batch."""
-        self.excited_base.load(excitation, scenes)
-        self.force.load(excitation, scenes)
+        self.excited_base.load(excitation)
+        self.force.load(excitation)
 
     def hang(self, mount: ModalMount) -> None:
         """Take over the structure of a batch and the places of its boxes."""

@@ -115,7 +115,7 @@ def shake(
     """
     progress_option("progress", progress)
     check_filling(filling)
-    excitation, numbered = _one_for_all(excitation), run_seeds(seeds)
+    excitation, numbered = _excitation(excitation), run_seeds(seeds)
     own = instance("oscillator", Oscillator() if oscillator is None else oscillator, Oscillator)
     counts = several("particles", particles, lambda n, x: whole(n, x, 0, filling.capacity))
     most = filling.default_dt if dt is None else positive("dt", dt)
@@ -204,7 +204,7 @@ def shake_structure(
     """
     progress_option("progress", progress)
     check_filling(filling)
-    excitation, numbered = _one_for_all(excitation), run_seeds(seeds)
+    excitation, numbered = _excitation(excitation), run_seeds(seeds)
     if (excitation.force is None) != (force_place is None):
         wanted = "None without" if excitation.force is None else "a place for"
         raise InputError(
@@ -253,7 +253,7 @@ def _window(excitation: Excitation, asked: Any, dt: float, interval: Any) -> Win
 
     asked: duration, that of the excitation if None. interval: between samples at most [s].
     """
-    end = float(excitation.duration(1)[0])
+    end = excitation.duration
     if asked is None and math.isinf(end):
         raise InputError("duration must be given for an excitation without an end, got None")
     duration = end if asked is None else positive("duration", asked)
@@ -266,16 +266,11 @@ def _window(excitation: Excitation, asked: Any, dt: float, interval: Any) -> Win
     return Window(duration, samples, every, duration / (samples * every))
 
 
-def _one_for_all(value: Any) -> Excitation:
-    """Excitation of one Signal or SineForce for all scenes; InputError for several or None."""
+def _excitation(value: Any) -> Excitation:
+    """Excitation that a user means; InputError for None, which shakes nothing."""
     if value is None:
         raise InputError("excitation must be a Signal or an Excitation, got None")
-    excitation = excitation_of(value)
-    if isinstance(excitation.base, tuple) or isinstance(excitation.force, tuple):
-        raise InputError(
-            f"excitation must be one for all scenes here, got several: {shown(excitation)}"
-        )
-    return excitation
+    return excitation_of(value)
 
 
 def _recorded(scenes, options, window, start, progress, saving):

@@ -101,10 +101,9 @@ def check_single_sine(excitation: Excitation, what: str) -> None:
 
 def check_within(excitation: Excitation, ends: np.ndarray) -> None:
     """InputError where a run to times ``ends`` [s], (scenes,), goes beyond its excitation."""
-    late = ends > excitation.duration(len(ends)) * (1.0 + 1e-9)
-    if late.any():
-        s = int(np.flatnonzero(late)[0])
-        got, most = told_apart(ends[s], excitation.duration(len(ends))[s])
+    s = int(np.argmax(ends))
+    if ends[s] > excitation.duration * (1.0 + 1e-9):
+        got, most = told_apart(ends[s], excitation.duration)
         raise InputError(
             f"a run must end within its excitation of {most} s, got {got} s in scene {s}: run "
             "fewer cycles, or shorter windows"
