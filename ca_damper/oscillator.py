@@ -182,7 +182,7 @@ class Oscillator:
         return self.base_amplitude * gain / np.sqrt(2.0)
 
     def right_hand_side(self, frequency: float) -> Callable[[float, Any], np.ndarray]:
-        """d(x, v)/dt of the empty container, for ``rk45.solve``.
+        """d(x, v)/dt of the empty container, for ``scipy.integrate.solve_ivp``.
 
         Parameters
         ----------
