@@ -1,6 +1,6 @@
 """Motion of the container: on its spring, driven by base and filling, or fixed to the base.
 
-All have ``load`` and ``excite`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``,
+All have ``load`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``,
 ``motion(s)`` at the beginning of a step, with ``base(s)``, the base's displacement [m],
 ``recoil(s)``, the speed that a unit impulse gives it [1/kg], ``renew(s)`` where the base has
 changed its motion, between two frequencies of a sweep, and ``advance(s, action)`` over the step,
@@ -12,8 +12,7 @@ from typing import Any
 import taichi as ti
 
 from ca_damper.engine import rk45
-from ca_damper.engine.signals import BASES, FORCES
-from ca_damper.excitation.excitation import Excitation, ExcitationKind
+from ca_damper.engine.signals import DeviceExcitation
 from ca_damper.filling import Action, Motion
 from ca_damper.oscillator import Forcing, sine_and_cosine, slope, slope_at_phase
 from ca_damper.scenes.clock import Clock
@@ -32,9 +31,6 @@ class Container:
 
     def load(self, gravity: float, rtol: float, atol: float) -> None:
         """Take over the numbers of a batch."""
-
-    def excite(self, excitation: Excitation) -> None:
-        """Take over the excitation of a batch, where it is no single sine of the base."""
 
     @ti.func
     def renew(self, s):
@@ -208,20 +204,14 @@ class ExcitedContainer(SpringContainer):
     touches a base at rest.
     """
 
-    def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind, lifts: bool):
+    def __init__(self, table: SceneFields, excitation: DeviceExcitation, lifts: bool):
         super().__init__(table)
-        self.lifts, self.elapsed = lifts, table.field(ti.i32)
-        self.excited_base, self.force = BASES[kind.base](table, clock), FORCES[kind.force](table)
-
-    def excite(self, excitation: Excitation) -> None:
-        """Take over the excitation of a batch."""
-        self.excited_base.load(excitation)
-        self.force.load(excitation)
+        self.excitation, self.lifts, self.elapsed = excitation, lifts, table.field(ti.i32)
 
     @ti.func
     def base(self, s):
         """Displacement of the base at the beginning of the step [m]."""
-        return self.excited_base.at(s, self.elapsed[s] * self.table.dt[s], 0.0)[0]
+        return self.excitation.base.at(s, self.elapsed[s] * self.table.dt[s], 0.0)[0]
 
     @ti.func
     def _begin(self, s):
@@ -252,12 +242,12 @@ class ExcitedContainer(SpringContainer):
     @ti.func
     def _change(self, load, t, y):
         """d(x, v)/dt for y = (x, v): the right-hand side that RK45 integrates."""
-        base = self.excited_base.at(load.scene, load.start, t)
+        base = self.excitation.base.at(load.scene, load.start, t)
         pull = load.stiffness * (base[0] - y[0]) + load.damping * (base[1] - y[1])
         if ti.static(self.lifts):
             # Nothing at a distance, where a dashpot alone would already act.
             pull = ti.select(y[0] < base[0], ti.max(0.0, pull), 0.0)
-        push = self.force.at(load.scene, load.start, t) * load.per_mass
+        push = self.excitation.force.at(load.scene, load.start, t)[0] * load.per_mass
         return ti.Vector([y[1], pull + push + load.constant])
 
     @ti.func
@@ -313,13 +303,9 @@ class DrivenContainer(PrescribedContainer):
 class ShakenContainer(PrescribedContainer):
     """The container fixed to a base that moves as an Excitation says."""
 
-    def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind):
-        self.table, self.excited_base = table, BASES[kind.base](table, clock)
+    def __init__(self, table: SceneFields, excitation: DeviceExcitation):
+        self.table, self.excitation = table, excitation
         self.elapsed = table.field(ti.i32)
-
-    def excite(self, excitation: Excitation) -> None:
-        """Take over the base motions of a batch."""
-        self.excited_base.load(excitation)
 
     @ti.func
     def start(self, s, x, v):
@@ -329,7 +315,7 @@ class ShakenContainer(PrescribedContainer):
     @ti.func
     def motion(self, s):
         """Of the base."""
-        at = self.excited_base.at(s, self.elapsed[s] * self.table.dt[s], 0.0)
+        at = self.excitation.base.at(s, self.elapsed[s] * self.table.dt[s], 0.0)
         return Motion(at[0], at[1], at[2])
 
     @ti.func
@@ -339,11 +325,12 @@ class ShakenContainer(PrescribedContainer):
         return 1
 
 
-def container_of(mount: str, table: SceneFields, clock: Clock, kind: ExcitationKind) -> Any:
-    """Container on a mount under an excitation of some kind."""
-    single = kind == ExcitationKind()
+def container_of(
+    mount: str, table: SceneFields, clock: Clock, excitation: DeviceExcitation, is_sine: bool
+) -> Any:
+    """Container on a mount under an excitation; is_sine: which is a single sine of the base."""
     if mount == "base":
-        return DrivenContainer(table, clock) if single else ShakenContainer(table, clock, kind)
-    if mount == "spring" and single:
+        return DrivenContainer(table, clock) if is_sine else ShakenContainer(table, excitation)
+    if mount == "spring" and is_sine:
         return SprungContainer(table, clock)
-    return ExcitedContainer(table, clock, kind, lifts=mount == "floor")
+    return ExcitedContainer(table, excitation, lifts=mount == "floor")

@@ -1,8 +1,8 @@
 """Excitation on the device: what moves the base and what pushes the container, at any time.
 
 Bases and forces have ``load(excitation)`` for the numbers of a batch and the ti.func
-``at(s, start, t)``: for a base its displacement, velocity and acceleration, for a force its value
-[N], at a time t after the beginning of a step, which begins at ``start`` [s].
+``at(s, start, t)``: value and two derivatives of the displacement of a base [m] or of a force [N]
+at a time t after the beginning of a step, which begins at ``start`` [s].
 """
 
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from ca_damper.excitation.excitation import Excitation
+from ca_damper.excitation.excitation import Excitation, ExcitationKind
 from ca_damper.excitation.signal import Signal
 from ca_damper.oscillator import sine_and_cosine as of_small
 from ca_damper.scenes.clock import Clock, added
@@ -30,7 +30,7 @@ class DeviceSignal:
     # Written by ``load``, so that a checkpoint leaves them out.
     constant_fields = ("nodes", "last", "step")
 
-    def __init__(self, table: SceneFields, role: str):
+    def __init__(self, table: SceneFields, clock: Clock, role: str):
         self.role = role
         self.nodes = ti.Vector.field(2, ti.f64, shape=table.length(f"{role}_nodes"))
         self.last, self.step = ti.field(ti.i32, shape=()), ti.field(ti.f64, shape=())
@@ -43,9 +43,9 @@ class DeviceSignal:
         assign(self.step, signal.step)
 
     @ti.func
-    def spline(self, time):
-        """Value, first and second derivative, see ``Signal``."""
-        h, place = self.step[None], time / self.step[None]
+    def at(self, s, start, t):
+        """Of the spline, see ``Signal``."""
+        h, place = self.step[None], (start + t) / self.step[None]
         k = ti.max(0, ti.min(ti.cast(ti.floor(place), ti.i32), self.last[None]))
         u = place - k
         w = 1.0 - u
@@ -58,23 +58,10 @@ class DeviceSignal:
 
 
 @ti.data_oriented
-class SignalBase(DeviceSignal):
-    """A base that moves by a Signal."""
-
-    def __init__(self, table: SceneFields, clock: Clock):
-        super().__init__(table, "base")
-
-    @ti.func
-    def at(self, s, start, t):
-        """Of the Signal."""
-        return self.spline(start + t)
-
-
-@ti.data_oriented
 class SineBase:
     """A base that moves by the sine of the scenes' table."""
 
-    def __init__(self, table: SceneFields, clock: Clock):
+    def __init__(self, table: SceneFields, clock: Clock, role: str):
         self.table, self.clock = table, clock
 
     def load(self, excitation: Excitation) -> None:
@@ -93,7 +80,7 @@ class SineBase:
 class NoForce:
     """No force but those of spring, dashpot and filling."""
 
-    def __init__(self, table: SceneFields):
+    def __init__(self, *parts: Any):
         pass
 
     def load(self, excitation: Excitation) -> None:
@@ -102,20 +89,7 @@ class NoForce:
     @ti.func
     def at(self, s, start, t):
         """None."""
-        return 0.0
-
-
-@ti.data_oriented
-class SignalForce(DeviceSignal):
-    """A force by a Signal."""
-
-    def __init__(self, table: SceneFields):
-        super().__init__(table, "force")
-
-    @ti.func
-    def at(self, s, start, t):
-        """Of the Signal."""
-        return self.spline(start + t)[0]
+        return ti.Vector([0.0, 0.0, 0.0])
 
 
 @ti.data_oriented
@@ -124,7 +98,7 @@ class DeviceSineForce:
 
     constant_fields = ("wave",)
 
-    def __init__(self, table: SceneFields):
+    def __init__(self, *parts: Any):
         self.wave = ti.Vector.field(3, ti.f64, shape=())
 
     def load(self, excitation: Excitation) -> None:
@@ -135,11 +109,24 @@ class DeviceSineForce:
     @ti.func
     def at(self, s, start, t):
         """Of the sine."""
-        wave = self.wave[None]
-        sine, _ = sine_and_cosine(wave[1] * (start + t) + wave[2])
-        return wave[0] * sine
+        amplitude, omega, phase = self.wave[None]
+        sine, cosine = sine_and_cosine(omega * (start + t) + phase)
+        return amplitude * ti.Vector([sine, omega * cosine, -omega * omega * sine])
 
 
-#: Bases and forces by the words of ``ExcitationKind``.
-BASES = {"sine": SineBase, "signal": SignalBase}
-FORCES = {"none": NoForce, "sine": DeviceSineForce, "signal": SignalForce}
+_BASES = {"sine": SineBase, "signal": DeviceSignal}
+_FORCES = {"none": NoForce, "sine": DeviceSineForce, "signal": DeviceSignal}
+
+
+@ti.data_oriented
+class DeviceExcitation:
+    """Base and force of an excitation of some kind."""
+
+    def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind):
+        self.base = _BASES[kind.base](table, clock, "base")
+        self.force = _FORCES[kind.force](table, clock, "force")
+
+    def load(self, excitation: Excitation) -> None:
+        """Take over the excitation of a batch."""
+        self.base.load(excitation)
+        self.force.load(excitation)
