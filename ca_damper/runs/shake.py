@@ -14,7 +14,7 @@ from ca_damper.filling import Filling, check_filling
 from ca_damper.oscillator import Oscillator
 from ca_damper.runs.history import StructureHistory, TimeHistory
 from ca_damper.runs.result import scenes_over
-from ca_damper.scenes.checks import MOST_SCENES, MOST_SEED, run_seeds
+from ca_damper.scenes.checks import MOST_SCENES, MOST_SEED, for_all, run_seeds
 from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE, MOST_STEPS_PER_CYCLE, automatic_dt
 from ca_damper.scenes.table import SceneTable
 from ca_damper.structure import Box, ModalStructure
@@ -28,7 +28,6 @@ from taichi_dem.kit.validation import (
     instance,
     positive,
     progress_option,
-    real_numbers,
     several,
     shown,
     told_apart,
@@ -210,7 +209,9 @@ def shake_structure(
         raise InputError(
             f"force_place must be {wanted} a force in the excitation, got {shown(force_place)}"
         )
-    boxed = _checked_boxes(boxes, filling.capacity)
+    boxed = several("boxes", boxes, lambda name, box: instance(name, box, Box))
+    for box in boxed:
+        whole("particles", box.particles, 0, filling.capacity)
     modal = ModalMount(structure, [box.place for box in boxed], force_place)
     scenes = modal.group * len(numbered)
     if scenes > MOST_SCENES:
@@ -293,16 +294,6 @@ def _recorded(scenes, options, window, start, progress, saving):
     return common, {**motion, "rms": cycles.rms, "peak": highest}
 
 
-def _checked_boxes(boxes, capacity):
-    """Boxes as a tuple; InputError."""
-    given = (boxes,) if isinstance(boxes, Box) else boxes
-    if not isinstance(given, (list, tuple)) or not given:
-        raise InputError(f"boxes must be a Box or a list of at least one, got {shown(boxes)}")
-    for box in given:
-        whole("particles", instance("boxes", box, Box).particles, 0, capacity)
-    return tuple(given)
-
-
 def _longest_step(filling, structure, dt):
     """Step asked for [s], or that of the filling and of the highest mode; InputError."""
     highest = float(structure.frequencies.max())
@@ -339,13 +330,7 @@ def _table_of_groups(modal, boxes, seeds, window):
 
 def _of_places(name, value, structure):
     """Motion at the beginning, (places,); InputError unless it is a sum of the modes."""
-    places = structure.place_count
-    try:
-        motion = np.broadcast_to(real_numbers(name, value), places)
-    except ValueError:
-        raise InputError(
-            f"{name} must be a finite number or {places}, one for each place, got {shown(value)}"
-        ) from None
+    motion = for_all(name, value, structure.place_count)
     left = motion - structure.shapes @ structure.modal(motion)
     if np.abs(left).max() > _OUTSIDE_MODES * np.abs(motion).max():
         raise InputError(
