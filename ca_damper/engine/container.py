@@ -262,7 +262,16 @@ class ExcitedContainer(SpringContainer):
 
 @ti.data_oriented
 class PrescribedContainer(Container):
-    """Base of containers fixed to the base, whose motion is prescribed, whatever fills them."""
+    """The container fixed to the base, whose motion is prescribed, whatever fills it."""
+
+    def __init__(self, table: SceneFields, excitation: DeviceExcitation):
+        self.table, self.moved_by = table, excitation.base
+        self.elapsed = table.field(ti.i32)
+
+    @ti.func
+    def start(self, s, x, v):
+        """Time zero; x and v are not used."""
+        self.elapsed[s] = 0
 
     @ti.func
     def recoil(self, s):
@@ -274,49 +283,11 @@ class PrescribedContainer(Container):
         """Displacement of the base at the beginning of the step [m]."""
         return self.motion(s).x
 
-
-@ti.data_oriented
-class DrivenContainer(PrescribedContainer):
-    """The container fixed to the base: x = y0 sin(2 pi f t)."""
-
-    def __init__(self, table: SceneFields, clock: Clock):
-        self.table, self.clock = table, clock
-
-    @ti.func
-    def start(self, s, x, v):
-        """Position of the base; x and v are not used."""
-
     @ti.func
     def motion(self, s):
         """Of the base."""
-        omega = 2.0 * ti.math.pi * self.table.frequency[s]
-        y0, circle = self.table.base_amplitude[s], self.clock.circle[s]
-        return Motion(y0 * circle[0], omega * y0 * circle[1], -omega * omega * y0 * circle[0])
-
-    @ti.func
-    def advance(self, s, action):
-        """Nothing to integrate: the clock moves the base."""
-        return 1
-
-
-@ti.data_oriented
-class ShakenContainer(PrescribedContainer):
-    """The container fixed to a base that moves as an Excitation says."""
-
-    def __init__(self, table: SceneFields, excitation: DeviceExcitation):
-        self.table, self.excitation = table, excitation
-        self.elapsed = table.field(ti.i32)
-
-    @ti.func
-    def start(self, s, x, v):
-        """Time zero; x and v are not used."""
-        self.elapsed[s] = 0
-
-    @ti.func
-    def motion(self, s):
-        """Of the base."""
-        at = self.excitation.base.at(s, self.elapsed[s] * self.table.dt[s], 0.0)
-        return Motion(at[0], at[1], at[2])
+        now = self.moved_by.now(s, self.elapsed[s] * self.table.dt[s])
+        return Motion(now[0], now[1], now[2])
 
     @ti.func
     def advance(self, s, action):
@@ -330,7 +301,7 @@ def container_of(
 ) -> Any:
     """Container on a mount under an excitation; is_sine: which is a single sine of the base."""
     if mount == "base":
-        return DrivenContainer(table, clock) if is_sine else ShakenContainer(table, excitation)
+        return PrescribedContainer(table, excitation)
     if mount == "spring" and is_sine:
         return SprungContainer(table, clock)
     return ExcitedContainer(table, excitation, lifts=mount == "floor")

@@ -2,7 +2,8 @@
 
 Bases and forces have ``load(excitation)`` for the numbers of a batch and the ti.func
 ``at(s, start, t)``: value and two derivatives of the displacement of a base [m] or of a force [N]
-at a time t after the beginning of a step, which begins at ``start`` [s].
+at a time t after the beginning of a step, which begins at ``start`` [s]. Bases have ``now(s,
+start)``, the same at the beginning.
 """
 
 from typing import Any
@@ -56,6 +57,11 @@ class DeviceSignal:
         slope = (high[0] - low[0]) / h + h / 6.0 * leaning
         return ti.Vector([value, slope, w * low[1] + u * high[1]])
 
+    @ti.func
+    def now(self, s, start):
+        """Of the spline."""
+        return self.at(s, start, 0.0)
+
 
 @ti.data_oriented
 class SineBase:
@@ -74,6 +80,13 @@ class SineBase:
         sine, cosine = of_small(omega * t)
         phase = added(self.clock.circle[s], ti.Vector([sine, cosine]))
         return y0 * ti.Vector([phase[0], omega * phase[1], -omega * omega * phase[0]])
+
+    @ti.func
+    def now(self, s, start):
+        """The clock's phase."""
+        omega, y0 = 2.0 * ti.math.pi * self.table.frequency[s], self.table.base_amplitude[s]
+        circle = self.clock.circle[s]
+        return ti.Vector([y0 * circle[0], omega * y0 * circle[1], -omega * omega * y0 * circle[0]])
 
 
 @ti.data_oriented
