@@ -26,12 +26,9 @@ from ca_damper.report.progress import BatchProgress
 from ca_damper.report.report import RK45_STAGES, Report
 from ca_damper.scenes.checks import (
     MOST_CYCLES,
-    check_finite_start,
-    check_record_fits,
     check_single_sine,
     check_within,
     checked_excitation,
-    checked_samples,
     for_all,
     starts_of,
 )
@@ -74,9 +71,9 @@ class Batch(LoadedScenes):
     effects : str, default "listed"
         ``"listed"``: effects that the options of the filling ask for. ``"auto"``: effects that an
         estimate shows to be negligible are left out; see ``certificate``.
-    excitation : Signal, sequence of Signal or Excitation, optional
-        Base motion [m], one for all scenes or one for each, or an Excitation. None: the sine of the
-        table. Under a Signal, a cycle is a window of 1 / frequency and base_amplitude is not used.
+    excitation : Signal or Excitation, optional
+        Base motion [m] of all scenes, or an Excitation. None: the sine of the table. Under a
+        Signal, a cycle is a window of 1 / frequency and base_amplitude is not used.
     recorded_samples : int, default 0
         Largest number of samples that a run may record for ``time_series``.
     structure : ModalMount, optional
@@ -127,20 +124,17 @@ class Batch(LoadedScenes):
         if_diverged: str = "nan",
     ):
         self.asked_effects = choice("effects", effects, EFFECTS)
-        self.filling, self.estimates = activated(filling, table, effects)
+        self.count = instance("table", table, SceneTable).count
+        self.filling, self.estimates = activated(check_filling(filling), table, effects)
         runtime.session()
         self.if_diverged = choice("if_diverged", if_diverged, ("nan", "raise"))
-        check_filling(self.filling)
-        self.count = instance("table", table, SceneTable).count
         self.mount, self.modal = checked_mount(mount, structure)
         self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
-        check_record_fits(self.count, self.measured_cycles)
         tolerances = positive("rtol", rtol, zero_allowed=True), positive("atol", atol)
         has_box = None if self.modal is None else self.modal.has_box(self.count)
         self.numbers = self._checked(SceneNumbers(self.filling, table, has_box))
         self.excitation = checked_excitation(excitation, mount)
-        self.recorded_samples = checked_samples(recorded_samples, self.count)
-        self._more_sizes = self.excitation.sizes(self.count)
+        self.recorded_samples = whole("recorded_samples", recorded_samples, 0, MOST_CYCLES)
         self.time_origin = np.zeros(self.count)
         self.periods: Periods | None = None
         self.launches, self.compile_seconds = Launches(self.count), 0.0
@@ -152,8 +146,8 @@ class Batch(LoadedScenes):
     def _take_engine(self, rtol: float, atol: float) -> None:
         """Borrow an engine and write the numbers of the batch to it."""
         counts = self.count, self.measured_cycles, self.recorded_samples
-        kind = self.mount if self.modal is None else self.modal.kind
-        asked = self.filling, kind, self.excitation.kind, counts, self._more_sizes
+        kind = self.mount if self.modal is None else self.modal.structure.mode_count
+        asked = self.filling, kind, self.excitation.kind, counts, self.excitation.sizes
         self._engine = borrow(*asked, owner=self)
         self._tell_compiling("set-up", 1)
         engine = self.engine
@@ -210,7 +204,6 @@ class Batch(LoadedScenes):
         more = for_all("displacement", displacement, self.count)
         initial = self.numbers.initial(start)
         initial += np.column_stack([more, for_all("velocity", velocity, self.count)])
-        check_finite_start(initial)
         warn_outside(self)
         self._tell_compiling("placing", 2)
         coupling.start(np.ascontiguousarray(initial))

@@ -99,7 +99,7 @@ def draw_films(path: str, page: str | None, films: tuple[Film, Film], options: N
     films: of the container with fixed particles, and with those of the filling, which are free.
     """
     # Imported here, so that matplotlib loads only where a picture is drawn.
-    from ca_damper.plot import Box, Hanging, film_hanging
+    from ca_damper.plot.boxes import Box, Hanging, film_hanging
     from ca_damper.plot.containers import show_containers
     from taichi_dem.kit.plot_style import GREY, styles_of
 

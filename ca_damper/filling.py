@@ -7,12 +7,11 @@ batch of a filling with the same ``Structure``. ``fixed_mass.py`` has a complete
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import taichi as ti
 
-from ca_damper.scenes.contracts import check_members, members_of
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
@@ -76,8 +75,6 @@ class Recoil:
 
 #: Places of a scene that an engine has at least.
 LEAST_PLACES = 256
-#: Places for particles in all scenes of a batch: they are counted in 32 bits.
-_MOST_PLACES = 2**25
 
 
 @dataclass(frozen=True)
@@ -97,15 +94,13 @@ class Structure:
     sizes: dict[str, int] = field(default_factory=dict)
 
 
+@runtime_checkable
 class Filling(Protocol):
     """Contract of a filling of the container.
 
-    Options of a user, checked when they are made. A filling may also have a property ``structure``,
-    a Structure. Its device then has a method ``load(filling)`` that takes over all numbers of a
-    filling of the same structure. Without it the filling itself, which must be hashable, is the
-    structure, and other options compile anew. It may have ``order``, that of the error in the step,
-    for the report; choose its effects by itself, as ``activation.py`` describes; and have
-    ``clearance(particles)`` [m] above settled particles, or ``with_clearance(particles,
+    Options of a user, checked when they are made. A filling may also have ``order``, that of the
+    error in the step, for the report; choose its effects by itself, as ``activation.py`` describes;
+    and have ``clearance(particles)`` [m] above settled particles, or ``with_clearance(particles,
     clearance)``, for ``damper_map``; and ``checked_range(driven)``, of ``checked_range.py``, for
     the report and the warning before a run.
     """
@@ -137,6 +132,10 @@ class Filling(Protocol):
     @property
     def step_bound(self) -> tuple[float, str] | None:
         """Longest step that it allows or advises [s], and why; None where any will do."""
+
+    @property
+    def structure(self) -> Structure:
+        """What is compiled; fillings of a class and an equal structure share it."""
 
     def check(self, particles: int, dt: float) -> None:
         """Refuse a number of particles or a step that the filling cannot do.
@@ -190,14 +189,17 @@ class Filling(Protocol):
 class DeviceFilling(Protocol):
     """A filling on the device, for all scenes of a table; data oriented.
 
-    Of its members ``uses`` and ``snapshot`` are Python, the others ti.funcs. ``table.dt`` may
-    change between two steps, when a sweep goes on to its next frequency. It may have two further
-    members for a certificate, in Python: see ``activation.py``.
+    Of its members ``load``, ``uses`` and ``snapshot`` are Python, the others ti.funcs. ``table.dt``
+    may change between two steps, when a sweep goes on to its next frequency. It may have two
+    further members for a certificate, in Python: see ``activation.py``.
 
     One whose blows see how the container gives way takes ``advance`` apart, so that boxes on one
     structure resolve theirs together: ``find_blows(s, step, motion)`` returns Blows, and
     ``carry_out(s, step, motion, recoil)`` with a Recoil returns the Action.
     """
+
+    def load(self, filling: Filling) -> None:
+        """Take over all numbers of a filling of the same structure."""
 
     def reset(self, s: int) -> None:
         """Place the particles of scene s at their start, from its seed."""
@@ -230,44 +232,9 @@ class DeviceFilling(Protocol):
 
 def check_filling(filling: Any) -> Any:
     """Return the filling; InputError unless it has all members of the contract."""
-    members = members_of(Filling)
-    if isinstance(filling, type) or not any(hasattr(filling, name) for name in members):
+    if isinstance(filling, type) or not isinstance(filling, Filling):
         raise InputError(
-            f"filling must be one such as Automaton(), Spheres() or RigidMass(), "
-            f"got {shown(filling)}"
+            "filling must be one such as Automaton(), Spheres() or RigidMass(), with all members "
+            f"of ca_damper.filling.Filling, got {shown(filling)}"
         )
-    check_members("filling", filling, members)
     return filling
-
-
-def check_places(scenes: int, places: int) -> None:
-    """InputError where so many scenes with so many places for particles each cannot be counted."""
-    if scenes * places > _MOST_PLACES:
-        raise InputError(
-            f"scenes x places for particles must be at most {_MOST_PLACES} in one batch, got "
-            f"{scenes} x {places}: run fewer scenes at a time"
-        )
-
-
-def check_device(filling: Any, device: Any) -> Any:
-    """Return the device of a filling; InputError unless it has all members of the contract."""
-    members = members_of(DeviceFilling)
-    if hasattr(filling, "structure"):
-        members = {**members, "load": "Take over the numbers of a filling of the same structure."}
-    check_members("what bind of a filling returns", device, members)
-    return device
-
-
-def structure_of(filling: Any) -> Structure:
-    """Structure of a filling; InputError for one that has none and is not hashable."""
-    if hasattr(filling, "structure"):
-        found: Structure = filling.structure
-        return Structure((type(filling), found.key), found.sizes)
-    try:
-        hash(filling)
-    except TypeError:
-        raise InputError(
-            f"filling must be hashable, as a frozen dataclass is, or have a 'structure', "
-            f"got {shown(filling)}"
-        ) from None
-    return Structure((type(filling), filling))

@@ -17,30 +17,22 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import FloatOrArray
 from taichi_dem.kit.validation import plain_fields, positive, real_numbers
 
-#: Rounding of the square of a natural frequency, of some ten operations.
-ROUNDED = 16.0 * np.finfo(float).eps
+#: Ratio x / y beyond which nothing but rounding bounds the motion.
+UNBOUNDED = 1e13
 
 
-def check_steady(what: str, unheld: Any, frequency: np.ndarray) -> None:
-    """Raise InputError where nothing bounds the motion at one of the frequencies [Hz]."""
-    if np.any(unheld):
-        at = np.broadcast_to(frequency, np.shape(unheld))[unheld].flat[0]
+def check_steady(what: str, ratio: Any, frequency: ArrayLike) -> None:
+    """Raise InputError where nothing bounds the motion at one of the frequencies [Hz].
+
+    ratio: x / y at each of them, of any number of places.
+    """
+    unheld = ~(np.abs(ratio) < UNBOUNDED)
+    if unheld.any():
+        at = np.broadcast_to(frequency, unheld.shape)[unheld][0]
         raise InputError(
             f"{what} without damping has no steady state at its natural frequency, got "
             f"{at:.6g} Hz: give it damping, or take another frequency"
         )
-
-
-def check_modes(matrix: np.ndarray, own: np.ndarray, omega: np.ndarray) -> None:
-    """The same where a matrix of the modes (..., modes, modes) holds against no motion.
-
-    own, omega (..., 1): natural frequencies and those asked for [rad/s].
-    """
-    # Each mode by its own scale, so that only one without damping leaves a small value.
-    scale = 1.0 / np.hypot(own, omega)
-    least = np.linalg.svd(matrix * scale[..., None] * scale[..., None, :], compute_uv=False)
-    unheld = least.min(axis=-1) <= ROUNDED * len(own)
-    check_steady("a structure", unheld, omega[..., 0] / (2.0 * np.pi))
 
 
 @dataclass(frozen=True)
@@ -116,16 +108,16 @@ class Oscillator:
         InputError
             At the natural frequency without damping, where there is no steady state.
         """
-        held, left, unheld = self._forces(frequency, added_mass)
-        check_steady("an oscillator", unheld, np.asarray(frequency, dtype=np.float64))
-        return held / left
+        ratio = self._ratio(frequency, added_mass)
+        check_steady("an oscillator", ratio, frequency)
+        return ratio
 
-    def _forces(self, frequency: ArrayLike, added_mass: FloatOrArray) -> tuple[Any, Any, Any]:
-        """Forces per displacement that hold and that are left over, and where none is left."""
+    def _ratio(self, frequency: ArrayLike, added_mass: FloatOrArray) -> Any:
+        """The same, no finite number where there is no steady state."""
         omega = 2.0 * np.pi * real_numbers("frequency", frequency)
         held = self.stiffness + 1j * omega * self.damping
-        left = held - (self.mass + real_numbers("added_mass", added_mass)) * omega**2
-        return held, left, (self.damping == 0.0) & (np.abs(left) <= ROUNDED * np.abs(held))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return held / (held - (self.mass + real_numbers("added_mass", added_mass)) * omega**2)
 
     def scaled(self, mass: float, base_amplitude: float) -> "Oscillator":
         """Return an oscillator of the same frequency and damping ratio.
@@ -185,14 +177,12 @@ class Oscillator:
         float or ndarray
             RMS displacement [m], infinite at the natural frequency without damping.
         """
-        held, left, unheld = self._forces(frequency, added_mass)
-        if np.any(unheld):
-            gain = np.where(unheld, np.inf, np.abs(held) / np.where(unheld, 1.0, np.abs(left)))
-            return np.multiply(self.base_amplitude, gain) / np.sqrt(2.0)
-        return self.base_amplitude * abs(held / left) / np.sqrt(2.0)
+        gain = abs(self._ratio(frequency, added_mass))
+        gain = np.where(gain < UNBOUNDED, gain, np.inf)[()]
+        return self.base_amplitude * gain / np.sqrt(2.0)
 
     def right_hand_side(self, frequency: float) -> Callable[[float, Any], np.ndarray]:
-        """d(x, v)/dt of the empty container, for ``rk45.solve``.
+        """d(x, v)/dt of the empty container, for ``scipy.integrate.solve_ivp``.
 
         Parameters
         ----------

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ca_damper.oscillator import check_modes
+from ca_damper.oscillator import check_steady
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import (
@@ -87,10 +87,10 @@ class ModalStructure:
             )
         if not 1 <= modes <= places:
             raise InputError(f"shapes must have from 1 to {places} modes, as places, got {modes}")
-        frequencies = _of_modes("frequencies", self.frequencies, modes, SMALLEST)
+        frequencies = _of_each("frequencies", "mode", self.frequencies, modes, SMALLEST)
         damping: Any = self.damping_ratios
         damping = damping if np.iterable(damping) else [damping] * modes
-        damping_ratios = _of_modes("damping_ratios", damping, modes, 0.0)
+        damping_ratios = _of_each("damping_ratios", "mode", damping, modes, 0.0)
         _check_orthonormal(shapes.T @ masses @ shapes)
         for name, value in (
             *(("masses", masses), ("frequencies", frequencies)),
@@ -233,58 +233,27 @@ class ModalStructure:
         InputError
             At the natural frequency of a mode without damping.
         """
-        omega, added = self._asked(frequency, added_masses)
+        omega = 2.0 * np.pi * real_numbers("frequency", frequency)[..., None]
+        added = np.zeros(self.place_count)
+        if added_masses is not None:
+            added = _of_each("added_masses", "place", added_masses, self.place_count, 0.0)
         held = (2.0 * np.pi * self.frequencies) ** 2 + 1j * omega * self._damping
         pull = held * self.participation + omega**2 * (self.shapes.T @ (added * self.residual))
-        return self._moved(omega, added, pull) + self.residual
-
-    def force_transfer(
-        self, frequency: ArrayLike, place: int, added_masses: Any = None
-    ) -> np.ndarray:
-        """Complex displacement of all places per force at one of them.
-
-        Parameters
-        ----------
-        frequency : array_like
-            Frequencies of the force [Hz], any shape.
-        place : int
-            Place of the force.
-        added_masses : array_like, optional
-            Masses fixed to the places [kg], shape (places,).
-
-        Returns
-        -------
-        ndarray
-            Displacement over force [m/N], shape (..., places); refused as by ``transfer``.
-        """
-        omega, added = self._asked(frequency, added_masses)
-        row = self.shapes[whole("place", place, 0, self.place_count - 1)]
-        return self._moved(omega, added, np.broadcast_to(row, (*omega.shape[:-1], len(row))))
+        more = (self.shapes.T * added) @ self.shapes
+        own = (held - omega**2)[..., None] * np.eye(self.mode_count)
+        matrix = own - omega[..., None] ** 2 * more
+        if not self.damping_ratios.all():
+            # Each mode by its own scale, so that only one without damping is out of bounds.
+            scale = 1.0 / np.hypot(2.0 * np.pi * self.frequencies, omega)
+            scaled = matrix * scale[..., None] * scale[..., None, :]
+            check_steady("a structure", np.linalg.cond(scaled), frequency)
+        moved = np.linalg.solve(matrix, pull[..., None])[..., 0] @ self.shapes.T
+        return moved + self.residual
 
     @property
     def _damping(self) -> np.ndarray:
         """2 z w of each mode [1/s]."""
         return 4.0 * np.pi * self.damping_ratios * self.frequencies
-
-    def _asked(self, frequency: Any, added_masses: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Angular frequencies (..., 1) and added masses (places,)."""
-        omega = 2.0 * np.pi * real_numbers("frequency", frequency)[..., None]
-        if added_masses is None:
-            return omega, np.zeros(self.place_count)
-        added = _array("added_masses", added_masses, 1, 0.0)
-        if len(added) != self.place_count:
-            wanted = counted(self.place_count, "number")
-            raise InputError(f"added_masses must be {wanted}, got {shown(added_masses)}")
-        return omega, added
-
-    def _moved(self, omega: np.ndarray, added: np.ndarray, pull: np.ndarray) -> np.ndarray:
-        """Motion phi p under a pull on the modes (..., modes), with masses added to the places."""
-        own = (2.0 * np.pi * self.frequencies) ** 2 - omega**2 + 1j * omega * self._damping
-        more = (self.shapes.T * added) @ self.shapes
-        matrix = own[..., None] * np.eye(self.mode_count) - omega[..., None] ** 2 * more
-        if not self.damping_ratios.all():
-            check_modes(matrix, 2.0 * np.pi * self.frequencies, omega)
-        return np.linalg.solve(matrix, pull[..., None])[..., 0] @ self.shapes.T
 
 
 @dataclass(frozen=True)
@@ -329,12 +298,12 @@ def _array(name: str, value: Any, axes: int, least: float = -LARGEST) -> np.ndar
     return numbers
 
 
-def _of_modes(name: str, value: Any, modes: int, least: float) -> np.ndarray:
-    """Numbers of the modes, (modes,), none below the least; InputError."""
+def _of_each(name: str, owner: str, value: Any, count: int, least: float) -> np.ndarray:
+    """A number of each of so many owners, (count,), none below the least; InputError."""
     numbers = _array(name, value, 1, least)
-    if len(numbers) != modes:
-        wanted = counted(modes, "number")
-        raise InputError(f"{name} must be {wanted}, one for each mode, got {shown(value)}")
+    if len(numbers) != count:
+        wanted = counted(count, "number")
+        raise InputError(f"{name} must be {wanted}, one for each {owner}, got {shown(value)}")
     return numbers
 
 

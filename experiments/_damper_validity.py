@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 import ca_damper as ca
-from ca_damper.plot import Box, FilmMeasures
+from ca_damper.plot.boxes import Box
+from ca_damper.plot.curves import FilmMeasures
 from ca_damper.report.measures import first_harmonic, peak
 
 #: Amplitudes between which the jump of the plug is sought [m].

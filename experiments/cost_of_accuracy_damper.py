@@ -18,11 +18,11 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from ca_damper import Automaton, Batch, Empty, Oscillator, ProgressBar, SceneTable, Spheres
 from ca_damper.accuracy.step_study import StepStudy
-from ca_damper.engine import rk45
-from ca_damper.plot import picture_compared
+from ca_damper.plot.curves import picture_compared
 from ca_damper.report.measures import curve_distance
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import power, seconds, styles_of
@@ -117,9 +117,9 @@ def rk45_in_python(frequency, rtol):
     for f in frequency:
         span, at = (0.0, RK45_CYCLES / f), (RK45_CYCLES - 1 + np.arange(SAMPLES) / SAMPLES) / f
         job = OSCILLATOR.right_hand_side(f), span, OSCILLATOR.steady_state(f)
-        solution = rk45.solve(*job, rtol=rtol, atol=1e-3 * rtol, at=at)
-        x.append(solution.y[:SAMPLES, 0])
-        evaluations += solution.evaluations
+        solution = solve_ivp(*job, rtol=rtol, atol=1e-3 * rtol, t_eval=at)
+        x.append(solution.y[0])
+        evaluations += solution.nfev
     spent = study.Timing.of([time.perf_counter() - started])
     return evaluations, curve_distance(np.std(x, axis=1), OSCILLATOR.rms(frequency)), spent
 

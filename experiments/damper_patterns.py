@@ -20,7 +20,8 @@ import numpy as np
 
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film
 from ca_damper.automaton import ACCOUNTINGS
-from ca_damper.plot import Box, FilmMeasures, animate_films, picture_cycle, picture_film_strips
+from ca_damper.plot.boxes import Box, animate_films, picture_film_strips
+from ca_damper.plot.curves import FilmMeasures, picture_cycle
 from ca_damper.report.progress import Stages
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import styles_of

@@ -26,7 +26,7 @@ import numpy as np
 import pandas as pd
 
 import ca_damper as ca
-from ca_damper.plot import picture_hysteresis, picture_measures, picture_responses
+from ca_damper.plot.curves import picture_hysteresis, picture_measures, picture_responses
 from ca_damper.runs.response import OUTSIDE, Grid
 from taichi_dem.kit import study
 from taichi_dem.kit.study import number, several, whole

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import taichi as ti
 
-from ca_damper.filling import LEAST_PLACES, Motion, structure_of
+from ca_damper.filling import LEAST_PLACES, Motion
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.allocation import values
@@ -26,7 +26,7 @@ class DrivenEngine(Engine):
     def declare(self):
         scenes, traced, *places = self.capacity
         filling = self.structure.filling
-        sizes = dict(zip(structure_of(filling).sizes, places))
+        sizes = dict(zip(filling.structure.sizes, places))
         self.table = SceneFields(scenes, {"traced": traced, **sizes})
         self.device = filling.bind(self.table)
         self.impulse = self.table.field(ti.f64)
@@ -70,7 +70,7 @@ class _Structure:
     """Compares as the structure of a filling, and holds one of them."""
 
     def __init__(self, filling):
-        self.filling, self.key = filling, structure_of(filling).key
+        self.filling, self.key = filling, (type(filling), filling.structure.key)
 
     def __hash__(self):
         return hash(self.key)
@@ -90,7 +90,7 @@ class Driven:
 
     def __init__(self, filling, particles, seed, dt, amplitude, frequency, traced=0):
         table = SceneTable(particles, seed, dt, frequency, amplitude)
-        size = (table.count, traced, *structure_of(filling).sizes.values())
+        size = (table.count, traced, *filling.structure.sizes.values())
         self.filling, self.count, self.done = filling, table.count, 0
         self.engine = _POOL.borrow(_Structure(filling), size, filling, self)
         self.engine.clear()

@@ -19,6 +19,6 @@ def response(particles=(0, 10), ratios=RATIOS, seeds=(1, 2), rms=None, **others)
         rms = np.array(gain)[:, :, None] * oscillator.base_amplitude / np.sqrt(2.0)
         rms = rms * (1.0 + 0.01 * np.arange(len(seeds)))
     measures = {**dict.fromkeys(MEASURE_UNITS, np.zeros_like(rms)), "rms": rms}
-    steps, dt = np.full(len(ratios), 100), np.full(len(ratios), 1e-4)
-    given = Response("rigid", oscillator, particles, ratios, seeds, steps, dt, **measures)
+    steps = np.full(len(ratios), 100)
+    given = Response("rigid", oscillator, particles, ratios, seeds, steps, **measures)
     return dataclasses.replace(given, **others)

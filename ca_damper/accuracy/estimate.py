@@ -265,9 +265,8 @@ class Readings:
         """Response of measures by name, (1, ratios, seeds) each."""
         runs, axis = self.runs, np.array(ratios)
         steps = np.array([runs.steps_per_cycle(ratio, dt) for ratio in ratios])
-        lengths = 1.0 / (axis * runs.oscillator.natural_frequency * steps)
         places = (runs.particles,), axis, seeds
-        return Response(runs.filling.label, runs.oscillator, *places, steps, lengths, **values)
+        return Response(runs.filling.label, runs.oscillator, *places, steps, **values)
 
 
 def _correlated(series):

@@ -8,7 +8,7 @@ import taichi as ti
 from ca_damper.automaton.accounting import QUANTUM
 from ca_damper.automaton.cells import Cells, Placement
 from ca_damper.automaton.conflict_resolution import ConflictResolution
-from ca_damper.automaton.lattice import Geometry, Lattice
+from ca_damper.automaton.lattice import EMPTY, HELD, WALL, Geometry, Lattice
 from ca_damper.engine.random_numbers import stream
 from ca_damper.engine.recorder import EventCounts
 from ca_damper.filling import Action
@@ -59,10 +59,11 @@ class Parameters:
 class LatticeDevice:
     """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``.
 
-    Rules add ``transport`` (with follow, fly_all and move_all) and ``collisions`` (with resolve,
-    recoil and strike_container). velocity: of the container at the beginning of the last step
-    [m/s]. gained: velocity along x that the container gave to the particles in this step [quanta].
-    Both (scenes,).
+    Rules add ``transport`` (with follow, fly_all and move_all), ``collisions`` (with resolve,
+    recoil and strike_container), and ``motion_of(s, kind, travelled, speed)``, which returns places
+    off the centres of cells [m] and velocities [m/s] of particles under way, (cells, 2) each.
+    velocity: of the container at the beginning of the last step [m/s]. gained: velocity along x
+    that the container gave to the particles in this step [quanta]. Both (scenes,).
     """
 
     def __init__(self, table: SceneFields):
@@ -133,6 +134,19 @@ class LatticeDevice:
         found = [(name, *_COUNTED[name]) for name in effects if name in _COUNTED]
         total = self.event_counts.total
         return tuple(EffectUse(name, what, total(kind), steers=True) for name, kind, what in found)
+
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
+        """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""
+        geometry, cells = self.lattice.geometry, self.cells
+        kind, travelled, speed = (
+            self.table.row(field, s)[: geometry.cells]
+            for field in (cells.kind, cells.travelled, cells.speed)
+        )
+        shift, velocity = self.motion_of(s, kind, travelled, speed)
+        velocity[kind == HELD, 1] = self.velocity[s]
+        position = geometry.centres(self.parameters.width[None]) + shift
+        present = (kind != EMPTY) & (kind != WALL)
+        return {"position": position[present], "velocity": velocity[present]}
 
     def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
         """Step in which each counted effect first acted, infinite if never, (scenes,)."""

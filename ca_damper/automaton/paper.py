@@ -50,18 +50,8 @@ class PaperAutomaton(LatticeDevice):
             fastest = max(fastest, self.cells.speed[s, cell])
         return 0 if fastest * self.table.dt[s] < self.parameters.width[None] else 1
 
-    def snapshot(self, s: int) -> dict[str, np.ndarray]:
-        """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""
-        geometry = self.lattice.geometry
-        kind, travelled, speed = (
-            self.table.row(field, s)[: geometry.cells]
-            for field in (self.cells.kind, self.cells.travelled, self.cells.speed)
-        )
-        flying, present = kind < DIRECTIONS, (kind != EMPTY) & (kind != WALL)
+    def motion_of(self, s: int, kind: np.ndarray, travelled: np.ndarray, speed: np.ndarray) -> Any:
+        """Places off the centres of cells, and velocities, along the direction of each particle."""
         way = np.zeros((len(kind), 2))
-        way[flying] = unit_vectors()[kind[flying]]
-        position = geometry.centres(self.parameters.width[None])
-        position = position + way * travelled[:, None]
-        velocity = way * speed[:, None]
-        velocity[kind == HELD, 1] = self.velocity[s]
-        return {"position": position[present], "velocity": velocity[present]}
+        way[kind < DIRECTIONS] = unit_vectors()[kind[kind < DIRECTIONS]]
+        return way * travelled[:, None], way * speed[:, None]

@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.filling import check_filling
 from ca_damper.report.certificate import Certificate, Periods
 from ca_damper.report.measures import Cycles
 from ca_damper.report.steady_state import period
-from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.certificate import Estimate
 from taichi_dem.kit.effect_usage import EffectUse
 
@@ -24,7 +22,7 @@ ALIKE = 1e-3
 
 def activated(filling: Any, table: Any, effects: str) -> tuple[Any, tuple[Estimate, ...]]:
     """The filling with the effects that are asked for, and estimates of those decided on."""
-    if effects == "listed" or not hasattr(check_filling(filling), "activated"):
+    if effects == "listed" or not hasattr(filling, "activated"):
         return filling, ()
     chosen: tuple[Any, tuple[Estimate, ...]] = filling.activated(_most_particles(table))
     return chosen
@@ -58,8 +56,8 @@ def periods_of(cycles: Cycles) -> Periods | None:
 
 
 def _most_particles(table: Any) -> int:
-    """Most particles of a scene; 0 for what is no table, which the batch refuses."""
-    return int(table.column("particles").max()) if isinstance(table, SceneTable) else 0
+    """Most particles of a scene."""
+    return int(table.column("particles").max())
 
 
 def _acting(batch, device):

@@ -1,6 +1,6 @@
 """Motion of the container: on its spring, driven by base and filling, or fixed to the base.
 
-All have ``load`` and ``excite`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``,
+All have ``load`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``,
 ``motion(s)`` at the beginning of a step, with ``base(s)``, the base's displacement [m],
 ``recoil(s)``, the speed that a unit impulse gives it [1/kg], ``renew(s)`` where the base has
 changed its motion, between two frequencies of a sweep, and ``advance(s, action)`` over the step,
@@ -12,8 +12,7 @@ from typing import Any
 import taichi as ti
 
 from ca_damper.engine import rk45
-from ca_damper.engine.signals import BASES, FORCES
-from ca_damper.excitation.excitation import Excitation, ExcitationKind
+from ca_damper.engine.signals import DeviceExcitation
 from ca_damper.filling import Action, Motion
 from ca_damper.oscillator import Forcing, sine_and_cosine, slope, slope_at_phase
 from ca_damper.scenes.clock import Clock
@@ -32,9 +31,6 @@ class Container:
 
     def load(self, gravity: float, rtol: float, atol: float) -> None:
         """Take over the numbers of a batch."""
-
-    def excite(self, excitation: Excitation, scenes: int) -> None:
-        """Take over the excitation of a batch, where it is no single sine of the base."""
 
     @ti.func
     def renew(self, s):
@@ -208,20 +204,14 @@ class ExcitedContainer(SpringContainer):
     touches a base at rest.
     """
 
-    def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind, lifts: bool):
+    def __init__(self, table: SceneFields, excitation: DeviceExcitation, lifts: bool):
         super().__init__(table)
-        self.lifts, self.elapsed = lifts, table.field(ti.i32)
-        self.excited_base, self.force = BASES[kind.base](table, clock), FORCES[kind.force](table)
-
-    def excite(self, excitation: Excitation, scenes: int) -> None:
-        """Take over the excitation of a batch."""
-        self.excited_base.load(excitation, scenes)
-        self.force.load(excitation, scenes)
+        self.excitation, self.lifts, self.elapsed = excitation, lifts, table.field(ti.i32)
 
     @ti.func
     def base(self, s):
         """Displacement of the base at the beginning of the step [m]."""
-        return self.excited_base.at(s, self.elapsed[s] * self.table.dt[s], 0.0)[0]
+        return self.excitation.base.at(s, self.elapsed[s] * self.table.dt[s], 0.0)[0]
 
     @ti.func
     def _begin(self, s):
@@ -252,12 +242,12 @@ class ExcitedContainer(SpringContainer):
     @ti.func
     def _change(self, load, t, y):
         """d(x, v)/dt for y = (x, v): the right-hand side that RK45 integrates."""
-        base = self.excited_base.at(load.scene, load.start, t)
+        base = self.excitation.base.at(load.scene, load.start, t)
         pull = load.stiffness * (base[0] - y[0]) + load.damping * (base[1] - y[1])
         if ti.static(self.lifts):
             # Nothing at a distance, where a dashpot alone would already act.
             pull = ti.select(y[0] < base[0], ti.max(0.0, pull), 0.0)
-        push = self.force.at(load.scene, load.start, t) * load.per_mass
+        push = self.excitation.force.at(load.scene, load.start, t)[0] * load.per_mass
         return ti.Vector([y[1], pull + push + load.constant])
 
     @ti.func
@@ -272,7 +262,16 @@ class ExcitedContainer(SpringContainer):
 
 @ti.data_oriented
 class PrescribedContainer(Container):
-    """Base of containers fixed to the base, whose motion is prescribed, whatever fills them."""
+    """The container fixed to the base, whose motion is prescribed, whatever fills it."""
+
+    def __init__(self, table: SceneFields, excitation: DeviceExcitation):
+        self.table, self.moved_by = table, excitation.base
+        self.elapsed = table.field(ti.i32)
+
+    @ti.func
+    def start(self, s, x, v):
+        """Time zero; x and v are not used."""
+        self.elapsed[s] = 0
 
     @ti.func
     def recoil(self, s):
@@ -284,53 +283,11 @@ class PrescribedContainer(Container):
         """Displacement of the base at the beginning of the step [m]."""
         return self.motion(s).x
 
-
-@ti.data_oriented
-class DrivenContainer(PrescribedContainer):
-    """The container fixed to the base: x = y0 sin(2 pi f t)."""
-
-    def __init__(self, table: SceneFields, clock: Clock):
-        self.table, self.clock = table, clock
-
-    @ti.func
-    def start(self, s, x, v):
-        """Position of the base; x and v are not used."""
-
     @ti.func
     def motion(self, s):
         """Of the base."""
-        omega = 2.0 * ti.math.pi * self.table.frequency[s]
-        y0, circle = self.table.base_amplitude[s], self.clock.circle[s]
-        return Motion(y0 * circle[0], omega * y0 * circle[1], -omega * omega * y0 * circle[0])
-
-    @ti.func
-    def advance(self, s, action):
-        """Nothing to integrate: the clock moves the base."""
-        return 1
-
-
-@ti.data_oriented
-class ShakenContainer(PrescribedContainer):
-    """The container fixed to a base that moves as an Excitation says."""
-
-    def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind):
-        self.table, self.excited_base = table, BASES[kind.base](table, clock)
-        self.elapsed = table.field(ti.i32)
-
-    def excite(self, excitation: Excitation, scenes: int) -> None:
-        """Take over the base motions of a batch."""
-        self.excited_base.load(excitation, scenes)
-
-    @ti.func
-    def start(self, s, x, v):
-        """Time zero; x and v are not used."""
-        self.elapsed[s] = 0
-
-    @ti.func
-    def motion(self, s):
-        """Of the base."""
-        at = self.excited_base.at(s, self.elapsed[s] * self.table.dt[s], 0.0)
-        return Motion(at[0], at[1], at[2])
+        now = self.moved_by.now(s, self.elapsed[s] * self.table.dt[s])
+        return Motion(now[0], now[1], now[2])
 
     @ti.func
     def advance(self, s, action):
@@ -339,11 +296,12 @@ class ShakenContainer(PrescribedContainer):
         return 1
 
 
-def container_of(mount: str, table: SceneFields, clock: Clock, kind: ExcitationKind) -> Any:
-    """Container on a mount under an excitation of some kind."""
-    single = kind == ExcitationKind()
+def container_of(
+    mount: str, table: SceneFields, clock: Clock, excitation: DeviceExcitation, is_sine: bool
+) -> Any:
+    """Container on a mount under an excitation; is_sine: which is a single sine of the base."""
     if mount == "base":
-        return DrivenContainer(table, clock) if single else ShakenContainer(table, clock, kind)
-    if mount == "spring" and single:
+        return PrescribedContainer(table, excitation)
+    if mount == "spring" and is_sine:
         return SprungContainer(table, clock)
-    return ExcitedContainer(table, clock, kind, lifts=mount == "floor")
+    return ExcitedContainer(table, excitation, lifts=mount == "floor")

@@ -8,27 +8,30 @@ from ca_damper.engine.container import container_of
 from ca_damper.engine.coupling import Coupling, MomentumAccount
 from ca_damper.engine.group_coupling import GroupCoupling
 from ca_damper.engine.modal_container import ModalContainer
-from ca_damper.engine.modal_mount import ModalKind
 from ca_damper.engine.recorder import ROOM, Recorder
+from ca_damper.engine.signals import DeviceExcitation
 from ca_damper.excitation.excitation import Excitation, ExcitationKind
-from ca_damper.filling import LEAST_PLACES, check_device, check_places, structure_of
+from ca_damper.filling import LEAST_PLACES
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.gravity import gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.engine_pool import Engine, EnginePool
+from taichi_dem.kit.errors import InputError
 
 #: Least room for scenes, measured cycles, samples, and places of a scene: below, nothing is saved.
 _LEAST = (64, 32, ROOM, *(LEAST_PLACES,) * 32)
+#: Places in all scenes of a batch: twelve numbers of each are half of what Taichi can index.
+_MOST = 2**23
 
 
 @dataclass(frozen=True)
 class EngineStructure:
     """Compiled structure of a batch: key of its filling's structure, mount, names of sizes.
 
-    mount: its word, or a ModalKind. excitation: kind of it. filling: one of that structure, which
-    declares the fields.
+    mount: its word, or the number of modes. excitation: kind of it. filling: one of that structure,
+    which declares the fields.
     """
 
     key: Hashable
@@ -57,14 +60,15 @@ class DamperEngine(Engine):
         self.account, self.recorder = MomentumAccount(self.table), Recorder(self.table)
         mount: Any = self.structure.mount
         kind = self.structure.excitation
+        self.excitation = DeviceExcitation(self.table, self.clock, kind)
         coupling: type[Coupling] | type[GroupCoupling] = Coupling
-        if isinstance(mount, ModalKind):
-            self.container = ModalContainer(self.table, self.clock, kind, mount.modes)
+        if isinstance(mount, int):
+            self.container = ModalContainer(self.table, self.excitation, mount)
             coupling = GroupCoupling
         else:
-            self.container = container_of(mount, self.table, self.clock, kind)
-        filling = self.structure.filling
-        self.device = check_device(filling, filling.bind(self.table))
+            is_sine = kind == ExcitationKind()
+            self.container = container_of(mount, self.table, self.clock, self.excitation, is_sine)
+        self.device = self.structure.filling.bind(self.table)
         parts = self.container, self.device, self.account, self.recorder
         self.coupling = coupling(self.table, self.clock, *parts)
         self.is_compiled = False
@@ -76,11 +80,10 @@ class DamperEngine(Engine):
         self.table.load(table)
         gravity = gravity_along(filling)
         self.container.load(gravity, rtol, atol)
-        self.container.excite(excitation, table.count)
+        self.excitation.load(excitation)
         assign(self.coupling.gravity, gravity)
         assign(self.account.weight, filling.particle_mass * gravity)
-        if hasattr(filling, "structure"):
-            self.device.load(filling)
+        self.device.load(filling)
 
 
 _POOL = EnginePool(DamperEngine, _LEAST)
@@ -96,13 +99,19 @@ def borrow(
 ) -> DamperEngine:
     """An engine in which so many scenes of a filling find room, for an owner; or InputError.
 
-    mount: its word, or a ModalKind. counts: scenes, measured cycles and samples. more: sizes by
-    name beside those of the filling.
+    mount: its word, or the number of modes. counts: scenes, measured cycles and samples. more:
+    sizes by name beside those of the filling.
     """
-    structure = structure_of(filling)
-    check_places(counts[0], max((1, *tuple(structure.sizes.values())[:1])))
+    structure = filling.structure
+    scenes, *others = counts
+    most = max(*others, *tuple(structure.sizes.values())[:1])
+    if scenes * most > _MOST:
+        raise InputError(
+            f"scenes x particles, cycles or samples must be at most {_MOST} in one batch, got "
+            f"{scenes} x {most}: run fewer scenes at a time, or measure fewer cycles"
+        )
     sizes = {**structure.sizes, **more}
-    asked = EngineStructure(structure.key, mount, kind, tuple(sizes), filling)
+    asked = EngineStructure((type(filling), structure.key), mount, kind, tuple(sizes), filling)
     capacity = (*counts, *sizes.values())
     engine: DamperEngine = _POOL.borrow(asked, capacity, filling, owner)
     return engine

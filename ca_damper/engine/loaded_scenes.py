@@ -13,7 +13,8 @@ from ca_damper.engine.coupling import LOST
 from ca_damper.engine.damper_engine import DamperEngine
 from ca_damper.engine.modal_mount import ModalMount
 from ca_damper.errors import SimulationDiverged
-from ca_damper.filling import Filling, structure_of
+from ca_damper.excitation.excitation import Excitation
+from ca_damper.filling import Filling
 from ca_damper.report import measures
 from ca_damper.scenes.scene_fields import SceneMemory
 from ca_damper.scenes.scene_numbers import SceneNumbers
@@ -42,9 +43,9 @@ class LoadedScenes:
     measured_cycles: int
     recorded_samples: int
     numbers: SceneNumbers
+    excitation: Excitation
     time_origin: np.ndarray
     _engine: DamperEngine
-    _more_sizes: dict[str, int]
     _started: bool = False
     _told: int = 0
     _recording: tuple[int, int, int] | None = None
@@ -84,7 +85,7 @@ class LoadedScenes:
     def memory(self) -> SceneMemory:
         """State of the batch on the device, as arrays."""
         sizes = {"cycles": max(1, self.measured_cycles), "samples": self.recorded_samples}
-        places = {**structure_of(self.filling).sizes, **self._more_sizes}
+        places = {**self.filling.structure.sizes, **self.excitation.sizes}
         return SceneMemory(self.engine, {**sizes, **places})
 
     @property

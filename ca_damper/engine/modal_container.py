@@ -11,10 +11,8 @@ import taichi as ti
 from ca_damper.engine import rk45
 from ca_damper.engine.container import MOST_ATTEMPTS, IntegratedContainer
 from ca_damper.engine.modal_mount import ModalMount
-from ca_damper.engine.signals import BASES, FORCES
-from ca_damper.excitation.excitation import Excitation, ExcitationKind
+from ca_damper.engine.signals import DeviceExcitation
 from ca_damper.filling import Action, Motion, Recoil
-from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
 
@@ -35,10 +33,9 @@ class ModalContainer(IntegratedContainer):
     of the blows of a step: struck, rubbed [kg] of ``Blows``, speed_gain [m/s] and shared by all.
     """
 
-    def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind, modes: int):
+    def __init__(self, table: SceneFields, excitation: DeviceExcitation, modes: int):
         super().__init__(table)
-        self.modes = modes
-        self.excited_base, self.force = BASES[kind.base](table, clock), FORCES[kind.force](table)
+        self.excitation, self.modes = excitation, modes
         for name in ("mass", "stiffness", "damping", "share", "pushed"):
             setattr(self, name, ti.field(ti.f64, shape=modes))
         self.group, self.boxes = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
@@ -51,11 +48,6 @@ class ModalContainer(IntegratedContainer):
         self.home = table.field(ti.i32)
         self.struck, self.rubbed = table.field(ti.f64), table.field(ti.f64)
         self.speed_gain, self.shared = table.field(ti.f64), table.field(ti.f64)
-
-    def excite(self, excitation: Excitation, scenes: int) -> None:
-        """Take over the excitation of a batch."""
-        self.excited_base.load(excitation, scenes)
-        self.force.load(excitation, scenes)
 
     def hang(self, mount: ModalMount) -> None:
         """Take over the structure of a batch and the places of its boxes."""
@@ -108,7 +100,7 @@ class ModalContainer(IntegratedContainer):
     @ti.func
     def base(self, s):
         """Displacement of the base at the beginning of the step [m]."""
-        return self.excited_base.at(s, self._time(self.first(s)), 0.0)[0]
+        return self.excitation.base.at(s, self._time(self.first(s)), 0.0)[0]
 
     @ti.func
     def motion(self, s):
@@ -212,8 +204,8 @@ class ModalContainer(IntegratedContainer):
         for k in ti.static(range(2 * self.modes)):
             self.tried[first, k] = y[k]
         start = self._time(first)
-        base = self.excited_base.at(first, start, t)
-        push = self.force.at(first, start, t)
+        base = self.excitation.base.at(first, start, t)
+        push = self.excitation.force.at(first, start, t)[0]
         for k in range(self.modes):
             spring = self.stiffness[k] * (self.share[k] * base[0] - self.tried[first, k])
             speed = self.share[k] * base[1] - self.tried[first, self.modes + k]
@@ -298,7 +290,7 @@ class ModalContainer(IntegratedContainer):
     @ti.func
     def _see(self, first, t):
         """Motion of all places at t in the step; its impacts are left out of the acceleration."""
-        base = self.excited_base.at(first, self._time(first), t)
+        base = self.excitation.base.at(first, self._time(first), t)
         self._strike(first)
         for k in ti.static(range(self.modes)):
             self.gain[first, k] = self.slope[first][self.modes + k] - self.gain[first, k]

@@ -5,7 +5,7 @@ that the motion of every place is measured and recorded.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,12 +19,6 @@ MOUNTS = ("spring", "base", "floor")
 #: Modes that a kernel integrates at most: its compile time grows with their number.
 MOST_MODES = 16
 _SHARED = ("frequency", "base_amplitude", "dt")
-
-
-class ModalKind(NamedTuple):
-    """Compiled structure of a ModalMount: number of modes."""
-
-    modes: int
 
 
 class ModalMount:
@@ -53,11 +47,6 @@ class ModalMount:
             force_place = whole("force_place", force_place, 0, last)
         self.force_place = force_place
         self.sizes = np.abs(structure.shapes).max(axis=0)
-
-    @property
-    def kind(self) -> ModalKind:
-        """What of it is compiled."""
-        return ModalKind(self.structure.mode_count)
 
     @property
     def group(self) -> int:

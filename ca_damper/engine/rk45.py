@@ -1,6 +1,6 @@
 """Dormand-Prince 5(4) for any right-hand side, in Python and inside kernels alike.
 
-Every function here but ``solve`` is a ``ti.pyfunc``: called from a kernel it is compiled into it,
+Every function here is a ``ti.pyfunc``: called from a kernel it is compiled into it,
 called from Python it runs as it stands, on NumPy vectors. So the formulas are written once. ``rhs``
 is called as ``rhs(context, t, y)`` and returns dy/dt; in a kernel it is a ti.func or a bound method
 of a data-oriented object, ``context`` whatever it needs (a scene number, a struct), and ``y`` a
@@ -10,18 +10,10 @@ Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; step sizes af
 and Wanner, Solving Ordinary Differential Equations I, section II.4.
 """
 
-from collections.abc import Callable
-from typing import NamedTuple
-
-import numpy as np
 import taichi as ti
-from numpy.typing import ArrayLike
 
 from taichi_dem.kit.elementary import fifth_root
-from taichi_dem.kit.errors import InputError
 
-#: Attempts after which an integration counts as stuck, unless the caller says otherwise.
-MOST_ATTEMPTS = 1_000_000
 #: Steps below this share of the time itself no longer move the clock.
 _SMALLEST_SHARE = 1e-15
 
@@ -83,22 +75,6 @@ def growth(error):
 
 
 @ti.pyfunc
-def first_step(rhs: ti.template(), context, t, y, slope, rtol, atol):
-    """Length of a first step (algorithm of Hairer et al.); one evaluation."""
-    size = scaled_norm(y, y, y, rtol, atol)
-    speed = scaled_norm(slope, y, y, rtol, atol)
-    h = 1e-6
-    if min(size, speed) > 1e-5:
-        h = 0.01 * size / speed
-    bend = rhs(context, t + h, y + h * slope) - slope
-    steepest = max(speed, scaled_norm(bend, y, y, rtol, atol) / h)
-    guess = max(1e-6, 1e-3 * h)
-    if steepest > 1e-15:
-        guess = fifth_root(0.01 / steepest)
-    return min(100.0 * h, guess)
-
-
-@ti.pyfunc
 def attempt(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol):
     """Try a step of length h, or the rest up to t_end.
 
@@ -146,56 +122,3 @@ def integrate(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol, mo
 def stuck(t, t_end, h, attempts, most_attempts):
     """Whether to give up: too many attempts, or a step that no longer moves the clock."""
     return (attempts >= most_attempts) | (h <= _SMALLEST_SHARE * max(abs(t), abs(t_end)))
-
-
-class Solution(NamedTuple):
-    """States y (n, k) at times t (n,), and evaluations of the right-hand side."""
-
-    t: np.ndarray
-    y: np.ndarray
-    evaluations: int
-
-
-def solve(
-    rhs: Callable[[float, np.ndarray], ArrayLike],
-    span: tuple[float, float],
-    y0: ArrayLike,
-    *,
-    rtol: float = 1e-6,
-    atol: float = 1e-9,
-    at: ArrayLike | None = None,
-) -> Solution:
-    """Solve dy/dt = rhs(t, y) from y(span[0]) = y0 to span[1] in Python, as kernels do.
-
-    rtol, atol: local error allowed, |error| <= atol + rtol |y| in the Euclidean mean. at: ascending
-    times in the span at which y is wanted; the steps land on them. All accepted steps are given if
-    None. Raises InputError where the end is not reached in MOST_ATTEMPTS.
-    """
-    t, t_end = map(float, span)
-    y, wanted = (
-        np.atleast_1d(np.asarray(y0, dtype=np.float64)),
-        np.atleast_1d([] if at is None else at),
-    )
-
-    def derivative(_, time, state):
-        """The user's right-hand side, in the shape that the stages call."""
-        return np.asarray(rhs(time, state), dtype=np.float64)
-
-    slope = derivative(None, t, y)
-    h = first_step(derivative, None, t, y, slope, rtol, atol)
-    times, states, attempts = [t], [y], 0
-    for stop in (*wanted[(wanted > t) & (wanted < t_end)], t_end):
-        while t < stop:
-            t, y, slope, size, error = attempt(derivative, None, t, stop, y, slope, h, rtol, atol)
-            attempts += 1
-            if error <= 1.0:
-                times.append(t)
-                states.append(y)
-            # A step cut short by the stop shortens no later one.
-            h = max(h if size < h and error <= 1.0 else 0.0, size * growth(error))
-            if t < stop and stuck(t, stop, h, attempts, MOST_ATTEMPTS):
-                raise InputError(f"rhs must be smooth up to t = {stop:g}, got stuck at t = {t:.6g}")
-    found = Solution(np.array(times), np.array(states), 6 * attempts + 2)
-    if at is None:
-        return found
-    return found._replace(t=wanted, y=found.y[np.searchsorted(found.t, wanted)])

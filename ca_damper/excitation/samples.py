@@ -6,21 +6,18 @@ sinc^4(f) 3 / (2 + cos(2 pi f)), f by the sampling rate, is then within 1.5 % of
 the sampling rate.
 """
 
-import csv
-import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ca_damper.excitation.signal import LEAST_NODES, Signal, end_slope, integral, spline
+from ca_damper.excitation.signal import Signal, end_slope, integral, nodes, spline
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import (
     FileName,
     choice,
     flag,
     path_name,
-    real_numbers,
     shown,
     told_apart,
 )
@@ -73,7 +70,7 @@ def from_samples(
     """
     choice("of", of, OF)
     flag("correct_baseline", correct_baseline)
-    times, samples = _column("time_s", time_s), _column("values", values)
+    times, samples = nodes("time_s", time_s), nodes("values", values)
     if len(times) != len(samples):
         raise InputError(f"values must be {len(times)}, as many as times, got {len(samples)}")
     step, evened = _even_step(times)
@@ -88,39 +85,20 @@ def from_samples(
     return replace(made, treated="; ".join(filter(None, (evened, treated))))
 
 
-def _column(name, values):
-    column = real_numbers(name, values)
-    if column.ndim != 1 or len(column) < LEAST_NODES:
-        raise InputError(
-            f"{name} must be at least {LEAST_NODES} finite numbers, got {shown(values)}"
-        )
-    return column
-
-
 def _even_step(times):
     """Step of evenly spaced times, and by how much they were evened, in words.
 
-    InputError that names the first one that is not even.
+    InputError that names the one that is least even.
     """
-    steps = np.diff(times)
-    usual = float(np.median(steps))
-    if (steps <= 0.0).any():
-        k = int(np.flatnonzero(steps <= 0.0)[0]) + 1
-        late, early = told_apart(times[k], times[k - 1], 6)
-        raise InputError(f"times must ascend, got {late} s after {early} s in sample {k + 1}")
-    if (steps > 1.5 * usual).any():
-        k = int(np.flatnonzero(steps > 1.5 * usual)[0]) + 1
-        raise InputError(
-            f"times must have no gaps in steps of {usual:g} s, got {times[k]:g} s after "
-            f"{times[k - 1]:g} s in sample {k + 1}: fill it, or read one part at a time"
-        )
-    step = float(times[-1] - times[0]) / (len(times) - 1)
+    steps, step = np.diff(times), float(times[-1] - times[0]) / (len(times) - 1)
     late = np.abs(times - times[0] - step * np.arange(len(times)))
-    if late.max() > _UNEVEN * step:
-        k = int(np.argmax(late))
+    if not late.max() <= _UNEVEN * step:
+        usual = float(np.median(steps))
+        k = int(np.abs(steps - usual).argmax()) + 1
         raise InputError(
-            f"times must be even to {_UNEVEN:g} of their step of {step:g} s, got {times[k]:g} s in "
-            f"sample {k + 1}, {late[k]:.3g} s off"
+            f"times must ascend evenly, to {_UNEVEN:g} of their step of {usual:g} s, got "
+            f"{times[k]:.9g} s after {times[k - 1]:.9g} s in sample {k + 1}: fill the gap, or read "
+            "one part at a time"
         )
     is_even = late.max() <= _ROUNDED * max(step, abs(times[0]), abs(times[-1]))
     return step, "" if is_even else f"times evened by up to {late.max():.2g} s"
@@ -209,15 +187,11 @@ def from_csv(
     """
     name = path_name("path", path)
     flag("correct_baseline", correct_baseline)
-    rows = _rows(name)
-    head = [cell.strip() for cell in rows[0][1]] if rows else []
-    wanted = _wanted(name, head, column)
-    times = [one for one in TIMES if one in head]
-    if len(times) != 1:
-        raise InputError(f"{name} must have one column of {' or '.join(TIMES)}, got {shown(head)}")
-    time_s = TIMES[times[0]] * _numbers(name, rows, head, times[0])
+    table = _table(name)
+    wanted, times = _wanted(name, table, COLUMNS, column), _wanted(name, table, TIMES)
+    time_s = TIMES[times] * _numbers(name, table, times)
     of, unit = COLUMNS[wanted]
-    samples = unit * _numbers(name, rows, head, wanted)
+    samples = unit * _numbers(name, table, wanted)
     try:
         made = from_samples(time_s, samples, of=of, correct_baseline=correct_baseline)
     except InputError as error:
@@ -225,45 +199,43 @@ def from_csv(
     return replace(made, label=f"{wanted} of {name}")
 
 
-def _rows(name):
-    """(number of the line, cells) of each line with something in it."""
+def _table(name):
+    """Columns of a file as a DataFrame, by their names."""
+    import pandas
+
+    layout = {"comment": "#", "index_col": False, "dtype": str}
     try:
-        with open(name, newline="", encoding="utf-8-sig") as file:
-            lines = enumerate(csv.reader(file), start=1)
-            return [(k, row) for k, row in lines if any(map(str.strip, row)) and row[0][:1] != "#"]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        found = pandas.read_csv(name, encoding="utf-8-sig", **layout)
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{name} must be a CSV file that can be read: {reason}") from None
+    return found.rename(columns=str.strip)
 
 
-def _wanted(name, head, column):
-    there = [one for one in head if one in COLUMNS]
+def _wanted(name, table, known, column=None):
+    """The one of the columns known that a file has, or that is asked for; InputError."""
     if column is not None:
-        if choice("column", column, COLUMNS) not in there:
-            raise InputError(f"{name} must have the column {column}, got {shown(head)}")
-        return column
-    if not there:
-        raise InputError(f"{name} must have a column of {', '.join(COLUMNS)}, got {shown(head)}")
-    if len(there) > 1:
+        choice("column", column, known)
+    there = [one for one in table.columns if one in known and column in (None, one)]
+    if len(there) != 1:
         raise InputError(
-            f"column must say which of {', '.join(there)} of {name} is meant, got None"
+            f"column must say which of {', '.join(known)} is meant where {name} has not one of "
+            f"them, got {shown(column)} and {shown(list(table.columns))}"
         )
     return there[0]
 
 
-def _numbers(name, rows, head, column):
-    """Numbers of a column; InputError that names the line of the first cell that holds none."""
-    place = head.index(column)
-    found = np.empty(len(rows) - 1)
-    for k, (line, cells) in enumerate(rows[1:]):
-        cell = cells[place].strip() if place < len(cells) else ""
-        try:
-            found[k] = float(cell)
-        except ValueError:
-            found[k] = math.nan
-        if not math.isfinite(found[k]):
-            raise InputError(
-                f"{name} must hold a finite number in column {column} of line {line}, "
-                f"got {shown(cell)}"
-            )
+def _numbers(name, table, column):
+    """Numbers of a column; InputError that names the row of the first cell that holds none."""
+    cells = table[column].to_numpy(object)
+    try:
+        found = cells.astype(np.float64)
+    except ValueError as error:
+        raise InputError(f"{name} must hold numbers in column {column}: {error}") from None
+    bad = np.flatnonzero(~np.isfinite(found))
+    if len(bad):
+        raise InputError(
+            f"{name} must hold a finite number in column {column} of row {bad[0] + 1}, "
+            f"got {shown(cells[bad[0]])}"
+        )
     return found

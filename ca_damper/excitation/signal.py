@@ -14,6 +14,7 @@ continuity (de Boor, A Practical Guide to Splines, chapter IV, with the conditio
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
@@ -72,7 +73,7 @@ class Signal:
         object.__setattr__(self, "step", positive("step", self.step))
         instance("label", self.label, str)
         for name in ("value", "bend"):
-            object.__setattr__(self, name, _nodes(name, getattr(self, name)))
+            object.__setattr__(self, name, nodes(name, getattr(self, name)))
         if len(self.value) != len(self.bend):
             raise InputError(
                 f"bend must have as many nodes as value, {len(self.value)}, got {len(self.bend)}"
@@ -163,7 +164,7 @@ def spline(step: float, value: np.ndarray, label: str) -> Signal:
     m[k-1] + 4 m[k] + m[k+1] = 6 (y[k-1] - 2 y[k] + y[k+1]) / h^2 = r[k] inside. "Not a knot" makes
     the third derivative continuous at the first and last inner node, where this leaves 6 m = r.
     """
-    value = _nodes("value", value)
+    value = nodes("value", value)
     right = (6.0 * (value[:-2] - 2.0 * value[1:-1] + value[2:]) / step**2).tolist()
     bend = np.empty(len(value))
     bend[1:-1] = _inner(right)
@@ -173,7 +174,7 @@ def spline(step: float, value: np.ndarray, label: str) -> Signal:
 
 def integral(step: float, bend: np.ndarray, label: str) -> Signal:
     """Signal that begins at rest in zero, from its second derivative at the nodes: exact."""
-    bend = _nodes("bend", bend)
+    bend = nodes("bend", bend)
     first, second = bend[:-1], bend[1:]
     slope = np.concatenate([[0.0], np.cumsum(0.5 * step * (first + second))])
     more = step * slope[:-1] + step**2 / 6.0 * (2.0 * first + second)
@@ -204,12 +205,12 @@ def _inner(right):
     return [first, *sums, last]
 
 
-def _nodes(name, values):
+def nodes(name: str, values: ArrayLike) -> np.ndarray:
     """A copy of finite numbers (nodes,) that refuses to be written."""
-    nodes = real_numbers(name, values)
-    if nodes.ndim != 1 or not LEAST_NODES <= len(nodes) <= MOST_NODES:
+    found = real_numbers(name, values)
+    if found.ndim != 1 or not LEAST_NODES <= len(found) <= MOST_NODES:
         raise InputError(
             f"{name} must be from {LEAST_NODES} to {MOST_NODES} numbers, got {shown(values)}"
         )
-    nodes.flags.writeable = False
-    return nodes
+    found.flags.writeable = False
+    return found

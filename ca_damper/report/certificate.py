@@ -67,7 +67,7 @@ class Certificate(BaseCertificate):
     @property
     def remedy(self) -> str:
         """What makes all contact tests."""
-        return "run it with search='cells', which skips no contact test"
+        return "run it with search='all_pairs', which skips no contact test"
 
     def left_out_lines(self) -> list[str]:
         """What was left out, and what is periodic, in lines."""

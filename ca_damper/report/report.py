@@ -8,14 +8,11 @@ from ca_damper.report.certificate import Certificate
 from ca_damper.report.checked_range import CheckedRange
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.effect_usage import Advice, EffectUse
-from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_text
-from taichi_dem.kit.validation import FileName, fraction
+from taichi_dem.kit.validation import FileName, fraction, instance
 
 #: Evaluations of the right-hand side in an attempt of RK45; the first slope is the last one's.
 RK45_STAGES = 6
-# Signals that a table describes.
-_MOST_TOLD = 4
 
 
 @dataclass(frozen=True)
@@ -166,11 +163,6 @@ class Report:
         words = f"{len(self.diverged):,} of them; nan for these and all on one structure with them"
         return ("diverged", words), ("", self.diverged[0])
 
-    def _further_excitations(self):
-        """Number of the signals that a table has no room for."""
-        more = len(self.excitation) - _MOST_TOLD
-        return (("", f"and {more} more, listed in report.excitation"),) if more > 0 else ()
-
     def _bound_row(self):
         """Bound of the step, and the step relative to it."""
         if self.step_bound is None:
@@ -183,8 +175,7 @@ class Report:
         step, *others = self.known_error.split("; ")
         rows = [
             ("method", f"{self.method}, container on the {self.mount}"),
-            *(("excitation", words) for words in self.excitation[:_MOST_TOLD]),
-            *self._further_excitations(),
+            *(("excitation", words) for words in self.excitation),
             ("effects", ", ".join(self.effects) or "none"),
             *(("", f"{use.effect}: {use}") for use in self.effect_activity),
             *(("", line) for line in self._certified()),
@@ -242,8 +233,5 @@ def needed_effects(result: object, tolerance: float = 1e-3) -> Advice:
     --------
     >>> print(needed_effects(response))  # doctest: +SKIP
     """
-    report = getattr(result, "report", result)
-    if not isinstance(report, Report):
-        kind = type(result).__name__
-        raise InputError(f"result must be a Response or the Report of a Batch, got {kind}")
+    report: Report = instance("result", getattr(result, "report", result), Report)
     return Advice(report.effect_activity, (), fraction("tolerance", tolerance))

@@ -17,7 +17,7 @@ from ca_damper.report.measures import MEASURE_UNITS
 from ca_damper.report.progress import Stages
 from ca_damper.report.report import Report
 from ca_damper.report.steady_state import ROUNDING, half_width
-from ca_damper.runs.response import Grid, Response
+from ca_damper.runs.response import Grid, Response, stacked
 from ca_damper.scenes.checks import check_run
 from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.checkpoint import Checkpoint
@@ -102,10 +102,7 @@ class Sweep:
         xarray.Dataset
             Units in the attributes of each variable.
         """
-        import xarray
-
-        axis = xarray.Variable("direction", ["up", "down"])
-        return xarray.concat([self.up.to_xarray(), self.down.to_xarray()], axis)
+        return stacked((self.up, self.down), "direction", ["up", "down"])
 
     @property
     def plot(self) -> Any:

@@ -62,9 +62,6 @@ class Response(Result):
         Seeds.
     steps_per_cycle : ndarray
         Steps in a cycle at each ratio, shape (ratios,).
-    dt : ndarray
-        Step at each ratio [s], shape (ratios,): the one asked for, shortened so that whole steps
-        make a cycle.
     rms : ndarray
         RMS of the displacement about its mean in each cycle [m].
     amplitude : ndarray
@@ -95,7 +92,6 @@ class Response(Result):
     ratios: np.ndarray
     seeds: tuple
     steps_per_cycle: np.ndarray
-    dt: np.ndarray
     rms: np.ndarray
     amplitude: np.ndarray
     mean: np.ndarray
@@ -164,6 +160,11 @@ class Response(Result):
         found = np.array([peak(self.ratios, curve) for curve in curves])
         shape = (len(self.particles), len(self.seeds))
         return found[:, 0].reshape(shape), found[:, 1].reshape(shape)
+
+    @property
+    def dt(self) -> np.ndarray:
+        """Step at each ratio [s]: the one asked for, shortened to make whole steps a cycle."""
+        return 1.0 / (self.ratios * self.oscillator.natural_frequency * self.steps_per_cycle)
 
     @property
     def units(self) -> dict[str, str]:
@@ -282,10 +283,7 @@ class AmplitudeResponse(Tabulated):
         xarray.Dataset
             Units in the attributes of each variable.
         """
-        import xarray
-
-        axis = xarray.Variable("base_amplitude", list(self.amplitudes), {"units": "m"})
-        return xarray.concat([one.to_xarray() for one in self.responses], axis)
+        return stacked(self.responses, "base_amplitude", list(self.amplitudes), units="m")
 
 
 def frequency_response(
@@ -464,9 +462,8 @@ class Grid:
 
     def response(self, steps: np.ndarray, values: Mapping[str, Any]) -> Response:
         """Response of measures by name, each of our shape; steps: a cycle, (ratios,)."""
-        dt = 1.0 / (self.ratios * self.oscillator.natural_frequency * steps)
         axes = (self.particles, self.ratios, self.seeds)
-        return Response(self.filling.label, self.oscillator, *axes, steps, dt, **values)
+        return Response(self.filling.label, self.oscillator, *axes, steps, **values)
 
     def responses(self, batch: Batch, cycles: Cycles) -> Iterator[Response]:
         """The Response of a batch that has run, one for each amplitude."""
@@ -476,6 +473,14 @@ class Grid:
         for k, amplitude in enumerate(self.amplitudes):
             made = self.response(steps, {name: one[k] for name, one in values.items()})
             yield replace(made, oscillator=replace(self.oscillator, base_amplitude=amplitude))
+
+
+def stacked(responses: Sequence[Response], name: str, values: list, **attributes: str) -> Any:
+    """Responses as an xarray Dataset over a further axis, whose values and attributes are given."""
+    import xarray
+
+    axis = xarray.Variable(name, values, attributes)
+    return xarray.concat([one.to_xarray() for one in responses], axis)
 
 
 def measures_of(oscillator: Oscillator, cycles: Cycles) -> dict[str, np.ndarray]:

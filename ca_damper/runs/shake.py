@@ -14,7 +14,7 @@ from ca_damper.filling import Filling, check_filling
 from ca_damper.oscillator import Oscillator
 from ca_damper.runs.history import StructureHistory, TimeHistory
 from ca_damper.runs.result import scenes_over
-from ca_damper.scenes.checks import MOST_SCENES, MOST_SEED, run_seeds
+from ca_damper.scenes.checks import MOST_SCENES, MOST_SEED, for_all, run_seeds
 from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE, MOST_STEPS_PER_CYCLE, automatic_dt
 from ca_damper.scenes.table import SceneTable
 from ca_damper.structure import Box, ModalStructure
@@ -28,7 +28,6 @@ from taichi_dem.kit.validation import (
     instance,
     positive,
     progress_option,
-    real_numbers,
     several,
     shown,
     told_apart,
@@ -115,7 +114,7 @@ def shake(
     """
     progress_option("progress", progress)
     check_filling(filling)
-    excitation, numbered = _one_for_all(excitation), run_seeds(seeds)
+    excitation, numbered = _excitation(excitation), run_seeds(seeds)
     own = instance("oscillator", Oscillator() if oscillator is None else oscillator, Oscillator)
     counts = several("particles", particles, lambda n, x: whole(n, x, 0, filling.capacity))
     most = filling.default_dt if dt is None else positive("dt", dt)
@@ -204,13 +203,15 @@ def shake_structure(
     """
     progress_option("progress", progress)
     check_filling(filling)
-    excitation, numbered = _one_for_all(excitation), run_seeds(seeds)
+    excitation, numbered = _excitation(excitation), run_seeds(seeds)
     if (excitation.force is None) != (force_place is None):
         wanted = "None without" if excitation.force is None else "a place for"
         raise InputError(
             f"force_place must be {wanted} a force in the excitation, got {shown(force_place)}"
         )
-    boxed = _checked_boxes(boxes, filling.capacity)
+    boxed = several("boxes", boxes, lambda name, box: instance(name, box, Box))
+    for box in boxed:
+        whole("particles", box.particles, 0, filling.capacity)
     modal = ModalMount(structure, [box.place for box in boxed], force_place)
     scenes = modal.group * len(numbered)
     if scenes > MOST_SCENES:
@@ -253,7 +254,7 @@ def _window(excitation: Excitation, asked: Any, dt: float, interval: Any) -> Win
 
     asked: duration, that of the excitation if None. interval: between samples at most [s].
     """
-    end = float(excitation.duration(1)[0])
+    end = excitation.duration
     if asked is None and math.isinf(end):
         raise InputError("duration must be given for an excitation without an end, got None")
     duration = end if asked is None else positive("duration", asked)
@@ -266,16 +267,11 @@ def _window(excitation: Excitation, asked: Any, dt: float, interval: Any) -> Win
     return Window(duration, samples, every, duration / (samples * every))
 
 
-def _one_for_all(value: Any) -> Excitation:
-    """Excitation of one Signal or SineForce for all scenes; InputError for several or None."""
+def _excitation(value: Any) -> Excitation:
+    """Excitation that a user means; InputError for None, which shakes nothing."""
     if value is None:
         raise InputError("excitation must be a Signal or an Excitation, got None")
-    excitation = excitation_of(value)
-    if isinstance(excitation.base, tuple) or isinstance(excitation.force, tuple):
-        raise InputError(
-            f"excitation must be one for all scenes here, got several: {shown(excitation)}"
-        )
-    return excitation
+    return excitation_of(value)
 
 
 def _recorded(scenes, options, window, start, progress, saving):
@@ -296,16 +292,6 @@ def _recorded(scenes, options, window, start, progress, saving):
     highest = np.maximum(cycles.mean_of("x_max"), -cycles.mean_of("x_min"))
     motion = {name: series[name] for name in ("x", "v", "force")}
     return common, {**motion, "rms": cycles.rms, "peak": highest}
-
-
-def _checked_boxes(boxes, capacity):
-    """Boxes as a tuple; InputError."""
-    given = (boxes,) if isinstance(boxes, Box) else boxes
-    if not isinstance(given, (list, tuple)) or not given:
-        raise InputError(f"boxes must be a Box or a list of at least one, got {shown(boxes)}")
-    for box in given:
-        whole("particles", instance("boxes", box, Box).particles, 0, capacity)
-    return tuple(given)
 
 
 def _longest_step(filling, structure, dt):
@@ -344,13 +330,7 @@ def _table_of_groups(modal, boxes, seeds, window):
 
 def _of_places(name, value, structure):
     """Motion at the beginning, (places,); InputError unless it is a sum of the modes."""
-    places = structure.place_count
-    try:
-        motion = np.broadcast_to(real_numbers(name, value), places)
-    except ValueError:
-        raise InputError(
-            f"{name} must be a finite number or {places}, one for each place, got {shown(value)}"
-        ) from None
+    motion = for_all(name, value, structure.place_count)
     left = motion - structure.shapes @ structure.modal(motion)
     if np.abs(left).max() > _OUTSIDE_MODES * np.abs(motion).max():
         raise InputError(

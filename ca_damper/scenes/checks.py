@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from ca_damper.excitation.excitation import Excitation, excitation_of
-from ca_damper.report import measures
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import (
     choice,
@@ -22,8 +21,6 @@ STARTS = ("rest", "empty", "rigid")
 MOST_CYCLES = 10_000_000
 #: Scenes of a run, and the largest seed.
 MOST_SCENES, MOST_SEED = 2**24, 2**31 - 1
-#: Largest field of measured sums: 1 GiB, half of the most that Taichi can index.
-_MOST_NUMBERS = 2**27
 
 
 def check_run(transient_cycles: Any, measured_cycles: Any, start: Any, progress: Any) -> None:
@@ -34,33 +31,17 @@ def check_run(transient_cycles: Any, measured_cycles: Any, start: Any, progress:
     progress_option("progress", progress)
 
 
-def check_record_fits(scenes: int, measured_cycles: int) -> None:
-    """Raise InputError where so many scenes and cycles exceed the record of measures."""
-    cycles = scenes * max(1, measured_cycles)
-    most = _MOST_NUMBERS // len(measures.COLUMNS)
-    if cycles > most:
-        raise InputError(
-            f"scenes x measured_cycles must be at most {most} in one batch, got {cycles}: measure "
-            "fewer cycles"
-        )
-
-
 def for_all(name: str, value: Any, scenes: int, most: int | None = None) -> np.ndarray:
     """One number for all scenes or one for each, (scenes,); InputError for anything else.
 
     most: the largest of whole numbers from zero; None for any numbers.
     """
-    words, kinds = ("numbers", "iuf") if most is None else (f"whole numbers from 0 to {most}", "iu")
-    try:
-        given = np.asarray(value)
-        numbers = np.broadcast_to(given, scenes)
-        bad = given.dtype.kind not in kinds
-        bad = bad or (most is not None and bool(((numbers < 0) | (numbers > most)).any()))
-    except ValueError:
-        bad = True
-    if bad:
+    given = real_numbers(name, value)
+    words = "numbers" if most is None else f"whole numbers from 0 to {most}"
+    is_whole = most is None or ((given >= 0) & (given <= most) & (given == np.floor(given))).all()
+    if not is_whole or given.shape not in ((), (1,), (scenes,)):
         raise InputError(f"{name} must be {words}, one for all or {scenes}, got {shown(value)}")
-    return numbers
+    return np.broadcast_to(given, scenes)
 
 
 def checked_excitation(value: Any, mount: str) -> Excitation:
@@ -74,20 +55,9 @@ def checked_excitation(value: Any, mount: str) -> Excitation:
     return excitation
 
 
-def checked_samples(value: Any, scenes: int) -> int:
-    """Number of samples to record; InputError where those of all scenes find no memory."""
-    return whole("recorded_samples", value, 0, _MOST_NUMBERS // (4 * max(1, scenes)))
-
-
 def starts_of(excitation: Excitation, mount: str) -> tuple[str, ...]:
     """Words for the motion of the container at the beginning: steady ones are those of a spring."""
     return STARTS if excitation == Excitation() and mount in ("spring", "base") else STARTS[:1]
-
-
-def check_finite_start(initial: np.ndarray) -> None:
-    """InputError unless (x, v) of every container, (scenes, 2), are finite numbers."""
-    for name, values in zip(("displacement", "velocity"), initial.T):
-        real_numbers(name, values)
 
 
 def check_single_sine(excitation: Excitation, what: str) -> None:
@@ -101,10 +71,9 @@ def check_single_sine(excitation: Excitation, what: str) -> None:
 
 def check_within(excitation: Excitation, ends: np.ndarray) -> None:
     """InputError where a run to times ``ends`` [s], (scenes,), goes beyond its excitation."""
-    late = ends > excitation.duration(len(ends)) * (1.0 + 1e-9)
-    if late.any():
-        s = int(np.flatnonzero(late)[0])
-        got, most = told_apart(ends[s], excitation.duration(len(ends))[s])
+    s = int(np.argmax(ends))
+    if ends[s] > excitation.duration * (1.0 + 1e-9):
+        got, most = told_apart(ends[s], excitation.duration)
         raise InputError(
             f"a run must end within its excitation of {most} s, got {got} s in scene {s}: run "
             "fewer cycles, or shorter windows"

@@ -17,7 +17,7 @@ class SceneNumbers:
     """A table of its own, whose steps are shortened so that a whole number of them makes a cycle.
 
     largest_dt: the steps asked for [s]. steps_per_cycle: of each scene. Both (scenes,).
-    oscillators: what each scene hangs on. has_box: scenes whose number of particles the filling
+    has_box: scenes whose number of particles the filling
     checks, None for all. Plain NumPy. Raises InputError for a scene that the
     filling refuses or a step out of range.
     """
@@ -25,8 +25,6 @@ class SceneNumbers:
     def __init__(self, filling: Any, table: SceneTable, has_box: np.ndarray | None = None):
         self.filling, self.table = filling, table.copy()
         self.has_box = has_box
-        structure = zip(*map(self.table.column, _STRUCTURE))
-        self.oscillators = [Oscillator(*row) for row in structure]
         self.largest_dt = self.table.column("dt")
         self.drive(self.table.column("frequency"))
 
@@ -62,8 +60,9 @@ class SceneNumbers:
         state, gravity = np.zeros((self.table.count, 2)), gravity_along(self.filling)
         if start == "rest":
             return state
-        for s, oscillator in enumerate(self.oscillators):
+        for s in range(self.table.count):
             row = self.table.row(s)
+            oscillator = Oscillator(**{name: row[name] for name in _STRUCTURE})
             fixed = row["particles"] * self.filling.particle_mass if start == "rigid" else 0.0
             state[s] = oscillator.steady_state(row["frequency"], fixed, gravity)
         return state

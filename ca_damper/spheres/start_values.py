@@ -30,13 +30,8 @@ def checked_start(options: Any) -> tuple:
 
 
 def checked_start_velocity(options: Any) -> tuple:
-    """Velocities as a tuple of pairs, as many as places where these are given."""
+    """Velocities as a tuple of pairs."""
     velocity = _pairs("start_velocity", options.start_velocity, options.capacity)
-    if options.start is not None and len(options.start) != len(velocity):
-        raise InputError(
-            f"start_velocity must hold {len(options.start)} velocities, as many as places in "
-            f"start, got {len(velocity)}"
-        )
     return tuple(map(tuple, velocity.tolist()))
 
 

@@ -269,28 +269,6 @@ class ImpactDamper:
         free = -(own.stiffness * x + own.damping * v) / own.mass
         return float(free - self.omega**2 * forced[0])
 
-    def is_possible(self, u: float) -> bool:
-        """Whether the motion can last: small changes die away, and nothing else is hit.
-
-        Parameters
-        ----------
-        u : float
-            Speed of the grain [m/s].
-
-        Returns
-        -------
-        bool
-            True where the motion is stable, and the grain flies from wall to wall without another
-            impact.
-        """
-        return self.is_stable(u) and self._flies_freely(u)
-
-    def _flies_freely(self, u):
-        """Whether the grain stays between the walls from blow to blow."""
-        times = np.linspace(0.0, self.half_cycle, _POINTS)
-        places = [self.position(u, t) - self.motion(u, t)[0] for t in times]
-        return bool(np.abs(places).max() < 0.5 * self.clearance * (1.0 + 1e-6))
-
     def rms(self, u: float) -> float:
         """RMS displacement of the container over a cycle, by Simpson's rule.
 

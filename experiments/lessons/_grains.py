@@ -7,7 +7,7 @@ import numpy as np
 
 from _page import percent, png_like_the_first
 from ca_damper import Automaton, Batch, Oscillator, SceneTable
-from ca_damper.plot import Box, DrawnBox, frame_panel
+from ca_damper.plot.boxes import Box, DrawnBox, frame_panel
 from ca_damper.report.record import frames_of
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, STYLES, styled
 from taichi_dem.kit.session_thread import session

@@ -120,7 +120,7 @@ def _structures():
     yield "ImpactDamper.free", damper.free, {"t": 0.01}
     for name in ("motion", "position"):
         yield f"ImpactDamper.{name}", getattr(damper, name), {"u": 0.1, "t": 0.01}
-    for name in ("start", "is_possible", "rms"):
+    for name in ("start", "is_stable", "rms"):
         yield f"ImpactDamper.{name}", getattr(damper, name), {"u": 0.1}
     modes = {"masses": [1.0, 2.0], "frequencies": [3.0], "damping_ratios": 0.01}
     yield "ModalStructure", ca.ModalStructure, {**modes, "shapes": [[1.0], [0.0]]}
@@ -130,7 +130,6 @@ def _structures():
     yield "ModalStructure.modal", STRUCTURE.modal, {"motion": [1.0, 0.0]}
     asked = {"frequency": 3.0, "added_masses": [0.1, 0.0]}
     yield "ModalStructure.transfer", STRUCTURE.transfer, asked
-    yield "ModalStructure.force_transfer", STRUCTURE.force_transfer, {"place": 0, **asked}
     yield "Box", ca.Box, {"place": 0, "particles": 3}
     yield "collect_and_collide", ca.collect_and_collide, {"amplitude": 1e-2, "gap": 1e-3}
     time = np.linspace(0.0, 50.0, 500)
@@ -139,18 +138,14 @@ def _structures():
 
 
 def _excitations():
-    where, base = "excitation", excitation.Excitation(base=SIGNAL)
+    where = "excitation"
     yield f"{where}.Excitation", excitation.Excitation, {"base": SIGNAL}
-    yield f"{where}.Excitation.signals", base.signals, {"role": "base", "scenes": 1}
-    yield f"{where}.Excitation.sizes", base.sizes, {"scenes": 1}
-    yield f"{where}.Excitation.duration", base.duration, {"scenes": 1}
     nodes = {"value": [0.0, 1.0, 1.0, 0.0], "bend": [0.0] * 4}
     yield f"{where}.Signal#", excitation.Signal, {"step": 0.1, "label": "x", **nodes}
     yield f"{where}.Signal.at", SIGNAL.at, {"time_s": 0.01}
     yield f"{where}.Signal.scaled", SIGNAL.scaled, {"factor": 2.0}
     force = {"amplitude": 1.0, "frequency": 5.0}
     yield f"{where}.SineForce", excitation.SineForce, force
-    yield f"{where}.SineForce.rows", excitation.SineForce(**force).rows, {"scenes": 1}
     time = np.arange(100) * 0.01
     samples = {"time_s": time, "values": np.sin(10.0 * time), "of": "acceleration"}
     yield f"{where}.from_samples", excitation.from_samples, samples

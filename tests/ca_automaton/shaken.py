@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from ca_damper.filling import structure_of
 from taichi_dem.kit.allocation import assign
 from tests.driven import Driven
 
@@ -15,7 +14,7 @@ class Shaken(Driven):
     """Scenes of one automaton in containers that move as x = A sin(w t), all at once."""
 
     def __init__(self, filling, particles, seed=1, dt=1e-4, amplitude=0.0, frequency=6.0, traced=0):
-        key = structure_of(filling).key
+        key = (type(filling), filling.structure.key)
         if key not in _with_room:
             _with_room.add(key)
             Driven(filling, np.resize(particles, SCENES), 1, dt, 0.0, frequency, TRACED)

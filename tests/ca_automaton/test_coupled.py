@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ca_damper import Automaton, Batch, Oscillator, SceneTable, needed_effects
-from ca_damper.plot import Box
+from ca_damper.plot.boxes import Box
 from taichi_dem.kit.allocation import assign, values
 from tests.paper import expected, paper
 

@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from ca_damper import Batch, RigidMass, SceneTable
-from ca_damper.plot import Box
+from ca_damper.plot.boxes import Box
 from taichi_dem import Simulation
 from taichi_dem.observers import Every
 from taichi_dem.report.energy_balance import unexplained_share

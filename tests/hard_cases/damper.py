@@ -3,7 +3,7 @@
 import numpy as np
 
 from ca_damper import Batch, SceneTable, SimulationDiverged
-from ca_damper.plot import Box
+from ca_damper.plot.boxes import Box
 from tests.hard_cases import damper_run
 from tests.hard_cases.cases import Cases
 from tests.hard_cases.damper_run import ALL, AUTOMATA, EXACT, SPHERES, drive, fall, filling, spring

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ca_damper import Automaton, Batch, Empty, Oscillator, SceneTable, Spheres, film
-from ca_damper.plot import Box
+from ca_damper.plot.boxes import Box
 from ca_damper.report.measures import COLUMNS
 
 FILLINGS = {

@@ -6,7 +6,7 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.automaton.device import LatticeDevice
-from ca_damper.automaton.lattice import HELD, UP
+from ca_damper.automaton.lattice import UP
 from ca_damper.automaton.place.blows import Collisions
 from ca_damper.automaton.place.grains import Grains, Heap
 from ca_damper.automaton.place.transport import Transport
@@ -63,20 +63,9 @@ class PlaceAutomaton(LatticeDevice):
         height = self.cells.height(s, cell) - self.cells.offset[s]
         return ti.max(-height, height - most)
 
-    def snapshot(self, s: int) -> dict[str, np.ndarray]:
-        """Positions and velocities of the grains, by cell (see ``ca_damper.filling``).
-
-        Across, grains stand in the middle of their columns.
-        """
-        geometry, cells = self.lattice.geometry, self.cells
-        kind, travelled, speed, across = (
-            self.table.row(field, s)[: geometry.cells]
-            for field in (cells.kind, cells.travelled, cells.speed, cells.across)
-        )
-        held, present = kind == HELD, (kind == UP) | (kind == HELD)
-        offset = float(self.table.row(cells.offset, s))
-        position = geometry.centres(self.parameters.width[None])
-        position[:, 1] += np.where(held, 0.0, travelled - offset)
-        speed = np.where(held, float(self.table.row(self.velocity, s)), speed)
-        velocity = np.column_stack([across, speed])
-        return {"position": position[present], "velocity": velocity[present]}
+    def motion_of(self, s: int, kind: np.ndarray, travelled: np.ndarray, speed: np.ndarray) -> Any:
+        """Places off the centres of cells, and velocities; grains stand amid their columns."""
+        across = self.table.row(self.cells.across, s)[: len(kind)]
+        offset = float(self.table.row(self.cells.offset, s))
+        shift = np.where(kind == UP, travelled - offset, 0.0)
+        return np.column_stack([np.zeros(len(kind)), shift]), np.column_stack([across, speed])
