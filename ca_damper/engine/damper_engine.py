@@ -22,8 +22,9 @@ from taichi_dem.kit.errors import InputError
 
 #: Least room for scenes, measured cycles, samples, and places of a scene: below, nothing is saved.
 _LEAST = (64, 32, ROOM, *(LEAST_PLACES,) * 32)
-#: Places in all scenes of a batch: twelve numbers of each are half of what Taichi can index.
-_MOST = 2**23
+#: Most places, and most cycles or samples, in all scenes of a batch: four numbers of a place, and
+#: twelve of a cycle, are half of what Taichi can index.
+_MOST_PLACES, _MOST_RECORDS = 2**25, 2**23
 
 
 @dataclass(frozen=True)
@@ -104,12 +105,14 @@ def borrow(
     """
     structure = filling.structure
     scenes, *others = counts
-    most = max(*others, *tuple(structure.sizes.values())[:1])
-    if scenes * most > _MOST:
-        raise InputError(
-            f"scenes x particles, cycles or samples must be at most {_MOST} in one batch, got "
-            f"{scenes} x {most}: run fewer scenes at a time, or measure fewer cycles"
-        )
+    places = next(iter(structure.sizes.values()), 0)
+    rooms = ("particles", places, _MOST_PLACES), ("cycles or samples", max(others), _MOST_RECORDS)
+    for what, count, most in rooms:
+        if scenes * count > most:
+            raise InputError(
+                f"scenes x {what} must be at most {most} in one batch, got {scenes} x {count}: run "
+                "fewer scenes at a time, or measure fewer cycles"
+            )
     sizes = {**structure.sizes, **more}
     asked = EngineStructure((type(filling), structure.key), mount, kind, tuple(sizes), filling)
     capacity = (*counts, *sizes.values())
