@@ -12,8 +12,9 @@ _PAPER = (
     "motions above 1 g and half a cell: peaks at resonance within 3 % of spheres"
 )
 _PLACE = (
-    "1 to 50 grains, 0.8 to 8 g, restitution up to 0.9: impedance within 20 % of that of spheres at "
-    "four of five points, worst at five and ten grains; loss within 4 % in the median, 40 % at worst"
+    "1 to 50 grains, 0.8 to 8 g, restitution up to 0.9: impedance within 20 % of that of spheres "
+    "at four of five points, worst at five and ten grains; loss within 4 % in the median, 40 % at "
+    "worst"
 )
 
 
