@@ -8,8 +8,9 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 TESTS = Path(__file__).parents[1] / "tests"
-#: Nothing of what the other tests need, and nothing said but by the program.
-PYTEST = "-s --noconftest -o addopts= --import-mode=importlib -p no:terminal -p no:cacheprovider"
+#: Nothing of what the other tests need, and nothing said but by the program, which shows warnings.
+PYTEST = """-s --noconftest -o addopts= --import-mode=importlib -p no:terminal -p no:cacheprovider
+    -p no:warnings"""
 
 
 class Asked:
