@@ -54,7 +54,7 @@ def scene_of(names, material=dem.CONCRETE, peak=PEAK):
     return dem.Scene(mesh, material, [gas, *(EFFECTS[name]() for name in names)])
 
 
-def blast(names, until, step, ulps):
+def blast(names, until, step, ulps=0):
     """A run of the paper's block with some effects, and what it took.
 
     ulps: by which the peak of the gas pressure differs; nobody would notice but a chaotic run.
@@ -214,7 +214,8 @@ def paired_costs(frozen, states, **timing):
 def costs_of_blast(scenes, lists, certified, until, step, states, substeps, **timing):
     """Costs by group, all in one process: scenes by their effects, lists beside the best one.
 
-    certified: end [s] of the run with effects="auto" whose certificate is a third entry.
+    scenes: arguments of ``blast`` of their own. certified: end [s] of the run with effects="auto"
+    whose certificate is a third entry.
     """
     method, times = dem.ImplicitDashpots(step), [until * (k + 0.5) / states for k in range(states)]
 
@@ -231,8 +232,9 @@ def costs_of_blast(scenes, lists, certified, until, step, states, substeps, **ti
         return paired_costs(frozen, states, **timing)
 
     first, costs = next(iter(scenes)), {}
-    alike = {scene: scene if {*names} & {*REPLACING} else first for scene, names in scenes.items()}
-    blasts = from_runs({scene: scene_of(names) for scene, names in scenes.items()}, alike)
+    named = {scene: own["names"] for scene, own in scenes.items()}
+    alike = {scene: scene if {*names} & {*REPLACING} else first for scene, names in named.items()}
+    blasts = from_runs({scene: scene_of(names) for scene, names in named.items()}, alike)
     for scene in lists:
         material, peak, best = KNOWN_LISTS[scene]
         listed = {"best list": best, "auto": "auto", "all effects": ORDER}
@@ -245,7 +247,7 @@ def costs_of_blast(scenes, lists, certified, until, step, states, substeps, **ti
 
 def costs_of_damper(filling, scenes, table, transient, states, substeps, **timing):
     """Costs of options of a filling by scene, the first as it is, whose run the states are of."""
-    frozen = {name: FrozenBatch(filling, options, table) for name, options in scenes.items()}
+    frozen = {name: FrozenBatch(filling, table=table, **own) for name, own in scenes.items()}
     first = next(iter(frozen.values()))
     found = first.states_of_run(states, transient, table["measured_cycles"])
     for one in frozen.values():

@@ -69,9 +69,8 @@ def price_row(seed, others):
     if not good:
         return None
     least, method = min(good)
-    names = {"solve_s": found.cpu_s, "cheapest_s": least, "cheapest_method": method}
-    ratio = {"half_step_s": runs[1][2], "ratio": found.cpu_s / least}
-    return {"seed": seed, "question": found.question, **names, **ratio}
+    row = {"seed": seed, "question": found.question, "solve_s": found.cpu_s, "cheapest_s": least}
+    return {**row, "cheapest_method": method, "half_step_s": runs[1][2]}
 
 
 def cost_of_blast(options):
@@ -102,8 +101,7 @@ def cost_of_damper(options):
 
 def panel_of(true, answers, seconds, fixed):
     """Answers and fixed runs as ``draw_cost`` takes them, and the seconds nearest to 1 %."""
-    for answer in answers:
-        print(f"{100 * answer.tolerance:g} %: {answer}")
+    print(*(f"{100 * one.tolerance:g} %: {one}" for one in answers), sep="\n")
     shares = [(one.error / true, abs(one.value / true - 1.0)) for one in answers]
     nearest = np.abs(np.log([one.tolerance / 0.01 for one in answers])).argmin()
     return ([(*both, spent) for both, spent in zip(shares, seconds)], fixed), seconds[nearest]
@@ -119,8 +117,7 @@ def draw_cost(path, panels):
         for one, (title, (answers, fixed)) in zip(axes[0], panels.items()):
             for (name, runs), colour, mark in zip(fixed.items(), (ORANGE, RED, GREY), "sDv"):
                 tried = np.maximum(np.array(runs).T, [[1e-6], [0.0]])
-                look = {"color": colour, "label": name, "markersize": 4}
-                one.plot(100.0 * tried[0], tried[1], mark, **look)
+                one.plot(100.0 * tried[0], tried[1], mark, color=colour, label=name, markersize=4)
             bars, off, seconds = np.maximum(np.array(answers).T, 1e-6)
             look = {"color": BLUE, "zorder": 3}
             one.plot(100.0 * bars, seconds, "-o", label="answer, by its bar", **look)
@@ -175,7 +172,7 @@ def run(options):
         return own[first : first + getattr(options, f"{kind}s")].tolist()
 
     prices = [price_row(seed, options.others) for seed in seeds("price")]
-    prices = pd.DataFrame([row for row in prices if row])
+    prices = pd.DataFrame([row for row in prices if row]).eval("ratio = solve_s / cheapest_s")
     prices.to_csv(folder / "prices.csv", index=False)
     found = [judge.judged_blast(blast_question(seed)) for seed in seeds("blast")]
     found += [judge.judged_damper(damper_question(seed)) for seed in seeds("damper")]

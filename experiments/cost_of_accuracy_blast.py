@@ -28,7 +28,6 @@ from taichi_dem.kit.study.work_precision_picture import picture_errors, picture_
 from taichi_dem.simulate import result_of, run_simulation
 
 NAME = "cost_of_accuracy_blast"
-TARGETS = (0.1, 0.01, 0.001)
 #: The paper's largest step [s], and its largest way in a step [m].
 PAPER_DT0, PAPER_L = 1e-8, 1e-8
 #: A run that took longer is not made a second time [s]; how far that one is disturbed [m].
@@ -38,8 +37,7 @@ TIME = "CPU time of one thread [s], least of its runs"
 
 def controlled(dt0):
     """Step control; dashpots are limited where they ask for an eighth of the largest step."""
-    control = StepControl(dashpot_floor=dt0 / 8)
-    return Multirate(dt0, 1e-5, control=control, dashpot="limited")
+    return Multirate(dt0, 1e-5, control=StepControl(dashpot_floor=dt0 / 8), dashpot="limited")
 
 
 drifted = partial(Multirate, PAPER_DT0, neighbour="drifted")
@@ -53,21 +51,17 @@ METHODS = {
     "implicit": (ImplicitDashpots, (4e-6, 2e-6, 1e-6, 5e-7, 2.5e-7, 1e-7, 5e-8)),
     "fixed": (Uniform, (1e-8, 4e-9, 2e-9, 1e-9)),
 }
+STEPS = {name: steps for name, (_, steps) in METHODS.items()}
 BY_WAY, CHECK = (*METHODS,)[:3], "multirate_held"
 SETTINGS = {
     "until": (1e-4, 6e-5),
-    "steps": (
-        {name: steps for name, (_, steps) in METHODS.items()},
-        {CHECK: (1e-7,), "implicit": (5e-7,)},
-    ),
+    "steps": (STEPS, {CHECK: (1e-7,), "implicit": (5e-7,)}),
     "reference": (1.25e-8, 5e-8),
     "twins": (tuple(METHODS), (CHECK,)),
 }
 #: Where the work of the gas goes.
-SPLIT = (
-    *("kinetic", "bond_strain", "sphere_strain", "bond_dashpot", "softening", "release"),
-    *("slip", "sphere_dashpot", "friction", "injected"),
-)
+SPLIT = """kinetic bond_strain sphere_strain bond_dashpot softening release slip sphere_dashpot
+    friction injected""".split()
 #: Times are of one thread.
 options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
@@ -84,8 +78,7 @@ def outcome_of(scene, method, until, disturbance=0.0, **looks):
         centre = simulation.model.centre
         noise = np.random.default_rng(1).uniform(-disturbance, disturbance, centre.shape)
         simulation.state.set_motion(centre + noise, **scene.initial_motion)
-    job = {"until": until, "samples": 1, "frames": 1, **looks}
-    result = result_of(run_simulation, simulation, **job)
+    result = result_of(run_simulation, simulation, until=until, samples=1, frames=1, **looks)
     report = result.report
     return {
         "moved": result.frames[-1].displacement.tolist(),
@@ -135,36 +128,35 @@ def label_of(name, step):
     return f"l = {1e6 * step:g} µm" if name in BY_WAY else seconds(step)
 
 
-def runs_of(name, steps, scene, options):
-    """Outcomes of a method by step, and those of its disturbed twins."""
-    runs, twins = {}, {}
-    for step in steps:
-        job = scene, METHODS[name][0](step), options.until
-        shown = {"driver": options.driver, "title": f"{name}, {label_of(name, step)}"}
-        made = runs[step] = outcome_of(*job, **shown)
-        # The coarsest of several is too coarse for its spread to matter.
-        again = name in options.twins and (step != steps[0] or len(steps) == 1)
-        if again and not made["failure"] and made["cpu_s"] < ENOUGH:
-            twins[step] = outcome_of(*job, DISTURBANCE, **shown)
-    return runs, twins
+def runs_of(scene, options):
+    """Outcomes by method and step; spread, again_s: distance and time of the twin, if any."""
+    runs = {}
+    for name, steps in options.steps.items():
+        for step in steps:
+            job = scene, METHODS[name][0](step), options.until
+            shown = {"driver": options.driver, "title": f"{name}, {label_of(name, step)}"}
+            made = runs[name, step] = outcome_of(*job, **shown)
+            # The coarsest of several is too coarse for its spread to matter.
+            again = name in options.twins and (step != steps[0] or len(steps) == 1)
+            if again and not made["failure"] and made["cpu_s"] < ENOUGH:
+                twin = outcome_of(*job, DISTURBANCE, **shown)
+                made.update(spread=displacement_error(twin, made), again_s=twin["cpu_s"])
+                made["compile_s"] += twin["compile_s"]
+    return runs
 
 
-def points_of(name, runs, twins, reference):
-    """Points of the work-precision diagram of a method."""
-    done = [step for step, run in runs.items() if not run["failure"]]
-    found = []
-    for step, run in runs.items():
-        work, label = run["evaluations"], label_of(name, step)
-        if run["failure"]:
-            # To the end it would take what the next finer one takes, by steps.
-            work = runs[max(done)]["evaluations"] * max(done) / step if done else work
-            words = f"diverged at {1e6 * run['reached_s']:.0f} µs"
-            found.append(Point(name, step, label, work, failure=words))
-        else:
-            spent = study.Timing.of([run["cpu_s"], twins.get(step, run)["cpu_s"]])
-            error = displacement_error(run, reference)
-            found.append(Point(name, step, label, work, error, spent, run["residual"]))
-    return found
+def point_of(name, step, runs, reference):
+    """Point of the work-precision diagram."""
+    run, known = runs[name, step], (name, step, label_of(name, step))
+    if not run["failure"]:
+        spent = study.Timing.of([run["cpu_s"], run.get("again_s", run["cpu_s"])])
+        error = displacement_error(run, reference)
+        return Point(*known, run["evaluations"], error, spent, run["residual"])
+    # To the end it would take what the next finer one takes, by steps.
+    done = [key for key, one in runs.items() if key[0] == name and not one["failure"]]
+    near = max(done, default=(name, step))
+    work = runs[near]["evaluations"] * near[1] / step
+    return Point(*known, work, failure=f"diverged at {1e6 * run['reached_s']:.0f} µs")
 
 
 def run(options):
@@ -172,42 +164,32 @@ def run(options):
     scene, folder = paper_scene(options.mesh), study.begin(options)
     # Swept until nothing changes by a thousandth, not a twentieth, of the largest speed.
     method = ImplicitDashpots(options.reference, sweeps=(6, 50), tolerance=1e-3)
-    place = folder / "references", "implicit", (scene, method, options.until), ("taichi_dem",)
-    job = {"driver": options.driver, "title": "reference"}
-    made = partial(outcome_of, scene, method, options.until, **job)
-    reference, kept = study.cached(*place, made)
-    all_runs = {name: runs_of(name, *one, scene, options) for name, *one in options.steps.items()}
-    points = [p for name, both in all_runs.items() for p in points_of(name, *both, reference)]
-    spreads = {
-        name: [displacement_error(twins[step], runs[step]) for step in twins]
-        for name, (runs, twins) in all_runs.items()
-        if twins
-    }
-    floors = {name: spread[-1] for name, spread in spreads.items()}
-    titles = {name: style.label for name, style in styles_of(all_runs).items()}
-    check = displacement_error([*all_runs[CHECK][0].values()][-1], reference)
-    study.give_answers(options.out, points, TARGETS, floors, titles)
-    draw(folder, options, all_runs, points, floors, reference, check, titles)
-    figures = {
-        **study.cheapest_figures(points, 0.01, floors, "cheapest_seconds"),
-        **study.cheapest_figures(points, 0.001, floors, "seconds"),
-        "chaos_floor": (max(floors.values()), "1"),
-        "chaos_at_any_step": (max(max(spread) for spread in spreads.values()), "1"),
-        "reference_check": (check, "1"),
-        **study.figures_by_method(points, 0.01, floors),
-    }
-    if paper := all_runs.get("uniform", ({}, {}))[0].get(PAPER_L):
+    job, shown = (scene, method, options.until), {"driver": options.driver, "title": "reference"}
+    place = folder / "references", "implicit", job, ("taichi_dem",)
+    reference, kept = study.cached(*place, partial(outcome_of, *job, **shown))
+    runs = runs_of(scene, options)
+    points = [point_of(*key, runs, reference) for key in runs]
+    spreads = {key: one["spread"] for key, one in runs.items() if "spread" in one}
+    # Of the finest.
+    floors = {name: spread for (name, _), spread in spreads.items()}
+    check = [point.error for point in points if point.method == CHECK][-1]
+    titles = {name: style.label for name, style in styles_of(options.steps).items()}
+    figures = study.give_answers(options.out, points, floors, titles)
+    figures["chaos_floor"] = max(floors.values()), "1"
+    figures["chaos_at_any_step"] = max(spreads.values()), "1"
+    figures["reference_check"] = check, "1"
+    draw(folder, options, runs, points, floors, reference, check)
+    if paper := runs.get(("uniform", PAPER_L)):
         figures["paper_rule_seconds"] = paper["cpu_s"], "s"
         figures["paper_rule_error"] = displacement_error(paper, reference), "1"
     if fixed := [point for point in points if point.method == "fixed"]:
         longest = max((point.step for point in fixed if not point.failure), default=None)
         figures["longest_fixed_step_full_dashpots"] = longest, "s"
-    outcomes = [one for both in all_runs.values() for some in both for one in some.values()]
-    compiling = sum(one["compile_s"] for one in outcomes + [reference] * (not kept))
+    compiling = sum(one["compile_s"] for one in [*runs.values(), *[reference] * (not kept)])
     study.finish(options, NAME, figures, float(compiling))
 
 
-def draw(folder, options, all_runs, points, floors, reference, check, titles):
+def draw(folder, options, runs, points, floors, reference, check):
     """The work-precision diagram, and the same for broken faces and energy."""
     scene = (
         f"Paper's block, {len(reference['moved'])} bodies to {1e6 * options.until:.0f} µs, "
@@ -217,12 +199,9 @@ def draw(folder, options, all_runs, points, floors, reference, check, titles):
     # Floors far below all errors would only squeeze the picture.
     least = min(point.error for point in points if point.error > 0.0)
     picture_work_precision(
-        folder / "work_precision.png",
-        points,
-        titles,
+        *(folder / "work_precision.png", points),
         floors={name: floor for name, floor in floors.items() if floor > 0.1 * least},
-        time_name=TIME,
-        error_name="error of the displacement field [1]",
+        **{"time_name": TIME, "error_name": "error of the displacement field [1]"},
         work_name="evaluations of bonds and contact pairs [1]",
         residual_names=("step [ns], or displacement limit l [nm]", "unexplained energy / work [1]"),
         step_unit=1e-9,
@@ -231,16 +210,13 @@ def draw(folder, options, all_runs, points, floors, reference, check, titles):
         f"the paper's multirate rule at its finest lies {percent(check)} from it. "
         f"Runs that differ by 1 pm at the start end {power(max(floors.values()))} apart.",
     )
-    own = {name: [p for p in points if p.method == name and not p.failure] for name in titles}
-    errors = {
-        words: {
-            name: [(p.low, error(all_runs[name][0][p.step], reference)) for p in good]
-            for name, good in own.items()
-        }
-        for words, error in MEASURES.items()
-    }
+    errors = {words: {name: [] for name in options.steps} for words in MEASURES}
+    for point in (point for point in points if not point.failure):
+        for words, error in MEASURES.items():
+            pair = point.low, error(runs[point.method, point.step], reference)
+            errors[words][point.method].append(pair)
     caption = f"{scene}. {against}. Points at the bottom edge have no error at all."
-    picture_errors(folder / "errors.png", errors, titles, time_name=TIME, caption=caption)
+    picture_errors(folder / "errors.png", errors, time_name=TIME, caption=caption)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ figure of its own, and a second picture takes the spheres' curve for the truth. 
 with the transfer function of the empty container.
 """
 
-import os
 import sys
 import time
 from dataclasses import replace
@@ -31,7 +30,6 @@ from taichi_dem.kit.study.work_precision_picture import picture_work_precision
 
 NAME = "cost_of_accuracy_damper"
 OSCILLATOR = Oscillator()
-TARGETS = (0.1, 0.01, 0.001)
 PARTICLES, SPHERES = 30, "dem_tsuji"
 CA_STEPS = (2e-3, 1.1e-3, 7e-4, 5e-4, 3e-4, 2e-4, 1e-4, 5e-5)
 DEM_STEPS = (1e-4, 6e-5, 4e-5, 3e-5, 2e-5, 1.4e-5)
@@ -57,18 +55,16 @@ SETTINGS = {
 #: Repeats of a point end when they took so long together [s].
 ENOUGH = 1.5
 #: RK45 on the empty container: relative tolerances in the kernel and in Python.
-TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
-PYTHON_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
+TOLERANCES = {"kernel": (1e-6, 1e-8, 1e-10, 1e-12), "python": (0.1, 0.01, 1e-3, 1e-4, 1e-6, 1e-8)}
 #: A Batch takes at least 40 steps a cycle: the first is the longest [s].
-RK45_STEPS = (3.9e-3, 1e-3, 2e-4)
-RK45_CYCLES = 30
+RK45_STEPS, RK45_CYCLES = (3.9e-3, 1e-3, 2e-4), 30
 #: Samples a cycle from which the RMS of a sine is exact.
 SAMPLES = 8
 #: Times are of one thread.
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
 
-def sweep_of(name, options, bar):
+def sweep_of(name, options, folder, bar):
     """All runs of a method: a ``StepStudy``."""
     filling, steps, quick, finest, count = METHODS[name]
     steps = quick if options.quick else steps
@@ -77,7 +73,7 @@ def sweep_of(name, options, bar):
     job = {"ratios": options.ratios, "start": "rigid", "progress": bar, **cycles}
     made = StepStudy(name, filling, PARTICLES, options.seeds, **job)
     settings = filling, PARTICLES, OSCILLATOR, options.ratios, options.cycles, finest, count
-    place = os.path.join(options.out, "references"), name, settings, ("ca_damper",)
+    place = folder / "references", name, settings, ("ca_damper",)
     made.reference, kept = study.cached(*place, lambda: made.make_reference(finest, count))
     made.compile_s += 0.0 if kept else made.reference["compile_s"]
     for dt in steps:
@@ -90,7 +86,7 @@ def sweep_of(name, options, bar):
 def rk45_points(frequency, repeats, quick):
     """(Points of all ways, seconds of compiling) at frequencies [Hz]; quick: every other point."""
     every, points, compiling = 2 if quick else 1, [], 0.0
-    jobs = [("rk45_tolerance", rtol, RK45_STEPS[0], rtol) for rtol in TOLERANCES[::every]]
+    jobs = [("rk45_tolerance", rtol, RK45_STEPS[0], rtol) for rtol in TOLERANCES["kernel"][::every]]
     jobs += [("rk45_step", dt, dt, 1e-2) for dt in RK45_STEPS[::every]]
     for method, swept, dt, rtol in jobs:
         table = SceneTable(0, 1, dt, frequency, OSCILLATOR.base_amplitude)
@@ -106,57 +102,48 @@ def rk45_points(frequency, repeats, quick):
         label = power(swept) if swept == rtol else f"{1e3 * dt:g} ms"
         points.append(Point(method, swept, label, *found))
         compiling += batch.compile_seconds
-    for rtol in PYTHON_TOLERANCES[::every]:
+    for rtol in TOLERANCES["python"][::every]:
         points.append(Point("rk45_python", rtol, power(rtol), *rk45_in_python(frequency, rtol)))
     return points, compiling
 
 
 def rk45_in_python(frequency, rtol):
     """(Evaluations, error, timing) of the last cycle, begun in the steady state."""
-    started, x, evaluations = time.perf_counter(), [], 0
+    started, found = time.perf_counter(), []
+    cycles = RK45_CYCLES - 1 + np.arange(SAMPLES) / SAMPLES
     for f in frequency:
-        span, at = (0.0, RK45_CYCLES / f), (RK45_CYCLES - 1 + np.arange(SAMPLES) / SAMPLES) / f
-        job = OSCILLATOR.right_hand_side(f), span, OSCILLATOR.steady_state(f)
-        solution = solve_ivp(*job, rtol=rtol, atol=1e-3 * rtol, t_eval=at)
-        x.append(solution.y[0])
-        evaluations += solution.nfev
+        job = OSCILLATOR.right_hand_side(f), (0.0, RK45_CYCLES / f), OSCILLATOR.steady_state(f)
+        found.append(solve_ivp(*job, rtol=rtol, atol=1e-3 * rtol, t_eval=cycles / f))
     spent = study.Timing.of([time.perf_counter() - started])
-    return evaluations, curve_distance(np.std(x, axis=1), OSCILLATOR.rms(frequency)), spent
+    x, evaluations = zip(*((one.y[0], one.nfev) for one in found))
+    return sum(evaluations), curve_distance(np.std(x, axis=1), OSCILLATOR.rms(frequency)), spent
 
 
 def draw(folder, options, made, own, toward, empty, floors):
     """Work-precision diagrams: by method, toward the spheres, of the empty container; curves."""
     ratios, (transient, measured) = options.ratios, options.cycles
-    titles = {name: style.label for name, style in styles_of(made).items()}
-    shared = {"titles": titles, "floors": floors, "work_name": "particle steps [1]"}
+    shared = {"floors": floors, "work_name": "particle steps [1]"}
     shorter = max(sweep.reference["step"] / min(sweep.runs) for sweep in made.values())
     scenes = (
         f"{PARTICLES} particles, f/f0 = {', '.join(f'{r:g}' for r in ratios)}, "
         f"{len(options.seeds)} seeds, {transient} + {measured} cycles. Error: RMS over the "
         "frequencies of (response - reference), mean over seeds, as a share of the peak.\n"
     )
+    force = "mean force on the container: missing share of the weight [1]"
     picture_work_precision(
         *(folder / "work_precision.png", own),
         error_name="error of the response curve / its peak [1]",
-        residual_names=(
-            "step [µs]",
-            "mean force on the container: missing share of the weight [1]",
-        ),
-        step_unit=1e-6,
+        **{"residual_names": ("step [µs]", force), "step_unit": 1e-6},
         caption=f"{scenes}Reference of each method: itself with other seeds, at {shorter:.2g} of "
         "its finest step or less. Dotted: what seeds alone make of it.",
         **shared,
     )
-    picture_work_precision(
-        *(folder / "against_spheres.png", toward),
-        error_name="difference to the spheres' curve / its peak [1]",
-        caption=f"{scenes}Reference of all: spheres, p = 1/4, at "
-        f"{seconds(made[SPHERES].reference['step'])}.",
-        **shared,
-    )
+    finest = seconds(made[SPHERES].reference["step"])
+    caption = f"{scenes}Reference of all: spheres, p = 1/4, at {finest}."
+    words = {"error_name": "difference to the spheres' curve / its peak [1]", "caption": caption}
+    picture_work_precision(folder / "against_spheres.png", toward, **words, **shared)
     picture_work_precision(
         *(folder / "rk45.png", empty),
-        {name: style.label for name, style in styles_of(p.method for p in empty).items()},
         **{"floors": {}, "order": 5},
         error_name="error of the response curve / its peak [1]",
         work_name="evaluations of the right-hand side [1]",
@@ -173,7 +160,7 @@ def run(options):
     folder = study.begin(options)
     with ProgressBar("sweep") as bar:
         names = [name for name, one in METHODS.items() if one[2] or not options.quick]
-        made = {name: sweep_of(name, options, bar) for name in names}
+        made = {name: sweep_of(name, options, folder, bar) for name in names}
     frequency = np.array(options.ratios) * OSCILLATOR.natural_frequency
     empty, compiling = rk45_points(frequency, options.repeats, options.quick)
     truth = made[SPHERES].mean
@@ -181,19 +168,13 @@ def run(options):
     toward = [point for sweep in made.values() for point in sweep.points(truth)]
     floors = {name: sweep.floor for name, sweep in made.items()}
     titles = {name: style.label for name, style in styles_of(made).items()}
-    study.give_answers(options.out, own, TARGETS, floors, titles)
+    figures = study.give_answers(options.out, own, floors, titles)
     draw(folder, options, made, own, toward, empty, floors)
     near = "cheapest_seconds", "to_spheres_within_2_percent"
-    figures = {
-        **study.cheapest_figures(own, 0.01, floors, "cheapest_seconds"),
-        **study.cheapest_figures(own, 0.001, floors, "seconds"),
-        **study.cheapest_figures(toward, 0.02, floors, *near),
-        **study.figures_by_method(own, 0.01, floors),
-        "chaos_floor": (min(floors.values()), "1"),
-        "rk45_evaluations_at_1e-6": (answers(empty, 1e-6, {})[0].point.evaluations, "1"),
-    }
+    figures.update(study.cheapest_figures(toward, 0.02, floors, *near))
+    figures["chaos_floor"] = min(floors.values()), "1"
+    figures["rk45_evaluations_at_1e-6"] = answers(empty, 1e-6, {})[0].point.evaluations, "1"
     for label, sweep in made.items():
-        compiling += sweep.compile_s
         values = {
             "chaos_floor": sweep.floor,
             "roundoff_spread": sweep.roundoff,
@@ -202,9 +183,8 @@ def run(options):
             "check_force": sweep.reference["force_check"],
             "distance_to_spheres": curve_distance(sweep.mean, truth),
         }
-        known = {f"{name}_{label}": one for name, one in values.items() if one is not None}
-        figures.update({name: (one, "1") for name, one in known.items()})
-    study.finish(options, NAME, figures, compiling)
+        figures |= {f"{key}_{label}": (one, "1") for key, one in values.items() if one is not None}
+    study.finish(options, NAME, figures, compiling + sum(one.compile_s for one in made.values()))
 
 
 if __name__ == "__main__":

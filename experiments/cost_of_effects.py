@@ -39,14 +39,31 @@ from taichi_dem.kit.timing import median_interval
 
 NAME = "cost_of_effects"
 ALL, LAST_BIT = "all effects", "all effects, last bit of the load changed"
-#: What cannot stay without an effect.
-ALONG = {"body_contact": ("sticking_friction",)}
+#: What is left out together: nothing sticks without contact.
+LEFT_OUT = [(name, "sticking_friction") if name == "body_contact" else (name,) for name in ORDER]
+LESS = {f"without {' and '.join(out)}": [e for e in ORDER if e not in out] for out in LEFT_OUT}
 #: Contact and friction in the place of those of bodies, by row: the paper's, then on all faces.
-CONTACTS = {
-    "contact of spheres": ("sphere_contact", "friction"),
-    "spheres on all faces": ("surface_contact", "friction"),
+CONTACTS = {"contact of spheres": "sphere_contact", "spheres on all faces": "surface_contact"}
+INSTEAD = {scene: [*ORDER[:3], contact, "friction"] for scene, contact in CONTACTS.items()}
+ADDED = {"rotation": "added", **dict.fromkeys(CONTACTS, "instead")}
+#: Scenes by group, the complete one first: arguments of a run that are its own.
+SCENES = {
+    "blast": {name: {"names": one} for name, one in {ALL: ORDER, **LESS, **INSTEAD}.items()},
+    "spheres": {
+        "spheres as they are": {"options": {}},
+        "friction of spheres": {"options": {"friction": 0.0}},
+        "friction at walls": {"options": {"wall_friction": 0.0}},
+        "rotation": {"options": {"rotation": True}},
+    },
+    "automaton": {
+        "automaton as they are": {"options": {}},
+        "static contact": {"options": {"accounting": "landing+ejection"}},
+        "ejection and static contact": {"options": {"accounting": "landing"}},
+    },
 }
-ADDED = ("rotation", *CONTACTS)
+SCENES["blast"][LAST_BIT] = {"names": ORDER, "ulps": 1}
+#: In the quick job every scene compiles in a process of its own.
+QUICK = {"blast": (ALL, [*LESS][3]), "spheres": ("spheres as they are", "friction of spheres")}
 SETTINGS = {
     "until": (2.5e-4, 1e-4, study.number(0, 1), "simulated time of the blast [s], 2.5e-4"),
     "rounds": (60, 10, study.whole(1, 10_000), "most rounds of turns from the same states, 60"),
@@ -55,120 +72,81 @@ SETTINGS = {
     "substeps": (16, 8),
     "lists": ((*KNOWN_LISTS,), ("blast",)),
     "certified": (5e-4, 1e-4),
-    "chance": (True, False),
     "ratios": ((0.88, 0.91, 0.94, 0.96, 0.98, 1.0, 1.03), (0.92, 0.98)),
     "cycles": ((60, 20), (10, 4)),
-    "left_out": (ORDER, ("body_contact",)),
     "again": (100, 20),
-    "contacts": (CONTACTS, {}),
-    # In the quick job every scene compiles in a process of its own.
-    "fillings": (("spheres", "automaton"), ("spheres",)),
-    "options": (4, 2),
+    "scenes": (SCENES, QUICK),
 }
 #: Substeps that the elastic block is timed over at a time, and fewest rounds of turns.
 SUBSTEPS, FEWEST = 150, 8
 STEPS = {"blast": 4e-7, "spheres": 3e-5, "automaton": 1e-4}
 #: Steps of a damper from a state, about a tenth of a cycle.
 TENTH = {"spheres": 600, "automaton": 180}
-#: Scenes of a filling by its options: as it is, then with an effect left out of it, or added.
-FILLINGS = {
-    "spheres": {
-        "spheres as they are": {},
-        "friction of spheres": {"friction": 0.0},
-        "friction at walls": {"wall_friction": 0.0},
-        "rotation": {"rotation": True},
-    },
-    "automaton": {
-        "automaton as they are": {},
-        "static contact": {"accounting": "landing+ejection"},
-        "ejection and static contact": {"accounting": "landing"},
-    },
-}
-TITLES = {
-    "blast": "Blast of the paper's block",
-    "spheres": "Damper, spheres",
-    "automaton": "Damper, automaton",
-}
-#: Cost of an effect, and the ends of its interval.
-STEP = ("step_percent", "step_low_percent", "step_high_percent")
+TITLES = {"spheres": "Damper, spheres", "automaton": "Damper, automaton"}
+TITLES["blast"] = "Blast of the paper's block"
+#: Ends of the interval of an effect's cost, and the cost between them.
+STEP = ("step_low_percent", "step_percent", "step_high_percent")
+#: Results of a run that are no columns.
+UNTOLD = ("run_s", "steps", "rms_mm")
 #: Threads are processes side by side.
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 
 
-def calls_of(options):
-    """Runs in processes of their own by group and scene: function and arguments."""
-    scenes = {ALL: ORDER}
-    for name in options.left_out:
-        gone = (name, *ALONG.get(name, ()))
-        scenes[f"without {' and '.join(gone)}"] = [e for e in ORDER if e not in gone]
-    scenes.update({scene: (*ORDER[:3], *both) for scene, both in options.contacts.items()})
-    given = {"until": options.until, "step": STEPS["blast"], "ulps": 0}
-    found = {("blast", scene): (blast, {**given, "names": n}) for scene, n in scenes.items()}
-    if options.chance:
-        found["blast", LAST_BIT] = blast, {**given, "names": ORDER, "ulps": 1}
-    for filling in options.fillings:
-        table = {"particles": 30, "seeds": (1, 2), "ratios": options.ratios}
-        table.update(step=STEPS[filling], measured_cycles=options.cycles[1])
-        given = {"filling": filling, "table": table, "transient": options.cycles[0]}
-        for scene, chosen in [*FILLINGS[filling].items()][: options.options]:
-            found[filling, scene] = damper, {**given, "options": chosen}
-    return found
-
-
-def costs_of(options, calls, results):
-    """Costs of a step by group and scene, of the scenes whose own run ended well."""
-    shared = {"half_width": options.half_width, "states": options.states}
-    shared["rounds"] = FEWEST, options.rounds
-    good = [key for key in calls if "failed" not in results[key] and key[1] != LAST_BIT]
-    found = {}
-    with ProgressBar("comparing") as bar:
-        for k, group in enumerate(("blast", *options.fillings)):
-            own = {scene: calls[of, scene][1] for of, scene in good if of == group}
-            if group == "blast":
-                job = {name: getattr(options, name) for name in ("until", "lists", "certified")}
-                job.update(step=STEPS["blast"], substeps=options.substeps)
-                job["scenes"] = {scene: call["names"] for scene, call in own.items()}
-            else:
-                first = next(iter(own.values()))
-                job = {name: first[name] for name in ("filling", "table", "transient")}
-                job.update(substeps=TENTH[group])
-                job["scenes"] = {scene: call["options"] for scene, call in own.items()}
-            work = costs_of_blast if group == "blast" else costs_of_damper
-            found.update(study.call_in_process(work, **job, **shared))
-            bar.count(k + 1, 1 + len(options.fillings))
-    return found
-
-
-def row_of(group, scene, found, complete, costs):
-    """Row of a table; complete: result of the first scene. sign: -1 of what was added."""
-    name, sign = scene.removeprefix("without "), 1.0
-    if name in ADDED:
-        sign = -1.0
-    key = CONTACTS.get(name, name.split())[0] if group == "blast" else f"{group} {name}"
-    row = {"group": group, "scene": scene, "key": key.replace(" ", "_"), "sign": sign}
-    row["effect"] = name if group != "blast" or name != scene or name in ADDED else ""
-    row["failed"] = found.get("failed", "")
-    if row["failed"]:
-        return row
-    if scene in costs:
-        # By ratio and not by seconds, which differ from round to round with the machine's load.
-        base, cost = next(iter(costs.values()))["seconds"], costs[scene]
-        spared = [1.0 - cost[end] for end in ("ratio", "low", "high")]
-        low, middle, high = sorted(100.0 * sign * one for one in spared)
-        row.update(zip(STEP, (middle, low, high)))
-        row.update(step_ms=1e3 * base * cost["ratio"])
-        row["seconds"] = sign * spared[0] * base * found["steps"]
-    row.update({name: found[name] for name in ("before_first_step_s", "memory_MB", "compiled_kB")})
+def shared_of(group, options):
+    """Arguments that the runs of a group share."""
     if group == "blast":
+        return {"until": options.until, "step": STEPS[group]}
+    table = {"particles": 30, "seeds": (1, 2), "ratios": options.ratios, "step": STEPS[group]}
+    table["measured_cycles"] = options.cycles[1]
+    return {"filling": group, "table": table, "transient": options.cycles[0]}
+
+
+def costs_of(group, options, results):
+    """Costs of a step by scene, under the group's name, of scenes whose own run ended well."""
+    job = {**shared_of(group, options), "rounds": (FEWEST, options.rounds)}
+    job.update(half_width=options.half_width, states=options.states)
+    good = [scene for scene in options.scenes[group] if "failed" not in results[group, scene]]
+    job["scenes"] = {scene: SCENES[group][scene] for scene in good if scene != LAST_BIT}
+    if group != "blast":
+        return study.call_in_process(costs_of_damper, **job, substeps=TENTH[group])
+    job.update(lists=options.lists, certified=options.certified, substeps=options.substeps)
+    return study.call_in_process(costs_of_blast, **job)
+
+
+def table_of(group, results, costs):
+    """Table of a group, the complete scene first. sign: -1 of what was added."""
+    own = {scene: found for (of, scene), found in results.items() if of == group}
+    rows, complete = [], next(iter(own.values()))
+    for scene, found in own.items():
+        name = scene.removeprefix("without ")
+        key = CONTACTS.get(name, name.split()[0]) if group == "blast" else f"{group} {name}"
+        row = {"group": group, "scene": scene, "key": key.replace(" ", "_")}
+        row["sign"] = sign = -1.0 if name in ADDED else 1.0
+        row.update(effect="" if scene in (ALL, LAST_BIT) else name, failed=found.get("failed", ""))
+        rows.append(row)
+        if scene in costs:
+            # By ratio and not by seconds, which differ from round to round with the machine's load.
+            base, cost = next(iter(costs.values()))["seconds"], costs[scene]
+            spared = sorted(sign * (1.0 - cost[end]) for end in ("low", "ratio", "high"))
+            row.update(zip(STEP, np.multiply(100.0, spared)), step_ms=1e3 * base * cost["ratio"])
+            row["seconds"] = spared[1] * base * found["steps"]
+        if not row["failed"]:
+            row.update({name: found[name] for name in found if name not in UNTOLD})
+            row.update(change_of(found, complete))
+    return pd.DataFrame(rows).dropna(axis=1, how="all")
+
+
+def change_of(found, complete):
+    """By how much a result differs from that of the complete scene."""
+    if "hole_mm" in found:
         hole, wanted = found["hole_mm"], complete["hole_mm"]
-        row.update(hole_mm=hole, broken_faces=found["broken_faces"])
-        return {**row, "change_percent": 100.0 * abs(hole - wanted) / abs(wanted)}
+        return {"change_percent": 100.0 * abs(hole - wanted) / abs(wanted)}
     # Of the complete filling half of the distance of two seeds: what the mean may owe to chance.
     curve, (one, other) = np.mean(found["rms_mm"], axis=0), complete["rms_mm"]
     change = 100.0 * curve_distance(curve, np.mean(complete["rms_mm"], axis=0))
     if found is complete:
         change = 50.0 * curve_distance(one, other)
-    return {**row, "peak_mm": curve.max(), "change_percent": change}
+    return {"change_percent": change, "peak_mm": curve.max()}
 
 
 def figures_of(table):
@@ -216,18 +194,17 @@ def draw(path, tables):
 
 def draw_costs(axes, rows):
     """Bars with the interval; pale where that holds 0, so that the cost is not resolved."""
-    words = {name: "instead" if name in CONTACTS else "added" for name in ADDED}
-    names = [f"{one}\n({words[one]})" if one in words else one for one in rows.effect]
-    for place, (cost, least, most) in enumerate(rows[[*STEP]].to_numpy()):
-        hidden = bool(least <= 0.0 <= most)
-        axes.barh(place, cost, color=SKY if hidden else BLUE, height=0.6)
-        axes.plot([least, most], [place, place], color=BLACK, linewidth=1.0, marker="|")
-        digits = int(abs(cost) < 10.0)
-        # A zero has no sign.
-        text = f"  {round(cost, digits) + 0.0:.{digits}f} %" + ", not resolved" * hidden
-        axes.text(max(most, 0.0), place, text.replace("-", "−"), va="center", fontsize=8.5)
+    (least, cost, most), places = rows[[*STEP]].to_numpy().T, range(len(rows))
+    hidden = [bool(low <= 0.0 <= high) for low, high in zip(least, most)]
+    axes.barh(places, cost, color=np.where(hidden, SKY, BLUE), height=0.6)
+    axes.plot([least, most], [places, places], color=BLACK, linewidth=1.0, marker="|")
+    for place, value in enumerate(cost):
+        text = f"  {value:z.{int(abs(value) < 10.0)}f} %" + ", not resolved" * hidden[place]
+        end = max(most[place], 0.0)
+        axes.text(end, place, text.replace("-", "−"), va="center", fontsize=8.5)
+    names = [f"{one}\n({ADDED[one]})" if one in ADDED else one for one in rows.effect]
     names = [name.replace("_", " ").replace(" and ", "\nand ") for name in names]
-    axes.set(yticks=range(len(names)), yticklabels=names)
+    axes.set(yticks=places, yticklabels=names)
     axes.set_xlabel("cost: share of a step's time [%], below 0: slower without it")
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     axes.margins(x=0.3)
@@ -251,25 +228,27 @@ def draw_changes(axes, changes, chance):
 
 def run(options):
     """Measure, then write and print."""
-    folder, calls, rows, figures = study.begin(options), calls_of(options), [], {}
+    folder, calls, costs, figures = study.begin(options), {}, {}, {}
+    for group, scenes in options.scenes.items():
+        work, shared = blast if group == "blast" else damper, shared_of(group, options)
+        calls.update({(group, one): (work, {**shared, **SCENES[group][one]}) for one in scenes})
     with ProgressBar("compiling, measuring") as bar:
         results = study.call_all(calls, options.threads or 1, bar.count)
-    costs = costs_of(options, calls, results)
+    with ProgressBar("comparing") as bar:
+        for k, group in enumerate(options.scenes, 1):
+            costs.update(costs_of(group, options, results))
+            bar.count(k, len(options.scenes))
     elastic = study.call_in_process(absent, substeps=SUBSTEPS, repeats=options.again)
     # Each against its neighbour in time: a machine is never equally fast for long.
     ratio = np.array(elastic["composed"]) / np.array(elastic["by_hand"])
     for end, value in zip(("", "_low", "_high"), (np.median(ratio), *median_interval(ratio))):
         figures[f"overhead_absent{end}_percent"] = 100.0 * (value - 1.0), "%"
-    complete = {}
-    for (group, scene), found in results.items():
-        rows.append(row_of(group, scene, found, complete.setdefault(group, found), costs[group]))
-    figures["blast_seconds"] = complete["blast"]["run_s"], "s"
-    tables = dict([*pd.DataFrame(rows).groupby("group", sort=False)])
-    if options.chance:
-        last = tables["blast"].set_index("scene").change_percent[LAST_BIT]
-        figures["blast_chance_percent"] = last, "%"
+    figures["blast_seconds"] = results["blast", ALL]["run_s"], "s"
+    tables = {group: table_of(group, results, costs[group]) for group in options.scenes}
+    for row in tables["blast"].itertuples():
+        if row.scene == LAST_BIT:
+            figures["blast_chance_percent"] = row.change_percent, "%"
     for group, table in tables.items():
-        tables[group] = table = table.reset_index(drop=True).dropna(axis=1, how="all")
         table.to_csv(folder / f"{group}.csv", index=False)
         print(f"\n{TITLES[group]}: cost of a step, what leaving an effect out spares and changes")
         hidden = ["group", "failed", "key", "sign", "effect"]
@@ -277,9 +256,7 @@ def run(options):
         print(*(f"{one.scene}: {one.failed}" for one in table.itertuples() if one.failed), sep="\n")
         figures.update(figures_of(table))
     draw(folder / "effects.png", tables)
-    listed = pd.DataFrame(
-        {(scene, name): cost for scene, by in costs["lists"].items() for name, cost in by.items()}
-    ).T
+    listed = pd.concat({scene: pd.DataFrame(by).T for scene, by in costs["lists"].items()})
     listed.to_csv(folder / "lists.csv", index_label=["scene", "list"])
     over = 100.0 * (listed.ratio.xs("auto", level=1) - 1.0)
     figures["auto_overhead_percent"] = over.max(), "%"

@@ -20,6 +20,7 @@ from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 
 import taichi_dem as dem
 from _drawing import FilmedRun, film_runs
@@ -49,7 +50,7 @@ TABLE = study.Table(
     error_cells=(lambda one: float(one.depth_m - one.formula_m) / one.cell, "", "", "1"),
 )
 #: Below zero, at zero, above: pressed, at rest, pulled.
-COLOURS = "RdBu_r"
+COLOURS, LINES = "RdBu_r", ("-", "--", "-.")
 
 
 def follow(simulation, bars, until, title):
@@ -59,18 +60,15 @@ def follow(simulation, bars, until, title):
     all bonds between a cell and the next have broken, (looks, bars, cells - 1).
     """
     looks = round(until / STEP) // LOOK
-    shown = {"samples": 1, "frames": looks, "title": title}
-    result = run_simulation(simulation, until=looks * LOOK * STEP, **shown)
+    until = looks * LOOK * STEP
+    result = run_simulation(simulation, until=until, samples=1, frames=looks, title=title)
     frames, top = result.frames, result.model.topology
-    place = np.array([frame.position[:, 0] for frame in frames]) - result.model.centre[:, 0]
-    speed = np.array([frame.velocity[:, 0] for frame in frames])
-    time = np.array([frame.time_s for frame in frames])
-    moved, speed = (x.reshape(len(frames), bars, -1, CELL).mean(axis=-1) for x in (place, speed))
-    ends = np.sort([top.master // CELL, top.slave // CELL], axis=0)
-    between, broke = ends[0] != ends[1], np.full(moved[0].size, -np.inf)
-    last = np.nan_to_num(result.broken_time[between], nan=np.inf)
-    np.maximum.at(broke, ends[0, between], last)
-    joints = broke.reshape(moved[0].shape)[:, :-1] <= time[:, None, None]
+    cells = np.array([[one.displacement[:, 0], one.velocity[:, 0]] for one in frames])
+    cells = cells.reshape(len(frames), 2, bars, -1, CELL).mean(axis=-1)
+    time, moved, speed = np.array([one.time_s for one in frames]), cells[:, 0], cells[:, 1]
+    low, high = np.sort([top.master // CELL, top.slave // CELL], axis=0)
+    broke = pd.Series(result.broken_time, low).fillna(np.inf)[low != high]
+    joints = broke.groupby(level=0).max().to_numpy().reshape(bars, -1) <= time[:, None, None]
     return result, SimpleNamespace(time=time, moved=moved, speed=speed, joints=joints)
 
 
@@ -83,8 +81,7 @@ def spall(cells, ratios, speed):
     one, places = bar(LENGTH, WIDTH, (cells, 1, 1)), range(len(ratios))
     mesh = placed_together({f"bar{k}": (one, (0.0, 3 * WIDTH * k, 0.0)) for k in places})
     acting = [dem.effects.Softening(), dem.effects.BondDamping()]
-    scene = dem.Scene(mesh, replace(LAW, **damping), acting)
-    simulation = dem.Simulation(scene, dem.Uniform(STEP))
+    simulation = dem.Simulation(dem.Scene(mesh, replace(LAW, **damping), acting), dem.Uniform(STEP))
     centre = simulation.model.centre
     peak = np.repeat(ratios, CELL * cells) * LAW.tensile_strength / (LAW.density * speed)
     depth, grid = LENGTH - centre[:, 0], np.linspace(0.0, LENGTH, 4001)
@@ -130,11 +127,9 @@ def picture_wave(path, wave, place, cells):
     with picture(path, 1, 2, size=(9.0, 3.8)) as (figure, (along, over)):
         drawn = space_time(along, place, time, velocity, np.abs(velocity).max())
         figure.colorbar(drawn, ax=along, label=label)
-        looks = zip((BLUE, GREEN, RED), ("-", "--", "-."))
-        for (words, cell), (colour, dashes) in zip(cells.items(), looks):
-            look = {"color": colour, "ls": dashes, "label": words}
-            over.plot(1e3 * time, velocity[:, cell], **look)
-            along.axvline(place[cell], lw=1.2, **look)
+        for (words, cell), colour, line in zip(cells.items(), (BLUE, GREEN, RED), LINES):
+            over.plot(1e3 * time, velocity[:, cell], color=colour, ls=line, label=words)
+            along.axvline(place[cell], lw=1.2, color=colour, ls=line, label=words)
         along.set_title("it runs, comes back, runs again")
         along.legend(loc="lower left", bbox_to_anchor=(0.0, 1.08), ncols=4, columnspacing=1.0)
         top = velocity[:, [*cells.values()][1]].max()
@@ -160,8 +155,7 @@ def picture_spall(path, made, stress, rows, joint, cell):
         line = np.linspace(0.8 * min(arrived), 1.1 * max(arrived), 100)
         formula = rows[0]["formula_m"] * rows[0]["arrived_MPa"] / line
         last.plot(line, formula, color=GREY, label="pulse length × strength / (2 s$_0$)")
-        look = {"fmt": "o", "color": RED, "ms": 5, "label": "broke, ± one cell"}
-        last.errorbar(arrived, depth, yerr=cell, **look)
+        last.errorbar(arrived, depth, cell, fmt="o", color=RED, ms=5, label="broke, ± one cell")
         last.set(xlabel="pulse s$_0$ that arrived [MPa]", ylabel="depth of the first break [m]")
         last.set(ylim=(0.0, None), title="the stronger, the thinner")
         last.legend(loc="lower right", bbox_to_anchor=(1.0, 1.08))
@@ -193,8 +187,7 @@ def run(options):
     first, wave = follow(dem.Simulation(elastic, dem.Uniform(STEP)), 1, 2.6e-3, "wave")
     speed = wave_speed(wave, gates, cell)
     second, made = spall(cells, options.ratios, speed)
-    ratios = enumerate(options.ratios)
-    rows = TABLE.rows([spalled(made, k, one, speed, cell) for k, one in ratios])
+    rows = TABLE.rows([spalled(made, *one, speed, cell) for one in enumerate(options.ratios)])
     TABLE.show(rows)
     study.write_rows(at("spall.csv"), rows)
     cells = {**{f"at {place[k]:.2f} m": k for k in gates}, "free end": -1}
@@ -207,10 +200,9 @@ def run(options):
     film(at("spall.gif"), second, made, stress, options.ratios.index(1.5))
     end, gate = wave.speed[:, 0, [-1, gates[1]]].max(axis=0)
     figures = {"wave_speed_m_s": (speed, "m/s"), "free_end_over_wave": (float(end / gate), "1")}
-    figures["cell_m"] = cell, "m"
     for row in rows:
         figures.update(TABLE.figures(row, "spall_{ratio:g}_{key}"))
-    study.finish(options, NAME, figures, [first.report, second.report])
+    study.finish(options, NAME, {**figures, "cell_m": (cell, "m")}, [first.report, second.report])
 
 
 if __name__ == "__main__":

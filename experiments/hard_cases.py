@@ -13,18 +13,17 @@ Writes hard_cases.csv, a picture of each case, hard_cases_blast.png, hard_cases_
 hard_cases.png and summary.json to results/hard_cases/.
 """
 
+import itertools
 import math
+import re
 import sys
+import textwrap
 from collections import Counter, defaultdict
 from functools import partial
-from pathlib import Path
 
-import pytest
-
-from _hard_cases_pictures import picture_cases, picture_margins
+from _asked import found_by
 from taichi_dem.kit import study
-from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress_bar import ProgressBar
+from taichi_dem.kit.plot_style import BLACK, GREY, RED, line_key, picture, power, styles_of
 
 NAME = "hard_cases"
 #: Of a quick run, which compile little; the tests ask all, at quick size.
@@ -34,54 +33,9 @@ SETTINGS = {
     "columns": (3, 3, study.whole(1, 8), "of the sheet, 3"),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
-TESTS = Path(__file__).parents[1] / "tests" / "hard_cases" / "test_hard_cases.py"
-#: Nothing of what the other tests need, and nothing said but by this program.
-PYTEST = "-s --noconftest -o addopts= --import-mode=importlib -p no:terminal -p no:cacheprovider"
-
-
-class Asked:
-    """A plugin of pytest that chooses cases and their size, and keeps what they gave."""
-
-    def __init__(self, only, quick, bar):
-        self.only, self.quick, self.bar = only, quick, bar
-        self.trials, self.count, self.unknown, self.interrupted = [], 0, [], False
-
-    def pytest_configure(self, config):
-        """Tell the test that it is asked."""
-        config.option.hard_cases = self
-
-    def pytest_collection_modifyitems(self, items):
-        """Keep the cases of these names."""
-        given = [getattr(item, "callspec", None) for item in items]
-        cases = [one and one.params.get("case") for one in given]
-        names = {case.name for case in cases if case}
-        self.unknown = sorted({*(self.only or ())} - names)
-        chosen = () if self.unknown else self.only or names
-        items[:] = [item for item, case in zip(items, cases) if case and case.name in chosen]
-        self.count = len(items)
-
-    def pytest_keyboard_interrupt(self):
-        """Pytest keeps Ctrl-C to itself."""
-        self.interrupted = True
-
-    def take(self, trial):
-        """Keep the trial of a test."""
-        self.trials.append(trial)
-        self.bar.count(len(self.trials), self.count)
-
-
-def trials_of(options):
-    """Run the tests; returns their trials."""
-    with ProgressBar("hard cases") as bar:
-        asked = Asked(options.only, options.quick, bar)
-        pytest.main([str(TESTS), *PYTEST.split()], plugins=[asked])
-    if asked.interrupted:
-        raise KeyboardInterrupt
-    if asked.unknown:
-        raise InputError(f"only must name cases of {TESTS.parent}, got {', '.join(asked.unknown)}")
-    if not asked.trials or len(asked.trials) < asked.count:
-        raise RuntimeError(f"tests of hard cases broke: see pytest {TESTS}")
-    return asked.trials
+#: Margins from which on more means nothing; where those stand that refuse, and those that fail.
+MOST, PLACES = 1e4, {"refused": 0.05, "failed": 0.4}
+TICKS = {0.05: "refused", 1.0: "1", 10.0: "10", 100.0: "100", MOST: "≥ 10⁴"}
 
 
 def row_of(trial):
@@ -96,7 +50,7 @@ def row_of(trial):
 def run(options):
     """Ask every method of every case, write table, pictures and the sheet of all."""
     folder, sheets = study.begin(options), defaultdict(list)
-    trials = trials_of(options)
+    trials = found_by(NAME, options)
     rows = [row_of(trial) for trial in trials]
     study.write_rows(folder / "hard_cases.csv", rows)
     for trial in trials:
@@ -121,6 +75,137 @@ def cell_of(value):
     """A value as it is printed."""
     text = value if isinstance(value, str) else f"{value:.3g}"
     return text if len(text) < 90 else f"{text[:87]}..."
+
+
+def with_powers(words):
+    """Words with powers of ten for numbers as a program prints them: 1e4 -> 10⁴."""
+    return re.sub(r"\d+(?:\.\d+)?e[-+]?\d+", lambda found: power(float(found[0])), words)
+
+
+def title_of(case):
+    """Name of a case in words: fragment_at_1_km_s -> fragment at 1 km/s."""
+    words = re.sub(r"(\d+_k?m)_s(?![a-z])", r"\1/s", case.name)
+    return with_powers(words.replace("_", " "))
+
+
+def by_name(trials):
+    """Trials of each case, by its name; those of a case follow each other."""
+    groups = itertools.groupby(trials, lambda trial: trial.case.name)
+    return {name: list(own) for name, own in groups}
+
+
+def looks_of(trials):
+    """Label, colour, mark and dashes of every method."""
+    methods = dict.fromkeys(trial.method for trial in trials)
+    # A uniform step of a hard case is fixed: the paper's rule does not shorten it.
+    styles = styles_of("fixed" if method == "uniform" else method for method in methods)
+    return {
+        m: {"label": s.label, "color": s.colour, "marker": s.marker, "ls": s.line}
+        for m, s in zip(methods, styles.values())
+    }
+
+
+def picture_cases(path, trials, columns):
+    """A panel a case with the curves of its methods; one case alone with its question."""
+    cases, looks = by_name(trials), looks_of(trials)
+    # The first are thick, so that all are seen.
+    for k, look in enumerate(looks.values()):
+        look["lw"] = max(0.8, 3.0 - 0.45 * k)
+    alone = len(cases) == 1
+    columns = 1 if alone else columns
+    rows = -(-len(cases) // columns)
+    size = (7.0, 4.6) if alone else (3.06 * columns, 0.6 + 2.6 * rows)
+    with picture(path, rows, columns, size, squeeze=False) as (figure, axes):
+        for axis in axes.ravel()[len(cases) :]:
+            axis.set_axis_off()
+        for axis, own in zip(axes.ravel(), cases.values()):
+            draw_case(axis, own, looks)
+        shown = dict.fromkeys(trial.method for trial in trials if trial.curve)
+        keys = [line_key(**{**looks[method], "marker": None}) for method in shown]
+        place = "lower center" if alone else "upper left"
+        figure.legend(handles=keys, loc=f"outside {place}", ncols=2)
+        if alone:
+            question = textwrap.fill(with_powers(trials[0].case.question), 100)
+            figure.suptitle(question, fontsize=9.0, x=0.02, ha="left")
+
+
+def draw_case(axis, own, looks):
+    """Curves of the methods of a case, and how they fared in the title."""
+    shown = [trial for trial in own if trial.curve]
+    for trial in shown:
+        xlabel, x, ylabel, lines, dots = trial.curve
+        look = looks[trial.method]
+        hollow = {"ls": "none", "ms": 1.6 * look["lw"] + 1.0, "mfc": "none", "lw": 1.0}
+        look = {**look, **(hollow if dots else {"marker": None})}
+        for y in lines:
+            axis.plot(x, y, **look)
+        axis.set(xlabel=xlabel, ylabel=ylabel)
+    if shown:
+        axis.locator_params(axis="x", nbins=5)
+    else:
+        said = textwrap.fill(f"“{own[0].words}”", 32)
+        axis.set(xticks=[], yticks=[])
+        axis.text(0.03, 0.92, said, fontsize=8.5, va="top", transform=axis.transAxes)
+    lowest, highest = axis.get_ylim()
+    if 0.0 < lowest < 0.95 * highest:
+        axis.set_ylim(0.0, 1.05 * highest)
+    failed = any(trial.status == "failed" for trial in own)
+    title = textwrap.fill(f"{title_of(own[0].case)}: {verdict(own)}", 32)
+    axis.set_title(title, fontsize=9.0, color=RED if failed else BLACK)
+
+
+def verdict(own):
+    """How the methods of a case fared, in words."""
+    ends = [trial.status for trial in own]
+    words = {"passed": "passed", "refused": "refused", "failed": "FAILED"}
+    said = [f"{ends.count(end)} {word}" for end, word in words.items() if end in ends]
+    least = min((trial.worst.margin for trial in own if trial.worst), default=math.inf)
+    if math.isfinite(least):
+        # A line of the title shall not end within it.
+        number = power(least) if least >= 100.0 else f"{least:.2g}"
+        said.append(f"margin {number}".replace(" ", "\N{NO-BREAK SPACE}"))
+    return ", ".join(said)
+
+
+def picture_margins(path, trials):
+    """A panel a package, a row a case, a mark a method: its margin, or that it refuses."""
+    packages = dict.fromkeys(trial.case.package for trial in trials)
+    panels = {name: [one for one in trials if one.case.package == name] for name in packages}
+    longest = max(len(by_name(own)) for own in panels.values())
+    size = 4.6 * len(panels), 2.2 + 0.155 * longest
+    with picture(path, 1, len(panels), size, squeeze=False) as (_, axes):
+        for axis, (package, own) in zip(axes[0], panels.items()):
+            draw_margins(axis, own)
+            look = {"title_fontsize": 9.5, "alignment": "left", "loc": "lower left"}
+            look.update(bbox_to_anchor=(-0.3, 1.0), borderpad=0.0)
+            axis.legend(title=f"{package}: {len(own)} runs", **look)
+
+
+def draw_margins(axis, own):
+    """Marks of all methods, those that fail as stars."""
+    cases, looks = by_name(own), looks_of(own)
+    names = list(cases)
+    failed = [trial for trial in own if trial.status == "failed"]
+    for k, (method, look) in enumerate(looks.items()):
+        spread = 0.5 * (k / max(1, len(looks) - 1) - 0.5)
+        look = {**look, "ls": "none", "mew": 0.0, "ms": 5.0}
+        for some, more in ((own, {}), (failed, {"marker": "*", "ms": 11.0, "label": None})):
+            mine = [trial for trial in some if trial.method == method]
+            level = [names.index(trial.case.name) + spread for trial in mine]
+            axis.plot([place_of(trial) for trial in mine], level, **{**look, **more})
+    if failed:
+        axis.plot([], [], "*", ms=11.0, color=BLACK, label="failed")
+    axis.axvline(1.0, color=GREY, lw=1.0, label="at the bound")
+    axis.set(xscale="log", xlim=(0.02, 2.5 * MOST), ylim=(len(cases) - 0.3, -0.7))
+    axis.set_yticks(range(len(cases)), [title_of(trials[0].case) for trials in cases.values()])
+    axis.set_xticks(list(TICKS), list(TICKS.values()))
+    axis.set_xticks([], minor=True)
+    axis.set_xlabel("margin: bound / worst figure [1]")
+
+
+def place_of(trial):
+    """Place of a trial on the axis of margins."""
+    return PLACES.get(trial.status) or min(trial.worst.margin, MOST)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ from hypothesis.extra.numpy import arrays
 
 from _meshes import group_area, mirrored_copies
 from _scaling import even_cuts, share_costs
-from _trust.blast import laws
 from ca_damper.theory.bouncing import Fall, RecordedFall
 from cost_of_accuracy_blast import SPLIT, displacement_error, energy_error, faces_error
 from taichi_dem import CONCRETE, PAPER_BLOCK, read_mesh
@@ -18,6 +17,7 @@ from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.output.hole_monitor import Attenuation, attenuation_of
 from taichi_dem.state.model import Model
+from tests.trust.blast import laws
 
 
 def outcome(moved=((3.0, 0.0, 0.0), (0.0, 4.0, 0.0)), broken=(1, 2), **energy):

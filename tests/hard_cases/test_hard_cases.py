@@ -46,8 +46,8 @@ ASKED = [
 
 @pytest.mark.parametrize(("case", "method"), ASKED)
 def test_method_bears_the_case_or_refuses_it_in_words(case, method, pytestconfig):
-    asked = getattr(pytestconfig.option, "hard_cases", None)
-    trial = assess(case, method, quick=asked is None or asked.quick)
+    asked = getattr(pytestconfig.option, "asked", None)
+    trial = assess(case, method, quick=asked is None or asked.options.quick)
     if asked:
         asked.take(trial)
     assert trial.status == ("refused" if method in case.refused else "passed"), trial.words

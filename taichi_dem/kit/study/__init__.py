@@ -32,6 +32,6 @@ from taichi_dem.kit.study.summary import (
     write_accuracy,
     write_rows,
 )
-from taichi_dem.kit.study.work_precision import cheapest_figures, figures_by_method, give_answers
+from taichi_dem.kit.study.work_precision import cheapest_figures, give_answers
 from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.timing import Timing, clock, on_device, seconds_of

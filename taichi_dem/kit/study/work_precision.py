@@ -16,6 +16,8 @@ from taichi_dem.kit.study.summary import figure, write_rows
 from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.timing import Timing
 
+#: Errors that are asked for.
+TARGETS = (0.1, 0.01, 0.001)
 _ANSWER_HEADER = ["I want", "take", "at a step of", "seconds", "evaluations", "error"]
 _POINT_HEADER = (
     "method step label error floor evaluations seconds_low seconds_median seconds_high repeats "
@@ -86,23 +88,28 @@ def percent(share: float) -> str:
 def give_answers(
     folder: str,
     points: Sequence[Point],
-    targets: Iterable[float],
     floors: Mapping[str, float],
     titles: Mapping[str, str],
-) -> None:
-    """Write points.csv and answers.csv to a folder and print the answers.
+) -> dict[str, dict]:
+    """Write points.csv and answers.csv to a folder, print the answers, return figures of them.
 
-    targets: errors asked for. floors: error by method that no step can take away. titles: of the
-    methods.
+    floors: error by method that no step can take away. titles: of the methods. Figures: the seconds
+    at 1 and at 0.1 %, cheapest method first, and those of each method at 1 %.
     """
     rows = []
-    for target in targets:
+    for target in TARGETS:
         for one in answers(points, target, floors):
             rows.append((percent(target), titles[one.method], *_cells(one)))
     write_points(os.path.join(folder, "points.csv"), points, floors)
     write_rows(os.path.join(folder, "answers.csv"), rows, _ANSWER_HEADER)
     print_table(rows, _ANSWER_HEADER)
     print()
+    found = cheapest_figures(points, 0.01, floors, "cheapest_seconds")
+    found.update(cheapest_figures(points, 0.001, floors, "seconds"))
+    for method in dict.fromkeys(point.method for point in points):
+        seconds, _ = cheapest(points, 0.01, floors, method)
+        found[f"seconds_{_end_of(0.01)}_{method}"] = figure(seconds, "s")
+    return found
 
 
 def _cells(answer):
@@ -148,18 +155,6 @@ def cheapest_figures(
     seconds, method = cheapest(points, target, floors)
     found = {f"{name}_{end}": figure(seconds, "s")}
     return {**found, f"cheapest_method_{end}": figure(method, "")}
-
-
-def figures_by_method(
-    points: Sequence[Point], target: float, floors: Mapping[str, float]
-) -> dict[str, dict]:
-    """Figures of the seconds that each method needs for an error."""
-    return {
-        f"seconds_{_end_of(target)}_{method}": figure(
-            cheapest(points, target, floors, method)[0], "s"
-        )
-        for method in dict.fromkeys(point.method for point in points)
-    }
 
 
 def _end_of(target):

@@ -33,7 +33,6 @@ def machine_words() -> str:
 def picture_work_precision(
     path: str,
     points: Sequence[Point],
-    titles: Mapping[str, str],
     *,
     floors: Mapping[str, float],
     caption: str,
@@ -46,17 +45,16 @@ def picture_work_precision(
 ) -> None:
     """Error over wall time and over evaluations; the residual of each run over its step.
 
-    titles: of the methods, in the order of the legend. time_name: what the times are. floors:
-    dotted, by method. order: of the line of ideal gain, error ~ cost^-order, drawn through the
-    best buy. residual_names: of a third panel's axes (step, residual), none if empty; step_unit: of
-    its step [s]. Failures are crosses on the top edge, above what they would have cost, with their
-    reason.
+    time_name: what the times are. floors: dotted, by method. order: of the line of ideal gain,
+    error ~ cost^-order, drawn through the best buy. residual_names: of a third panel's axes (step,
+    residual), none if empty; step_unit: of its step [s]. Failures are crosses on the top edge,
+    above what they would have cost, with their reason.
     """
     below = ["evaluations", "residual"] if residual_names else ["evaluations"]
     with picture(path, 0, size=(9.2, 9.6)) as (figure, _):
         places = [["seconds"] * len(below), below]
         axes = figure.subplot_mosaic(places, height_ratios=(1.4, 1.0))
-        looks, drawn = _looks(titles), {}
+        looks, drawn = _looks(point.method for point in points), {}
         for cost, name in (("seconds", time_name), ("evaluations", work_name)):
             drawn[cost] = _Panel(axes[cost], points, looks, cost)
             drawn[cost].draw(floors, order)
@@ -65,7 +63,7 @@ def picture_work_precision(
             _draw_residuals(drawn["seconds"], axes["residual"], step_unit)
             axes["residual"].set_xlabel(residual_names[0])
             axes["residual"].set_ylabel(textwrap.fill(residual_names[1], 36))
-        figure.legend(*_legend(axes["seconds"], titles), loc="outside upper left", ncols=2)
+        figure.legend(*_legend(axes["seconds"]), loc="outside upper left", ncols=2)
         marks = "At the points: what is swept. Bars: to the slowest repeat."
         _write_below(figure, f"{caption} {marks}")
         # Where a label has room is known when everything else has its place.
@@ -76,7 +74,6 @@ def picture_work_precision(
 def picture_errors(
     path: str,
     errors: Mapping[str, Mapping[str, Sequence[tuple[float, float]]]],
-    titles: Mapping[str, str],
     *,
     time_name: str,
     caption: str,
@@ -87,7 +84,7 @@ def picture_errors(
     zero lies on the bottom edge.
     """
     with picture(path, 1, len(errors), (9.2, 5.6)) as (figure, axes):
-        looks = _looks(titles)
+        looks = _looks(next(iter(errors.values())))
         for axis, (words, by_method) in zip(axes, errors.items()):
             seen = [error for pairs in by_method.values() for _, error in pairs if error > 0.0]
             bottom = 0.5 * min(seen, default=1.0)
@@ -96,7 +93,7 @@ def picture_errors(
                 axis.plot([cost for cost, _ in pairs], height, label=method, **looks[method])
             axis.set(xscale="log", yscale="log", title=words, ylabel="error [1]")
             axis.set_xlabel(textwrap.fill(time_name, 28))
-        figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=2)
+        figure.legend(*_legend(axes[0]), loc="outside upper left", ncols=2)
         _write_below(figure, caption)
 
 
@@ -106,17 +103,19 @@ def _write_below(figure, caption):
     figure.supxlabel("\n".join(lines), fontsize=_SMALL, x=0.01, ha="left")
 
 
-def _looks(titles):
+def _looks(methods):
     """Colour and mark of every method."""
     return {
         method: {"color": style.colour, "marker": style.marker, "ms": 5, "lw": 1.2}
-        for method, style in styles_of(titles).items()
+        for method, style in styles_of(methods).items()
     }
 
 
-def _legend(axis, titles):
+def _legend(axis):
+    """Handles and labels, the methods by their titles."""
     handles, labels = axis.get_legend_handles_labels()
-    return handles, [titles.get(label, label) for label in labels]
+    titles = {method: style.label for method, style in styles_of(labels).items()}
+    return handles, [titles[label] for label in labels]
 
 
 def _cost(point, points, cost):

@@ -4,9 +4,9 @@ from functools import partial
 
 import numpy as np
 
-from _trust.common import Number, dots, material_of, plate, springs_step
 from taichi_dem import ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
-from taichi_dem.kit.plot_style import BLACK, GREY, RED
+from tests.trust.cases import Number
+from tests.trust.plates import material_of, plate, springs_step
 
 #: Bar: length, width and thickness [m], Young's modulus [Pa], Poisson's ratio, density [kg/m3].
 LENGTH, WIDTH, YOUNG, POISSON, DENSITY = 1.0, 0.2, 32e9, 0.2, 2450.0
@@ -28,7 +28,8 @@ def bar_wave(effort):
         row(f"bar_wave_{2 * n}", words.format(2 * n), float(EXACT), speed[:, k])
         for k, n in enumerate(cells)
     ]
-    return numbers, partial(draw_speeds, cells=cells, speed=speed)
+    error = 100.0 * (speed / EXACT - 1.0)
+    return numbers, {"waves": 2.0 * np.array(cells), "error": error}
 
 
 def speed_of(cells, seed):
@@ -58,17 +59,6 @@ def period_of(times, swing):
     return 2.0 * float(np.diff(passed).mean())
 
 
-def draw_speeds(axes, cells, speed):
-    """Error of the speed over the elements in a wave length."""
-    waves, error = 2.0 * np.array(cells), 100.0 * (speed / EXACT - 1.0)
-    axes.axhspan(-1.0, 1.0, color=GREY, alpha=0.25, lw=0.0, label="1 %")
-    dots(axes, waves, error)
-    axes.plot(waves, error.mean(axis=0), "_", color=BLACK, ms=16, label="mean")
-    axes.set(xlabel="elements in a wave length [1]", ylabel="error of the speed [%]")
-    axes.set_xticks(waves, map("{:g}".format, waves))
-    axes.legend(loc="lower right")
-
-
 #: Spalled bar: length [m], speed of waves [m/s], density [kg/m3], strength [Pa]. Pulse: peak [Pa],
 #: its length [m].
 ROD, SPEED, HEAVY, STRENGTH, PEAK, PULSE = 0.3, 3500.0, 2350.0, 5e6, 20e6, 0.3
@@ -89,7 +79,8 @@ def spall(effort):
         edge = THICK / across
         depth, speed, planes, ends = zip(*(spalled(edge, seed) for seed in effort.seeds))
         numbers += of_size(edge, *map(np.array, (depth, speed, planes)))
-    return numbers, partial(draw_ends, ends=ends)
+    from_end = [1e3 * (ROD - np.array(places)) for places in ends]
+    return numbers, {"from_end": from_end, "depth": 1e3 * DEPTH}
 
 
 def of_size(edge, depth, speed, planes):
@@ -100,11 +91,12 @@ def of_size(edge, depth, speed, planes):
     first = f"spall_depth_{tag}", f"first plane from the free end, {size}", 1e3 * DEPTH
     leaves = f"spall_speed_{tag}", f"it leaves at, {size}", LEAVES
     count = f"spall_planes_{tag}", f"planes, {size}", PEAK / STRENGTH
+    near_the_end = "a bar broke near its end" if edge == THICK / ACROSS[1] else ""
     rings = "each new end rings at the length of an element, and breaks further pieces off"
     return (
-        row(*first, 1e3 * depth, *near, unit="mm", note="a bar broke near its end"),
+        row(*first, 1e3 * depth, *near, unit="mm", miss=near_the_end),
         row(*leaves, speed, unit="m/s", allowed=0.03),
-        row(*count, planes, note=rings),
+        row(*count, planes, miss=rings),
     )
 
 
@@ -137,18 +129,3 @@ def pulsed(mesh, material, peak, laws):
     until = (ROD + FRONT + 1.2 * PULSE) / SPEED
     method = ImplicitDashpots(springs_step(scene))
     return simulate(scene, method=method, until=until, samples=1, frames=120, progress=None)
-
-
-def draw_ends(axes, ends):
-    """Where the bars came apart."""
-    look = {"color": RED, "ms": 14}
-    for k, places in enumerate(ends):
-        from_end = 1e3 * (ROD - np.array(places))
-        axes.plot(from_end, np.full(len(places), k + 1.0), "|", **look)
-    axes.plot([], [], "|", label="end of a piece", **look)
-    for k in range(1, 5):
-        words = "" if k > 1 else "planes of the formula"
-        axes.axvline(1e3 * k * DEPTH, color=BLACK, lw=0.8, ls=":", label=words)
-    axes.set(xlabel="distance from the free end [mm]", ylabel="random mesh [1]")
-    axes.set(yticks=range(1, len(ends) + 1), ylim=(0.4, len(ends) + 0.6))
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)

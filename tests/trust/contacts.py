@@ -4,13 +4,12 @@ from functools import partial
 
 import numpy as np
 
-from _piles import GRAVITY, STEP, loose, softened
-from _trust.common import Number
 from ca_damper import Batch, SceneTable, Spheres
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation
-from taichi_dem.kit.plot_style import BLACK, BLUE, RED
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, placed_together
+from tests.piles import GRAVITY, STEP, loose, softened
+from tests.trust.cases import Number
 
 #: Time on the slope [s].
 TIME = 0.12
@@ -34,7 +33,7 @@ def slope(effort):
     words = "tangent at which a high block topples, by b / h"
     row = partial(Number, source="statics of a rigid block")
     topples = partial(
-        row, note="springs are soft, so a leaning block stands on a strip along its edge"
+        row, miss="springs are soft, so a leaning block stands on a strip along its edge"
     )
     slides = "tangent at which a block slides, by mu"
     numbers = (
@@ -43,7 +42,8 @@ def slope(effort):
         topples("slope_topples", words, 1.0, limit(usual)),
         topples("slope_topples_fine", f"{words}, 36 rays a face", 1.0, limit(fine)),
     )
-    return numbers, partial(draw_ways, curves={"slides, mu": way, "topples, b / h": usual})
+    ways = {"slides, mu": 1e3 * way, "topples, b / h": 1e3 * usual}
+    return numbers, {"shares": SHARES, "ways": ways}
 
 
 def limit(moved):
@@ -91,16 +91,6 @@ def turned(ratio, turn):
     return checked_mesh(points @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]), mesh.tetrahedra, {})
 
 
-def draw_ways(axes, curves):
-    """Ways over the angle."""
-    for (words, moved), colour, form in zip(curves.items(), (BLUE, RED), ("o-", "s--")):
-        axes.plot(SHARES, 1e3 * moved.T, form, color=colour, ms=4, lw=0.8)
-        axes.plot([], [], form, color=colour, label=words)
-    axes.axvline(1.0, color=BLACK, lw=0.8, ls=":", label="limit")
-    axes.set(xlabel="tangent of the slope / its limit [1]", ylabel="way after 0.12 s [mm]")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
-
-
 #: Radius [m], density [kg/m3], modulus [Pa], speed [m/s], restitution, friction: their test 6.
 RADIUS, DENSITY, YOUNG, SPEED, RESTITUTION, FRICTION = 0.1, 2700.0, 70e9, 0.2, 0.5, 0.4
 #: Spins [rad/s] before the blow; the point of contact slides all the time from 7 (1 + e) / 2 mu
@@ -137,7 +127,10 @@ def rotation(effort):
         row("rotation_angle", "tangent of the way of parting", tangent, way),
         row("rotation_pair", alike, 0.0, (of_pair - before).ravel(), -1e-12, 1e-12, "rad/s"),
     )
-    return numbers, partial(draw_spins, spin=spin)
+    unit = FRICTION * SPEED / RADIUS
+    line = np.linspace(0.0, SPINS[-1], 50) / unit
+    closed = line, line - 2.5 * (1.0 + RESTITUTION)
+    return numbers, {"closed": closed, "before": SPINS / unit, "after": spin / unit}
 
 
 def after(filling, count, spins):
@@ -152,15 +145,3 @@ def after(filling, count, spins):
     batch.advance(round(4e-3 / SHORT))
     ends = [batch.snapshot(s) for s in range(len(spins))]
     return np.array([end["velocity"] for end in ends]), np.array([end["spin"] for end in ends])
-
-
-def draw_spins(axes, spin):
-    """Spin after the blow over the spin before it, in units of mu v / R."""
-    unit = FRICTION * SPEED / RADIUS
-    line = np.linspace(0.0, SPINS[-1], 50) / unit
-    closed = line - 2.5 * (1.0 + RESTITUTION)
-    axes.plot(line, closed, color=BLACK, lw=1.0, label="sliding, closed form")
-    axes.plot(SPINS / unit, spin / unit, "o", color=RED, ms=5, label="spheres")
-    axes.set_xlabel(r"spin before, $R\omega/(\mu v)$ [1]")
-    axes.set_ylabel(r"spin after, $R\omega/(\mu v)$ [1]")
-    axes.legend(loc="upper left")

@@ -7,12 +7,11 @@ import numpy as np
 
 from _strength_tests import TESTS
 from _strength_tests import disc as disc_mesh
-from _trust.common import Number, dots
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
-from taichi_dem.kit.plot_style import BLACK, BLUE, GREY
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import checked_mesh, with_inner_group
 from taichi_dem.mesh.shapes import bar
+from tests.trust.cases import Number
 
 GRANITE = "Lac du Bonnet granite, Potyondy and Cundall, IJRMMS 41 (2004) 1329"
 #: Strength in the Brazilian test over that in direct tension, and what counts as agreement.
@@ -35,33 +34,22 @@ def disc(effort):
         np.array([strength(test, seed) for seed in effort.seeds])
         for test in (TESTS["tension"], *loaded)
     )
-    note = "a wide load holds the disc together beside the split"
-    row = partial(Number, source=GRANITE, note=note, allowed=ALLOWED)
+    misses = "", "a wide load holds the disc together beside the split"
+    row = partial(Number, source=GRANITE, allowed=ALLOWED)
     words = "Brazilian strength over direct tension, arcs of {:g} degrees"
     numbers = [
-        row(f"disc_ratio_{2 * arc:g}", words.format(2 * arc), RATIO, found / tension)
-        for arc, found in zip(ARCS, brazilian)
+        row(f"disc_ratio_{2 * arc:g}", words.format(2 * arc), RATIO, found / tension, miss=miss)
+        for arc, found, miss in zip(ARCS, brazilian, misses)
     ]
     words = "direct tension over the strength of a bond"
     numbers.append(Number("disc_tension", words, 1.0, tension / STRENGTH, source="one bond"))
-    return numbers, partial(draw_ratio, tension=tension / 1e6, brazilian=brazilian[0] / 1e6)
+    shown = {"tension": tension / 1e6, "brazilian": brazilian[0] / 1e6}
+    return numbers, {**shown, "ratio": RATIO, "allowed": ALLOWED}
 
 
 def strength(test, seed):
     """Strength of a random specimen [Pa]."""
     return test.strength(Material.from_elastic(**ROCK), EDGE, STRENGTH, seed, None)
-
-
-def draw_ratio(axes, tension, brazilian):
-    """Both strengths of every mesh, and the ratio of granite."""
-    ends = np.array([0.0, 1.15 * tension.max()])
-    near = (RATIO * (1.0 + way) * ends for way in (-ALLOWED, ALLOWED))
-    axes.fill_between(ends, *near, color=GREY, alpha=0.25, label=f"within {100 * ALLOWED:.0f} %")
-    axes.plot(ends, RATIO * ends, color=BLACK, lw=0.8, label="ratio of granite")
-    dots(axes, tension, [brazilian])
-    axes.set(xlabel="direct tension [MPa]", xlim=ends)
-    axes.set_ylabel("Brazilian test, arcs of 10 degrees [MPa]")
-    axes.legend(loc="lower right")
 
 
 MIXED = "Benzeggagh and Kenane, Compos. Sci. Technol. 56 (1996) 439"
@@ -90,7 +78,9 @@ def joint(effort):
         row(f"joint_{angle}", words.format(way), 1.0, shares[:, ANGLES.index(angle)])
         for angle, way in ways.items()
     ]
-    return numbers, partial(draw_joint, spent=spent)
+    every = np.linspace(0.0, 90.0, 91)
+    law = every, [energy_of(angle) for angle in every]
+    return numbers, {"law": law, "angles": ANGLES, "spent": spent}
 
 
 def energy_of(angle):
@@ -131,12 +121,3 @@ def jointed(seed):
     halves = moved.group("behind", lambda x: x[:, 0] < 0.5 * LENGTH)
     halves = halves.group("before", lambda x: x[:, 0] > 0.5 * LENGTH)
     return with_inner_group(halves, "joint", lambda x: np.abs(x[:, 0] - 0.5 * LENGTH) < 1e-9)
-
-
-def draw_joint(axes, spent):
-    """Energies over the angle beside the law."""
-    angles = np.linspace(0.0, 90.0, 91)
-    axes.plot(angles, [energy_of(angle) for angle in angles], color=BLACK, lw=0.8, label="law")
-    dots(axes, ANGLES, spent, "plates", BLUE)
-    axes.set(xlabel="pull against the joint's normal [degrees]", ylabel="energy [J/m2]")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)

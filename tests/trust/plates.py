@@ -1,15 +1,9 @@
-"""What cases of others share: numbers beside ours, random meshes of plates, and dots of meshes.
-
-A case is a function of an ``Effort``; it returns its Numbers, and a function that draws them.
-"""
-
-from dataclasses import dataclass
+"""Plates on random meshes, with the material and the step that they need."""
 
 import numpy as np
 
 from taichi_dem import step_report
 from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
-from taichi_dem.kit.plot_style import RED
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import checked_mesh
 
@@ -17,59 +11,6 @@ from taichi_dem.mesh.mesh import checked_mesh
 JITTER = 0.25
 #: Least distance of points without rows, in edges: one of them on the square of an edge.
 DISTANCE = 0.78
-
-
-@dataclass(frozen=True)
-class Effort:
-    """What is spent: seeds of random meshes of a size, and sizes of element."""
-
-    seeds: range
-    sizes: int
-
-
-@dataclass
-class Number:
-    """A number that others have published or derived, and ours beside it.
-
-    key, words, unit: what it is. source: where the published number comes from. values: ours, one
-    for each mesh or draw. low, high: what counts as agreement, published within a share ``allowed``
-    where not given. note: what a reader should know of a miss. mean, spread: of the meshes, which
-    is half of their range.
-    """
-
-    key: str
-    words: str
-    published: float
-    values: np.ndarray
-    low: float | None = None
-    high: float | None = None
-    unit: str = "1"
-    source: str = ""
-    note: str = ""
-    allowed: float = 0.01
-
-    def __post_init__(self):
-        reach = self.allowed * abs(self.published)
-        self.low = self.published - reach if self.low is None else self.low
-        self.high = self.published + reach if self.high is None else self.high
-        self.mean, self.spread = float(np.mean(self.values)), 0.5 * float(np.ptp(self.values))
-
-    @property
-    def error_percent(self):
-        """Of the mean, in percent of the published number; absolute where that is zero."""
-        gap = self.mean - self.published
-        return 100.0 * (gap / abs(self.published) if self.published else gap)
-
-    @property
-    def holds(self):
-        """Whether the mean of the meshes lies within what counts as agreement."""
-        return bool(self.low <= self.mean <= self.high)
-
-
-def dots(axes, x, values, words="a random mesh", colour=RED):
-    """A dot a mesh: values (meshes, n) over x (n,)."""
-    axes.plot(x, np.transpose(values), "o", color=colour, ms=4)
-    axes.plot([], [], "o", color=colour, label=words)
 
 
 def plate(length, height, edge, seed, layers=1, in_rows=True):

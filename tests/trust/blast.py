@@ -1,16 +1,13 @@
 """A block 3 m deep is blasted: how peak velocities fall, and how large its fragments are."""
 
-from functools import partial
-
 import numpy as np
 
 from _blast import BLOCK_STEP, FROM_RADII, HOLE_RADIUS, paper_effects
 from _meshes import mirrored_copies, with_moved_nodes
-from _trust.common import Number
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
-from taichi_dem.kit.plot_style import BLACK, GREY, RED
 from taichi_dem.mesh.shapes import in_space_order
 from taichi_dem.mesh.tetrahedra import all_faces, outer_rows
+from tests.trust.cases import Number
 
 #: Copies of the paper's block, one behind the other; end of a run [s].
 COPIES, UNTIL = 15, 1e-3
@@ -35,9 +32,12 @@ def blast(effort):
     numbers = (
         Number(*falls, exponent, -2.4, -1.1, source=field),
         Number(*first, rosin, 0.8, 1.5, source=rock),
-        Number(*other, swebrec, 1.5, 3.5, source=quarries, note=whole),
+        Number(*other, swebrec, 1.5, 3.5, source=quarries, miss=whole),
     )
-    return numbers, partial(draw, sieved=sieved)
+    sieves, _, limit = sieved[0]
+    (n, level), _ = laws(*sieved[0])
+    law = sieves, -np.expm1(-np.exp(level) * sieves**n)
+    return numbers, {"curves": [curve[:2] for curve in sieved], "law": law, "limit": limit}
 
 
 def blasted(seed):
@@ -81,18 +81,3 @@ def laws(sieves, passing, limit):
     x, passing = sieves[taken], passing[taken]
     rosin = np.polyfit(np.log(x), np.log(-np.log1p(-passing)), 1)
     return rosin, np.polyfit(np.log(np.log(sieves[-1] / x)), np.log(1.0 / passing - 1.0), 1)
-
-
-def draw(axes, sieved):
-    """Share of the mass below a size, for each mesh, and where sizes are those of the mesh."""
-    for k, (sieves, passing, _) in enumerate(sieved):
-        axes.loglog(1e3 * sieves, passing, color=RED, lw=1.0, label="" if k else "a random mesh")
-    sieves, _, limit = sieved[0]
-    (n, level), _ = laws(*sieved[0])
-    law = -np.expm1(-np.exp(level) * sieves**n)
-    axes.loglog(1e3 * sieves, law, color=BLACK, lw=0.8, ls=":", label="Rosin and Rammler")
-    low, high = 1e3 * sieves[0], 1e3 * sieves[-1]
-    axes.set(xlabel="size of a fragment [mm]", xlim=(low, high))
-    axes.set(ylabel="share of the mass below [1]", ylim=(1e-4, 1))
-    axes.axvspan(low, 1e3 * limit, color=GREY, alpha=0.3, label="the mesh's own sizes")
-    axes.legend(loc="lower right")
