@@ -29,6 +29,7 @@ DOCS_STAMP := .venv/stamp-docs
 LESSONS_STAMP := .venv/stamp-lessons
 LESSONS := $(addprefix experiments/lessons/,$(addsuffix .py,what_a_time_step_costs what_an_answer_costs \
   why_a_box_of_grains_damps which_effects_a_scene_needs))
+VULKAN_PACKAGES := mesa-vulkan-drivers libvulkan1
 GMSH_PACKAGES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
 
 # taichi aborts where HOME is not set.
@@ -36,7 +37,7 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-physics test-rest test-experiments test-slow test-quadrants attack fuzz lint bench \
+.PHONY: help venv demo test test-physics test-rest test-experiments test-slow test-quadrants test-gpu attack fuzz lint bench \
   gallery lessons docs mesh wheel release-check clean
 
 help: ## print this list
@@ -64,6 +65,15 @@ test-slow: $(STAMP) ## run those that take longer
 
 attack: $(STAMP) ## attack it with hostile values, files, sessions and environments (ATTACK_OPTIONS="--attacks 100")
 	$(BIN)/python -m pytest -q -n 2 -m attack tests/attack --attacks 20 $(ATTACK_OPTIONS)
+
+test-gpu: $(STAMP) ## compare each device here with the CPU (as root on Debian or Ubuntu it installs Vulkan's software driver)
+	@$(BIN)/python -c "from taichi_dem.kit import device; raise SystemExit(not backend.is_present('vulkan'))" || \
+	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	    echo "Installing $(VULKAN_PACKAGES)."; export DEBIAN_FRONTEND=noninteractive; \
+	    { apt-get update && apt-get install -y --no-install-recommends $(VULKAN_PACKAGES); } >/dev/null || \
+	      echo "apt-get failed: the tests of Vulkan are skipped."; \
+	  else echo "No Vulkan driver answers here: its tests are skipped (Debian's names: $(VULKAN_PACKAGES))"; fi
+	$(BIN)/python -m pytest -q -m gpu tests/devices --durations 5 $(TEST_OPTIONS)
 
 fuzz: $(STAMP) ## run random scenes, also with every access to a field checked (FUZZ_OPTIONS="--attack-seed 7")
 	$(BIN)/python -m pytest -q -n 2 -m attack tests/fuzz --attacks 20 $(FUZZ_OPTIONS)

@@ -34,7 +34,7 @@ from ca_damper.scenes.checks import (
 )
 from ca_damper.scenes.scene_numbers import SceneNumbers
 from ca_damper.scenes.table import SceneTable, dealt
-from taichi_dem.kit import runtime
+from taichi_dem.kit import backend, runtime
 from taichi_dem.kit.checkpoint import identity_of, version_text
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
@@ -43,6 +43,8 @@ from taichi_dem.kit.restart import CheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import choice, instance, positive, shown, whole
 
 _MOST_STEPS = 2**31 - 1
+#: Rounds of the loops of a step for each cell or particle: a launch that needs more is refused.
+_ROUNDS_A_PLACE = 24
 
 
 class Batch(LoadedScenes):
@@ -156,6 +158,9 @@ class Batch(LoadedScenes):
         if self.modal is not None:
             engine.container.hang(self.modal)
         self._load_pace()
+        if backend.most_rounds():
+            rounds = _ROUNDS_A_PLACE * max(engine.capacity[3:], default=1)
+            self.launches.most_steps = max(1, backend.most_rounds() // rounds)
 
     def _checked(self, numbers: SceneNumbers) -> SceneNumbers:
         """The numbers; InputError where they do not fit the structure."""
@@ -568,10 +573,10 @@ class Batch(LoadedScenes):
     def _launch_until_done(self, steps: np.ndarray, progress: Any) -> None:
         """Launch, report and save; one saved at its end is reported and saved once more."""
         launches, coupling = self.launches, self.engine.coupling
-        total, done = max(1, int(steps.sum())), -1.0
+        total, done = int(steps.sum()), -1.0
         while done < 1.0:
             done = launches.done
-            launches.launch(total, coupling.advance, self._check_divergence)
+            launches.launch(steps, coupling.advance, self._check_divergence)
             if done < 1.0 == launches.done:
                 begin, end = map(self.engine.table.in_use, (coupling.begin, coupling.step))
                 launches.count((end - begin).astype(np.int64), self.table.column("particles"))

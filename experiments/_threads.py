@@ -55,10 +55,11 @@ def work_since(simulation, before=(0, 0), store=CACHE):
     return Work(share * evaluated, store=store) + VISIT * visits
 
 
-def thread_job(mesh, cells, methods, threads, steps, repeats):
+def thread_job(mesh, cells, methods, threads, steps, repeats, arch=""):
     """Result of ``whole_steps`` in a process of its own: threads cannot change within one."""
     job = {"mesh": mesh, "cells": cells, "methods": [*methods], "steps": steps, "repeats": repeats}
-    return call_in_process(whole_steps, threads=threads, title=f"on {threads} threads", **job)
+    title = f"on {threads} threads{arch and ' of '}{arch}"
+    return call_in_process(whole_steps, arch=arch, threads=threads, title=title, **job)
 
 
 def thread_gains(mesh, cells, methods, steps, rounds, repeats):

@@ -53,6 +53,7 @@ class BlastEngine(Engine):
         "take a smaller mesh, or shorter lists of contact (pairs_per_body, spheres_per_body, "
         "neighbours_per_body)"
     )
+    counted = "bodies"
 
     def declare(self) -> None:
         """Build all parts; Taichi allocates their fields afterwards, all at once."""

@@ -19,6 +19,7 @@ from xdist.scheduler import LoadScopeScheduling
 from ca_damper.engine import damper_engine
 from taichi_dem import InputError, runtime
 from taichi_dem.engine import ENGINES
+from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import field_bytes, tree_count
 from taichi_dem.step.drivers import CPU_ONLY
 from tests import arch
@@ -28,7 +29,7 @@ pytest_plugins = ("tests.compiler",)
 
 def pytest_addoption(parser):
     """The architecture, as every experiment has it; how many seeds, from which on."""
-    parser.addoption("--arch", default="cpu", choices=runtime.ARCHITECTURES)
+    parser.addoption("--arch", default="cpu", choices=("cpu", *backend.GPUS))
     group = parser.getgroup("attacks")
     group.addoption("--attacks", type=int, default=1, metavar="N", help="seeds of each attack")
     group.addoption("--attack-seed", type=int, default=0, metavar="S", help="the first of them")
@@ -126,8 +127,8 @@ def taichi_session():
     _give_back()
     if runtime.settings() is not None and _is_full():
         _stop()
-    if arch.chosen() == "cuda" and not runtime.cuda_present():
-        pytest.skip("no CUDA device answers here")
+    if arch.chosen() != "cpu" and not backend.is_present(arch.chosen()):
+        pytest.skip(f"no {arch.chosen()} device answers here")
     if runtime.settings() is None:
         _at_start["bytes"] = _resident_bytes()
     runtime.start(arch.chosen(), threads=2)
@@ -206,7 +207,7 @@ def _skipping():
     try:
         return (yield)
     except InputError as error:
-        if arch.chosen() == "cuda" and CPU_ONLY in str(error):
+        if arch.chosen() != "cpu" and CPU_ONLY in str(error):
             pytest.skip(str(error))
         raise
 

@@ -13,11 +13,12 @@ import taichi as ti
 from ca_damper.report import measures
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit import runtime
+from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import assign
 
-#: Status of a scene whose container has no finite motion any more; fillings use codes above zero.
-LOST = -1
+#: Status of a scene whose container has no finite motion any more, and of one whose loops the
+#: device has ended too early (``backend``); fillings use codes above zero.
+LOST, CUT_SHORT = -1, -2
 # Beyond any motion that means something: squared [m^2] + [m^2/s^2].
 _FAR = 1e12
 _CHECK_EVERY = 64
@@ -95,7 +96,7 @@ class Coupling:
     ):
         self.table, self.clock, self.container, self.device = table, clock, container, device
         self.account, self.recorder = account, recorder
-        self.padding = _CPU_BLOCK if runtime.settings().arch == "cpu" else 1
+        self.padding = _CPU_BLOCK if backend.is_cpu() else 1
         self.gravity = ti.field(ti.f64, shape=())
         for name in ("order", "step", "begin", "goal", "measure_from", "cycle", "status"):
             setattr(self, name, table.field(ti.i32))
@@ -152,6 +153,9 @@ class Coupling:
         target = begin + ti.cast(ti.floor(share * way), ti.i32)
         while self.step[s] < target and self._is_sound(s):
             self._advance_step(s)
+        if ti.static(backend.most_rounds() > 0):
+            if backend.loops_have_ended(self.table.scenes[None]):
+                self.status[s] = CUT_SHORT
 
     @ti.func
     def _is_sound(self, s):

@@ -1,5 +1,6 @@
 """Launches of bounded length, and their cost."""
 
+import math
 import time
 from collections.abc import Callable, Mapping
 
@@ -15,26 +16,28 @@ class Launches:
 
     A launch lasts about a sixth of a second, so that Ctrl-C, progress and the check for diverged
     scenes are prompt. done: share of the run that is done. seconds: spent on it. run_seconds,
-    scene_steps, particle_steps: of all runs. pace: scene-steps that a launch may have.
+    scene_steps, particle_steps: of all runs. pace: scene-steps that a launch may have; most_steps:
+    those of one scene.
     """
 
     def __init__(self, scenes: int):
         self.done = self.seconds = self.run_seconds = 0.0
         self.scene_steps = self.particle_steps = 0
         # One a scene to begin with, as the cost of a step is not known yet.
-        self.scenes, self.pace = scenes, float(scenes)
+        self.scenes, self.pace, self.most_steps = scenes, float(scenes), math.inf
 
     def begin(self) -> None:
         """Begin another run."""
         self.done = self.seconds = 0.0
 
     def launch(
-        self, total: int, advance: Callable[[float], None], check: Callable[[], None]
+        self, steps: np.ndarray, advance: Callable[[float], None], check: Callable[[], None]
     ) -> None:
-        """Make one launch; total: scene-steps of the run. check: called after it."""
+        """Make one launch; steps: of the run, (scenes,). check: called after it."""
         started = time.perf_counter()
         try:
-            share = min(1.0, self.done + self.pace / total)
+            share = min(self.pace / max(1, steps.sum()), self.most_steps / max(1, steps.max()))
+            share = min(1.0, self.done + share)
             advance(share)
             ti.sync()
             # A short run does not determine the pace of a long one.

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.engine.coupling import LOST
+from ca_damper.engine.coupling import CUT_SHORT, LOST
 from ca_damper.engine.damper_engine import DamperEngine
 from ca_damper.engine.modal_mount import ModalMount
 from ca_damper.errors import SimulationDiverged
@@ -19,6 +19,7 @@ from ca_damper.report import measures
 from ca_damper.scenes.scene_fields import SceneMemory
 from ca_damper.scenes.scene_numbers import SceneNumbers
 from ca_damper.scenes.table import SceneTable
+from taichi_dem.kit import backend
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress import compiling
 from taichi_dem.kit.validation import whole
@@ -230,7 +231,12 @@ class LoadedScenes:
         engine.clock.set(self.steps_per_cycle)
 
     def _check_divergence(self) -> None:
-        """Raise SimulationDiverged where no scene is left that goes on, or one may not be lost."""
+        """Raise SimulationDiverged where no scene is left that goes on, or one may not be lost.
+
+        And InputError where the device has ended a loop too early.
+        """
+        if backend.most_rounds() and CUT_SHORT in self._read_status()[2]:
+            raise backend.cut_short("of these scenes", "fewer particles")
         diverged = self.diverged
         if diverged.all() or (self.if_diverged == "raise" and diverged.any()):
             raise self.divergences()[0]

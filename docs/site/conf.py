@@ -43,6 +43,7 @@ CONTENTS = {
         "docs/damper_engineering",
         "docs/results",
         "docs/units",
+        "docs/gpu",
         "docs/limits",
     ],
     "How to add": ["docs/add_*"],

@@ -21,6 +21,7 @@ import taichi as ti
 from taichi_dem.contact.breaks import Breaks
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.contact.verlet_list import NearPairs, VerletList
+from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.products import norm
@@ -57,6 +58,7 @@ class BroadPhase:
         self.start_pairs, self.limits = start_pairs, limits
         self.has_limits = limits is not None
         self.tables, self.state = contacts.tables, contacts.state
+        self.may_be_cut = backend.most_rounds() > 0
         self.free, self.mark = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.free_count = ti.field(ti.i32, shape=())
         self.neighbours = VerletList(contacts)
@@ -125,8 +127,16 @@ class BroadPhase:
     @ti.kernel
     def _search(self):
         for count, item in ti.static(self.phases):
-            for a in range(count()):
-                item(a)
+            if ti.static(backend.is_cpu()):
+                for a in range(count()):
+                    item(a)
+            else:
+                for a in range(ti.static(1 if count == self._once else self.mark.shape[0])):
+                    if a < count():
+                        item(a)
+                        if ti.static(self.may_be_cut):
+                            if backend.loops_have_ended(count()):
+                                self.state.cut_short[None] = 1
 
     @ti.func
     def is_requested(self):

@@ -21,6 +21,7 @@ from taichi.lang.matrix import MatrixField
 from taichi.lang.snode import SNode
 from taichi.lang.util import to_numpy_type
 
+from taichi_dem.kit import backend
 from taichi_dem.kit.errors import InputError
 
 #: Trees beyond which no new one is begun; a few more complete those begun.
@@ -38,15 +39,16 @@ class CapacityError(InputError):
 class FieldTree:
     """Fields declared in its ``with`` block; memory is taken at the end of the block, all at once.
 
-    advice: what to do where the machine lacks the memory, as the end of a sentence. bytes: size of
-    all fields. Raises InputError, before anything is allocated, where the machine lacks the memory
-    or the session has no room for another tree.
+    advice: what to do where the machine lacks the memory, as the end of a sentence. counted: for
+    how many of what the fields have room. bytes: size of all fields. Raises InputError,
+    before anything is allocated, where the machine lacks the memory or the session has no room for
+    another tree.
     """
 
     scratch_fields = ("_anchor",)
 
-    def __init__(self, advice: str = "take a smaller one"):
-        self.advice, self.bytes = advice, 0
+    def __init__(self, advice: str = "take a smaller one", counted: tuple[int, str] = (0, "")):
+        self.advice, self.counted, self.bytes = advice, counted, 0
         self._tree: Any = None
 
     def __enter__(self) -> "FieldTree":
@@ -57,6 +59,8 @@ class FieldTree:
         return self
 
     def __exit__(self, kind, error, _):
+        if kind is None:
+            backend.align(self._builder.root.ptr)
         self._before.restore_trees()
         if kind is not None:
             self._before.restore_fields()
@@ -67,14 +71,27 @@ class FieldTree:
             self._before.restore_fields(self._builder)
             raise
 
+    def _check_size(self):
+        """Raise CapacityError where the device cannot hold the fields, or loop over one of them."""
+        root, (count, what) = self._builder.root.ptr, self.counted
+        self.bytes = backend.declared_bytes(root)
+        longest = max(math.prod(SNode(root.get_ch(k)).shape) for k in range(root.get_num_ch()))
+        share = min(backend.most_bytes() / self.bytes, backend.most_entries() / longest)
+        if share < 1.0:
+            fits = f"; about {int(share * count)} {what} fit" if count else ""
+            raise CapacityError(
+                f"this needs {self.bytes / 1e9:.3g} GB and fields of {longest} entries, which this "
+                f"device does not take: {self.advice}{fits}"
+            )
+        check_memory(self.bytes, self.advice)
+
     def _allocate(self):
         """Take the memory of the declared fields."""
-        self.bytes = _declared_bytes(self._builder.root.ptr)
-        check_memory(self.bytes, self.advice)
+        self._check_size()
         # Taichi takes it off its list of trees that are not finalized, and expects it there.
         impl.get_runtime().initialize_fields_builder(self._builder)
         self._tree = self._builder.finalize(raise_warning=False)
-        if impl.current_cfg().arch != ti.cuda:
+        if backend.is_cpu():
             address = _address(self._anchor) - _offset(self._anchor.snode.ptr)[1]
             _base(self._builder.root.ptr)
             _bases[self._builder.root.ptr.id] = address
@@ -189,7 +206,7 @@ def _found_layout(field):
 
 def values(field: ti.Field, wanted: Any = ...) -> np.ndarray:
     """Copy of entries of a field; wanted: their slice or their numbers, all by default."""
-    if impl.current_cfg().arch == ti.cuda or not in_tree(field):
+    if not in_tree(field):
         return field.to_numpy()[wanted]
     impl.get_runtime().prog.synchronize()
     return np.array(array_of(field)[wanted])
@@ -203,7 +220,10 @@ def assign(field: ti.Field, array: ArrayLike) -> None:
     array = np.asarray(array)
     if array.ndim == 0 and field.shape:
         array = np.full(values(field).shape, array)
-    if impl.current_cfg().arch == ti.cuda or not in_tree(field):
+    if not in_tree(field):
+        if array.shape[:1] == field.shape[:1]:
+            field.from_numpy(array.astype(to_numpy_type(field.dtype)))
+            return
         whole = field.to_numpy()
         whole[slice(len(array)) if whole.ndim else ()] = array
         field.from_numpy(whole)
@@ -249,17 +269,6 @@ def check_memory(needed: float, advice: str) -> None:
             f"this needs {needed / 1e9:.3g} GB of memory, of which {free / 1e9:.3g} GB are free: "
             f"{advice}"
         )
-
-
-def _declared_bytes(node) -> int:
-    """Bytes of all fields placed below a node that is not allocated yet."""
-    total = 0
-    for child in map(node.get_ch, range(node.get_num_ch())):
-        if child.is_place():
-            total += np.dtype(to_numpy_type(child.data_type())).itemsize
-        else:
-            total += math.prod(SNode(child).shape) * _declared_bytes(child)
-    return total
 
 
 def _first_scalar(field):

@@ -10,10 +10,7 @@ import weakref
 from collections.abc import Hashable, Iterable, Sequence
 from typing import Any
 
-import taichi as ti
-from taichi.lang import impl
-
-from taichi_dem.kit import runtime
+from taichi_dem.kit import backend, runtime
 from taichi_dem.kit.allocation import CapacityError, FieldTree
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.field_memory import fields_of
@@ -28,6 +25,8 @@ class Engine:
 
     #: Advice where the machine lacks the memory, as the end of a sentence.
     advice = "take a smaller one"
+    #: What the first number of the capacity counts.
+    counted = "scenes"
     #: What an owner is, in words.
     serves = "simulation"
 
@@ -36,7 +35,7 @@ class Engine:
         self.session = runtime.session()
         self.owner: weakref.ref | None = None
         self._used = False
-        self.tree = FieldTree(self.advice)
+        self.tree = FieldTree(self.advice, (self.capacity[0], self.counted))
         with self.tree:
             self.declare()
 
@@ -65,7 +64,7 @@ class Engine:
 
     def clear(self) -> None:
         """Set all fields to zero, as they are in a new engine."""
-        if self._used and impl.current_cfg().arch == ti.cuda:
+        if self._used and not backend.is_cpu():
             for one in fields_of(self):
                 one.field.fill(0)
         elif self._used:

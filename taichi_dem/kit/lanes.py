@@ -12,6 +12,7 @@ A vector in space of all lanes is a matrix: rows are components x, y, z, columns
 import numpy as np
 import taichi as ti
 
+from taichi_dem.kit import backend
 from taichi_dem.kit.types import real, vec6
 
 #: Members worked on side by side.
@@ -113,6 +114,54 @@ def transposed_product(rows: ti.template(), place, vectors):
                 + third[r, n] * vectors[2, n]
             )
     return made
+
+
+@ti.func
+def _put(field: ti.template(), g, k: ti.template(), n, value):
+    field[g][k, n] = value
+
+
+@ti.func
+def _put_number(field: ti.template(), g, n, value):
+    field[g][n] = value
+
+
+@ti.func
+def _entry(field: ti.template(), g, k: ti.template(), n):
+    return field[g][k, n]
+
+
+@ti.func
+def _put_by_branch(field: ti.template(), g, k: ti.template(), n, value):
+    for m in ti.static(range(LANES)):
+        if m == n:
+            field[g][k, m] = value
+
+
+@ti.func
+def _put_number_by_branch(field: ti.template(), g, n, value):
+    for m in ti.static(range(LANES)):
+        if m == n:
+            field[g][m] = value
+
+
+@ti.func
+def _entry_by_branch(field: ti.template(), g, k: ti.template(), n):
+    found = 0.0
+    for m in ti.static(range(LANES)):
+        if m == n:
+            found = field[g][k, m]
+    return found
+
+
+def access() -> tuple:
+    """What writes component k of lane n of group g, writes lane n of numbers, reads a component.
+
+    Only a CPU finds a lane by a number that is not known when the kernel is compiled.
+    """
+    if backend.is_cpu():
+        return _put, _put_number, _entry
+    return _put_by_branch, _put_number_by_branch, _entry_by_branch
 
 
 @ti.func

@@ -40,6 +40,16 @@ class Launch:
         program.synchronize()
         return context.get_struct_ret_int((0,))
 
+    def queue(self, *values: int | np.ndarray) -> None:
+        """Run it some time soon, in order, without waiting for what it returns; whole numbers."""
+        if self._ready is None:
+            self(*values)
+            return
+        program, compiled, context, _ = self._ready
+        for place, value in enumerate(values):
+            context.set_arg_int((place,), value)
+        program.launch_kernel(compiled, context)
+
     def _prepared(self, values):
         """Taichi's program, the compiled kernel, its context, and whether it returns a number."""
         kernel, owner = self._kernel._primal, self._kernel._kernel_owner

@@ -17,7 +17,7 @@ from taichi_dem.kit.environment import kernel_cache, taichi_alone  # isort: skip
 import taichi as ti
 from taichi.lang import impl
 
-from taichi_dem.kit import llvm_options
+from taichi_dem.kit import backend, llvm_options
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.kernel_source_cache import remember
 from taichi_dem.kit.validation import choice, flag, whole
@@ -25,7 +25,7 @@ from taichi_dem.kit.validation import choice, flag, whole
 # Before any other module has Taichi decorate its functions.
 remember()
 
-ARCHITECTURES = ("cpu", "cuda")
+ARCHITECTURES = backend.ARCHITECTURES
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Settings:
     Parameters
     ----------
     arch : str
-        ``"cpu"`` or ``"cuda"``.
+        ``"cpu"``, ``"cuda"`` or ``"vulkan"``.
     threads : int
         CPU threads of parallel loops.
     debug : bool
@@ -84,7 +84,7 @@ def start(arch: str = "cpu", threads: int | None = None, debug: bool = False) ->
     Parameters
     ----------
     arch : str, default "cpu"
-        ``"cpu"`` or ``"cuda"``.
+        ``"cpu"``, ``"cuda"``, ``"vulkan"``, or ``"gpu"``: the first of the last two that answers.
     threads : int, optional
         Number of CPU threads; all cores if None.
     debug : bool, default False
@@ -98,8 +98,9 @@ def start(arch: str = "cpu", threads: int | None = None, debug: bool = False) ->
     Raises
     ------
     InputError
-        The architecture is unknown or absent, the number of threads is out of range, Taichi already
-        runs with other settings in this process, or this is a fork of the process that runs Taichi.
+        The architecture is unknown or absent, or its device has no doubles; the number of threads
+        is out of range; Taichi already runs with other settings in this process, or this is a fork
+        of the process that runs Taichi.
 
     Examples
     --------
@@ -288,19 +289,16 @@ def _end_session():
 def _checked(arch, threads, debug):
     choice("arch", arch, ARCHITECTURES)
     count = usable_cores() if threads is None else whole("threads", threads, 1, 1024)
-    return Settings(arch, count, flag("debug", debug))
+    return Settings(backend.found(arch), count, flag("debug", debug))
 
 
 def _initialise(wanted):
-    # Taichi falls back to the CPU with a mere warning: check first, and read back its choice.
-    if wanted.arch == "cuda" and not cuda_present():
-        raise InputError("arch 'cuda' was asked for, but no CUDA device answers here: use 'cpu'")
     if wanted.arch == "cpu":
         llvm_options.switch_off()
     keeps, folder = kernel_cache(impl.default_cfg().offline_cache_file_path)
     with taichi_alone():
         ti.init(
-            arch=ti.cuda if wanted.arch == "cuda" else ti.cpu,
+            arch=backend.GPUS.get(wanted.arch, ti.cpu),
             default_fp=ti.f64,
             default_ip=ti.i32,
             fast_math=False,
@@ -315,25 +313,18 @@ def _initialise(wanted):
             offline_cache_file_path=folder,
             random_seed=0,
         )
+    # Taichi falls back to the CPU with a mere warning.
     got = impl.current_cfg().arch
-    if (got == ti.cuda) != (wanted.arch == "cuda"):
+    if got != backend.GPUS.get(wanted.arch, got) or backend.is_cpu() != (wanted.arch == "cpu"):
         _reset()
         raise InputError(f"arch {wanted.arch!r} was asked for, Taichi started {got}")
+    try:
+        backend.probe()
+    except InputError:
+        _reset()
+        raise
 
 
 def _reset():
     with taichi_alone():
         ti.reset()
-
-
-def cuda_present() -> bool:
-    """Whether a CUDA device answers on this machine.
-
-    Returns
-    -------
-    bool
-        True where one answers.
-    """
-    # Taichi would say on stderr that it finds no libcuda; the caller says it in a sentence.
-    ti.set_logging_level(ti.ERROR)
-    return bool(ti._lib.core.with_cuda())

@@ -1,14 +1,15 @@
 """What reports read of a run, by tables that kernels fill, and what they keep of it."""
 
 import contextlib
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import taichi as ti
-from taichi.lang import impl
 
 from taichi_dem.contact.contacts import Contacts
+from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.products import norm
@@ -20,8 +21,8 @@ from taichi_dem.step.advance import Advance
 from taichi_dem.step.multirate.half_step import HalfStep
 from taichi_dem.step.multirate.schedule import Schedule
 
-#: Bodies up to which loops over them are serial.
-_FEW = 4096
+#: Bodies up to which loops over them are serial; rounds of the serial sum over a pair.
+_FEW, _SUMS = 4096, 14
 
 
 @ti.data_oriented
@@ -35,7 +36,7 @@ class Readings:
         self.tables, self.state, self.advance = tables, state, advance
         self.contacts, self.half_step = advance.contacts, HalfStep(advance)
         # A loop over few bodies takes less time than two threads to be told of it.
-        self.small = tables.capacity.bodies < _FEW and impl.current_cfg().arch != ti.cuda
+        self.small = tables.capacity.bodies < _FEW and backend.is_cpu()
         self._held: dict[str, Any] | None = None
         self._rooms: dict[str, np.ndarray] = {}
         self._launch_push, self._launch_visit = Launch(self._push), Launch(self._visit)
@@ -76,6 +77,8 @@ class Readings:
         pushed = self._room("pushed", int(values(self.tables.body_count)), 6)
         count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
         table = self._room("contacts", count, 21)
+        if _SUMS * count > (backend.most_rounds() or math.inf):
+            raise backend.cut_short("over these contacts", "a smaller mesh")
         if count:
             self._launch_push(table, pushed)
         return table, pushed

@@ -246,7 +246,7 @@ class StabilityLimits:
         self.contact_limits = ContactLimits(tables, state, contacts) if contacts else None
         self.jump = ti.field(ti.i32, shape=())
         self.rule = ti.field(real, shape=3)
-        n = tables.capacity.bodies
+        n = self.most = tables.capacity.bodies
         self.dashpot_table, self.spring_table = (ti.field(real, shape=(n, 16)) for _ in range(2))
         self.bond_damping, self.contact_damping = (ti.field(real, shape=n) for _ in range(2))
         self.limit_by, self.limit_level = (ti.field(ti.i32, shape=n) for _ in range(2))

@@ -8,6 +8,7 @@ import numpy as np
 import taichi as ti
 from numpy.typing import ArrayLike
 
+from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.types import mat3, real, vec3
 from taichi_dem.materials.body_materials import MOST
@@ -131,7 +132,10 @@ class State:
     coefficient of each pair of materials, whose excess in a bond is noted, without bound where an
     effect serves them; passed: ticks at which a bond first exceeded its tensile and its shear
     limit, NEVER before. activity: the ``Activity`` of bonds whose laws act on demand, else None.
+    cut_short: 1 once the device has ended a loop too early, on devices that do.
     """
+
+    scratch_fields = ("cut_short",)
 
     def __init__(self, tables: Tables):
         n, bonds = tables.capacity.bodies, tables.capacity.bonds
@@ -162,6 +166,8 @@ class State:
         self.impulse_sizes = ti.Vector.field(2, real, shape=n)
         self.tick = ti.field(ti.i64, shape=())
         self.bad_body = ti.field(ti.i32, shape=())
+        if backend.most_rounds():
+            self.cut_short = ti.field(ti.i32, shape=())
         self.max_speed2 = ti.field(real, shape=())
 
     def load(self, model: Model, max_speed: float) -> None:

@@ -13,10 +13,11 @@ from typing import Any
 
 import taichi as ti
 
-from taichi_dem.kit import runtime
-from taichi_dem.kit.allocation import values
+from taichi_dem.kit import backend, runtime
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.launch import Launch
+from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.phases import Step
 
 #: The parallel driver is called for about this long [s] between two checks of divergence, progress
@@ -25,8 +26,11 @@ CALL_SECONDS = 0.2
 #: The resident one is kept near this long [s]: its kernel cannot be interrupted.
 _KERNEL_SECONDS = 0.1
 _MAX_SUBSTEPS = 1 << 24
-#: Bit that a parallel substep sets in its result when a search is requested.
-_SEARCH = 2
+#: How a parallel substep ended, as bits: at the end or a halt; a search is requested; the device
+#: has ended a loop too early; more sweeps are needed.
+_HALTED, _SEARCH, _CUT_SHORT, _UNSOLVED = 1, 2, 4, 8
+#: Substeps that a GPU is given at a time.
+QUEUED = 16
 #: Reason why the resident driver cannot run, for a sentence.
 CPU_ONLY = "runs on a CPU only"
 #: Bonds below which the resident driver is the quicker one, and above which the parallel one is,
@@ -120,12 +124,21 @@ class Resident:
 
 @ti.data_oriented
 class Parallel:
-    """One substep a kernel, every phase a parallel loop: for large systems and for GPUs."""
+    """A phase a parallel loop: for large systems and for GPUs.
+
+    A GPU is given some substeps at a time, of which those after the end or a halt do nothing, and
+    as many sweeps as were needed before: the host waits for its answer once.
+    """
 
     name = "parallel"
 
     def __init__(self, step: Step):
-        self.step = step
+        self.step, on_gpu = step, not backend.is_cpu()
+        # On a GPU the length of a loop is a task of its own, and starts 131,072 threads.
+        self.fixed, self.may_be_cut = on_gpu, backend.most_rounds() > 0
+        self.queued, self.state = QUEUED if on_gpu else 1, 0
+        # As many as the steps before have needed; none is known where there is more than one part.
+        self.sweeps = 1 if len(step.parts) == 1 else 0
         self._parts = tuple(Launch(self._run, part) for part in range(len(step.parts)))
 
     def begin(self) -> None:
@@ -143,42 +156,105 @@ class Parallel:
 
     def few(self, end_tick: int, substeps: int) -> None:
         """Advance some substeps, or to a tick or the next halt."""
+        self.state = _HALTED
         for _ in range(substeps):
-            if self._substep(end_tick):
+            if self._substeps(end_tick, 1):
                 break
 
     def run(self, end_tick: int) -> None:
         """Advance to a tick, to the next halt, or for about CALL_SECONDS."""
-        start = time.perf_counter()
-        while self._substep(end_tick) == 0 and time.perf_counter() - start < CALL_SECONDS:
-            pass
+        start, self.state, count = time.perf_counter(), _HALTED, 1
+        if self.queued > 1:
+            # At least as many substeps are left as largest steps: all of them do something.
+            left = (end_tick - int(values(self.step.state.tick))) // MACRO_TICKS
+            count = max(1, min(left, self.queued if self.sweeps else 1))
+        while not self._substeps(end_tick, count):
+            if time.perf_counter() - start > CALL_SECONDS:
+                break
+            count = min(2 * count, self.queued)
+
+    def _substeps(self, end_tick, count):
+        """Run some substeps, or to a search that is requested; nonzero at the end or a halt."""
+        if self.state:
+            assign(self.step.ended, 0)
+        for _ in range(count - 1):
+            self._substep(end_tick).queue(end_tick, 1, 1)
+        self.state = self._substep(end_tick)(end_tick, 1, 1)
+        if self.state & _UNSOLVED:
+            self._finish_sweeps(end_tick)
+        elif self.sweeps > 1:
+            self.sweeps -= 1
+        if self.state & _CUT_SHORT:
+            raise backend.cut_short("of this scene", "a smaller mesh")
+        if self.state & _SEARCH:
+            self.step.search.renew()
+        return self.state & ~_SEARCH
 
     def _substep(self, end_tick):
-        """Run all parts of a substep, and a requested search; nonzero at the end or a halt."""
-        state = 0
-        for part, launch in enumerate(self._parts):
-            state = launch(end_tick, 1, 1)
-            while self.step.repeats(part):
-                state = launch(end_tick, 1, 1)
-        if state & _SEARCH:
-            self.step.search.renew()
-        return state & ~_SEARCH
+        """Queue all parts of a substep but the last one, which is returned."""
+        *earlier, last = self._parts
+        for part, launch in enumerate(earlier):
+            if not self.fixed:
+                while launch(end_tick, 1, 1):
+                    pass
+            for _ in range(self.fixed * (max(1, self.sweeps) if part else 1)):
+                launch.queue(end_tick, 1, 1)
+        return last
+
+    def _finish_sweeps(self, end_tick):
+        """Go on with a substep in which more sweeps are needed than were queued."""
+        assign(self.step.ended, 0)
+        while self._parts[1](end_tick, 1, 1):
+            self.sweeps += 1
+        self.sweeps += 1
+        self.state = self._parts[-1](end_tick, 1, 1)
 
     @ti.kernel
     def _run(self, part: ti.template(), end_tick: ti.i64, rest: ti.i32, bonds: ti.i32) -> ti.i32:
         # bonds, rest: 1 to run the phase of the bonds, and all others; 0 and 0 compile the kernel.
         low = ti.static(self.step.schedule.low)
         for active, item in ti.static(self.step.parts[part]):
-            share = rest
-            if ti.static(self.step.is_of_start(item)):
-                share = bonds
-            for a in range(share * active.count(low[None])):
-                item(active.pick(a))
-        finished = ti.cast(self.step.state.tick[None] >= end_tick, ti.i32)
-        finished |= self.step.halted()
-        if ti.static(self.step.has_contact):
-            finished |= _SEARCH * self.step.search.is_requested()
-        return finished
+            is_of_start = ti.static(self.step.is_of_start(item))
+            if ti.static(self.fixed):
+                for a in range(ti.static(active.most)):
+                    if a < self._share(part, is_of_start, rest, bonds) * active.count(low[None]):
+                        item(active.pick(a))
+                        if ti.static(self.may_be_cut):
+                            if backend.loops_have_ended(rest + bonds):
+                                self.step.state.cut_short[None] = 1
+            else:
+                count = self._share(part, is_of_start, rest, bonds) * active.count(low[None])
+                for a in range(count):
+                    item(active.pick(a))
+        return self._ended(part, end_tick, rest)
+
+    @ti.func
+    def _share(self, part: ti.template(), is_of_start: ti.template(), rest, bonds):
+        """1 where a phase is to run; only the start runs the bonds without the rest."""
+        share = rest
+        if self.step.ended[None] != 0 or self.step.waits(part) == 1:
+            share = 0
+        if ti.static(is_of_start):
+            share = bonds * (share + 1 - rest)
+        return share
+
+    @ti.func
+    def _ended(self, part: ti.template(), end_tick, rest):
+        """Whether a part is repeated; of the last one how the substep ended, which it notes."""
+        found = self.step.repeats(part)
+        if ti.static(part == len(self.step.parts) - 1):
+            if rest == 1 and self.step.ended[None] == 0:
+                found = ti.cast(self.step.state.tick[None] >= end_tick, ti.i32)
+                found |= self.step.halted()
+                if ti.static(self.step.has_contact):
+                    found |= _SEARCH * self.step.search.is_requested()
+                if ti.static(self.may_be_cut):
+                    found |= _CUT_SHORT * self.step.state.cut_short[None]
+                if self.step.waits(part) == 1:
+                    found = _UNSOLVED
+                self.step.ended[None] = found
+            found = self.step.ended[None]
+        return found
 
 
 #: Drivers by name.
@@ -192,10 +268,10 @@ def driver_name(name: str, bond_count: int) -> str:
     """
     settings: Any = runtime.settings()
     if name == "auto":
-        if settings.arch != "cuda" and (settings.threads == 1 or bond_count < RESIDENT_BELOW):
+        if settings.arch == "cpu" and (settings.threads == 1 or bond_count < RESIDENT_BELOW):
             return "resident"
-        return "parallel" if settings.arch == "cuda" or bond_count >= PARALLEL_FROM else MEASURED
-    if name == "resident" and settings.arch == "cuda":
+        return "parallel" if settings.arch != "cpu" or bond_count >= PARALLEL_FROM else MEASURED
+    if name == "resident" and settings.arch != "cpu":
         raise InputError(f"driver 'resident' {CPU_ONLY}: use 'parallel' with arch 'cuda'")
     return name
 

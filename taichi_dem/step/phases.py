@@ -10,7 +10,7 @@ from typing import Any
 import taichi as ti
 
 from taichi_dem.contact.search import BroadPhase
-from taichi_dem.kit.allocation import values
+from taichi_dem.kit import backend
 from taichi_dem.kit.products import squared
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
@@ -48,6 +48,7 @@ class Audit(Places):
     def __init__(self, schedule: Schedule):
         self.tables, self.state = schedule.tables, schedule.state
         self.schedule, self.sleeping = schedule, schedule.sleeping
+        self.most = schedule.bonds.most // RATE + 1
         self.first = ti.field(ti.i32, shape=())
         self.audited, self.misses = (ti.field(ti.i64, shape=()) for _ in range(2))
 
@@ -84,13 +85,15 @@ class Step:
 
     search: the ``BroadPhase`` that does so, None for a scene without contact. start_phases: those
     of the start of a run before the bonds of the first tick, which the step's kernel evaluates,
-    and after them.
+    and after them. ended: bits of the parallel driver by which the last substep ended, or 0.
     """
+
+    scratch_fields = ("ended",)
 
     def __init__(self, advance: Advance, search: BroadPhase | None):
         self.advance, self.schedule, self.search = advance, advance.schedule, search
         self.has_contact = search is not None
-        self.state = advance.state
+        self.state, self.ended = advance.state, ti.field(ti.i32, shape=())
         self.audit = Audit(self.schedule) if self.schedule.sleeps else None
         self.parts = self._parts()
         self.phases = self._phases()
@@ -152,9 +155,15 @@ class Step:
         sleeping = self.schedule.sleeping
         return (sleeping, sleeping.chunk), (Once(), self.schedule.sort_woken)
 
-    def repeats(self, part: int) -> bool:
-        """Whether a part of the phases is called for once more: never here."""
-        return False
+    @ti.func
+    def waits(self, part: ti.template()):
+        """1 where a part must not run now, as the part before it is called for once more."""
+        return 0
+
+    @ti.func
+    def repeats(self, part: ti.template()):
+        """1 where a part is called for once more: never here."""
+        return 0
 
     def _retimed(self):
         """Phases that update rates and wake bodies, where the method requires it."""
@@ -176,6 +185,9 @@ class Step:
         for members, item in ti.static(self.start_phases[last]):
             for a in range(members.count(0)):
                 item(members.pick(a))
+                if ti.static(backend.most_rounds() > 0):
+                    if backend.loops_have_ended(a + 1):
+                        self.state.cut_short[None] = 1
 
     @ti.func
     def halted(self):
@@ -233,16 +245,32 @@ class SolvedStep(Step):
         """One sweep, colour by colour."""
         phases: Phases = ()
         if solver.has_bonds:
-            first = solver.bonds.colour_first
-            phases += tuple((Colour(first, c), solver.bonds.visit) for c in range(BOND_COLOURS))
+            first, most = solver.bonds.colour_first, solver.bonds.groups
+            colours = (Colour(first, c, most) for c in range(BOND_COLOURS))
+            phases += tuple((colour, solver.bonds.visit) for colour in colours)
         if self.has_contact:
-            first = solver.pairs.colour_first
-            phases += tuple((Colour(first, c), solver.pairs.visit) for c in range(COLOURS))
+            first, most = solver.pairs.colour_first, self.schedule.pairs.most
+            colours = (Colour(first, c, most) for c in range(COLOURS))
+            phases += tuple((colour, solver.pairs.visit) for colour in colours)
             phases += ((Once(), solver.pairs.visit_last),)
         if solver.has_ground:
             phases += ((self.schedule.bodies, solver.ground.visit),)
         return (*phases, (Once(), solver.check_convergence))
 
-    def repeats(self, part: int) -> bool:
-        """Whether a part, the sweep, is called for once more."""
-        return part == 1 and values(self.advance.solver.unsolved) == 1
+    @ti.func
+    def waits(self, part: ti.template()):
+        """1 for a sweep once all dashpots are solved, and for what follows until they are."""
+        unsolved, wait = self.advance.solver.unsolved[None], 0
+        if ti.static(part == 1):
+            wait = 1 - unsolved
+        elif ti.static(part == 2):
+            wait = unsolved
+        return wait
+
+    @ti.func
+    def repeats(self, part: ti.template()):
+        """1 where another sweep is called for."""
+        again = 0
+        if ti.static(part == 1):
+            again = self.advance.solver.unsolved[None]
+        return again

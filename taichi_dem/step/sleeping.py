@@ -53,7 +53,7 @@ class Sleeping(Places):
     """
 
     def __init__(self, tables: Tables, state: State):
-        n = tables.capacity.bodies
+        n = self.most = tables.capacity.bodies
         self.tables, self.state, self.acting = tables, state, (*tables.loads, *tables.supports)
         self.awake, self.woken = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.part, self.members = (ti.field(ti.i32, shape=n) for _ in range(2))

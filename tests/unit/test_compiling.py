@@ -22,7 +22,7 @@ BUDGET = {
     "Resident._steps": 26784,
     "Resident._search": 10114,
     "Readings._visit": 3528,
-    "Step.start": 3148,
+    "Step.start": 3438,
     "_find_pairs": 2266,
     "Coupling.advance": 16068,
     "Coupling.start": 1765,

@@ -8,6 +8,9 @@ import time
 
 import pytest
 
+from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, runtime
+from taichi_dem.kit import backend
+from taichi_dem.mesh.shapes import bar
 from tests.scenes import ROOT
 
 _SCRIPT = """
@@ -99,3 +102,26 @@ def test_only_a_lock_left_by_a_killed_process_is_removed(tmp_path, age_s, remove
 def test_importing_a_package_imports_nothing_that_few_runs_need(package, tmp_path):
     loaded = answers(tmp_path, f"import json, sys, {package}; print(json.dumps([*sys.modules]))")
     assert not {"scipy", "pandas", "matplotlib", "rich", "argparse"} & {*loaded}
+
+
+@pytest.mark.skipif(backend.is_present("cuda"), reason="a CUDA device answers here")
+def test_a_machine_without_a_device_is_told_what_it_lacks():
+    """A loader of Vulkan that finds no driver stands for a machine without one."""
+    program = 'from taichi_dem import runtime; runtime.start("gpu")'
+    environment = {**os.environ, "PYTHONPATH": ROOT, "VK_ICD_FILENAMES": os.devnull}
+    line = [sys.executable, "-c", program]
+    done = subprocess.run(line, capture_output=True, text=True, env=environment)
+    said = done.stderr.splitlines()[-1]
+    assert "'gpu'" in said
+    assert "no CUDA device and no Vulkan driver" in said
+
+
+def test_a_scene_that_a_device_cannot_hold_is_refused_with_the_number_that_fits(monkeypatch):
+    """Room for the whole tree, less a byte, is room for one body less."""
+    scene = Scene(bar(0.1, 0.05, (3, 2, 2)), CONCRETE, [])
+    whole = Simulation(scene, Uniform(1e-8)).engine
+    bodies = whole.capacity[0]
+    runtime.clear()
+    monkeypatch.setattr(backend, "most_bytes", lambda: whole.tree.bytes - 1)
+    with pytest.raises(InputError, match=f"about {bodies - 1} bodies fit"):
+        Simulation(scene, Uniform(1e-8))

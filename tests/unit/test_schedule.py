@@ -23,7 +23,7 @@ class Sorter:
         self.keys.from_numpy(keys)
         number = ti.field(ti.i32, shape=())
         number.fill(len(keys))
-        self.list = ActiveList(len(keys), Everyone(number), self.key_of)
+        self.list = ActiveList(Everyone(number, len(keys)), self.key_of)
         self.fill()
 
     @ti.func

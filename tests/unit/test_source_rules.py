@@ -198,3 +198,14 @@ def test_every_mutant_can_be_made_and_names_tests_that_are_there():
 def test_no_area_of_the_physics_is_forgotten():
     count = Counter(mutant.area for mutant in table())
     assert {area: count[area] for area in LEAST if count[area] < LEAST[area]} == {}
+
+
+#: Functions that no device has in doubles, or each in bits of its own: ``kit.elementary`` has some.
+ELEMENTARY = {"sin", "cos", "tan", "asin", "acos", "atan2", "exp", "log", "pow", "tanh"}
+
+
+def test_kernels_call_no_elementary_function_of_a_device():
+    nodes = [(path, node) for path in PATHS for node in ast.walk(parsed(path))]
+    calls = [(path, node) for path, node in nodes if isinstance(node, ast.Attribute)]
+    of_taichi = [(path, one) for path, one in calls if ast.unparse(one.value) in ("ti", "ti.math")]
+    assert [(path, one.lineno) for path, one in of_taichi if one.attr in ELEMENTARY] == []

@@ -28,9 +28,15 @@ print(json.dumps(work(**arguments)))
 
 
 def call_in_process(
-    work: Callable, *, threads: int = 1, cache: str = "", title: str = "", **arguments: Any
+    work: Callable,
+    *,
+    arch: str = "",
+    threads: int = 1,
+    cache: str = "",
+    title: str = "",
+    **arguments: Any,
 ) -> Any:
-    """Result of work(**arguments) in a new process on this process's architecture.
+    """Result of work(**arguments) in a new process, on this process's architecture by default.
 
     work: a function at the top of a script or of a module beside it; arguments and result: as JSON
     has them. cache: a folder of compiled kernels instead of Taichi's own. Raises InputError with
@@ -38,7 +44,7 @@ def call_in_process(
     """
     file = Path(str(sys.modules[work.__module__].__file__)).absolute()
     settings: Any = runtime.settings()
-    job = [str(file.parent), file.stem, work.__name__, settings.arch, threads, arguments]
+    job = [str(file.parent), file.stem, work.__name__, arch or settings.arch, threads, arguments]
     environment = dict(os.environ)
     if cache:
         os.makedirs(cache, exist_ok=True)

@@ -10,6 +10,7 @@ from time import perf_counter, process_time
 
 import taichi as ti
 
+from taichi_dem.kit import backend
 from taichi_dem.kit.timing import on_device
 
 #: Names of the floors.
@@ -54,6 +55,7 @@ class Copy:
 
     def __init__(self, entries: int = LARGE):
         lanes = 1 if on_device() else LANES
+        entries = int(min(entries, backend.most_entries()))
         self.bytes = 16.0 * entries
         self.a, self.b = (ti.Vector.field(lanes, ti.f64, shape=entries // lanes) for _ in range(2))
 

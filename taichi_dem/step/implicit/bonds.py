@@ -5,7 +5,7 @@ import taichi as ti
 
 from taichi_dem.kit import products
 from taichi_dem.kit.allocation import assign, raise_to
-from taichi_dem.kit.lanes import LANES, cross, dot, product, transposed_product
+from taichi_dem.kit.lanes import LANES, access, cross, dot, product, transposed_product
 from taichi_dem.kit.products import matmul_transposed, matvec, stacked, transposed_matmul
 from taichi_dem.kit.types import real, vec3, vec6
 from taichi_dem.methods import ImplicitDashpots
@@ -45,6 +45,7 @@ class BondDashpots:
         self.tables, self.state = schedule.tables, schedule.state
         self.schedule, self.velocities = schedule, velocities
         bonds = self.tables.capacity.bonds
+        self.put, self.put_number, self.entry = access()
         self.theta = ti.field(real, shape=2)
         self.refresh_every = ti.field(ti.i64, shape=())
         self.index = ti.field(ti.i32, shape=bonds)
@@ -56,7 +57,8 @@ class BondDashpots:
             tuple(ti.Matrix.field(3, LANES, real) for _ in range(3)) for _ in range(3)
         )
         visited = self.masters, self.slaves, self.branch, self.last, *self.a, *self.b, *self.c
-        groups = ti.root.dense(ti.i, bonds // LANES + BOND_COLOURS)
+        self.groups = bonds // LANES + BOND_COLOURS
+        groups = ti.root.dense(ti.i, self.groups)
         groups.place(*visited)
         groups.place(self.start)
 
@@ -84,7 +86,8 @@ class BondDashpots:
         g, n = self._group_and_lane(b)
         twist = vec6(0.0)
         for k in ti.static(range(6)):
-            twist[k] = self.theta[0] * (self.last[g][k, n] + self.theta[1] * self.start[g][k, n])
+            before = self.theta[1] * self.entry(self.start, g, k, n)
+            twist[k] = self.theta[0] * (self.entry(self.last, g, k, n) + before)
         motion.velocity = matvec(motion.axes, twist[0:3])
         motion.spin = matvec(motion.axes, twist[3:6])
         return motion
@@ -93,14 +96,15 @@ class BondDashpots:
     def begin(self, b, i, j, branch):
         """Load the present twist of an intact bond and, at intervals, its block."""
         g, n = self._group_and_lane(b)
-        self.masters[g][n], self.slaves[g][n] = i, j
+        self.put_number(self.masters, g, n, i)
+        self.put_number(self.slaves, g, n, j)
         now = self._twist(i, j, branch)
         for k in ti.static(range(3)):
-            self.branch[g][k, n] = branch[k]
+            self.put(self.branch, g, k, n, branch[k])
         for k in ti.static(range(6)):
-            change = self.theta[1] * (self.start[g][k, n] - now[k])
-            self.last[g][k, n] = self.last[g][k, n] + change
-            self.start[g][k, n] = now[k]
+            change = self.theta[1] * (self.entry(self.start, g, k, n) - now[k])
+            self.put(self.last, g, k, n, self.entry(self.last, g, k, n) + change)
+            self.put(self.start, g, k, n, now[k])
         if (self.state.tick[None] // MACRO_TICKS) % self.refresh_every[None] == 0:
             self._refresh(b, g, n, i, j, branch)
 
@@ -113,8 +117,8 @@ class BondDashpots:
             g, n = self._group_and_lane(b)
             now = self._twist(i, j, self.state.position[j] - self.state.position[i])
             for k in ti.static(range(6)):
-                self.start[g][k, n] = now[k]
-                self.last[g][k, n] = now[k]
+                self.put(self.start, g, k, n, now[k])
+                self.put(self.last, g, k, n, now[k])
 
     @ti.func
     def _group_and_lane(self, b):
@@ -133,9 +137,10 @@ class BondDashpots:
     def end(self, b):
         """Remove a released bond from the sweeps."""
         g, n = self._group_and_lane(b)
-        self.masters[g][n], self.slaves[g][n] = self.velocities.spare, self.velocities.spare
+        self.put_number(self.masters, g, n, self.velocities.spare)
+        self.put_number(self.slaves, g, n, self.velocities.spare)
         for k in ti.static(range(6)):
-            self.last[g][k, n] = 0.0
+            self.put(self.last, g, k, n, 0.0)
 
     @ti.func
     def visit(self, g):
@@ -180,6 +185,6 @@ class BondDashpots:
             block = plus(block, point_block(arm, law))
         solved = inverse(plus(inverse(block), self.velocities.mobility(i, j, branch)))
         for r, c in ti.static(ti.ndrange(3, 3)):
-            self.a[r][g][c, n] = solved.a[r, c]
-            self.b[r][g][c, n] = solved.b[r, c]
-            self.c[r][g][c, n] = solved.c[r, c]
+            self.put(self.a[r], g, c, n, solved.a[r, c])
+            self.put(self.b[r], g, c, n, solved.b[r, c])
+            self.put(self.c[r], g, c, n, solved.c[r, c])

@@ -10,7 +10,9 @@ from taichi_dem.state.timeline import MAX_LEVEL
 
 @ti.data_oriented
 class Places:
-    """Base of lists whose members are the numbers 0 .. count - 1."""
+    """Base of lists whose members are the numbers 0 .. count - 1; most: the largest count."""
+
+    most: int
 
     @ti.func
     def pick(self, a):
@@ -22,6 +24,8 @@ class Places:
 class Once(Places):
     """List of one member, for phases that run once a substep."""
 
+    most = 1
+
     @ti.func
     def count(self, low):
         """One."""
@@ -32,11 +36,13 @@ class Once(Places):
 class Everyone:
     """List of all bodies, bonds or near pairs of a scene, active or not.
 
-    number: field of how many. slots: field of their numbers, None for 0 .. number - 1.
+    number: field of how many. most: the largest. slots: field of their numbers, None for 0 ..
+    number - 1.
     """
 
-    def __init__(self, number: ti.Field, slots: ti.Field | None = None):
-        self.number, self.slots, self.has_slots = number, slots, slots is not None
+    def __init__(self, number: ti.Field, most: int, slots: ti.Field | None = None):
+        self.number, self.most = number, most
+        self.slots, self.has_slots = slots, slots is not None
 
     @ti.func
     def count(self, low):
@@ -53,10 +59,10 @@ class Everyone:
 
 @ti.data_oriented
 class Colour:
-    """The members of one colour: those from colour_first[colour] on, in their order."""
+    """Members of one colour: those from colour_first[colour] on, in order; most: of all colours."""
 
-    def __init__(self, colour_first: ti.Field, colour: int):
-        self.colour_first, self.colour = colour_first, colour
+    def __init__(self, colour_first: ti.Field, colour: int, most: int):
+        self.colour_first, self.colour, self.most = colour_first, colour, most
 
     @ti.func
     def count(self, low):
@@ -79,9 +85,9 @@ class ActiveList:
     on it.
     """
 
-    def __init__(self, capacity: int, everyone: Everyone, key_of: Callable[..., Any]):
-        self.everyone, self.key_of = everyone, key_of
-        self.order, self.index, self.key = (ti.field(ti.i32, shape=capacity) for _ in range(3))
+    def __init__(self, everyone: Everyone, key_of: Callable[..., Any]):
+        self.everyone, self.most, self.key_of = everyone, everyone.most, key_of
+        self.order, self.index, self.key = (ti.field(ti.i32, shape=self.most) for _ in range(3))
         self.end = ti.field(ti.i32, shape=MAX_LEVEL + 2)
 
     @ti.func

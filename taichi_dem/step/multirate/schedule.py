@@ -55,21 +55,22 @@ class Schedule(Members):
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
         self.store, self.has_contact = getattr(contacts, "store", None), contacts is not None
         self.beside: tuple = ()
-        self.pairs = ActiveList(1, Everyone(tables.body_count), self.pair_key)
+        self.pairs = ActiveList(Everyone(tables.body_count, 1), self.pair_key)
         if self.store is not None:
             # Pairs of which a body is the first, then those of which it is the second.
             as_second = self.store.second_start, self.store.second_slot, 0
             self.beside = (self.store.first_of, self.store.near_slot, 1), as_second
-            near = Everyone(self.store.near_count, self.store.near_slot)
-            self.pairs = ActiveList(self.store.slots, near, self.pair_key)
+            near = Everyone(self.store.near_count, self.store.slots, self.store.near_slot)
+            self.pairs = ActiveList(near, self.pair_key)
         self.applied_until = AppliedUntil(self) if self.controlled else None
         self.spreads = self.controlled and not self.uniform and self.limits.spreads
         if self.spreads:
             self.level_limit = LevelLimit(self)
         self.criterion, self.drifted = method.criterion(), method.neighbour == "drifted"
         capacity = tables.capacity
-        self.bodies = ActiveList(capacity.bodies, Everyone(tables.body_count), self.body_key)
-        self.bonds = ActiveList(capacity.bonds, Everyone(tables.bond_count), self.bond_key)
+        bodies, bonds = tables.body_count, tables.bond_count
+        self.bodies = ActiveList(Everyone(bodies, capacity.bodies), self.body_key)
+        self.bonds = ActiveList(Everyone(bonds, capacity.bonds), self.bond_key)
         self.low, self.finest, self.undivided = (ti.field(ti.i32, shape=()) for _ in range(3))
         self.wanted, self.changed_count = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.changed = ti.field(ti.i32, shape=2 * capacity.bodies + 2 * capacity.bonds + 1)

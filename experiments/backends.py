@@ -1,0 +1,126 @@
+"""How many steps a second does each back end make, and what bounds them?
+
+Bars of tetrahedra under gas are stepped by one thread of the CPU, by all of them, and by each back
+end of a GPU that answers here, by three methods. Two lines bound what is measured: the bytes that a
+step has to move at the rate of a copy in memory, and the steps of the smallest scene, in which the
+device waits for launches and for numbers that the host reads.
+
+    python experiments/backends.py           # minutes on a CPU and on a graphics card
+    python experiments/backends.py --quick
+
+A Vulkan driver that runs on the CPU, Mesa's lavapipe, is slow, and refuses large scenes.
+
+Writes backends.png, backends.csv and summary.json to results/backends/.
+"""
+
+import sys
+from functools import partial
+from types import SimpleNamespace
+
+from _threads import thread_job
+from taichi_dem import InputError, runtime
+from taichi_dem.kit import backend, study
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, RED, picture
+from taichi_dem.kit.progress_bar import ProgressBar
+
+NAME = "backends"
+METHODS = {
+    "explicit_limited": "explicit, one step for all",
+    "multirate_controlled": "explicit, a step for each",
+    "implicit": "dashpots solved together",
+}
+SETTINGS = {
+    # Bars of 2k x k x k boxes of six tetrahedra.
+    "sizes": ((4, 8, 13, 20), (2, 3), study.several(study.whole(1, 60)), "boxes along a width"),
+    "places": (None, ["cpu 1", "cpu"], study.several(str), "cpu 1, cpu, cuda, vulkan; all there"),
+    "methods": ([*METHODS], ["explicit_limited"], study.several(study.one_of(METHODS)), "by comma"),
+    "steps": (20, 5, study.whole(1, 10_000), "timed together, 20"),
+    "repeats": (3, 1, study.whole(1, 100), "of them; the fastest counts, 3"),
+}
+#: Colour and words of a place.
+LOOK = {
+    "cpu 1": (RED, "CPU, one thread"),
+    "cpu": (BLACK, "CPU, all threads"),
+    "vulkan": (BLUE, "Vulkan"),
+    "cuda": (GREEN, "CUDA"),
+}
+TABLE = study.Table(
+    place=("place", "place"),
+    method=("method", "method"),
+    bodies=("bodies", "bodies", ","),
+    steps_per_s=("rate", "steps/s", ".3g"),
+    floor_per_s=("floor", "by bytes", ".3g"),
+)
+options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
+
+
+def places():
+    """Name, architecture and threads of what kernels can run on here."""
+    cores = runtime.usable_cores()
+    found = [("cpu 1", "cpu", 1), *([("cpu", "cpu", cores)] if cores > 1 else [])]
+    return [*found, *((name, name, 1) for name in backend.GPUS if backend.is_present(name))]
+
+
+def measured(place, method, size, options):
+    """Steps a second of a bar at a place, and as many as the bytes of a step allow."""
+    name, arch, threads = place
+    cells = 2 * size, size, size
+    found = thread_job("", cells, [method], threads, options.steps, options.repeats, arch)[method]
+    floor = found["bandwidth"] / found["work"][0]
+    rate = 1.0 / min(found["seconds"])
+    return SimpleNamespace(
+        place=name, method=method, bodies=found["bodies"], rate=rate, floor=floor
+    )
+
+
+def draw(path, rows, methods):
+    """Steps a second over bodies, a panel a method, a colour a place."""
+    with picture(path, 1, len(methods), size=(3.2 * len(methods) + 1.0, 4.2)) as (figure, panels):
+        for axes, method in zip(panels if len(methods) > 1 else [panels], methods):
+            for name in dict.fromkeys(row.place for row in rows):
+                mine = [row for row in rows if (row.place, row.method) == (name, method)]
+                if mine:
+                    bodies = [row.bodies for row in mine]
+                    colour, words = LOOK[name]
+                    axes.plot(bodies, [row.rate for row in mine], "o-", color=colour, label=words)
+                    axes.plot(bodies, [row.floor for row in mine], ":", color=colour)
+                    axes.axhline(mine[0].rate, color=colour, lw=0.6, ls="--")
+            axes.plot([], [], ":", color=GREY, label="bound by bytes")
+            axes.plot([], [], "--", lw=0.6, color=GREY, label="rate of the smallest scene")
+            axes.set(xscale="log", yscale="log", title=METHODS[method])
+            axes.set(xlabel="bodies [1]", ylabel="steps a second [1/s]")
+        figure.legend(
+            *axes.get_legend_handles_labels(), loc="outside lower center", ncols=2 * len(methods)
+        )
+
+
+def run(options):
+    """Measure all places, one after the other; table, picture, figures."""
+    at, rows = study.output_paths(options.out), []
+    jobs = [
+        (place, method, size)
+        for place in places()
+        if place[0] in (options.places or LOOK)
+        for method in options.methods
+        for size in options.sizes
+    ]
+    with ProgressBar("places") as bar:
+        for done, job in enumerate(jobs):
+            bar.count(done, len(jobs))
+            try:
+                rows.append(measured(*job, options))
+            except InputError as error:
+                print(f"{job[0][0]}, {job[1]}, size {job[2]}: {error}")
+    study.write_rows(at("backends.csv"), TABLE.rows(rows))
+    TABLE.show(TABLE.rows(rows))
+    draw(at("backends.png"), rows, options.methods)
+    figures = {}
+    for row in rows:
+        name = f"{row.place.replace(' ', '_')}_{row.method}_{row.bodies}"
+        figures[f"steps_per_s_{name}"] = row.rate, "1/s"
+        figures[f"share_of_floor_{name}"] = row.rate / row.floor, "1"
+    study.finish(options, NAME, figures, 0.0)
+
+
+if __name__ == "__main__":
+    sys.exit(study.main(run, options_parser()))

@@ -1,0 +1,180 @@
+"""What the running device is and can do: the only module that knows one back end from another.
+
+Kernels, drivers and loaders ask here. Doubles are required: Metal and most Vulkan drivers of
+telephones have none.
+"""
+
+import math
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import taichi as ti
+from taichi.lang import impl
+from taichi.lang.snode import SNode
+from taichi.lang.util import to_numpy_type
+
+from taichi_dem.kit.errors import InputError
+
+#: Back ends by name; "gpu" is the first of ``GPUS`` that is there.
+GPUS = {"cuda": ti.cuda, "vulkan": ti.vulkan}
+ARCHITECTURES = ("cpu", "gpu", *GPUS)
+_WORDS = {"cuda": "CUDA device", "vulkan": "Vulkan driver"}
+#: Threads and rounds of the loops that show what a driver does wrong.
+_THREADS, _ROUNDS = 1024, 70_000
+#: Threads a block with which drivers that mix threads up in loops with atomics keep them apart.
+_SMALL_BLOCK = 8
+#: Blocks that a loop may start on Vulkan.
+_MOST_BLOCKS = 65_535
+_I32, _F64 = (ti.types.ndarray(dtype=kind, ndim=1) for kind in (ti.i32, ti.f64))
+_faults: dict[str, int] = {"block": 0, "rounds": 0}
+
+
+def found(arch: str) -> str:
+    """The back end that a name means here. Raises InputError where the machine lacks it."""
+    if arch == "cpu":
+        return arch
+    wanted = tuple(GPUS) if arch == "gpu" else (arch,)
+    for name in wanted:
+        if is_present(name):
+            return name
+    lacking = " and no ".join(_WORDS[name] for name in wanted)
+    raise InputError(f"arch {arch!r} was asked for, but no {lacking} answers here: use 'cpu'")
+
+
+def is_present(name: str) -> bool:
+    """Whether a device or driver of a back end answers on this machine."""
+    # Taichi would say on stderr what it does not find; the caller says it in a sentence.
+    ti.set_logging_level(ti.ERROR)
+    return bool(getattr(ti._lib.core, f"with_{name}")())
+
+
+def is_cpu() -> bool:
+    """Whether kernels run on the CPU, where fields lie in the memory of this process."""
+    return impl.current_cfg().arch not in GPUS.values()
+
+
+def probe() -> None:
+    """Find out what the device that Taichi has just started on does wrong.
+
+    Raises InputError where it computes no doubles, or not even small blocks of threads serve.
+
+    Mesa's lavapipe, a Vulkan driver that runs on the CPU, ends all loops of a thread after 65,535
+    rounds, and threads of a block of more than 8 leave a loop with an atomic together.
+    """
+    _faults.update(block=0, rounds=0)
+    if is_cpu():
+        return
+    try:
+        blocks = [block for block in (0, _SMALL_BLOCK) if _loops_end_alone(block)]
+    except RuntimeError as error:
+        words = str(error).strip().splitlines()[-1]
+        raise InputError(f"the device computes no doubles: use arch 'cpu' ({words})") from None
+    if not blocks:
+        raise InputError("the driver of the device ends loops too early: use arch 'cpu'")
+    _faults.update(block=blocks[0], rounds=_rounds())
+    if blocks[0]:
+        impl.current_cfg().default_gpu_block_dim = blocks[0]
+
+
+def most_bytes() -> float:
+    """Bytes of one tree of fields: Vulkan keeps it in one buffer, with offsets of 32 bits."""
+    return 2.0**32 if impl.current_cfg().arch == ti.vulkan else math.inf
+
+
+def most_entries() -> float:
+    """Entries of a field that a loop over it can visit: fewer where blocks of threads are small."""
+    return _MOST_BLOCKS * _faults["block"] or math.inf
+
+
+def most_rounds() -> int:
+    """Rounds of all loops of one thread together, after which a driver ends them; 0 for no end."""
+    return _faults["rounds"]
+
+
+def cut_short(whose: str, advice: str) -> InputError:
+    """Error for a launch in which the driver has ended a loop; advice: what to take instead."""
+    return InputError(
+        f"a loop {whose} needs more than the {most_rounds()} rounds after which the driver of this "
+        f"device ends it: take {advice}, or arch 'cpu'"
+    )
+
+
+@ti.func
+def loops_have_ended(rounds):
+    """Whether the driver ends the loops of this thread; rounds: a number of at least 1.
+
+    Such loops make one round. No compiler knows that this one makes six.
+    """
+    x, made = ti.min(rounds, 1), 0
+    while x < 1000:
+        x = 3 * x + 1
+        made += 1
+    return made < 6
+
+
+def _loops_end_alone(block):
+    """Whether each thread of a block makes the rounds of its own loop, beside an atomic."""
+    total = ti.ndarray(ti.i32, shape=1)
+    made = ti.ndarray(ti.f64, shape=_THREADS)
+
+    @ti.kernel
+    def loop(total: _I32, made: _F64):
+        if ti.static(block):
+            ti.loop_config(block_dim=block)
+        for i in range(_THREADS):
+            rounds = 0.0
+            for _ in range(i % 11):
+                ti.atomic_add(total[0], 1)
+                rounds += 1.0
+            made[i] = rounds
+
+    loop(total, made)
+    return bool((made.to_numpy() == np.arange(_THREADS) % 11).all())
+
+
+def _rounds():
+    """Rounds after which loops end; 0 where they make all that they should."""
+    made = ti.ndarray(ti.i32, shape=1)
+
+    @ti.kernel
+    def loop(made: _I32, rounds: ti.i32):
+        for i in range(1):
+            for _ in range(rounds):
+                made[i] = made[i] + 1
+
+    loop(made, _ROUNDS)
+    found = int(made.to_numpy()[0])
+    return found if found < _ROUNDS else 0
+
+
+def declared_bytes(node: Any) -> int:
+    """Bytes of all fields placed below a node that is not allocated yet."""
+    return sum(_bytes_of(node.get_ch(k)) for k in range(node.get_num_ch()))
+
+
+def _bytes_of(node):
+    if node.is_place():
+        return to_numpy_type(node.data_type())().itemsize
+    return math.prod(SNode(node).shape) * declared_bytes(node)
+
+
+def align(root: Any) -> None:
+    """Declare fillers in a tree so that each field of 8 bytes lies at a multiple of 8.
+
+    Taichi's layout for Vulkan puts fields, and members of an entry, in a row, the smallest first,
+    without a gap: one of an odd number of words would shift all larger ones, and kernels would
+    write a number of 8 bytes over its neighbour's half (taichi issue 8803). Two of the same size
+    shift none.
+    """
+    if impl.current_cfg().arch != ti.vulkan:
+        return
+    nodes = [root.get_ch(k) for k in range(root.get_num_ch())]
+    for node in nodes:
+        entry = declared_bytes(node)
+        if entry % 8 and entry > 4:
+            SNode(node).place(ti.field(ti.i32))
+    sizes = Counter(map(_bytes_of, nodes))
+    for size, count in sizes.items():
+        if size % 8 and count % 2:
+            ti.field(ti.i32, shape=size // 4)

@@ -1,0 +1,90 @@
+"""Every back end that answers here computes what a CPU does: same events, motion up to rounding."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from taichi_dem.kit import backend
+from tests.scenes import ROOT
+
+pytestmark = pytest.mark.gpu
+#: Of the largest value, where a device rounds as a CPU does: what differs by 1e-16 grows by some
+#: powers of ten within a run. CUDA fuses products and sums: positions of 0.1 m are rounded by 1e-17
+#: m, and the openings that drive the bodies are a ten-millionth of a metre: a part in 1e10 of the
+#: force, in every step anew.
+SAME = {"vulkan": 1e-12, "cuda": 1e-8}
+
+
+#: Back ends, each skipped where it does not answer.
+PRESENT = [
+    pytest.param(name, marks=pytest.mark.skipif(not there, reason=f"no {name} device answers here"))
+    for name, there in ((name, backend.is_present(name)) for name in backend.GPUS)
+]
+
+
+def said(*arguments):
+    """What a process of Python with these arguments prints."""
+    line, environment = [sys.executable, *arguments], {**os.environ, "PYTHONPATH": ROOT}
+    done = subprocess.run(line, capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory):
+    """What a back end computes of ``work``, arrays by name; each once, in a process of its own."""
+    kept, folder = {}, tmp_path_factory.mktemp("devices")
+
+    def of(arch):
+        if arch not in kept:
+            said("-m", "tests.devices.work", arch, str(folder))
+            kept[arch] = dict(np.load(folder / f"{arch}.npz"))
+        return kept[arch]
+
+    return of
+
+
+@pytest.mark.parametrize("arch", PRESENT)
+def test_a_device_computes_what_a_cpu_does(computed, arch):
+    """Integers are equal; |x - x_cpu| <= SAME max |x_cpu|, by every method, in both packages.
+
+    So does a run that goes on from a checkpoint of a CPU.
+    """
+    here, there = computed("cpu"), computed(arch)
+    assert here.keys() == there.keys()
+    for name, expected in here.items():
+        if expected.dtype.kind == "f":
+            worst = np.abs(there[name] - expected).max()
+            assert worst <= SAME[arch] * np.abs(expected).max(), name
+        else:
+            assert np.array_equal(there[name], expected), name
+
+
+def test_something_happens_in_what_is_compared(computed):
+    """Each run breaks bonds and finds contacts: agreement says something."""
+    here = computed("cpu")
+    for name in (name for name in here if name.endswith("broken_tick")):
+        assert (here[name] >= 0).sum() >= 8, name
+        assert here[name.replace("broken_tick", "evaluations")][3] > 0, name
+
+
+@pytest.mark.parametrize("arch", PRESENT)
+def test_fields_of_a_drawn_tree_keep_apart(arch):
+    """Each field of a tree of drawn kinds and lengths keeps what was written to it."""
+    assert json.loads(said("-m", "tests.devices.trees", arch).splitlines()[-1]) == {
+        "trees": 12,
+        "damaged": 0,
+    }
+
+
+@pytest.mark.parametrize("arch", PRESENT)
+def test_a_launch_that_falls_short_is_an_error(arch):
+    """Of a driver that ends loops after some rounds, in both packages."""
+    found = json.loads(said("-m", "tests.devices.refusals", arch).splitlines()[-1])
+    rounds = found.pop("rounds")
+    for package, sentence in found.items():
+        assert (f"{rounds} rounds" in sentence) == (rounds > 0), package
