@@ -110,7 +110,8 @@ def run(options):
             try:
                 rows.append(measured(*job, options))
             except InputError as error:
-                print(f"{job[0][0]}, {job[1]}, size {job[2]}: {error}")
+                reason = str(error).splitlines()[-1]
+                print(f"{job[0][0]}, {job[1]}, size {job[2]}: {reason}")
     study.write_rows(at("backends.csv"), TABLE.rows(rows))
     TABLE.show(TABLE.rows(rows))
     draw(at("backends.png"), rows, options.methods)
