@@ -29,20 +29,20 @@ METHODS = {
     "multirate_controlled": "explicit, a step for each",
     "implicit": "dashpots solved together",
 }
-SETTINGS = {
-    # Bars of 2k x k x k boxes of six tetrahedra.
-    "sizes": ((4, 8, 13, 20), (2, 3), study.several(study.whole(1, 60)), "boxes along a width"),
-    "places": (None, ["cpu 1", "cpu"], study.several(str), "cpu 1, cpu, cuda, vulkan; all there"),
-    "methods": ([*METHODS], ["explicit_limited"], study.several(study.one_of(METHODS)), "by comma"),
-    "steps": (20, 5, study.whole(1, 10_000), "timed together, 20"),
-    "repeats": (3, 1, study.whole(1, 100), "of them; the fastest counts, 3"),
-}
 #: Colour and words of a place.
 LOOK = {
     "cpu 1": (RED, "CPU, one thread"),
     "cpu": (BLACK, "CPU, all threads"),
     "vulkan": (BLUE, "Vulkan"),
     "cuda": (GREEN, "CUDA"),
+}
+SETTINGS = {
+    # Bars of 2k x k x k boxes of six tetrahedra.
+    "sizes": ((4, 8, 13, 20), (2, 3), study.several(study.whole(1, 60)), "boxes along a width"),
+    "places": (None, ["cpu 1", "cpu"], study.several(study.one_of(LOOK)), "by comma; all there"),
+    "methods": ([*METHODS], ["explicit_limited"], study.several(study.one_of(METHODS)), "by comma"),
+    "steps": (20, 5, study.whole(1, 10_000), "timed together, 20"),
+    "repeats": (3, 1, study.whole(1, 100), "of them; the fastest counts, 3"),
 }
 TABLE = study.Table(
     place=("place", "place"),
@@ -104,6 +104,8 @@ def run(options):
         for method in options.methods
         for size in options.sizes
     ]
+    if not jobs:
+        raise InputError(f"places must have one that answers here, got {', '.join(options.places)}")
     with ProgressBar("places") as bar:
         for done, job in enumerate(jobs):
             bar.count(done, len(jobs))

@@ -58,7 +58,6 @@ class BroadPhase:
         self.start_pairs, self.limits = start_pairs, limits
         self.has_limits = limits is not None
         self.tables, self.state = contacts.tables, contacts.state
-        self.may_be_cut = backend.most_rounds() > 0
         self.free, self.mark = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.free_count = ti.field(ti.i32, shape=())
         self.neighbours = VerletList(contacts)
@@ -134,9 +133,7 @@ class BroadPhase:
                 for a in range(ti.static(1 if count == self._once else self.mark.shape[0])):
                     if a < count():
                         item(a)
-                        if ti.static(self.may_be_cut):
-                            if backend.loops_have_ended(count()):
-                                self.state.cut_short[None] = 1
+                        self.state.check_loops(count())
 
     @ti.func
     def is_requested(self):

@@ -269,6 +269,13 @@ class State:
         marks[4 * topology.outer_body[chosen] + topology.outer_face[chosen]] = 0
         assign(self.exposed_tick, marks)
 
+    @ti.func
+    def check_loops(self, rounds):
+        """Note where the device ends the loops of this thread; rounds: a number of at least 1."""
+        if ti.static(backend.most_rounds() > 0):
+            if backend.loops_have_ended(rounds):
+                self.cut_short[None] = 1
+
     def motion(self) -> dict[str, np.ndarray]:
         """Arrays of the bodies' motion by name.
 

@@ -133,10 +133,8 @@ class Parallel:
     name = "parallel"
 
     def __init__(self, step: Step):
-        self.step, on_gpu = step, not backend.is_cpu()
-        # On a GPU the length of a loop is a task of its own, and starts 131,072 threads.
-        self.fixed, self.may_be_cut = on_gpu, backend.most_rounds() > 0
-        self.queued, self.state = QUEUED if on_gpu else 1, 0
+        self.step, self.on_gpu, self.state = step, not backend.is_cpu(), 0
+        self.queued = QUEUED if self.on_gpu else 1
         # As many as the steps before have needed; none is known where there is more than one part.
         self.sweeps = 1 if len(step.parts) == 1 else 0
         self._parts = tuple(Launch(self._run, part) for part in range(len(step.parts)))
@@ -194,11 +192,12 @@ class Parallel:
         """Queue all parts of a substep but the last one, which is returned."""
         *earlier, last = self._parts
         for part, launch in enumerate(earlier):
-            if not self.fixed:
+            if self.on_gpu:
+                for _ in range(max(1, self.sweeps) if part else 1):
+                    launch.queue(end_tick, 1, 1)
+            else:
                 while launch(end_tick, 1, 1):
                     pass
-            for _ in range(self.fixed * (max(1, self.sweeps) if part else 1)):
-                launch.queue(end_tick, 1, 1)
         return last
 
     def _finish_sweeps(self, end_tick):
@@ -215,13 +214,12 @@ class Parallel:
         low = ti.static(self.step.schedule.low)
         for active, item in ti.static(self.step.parts[part]):
             is_of_start = ti.static(self.step.is_of_start(item))
-            if ti.static(self.fixed):
+            if ti.static(self.on_gpu):
+                # The length of a loop is a task of its own there, and starts 131,072 threads.
                 for a in range(ti.static(active.most)):
                     if a < self._share(part, is_of_start, rest, bonds) * active.count(low[None]):
                         item(active.pick(a))
-                        if ti.static(self.may_be_cut):
-                            if backend.loops_have_ended(rest + bonds):
-                                self.step.state.cut_short[None] = 1
+                        self.step.state.check_loops(rest + bonds)
             else:
                 count = self._share(part, is_of_start, rest, bonds) * active.count(low[None])
                 for a in range(count):
@@ -248,7 +246,7 @@ class Parallel:
                 found |= self.step.halted()
                 if ti.static(self.step.has_contact):
                     found |= _SEARCH * self.step.search.is_requested()
-                if ti.static(self.may_be_cut):
+                if ti.static(backend.most_rounds() > 0):
                     found |= _CUT_SHORT * self.step.state.cut_short[None]
                 if self.step.waits(part) == 1:
                     found = _UNSOLVED

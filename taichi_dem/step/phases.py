@@ -10,7 +10,6 @@ from typing import Any
 import taichi as ti
 
 from taichi_dem.contact.search import BroadPhase
-from taichi_dem.kit import backend
 from taichi_dem.kit.products import squared
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
@@ -185,9 +184,7 @@ class Step:
         for members, item in ti.static(self.start_phases[last]):
             for a in range(members.count(0)):
                 item(members.pick(a))
-                if ti.static(backend.most_rounds() > 0):
-                    if backend.loops_have_ended(a + 1):
-                        self.state.cut_short[None] = 1
+                self.state.check_loops(a + 1)
 
     @ti.func
     def halted(self):
