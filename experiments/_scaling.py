@@ -15,10 +15,10 @@ from scipy.optimize import nnls
 
 from taichi_dem import Collector, Every, Simulation
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.ordered import Once
 from taichi_dem.simulate import run_simulation
 from taichi_dem.state.timeline import MAX_LEVEL
 from taichi_dem.step.drivers import Resident
-from taichi_dem.step.multirate.lists import Once
 from taichi_dem.step.phases import Step
 
 #: What is counted: bonds, contact pairs, and the pairs of spheres that are compared in these.

@@ -72,7 +72,7 @@ class BlastEngine(Engine):
         self.advance = kinds[0](self.schedule)
         self.broad_phase = None
         if self.contacts is not None:
-            told = self.schedule.start_pairs, self.schedule.limits
+            told = self.schedule.pair_phases(), self.schedule.limits
             self.broad_phase = BroadPhase(self.contacts, *told)
         self.step = kinds[1](self.advance, self.broad_phase)
         self.drivers = {name: driver(self.step) for name, driver in DRIVERS.items()}

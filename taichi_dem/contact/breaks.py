@@ -4,7 +4,11 @@ import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.ordered import Once, Phases, Some
 from taichi_dem.state.model import Model
+
+#: Outer faces wait for the first break to be free; they are set free in this search.
+WAITING, ENDING = 1, 2
 
 
 @ti.data_oriented
@@ -14,8 +18,8 @@ class Breaks:
     Spheres touch on free faces, broken or outer ones. Bodies can touch others at every corner of a
     free face: around it lie bodies that reach the surface with an edge or a corner only.
     corner: number of a body's corners, 4 a body; is_open: 1 for a corner of a free face.
-    newest: last tick at which a face of a body was set free, negative for none. fresh: 1 when that
-    of any has been since the last search, whose injection is booked.
+    newest: last tick at which a face of a body was set free, negative for none; latest: of all.
+    fresh: 1 when that has been since the last search, whose injection is booked.
     """
 
     constant_fields = ("corner",)
@@ -25,6 +29,7 @@ class Breaks:
         self.contacts, self.store = contacts, contacts.store
         self.tables, self.state = contacts.tables, contacts.state
         self.fresh = ti.field(ti.i32, shape=())
+        self.latest = ti.field(ti.i64, shape=())
         self.newest = ti.field(ti.i64, shape=self.tables.capacity.bodies)
         if contacts.law.meets_bodies:
             self.corner, self.is_open = (
@@ -36,47 +41,56 @@ class Breaks:
         if self.contacts.law.meets_bodies:
             assign(self.corner, model.mesh.tetrahedra.reshape(-1))
 
+    def phases(self, bodies: Some) -> Phases:
+        """Phases that note which faces are free now, and when the last of them were set free."""
+        waiting = Some(self._bonds_waited_for, self.tables.capacity.bonds, light=True)
+        phases: Phases = ((waiting, self._note_break), (bodies, self._note))
+        if self.contacts.law.meets_bodies:
+            phases += ((bodies, self._open_corners),)
+        return (*phases, (Once(), self._end))
+
     @ti.func
-    def note(self):
-        """Note which faces are free now, and when the last of them were set free."""
-        self._free_outer()
-        latest = ti.cast(0, ti.i64)
-        for i in range(self.tables.body_count[None]):
-            newest = self.state.exposed_tick[4 * i]
-            for f in range(1, 4):
-                newest = ti.max(newest, self.state.exposed_tick[4 * i + f])
-            self.newest[i] = newest
-            latest = ti.max(latest, newest)
+    def _bonds_waited_for(self):
+        """Number of bonds, while outer faces wait for one of them to break."""
+        waits = self.contacts.outer_waits[None] == WAITING
+        return ti.select(waits, self.tables.bond_count[None], 0)
+
+    @ti.func
+    def _note_break(self, b):
+        if self.state.broken_tick[b] >= 0:
+            self.contacts.outer_waits[None] = ENDING
+
+    @ti.func
+    def _note(self, i):
+        """Set outer faces of body i free, where they are to be now; note when the last one was."""
+        newest = ti.cast(-1, ti.i64)
+        for face in range(4 * i, 4 * i + 4):
+            if self.contacts.outer_waits[None] == ENDING:
+                bare = self.state.exposed_tick[face] < 0
+                if bare and self.tables.face_bond[face] < 0:
+                    self.state.exposed_tick[face] = self.state.tick[None]
+            newest = ti.max(newest, self.state.exposed_tick[face])
+            if ti.static(self.contacts.law.meets_bodies):
+                self.is_open[face] = 0
+        self.newest[i] = newest
+        if newest > self.latest[None]:
+            ti.atomic_max(self.latest[None], newest)
+
+    @ti.func
+    def _open_corners(self, i):
+        """Mark the corners of the free faces; face f of a body lies opposite its corner f."""
+        for f in range(4):
+            if self.state.exposed_tick[4 * i + f] >= 0:
+                for c in range(1, 4):
+                    self.is_open[self.corner[4 * i + (f + c) % 4]] = 1
+
+    @ti.func
+    def _end(self, one):
         # A second search at the tick of a break must not book its injection again.
-        self.fresh[None] = ti.cast(latest > self.state.injected_tick[None], ti.i32)
-        self.state.injected_tick[None] = latest
-        if ti.static(self.contacts.law.meets_bodies):
-            self._open_corners()
-
-    @ti.func
-    def _free_outer(self):
-        """Set all outer faces free once a bond has broken, where they wait for that."""
-        if self.contacts.outer_waits[None] == 1:
-            broken = False
-            for b in range(self.tables.bond_count[None]):
-                broken = broken or self.state.broken_tick[b] >= 0
-            if broken:
-                self.contacts.outer_waits[None] = 0
-                for face in range(4 * self.tables.body_count[None]):
-                    bare = self.state.exposed_tick[face] < 0
-                    if bare and self.tables.face_bond[face] < 0:
-                        self.state.exposed_tick[face] = self.state.tick[None]
-
-    @ti.func
-    def _open_corners(self):
-        """Mark the corners of all free faces; face f of a body lies opposite its corner f."""
-        for k in range(4 * self.tables.body_count[None]):
-            self.is_open[k] = 0
-        for i in range(self.tables.body_count[None]):
-            for f in range(4):
-                if self.state.exposed_tick[4 * i + f] >= 0:
-                    for c in range(1, 4):
-                        self.is_open[self.corner[4 * i + (f + c) % 4]] = 1
+        self.fresh[None] = ti.cast(self.latest[None] > self.state.injected_tick[None], ti.i32)
+        self.state.injected_tick[None] = self.latest[None]
+        if self.contacts.outer_waits[None] == ENDING:
+            self.contacts.outer_waits[None] = 0
 
     @ti.func
     def is_free(self, i):

@@ -1,11 +1,15 @@
-"""Cell grid over the centres of bodies, and the counting sort that fills it.
+"""Cell grid over the centres of bodies.
 
 And the positions at which bodies were listed, with the distances that they may go from there.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
+from taichi_dem.kit.ordered import Chunks, Grouping, Phases, Some
 from taichi_dem.kit.products import norm, squared
 from taichi_dem.kit.types import real
 from taichi_dem.state.tables import Tables
@@ -74,15 +78,19 @@ class Reach:
 class CellGrid:
     """Sorts all bodies by cell, so that neighbours are sought in the cells nearby only.
 
+    making: function that is 1 where the next search fills it.
     ball: radius of the ball around a body within which others are near whose balls it meets [m].
     member: bodies, cell by cell.
     """
 
-    scratch_fields = ("first", "member", "cell", "counts", "corner", "edge", "largest")
+    scratch_fields = (
+        *("first", "member", "cell", "counts", "corner", "edge", "largest", "bounds"),
+    )
 
-    def __init__(self, tables: Tables, reach: Reach):
+    def __init__(self, tables: Tables, reach: Reach, making: Callable[..., Any]):
         n = tables.capacity.bodies
         self.tables, self.placed_at, self.ball = tables, reach.placed_at, reach.ball
+        self.making = making
         self.first = ti.field(ti.i32, shape=4 * n + 66)
         self.member = ti.field(ti.i32, shape=n)
         self.cell = ti.field(ti.i32, shape=n)
@@ -90,17 +98,36 @@ class CellGrid:
         self.corner = ti.Vector.field(3, real, shape=())
         self.edge = ti.field(real, shape=())
         self.largest = ti.field(real, shape=())
+        cells = Some(self._cell_count, 4 * n + 65, light=True)
+        bodies = Some(self._body_count, n, light=True)
+        parts = cells, bodies, self._cell_of_member, self._itself
+        self.grouping = Grouping(self.first, self.member, *parts)
+        self.chunks = Chunks(self._body_count, n)
+        self.bounds = ti.Matrix.field(3, 3, real, shape=self.chunks.most)
+        self.phases: Phases = (
+            (self.chunks, self._bound),
+            (Some(making, 1), self._size),
+            (bodies, self._find_cell),
+            *self.grouping.phases,
+        )
 
     @ti.func
-    def fill(self, one):
-        """Sort the bodies into cells about as wide as one of their balls."""
-        self._size()
+    def _body_count(self):
+        return self.making() * self.tables.body_count[None]
+
+    @ti.func
+    def _cell_count(self):
         counts = self.counts[None]
-        for i in range(self.tables.body_count[None]):
-            cell = self._cell_of(self._bounded(i))
-            self.cell[i] = (cell[2] * counts[1] + cell[1]) * counts[0] + cell[0]
-        total = counts[0] * counts[1] * counts[2]
-        group(self.first, self.member, total, self.tables.body_count[None], self._cell_of_member)
+        return self.making() * counts[0] * counts[1] * counts[2]
+
+    @ti.func
+    def _find_cell(self, i):
+        counts, cell = self.counts[None], self._cell_of(self._bounded(i))
+        self.cell[i] = (cell[2] * counts[1] + cell[1]) * counts[0] + cell[0]
+
+    @ti.func
+    def _itself(self, i):
+        return i
 
     @ti.func
     def around(self, i):
@@ -121,18 +148,31 @@ class CellGrid:
         return self.first[cell + low], self.first[cell + high]
 
     @ti.func
-    def _size(self):
-        low, high, mean = self._bounded(0), self._bounded(0), 0.0
-        self.largest[None] = 0.0
-        for i in range(self.tables.body_count[None]):
+    def _bound(self, c):
+        """Lowest and highest place of a chunk of bodies; sum and largest of their balls."""
+        first, last = self.chunks.span(c)
+        low, high, total, largest = self._bounded(first), self._bounded(first), 0.0, 0.0
+        for i in range(first, last):
             place = self._bounded(i)
             low, high = ti.min(low, place), ti.max(high, place)
-            mean += self.ball[i] / self.tables.body_count[None]
-            self.largest[None] = ti.max(self.largest[None], self.ball[i])
-        edge = 2.0 * mean
-        while _product(ti.floor((high - low) / edge) + 1.0) > 4 * self.tables.body_count[None] + 64:
+            total += self.ball[i]
+            largest = ti.max(largest, self.ball[i])
+        self.bounds[c] = ti.Matrix.rows([low, high, [total, largest, 0.0]])
+
+    @ti.func
+    def _size(self, one):
+        """Choose cells about as wide as one of the balls."""
+        first, count = self.bounds[0], self.tables.body_count[None]
+        low, high, total, largest = first[0, :], first[1, :], 0.0, 0.0
+        for c in range(self.chunks.count(0)):
+            found = self.bounds[c]
+            low, high = ti.min(low, found[0, :]), ti.max(high, found[1, :])
+            total += found[2, 0]
+            largest = ti.max(largest, found[2, 1])
+        edge = 2.0 * total / count
+        while _product(ti.floor((high - low) / edge) + 1.0) > 4 * count + 64:
             edge *= 1.25
-        self.edge[None], self.corner[None] = edge, low
+        self.largest[None], self.edge[None], self.corner[None] = largest, edge, low
         self.counts[None] = ti.cast((high - low) / edge, ti.i32) + 1
 
     @ti.func
@@ -152,22 +192,3 @@ class CellGrid:
 @ti.func
 def _product(counts):
     return counts[0] * counts[1] * counts[2]
-
-
-@ti.func
-def group(first: ti.template(), order: ti.template(), keys, count, key_of: ti.template()):
-    """List 0 .. count - 1 by key: those of key c, in order, at order[first[c]] .. first[c + 1].
-
-    first has room for keys + 2 entries.
-    """
-    for c in range(keys + 2):
-        first[c] = 0
-    for a in range(count):
-        key = key_of(a)
-        first[key + 2] = first[key + 2] + 1
-    for c in range(keys):
-        first[c + 2] = first[c + 2] + first[c + 1]
-    for a in range(count):
-        place = first[key_of(a) + 1]
-        order[place] = a
-        first[key_of(a) + 1] = place + 1

@@ -33,7 +33,7 @@ class Contacts:
     has gone [m]; horizon: path up to which its pairs are known [m], body_skin ahead of where it was
     visited last. skin: least of that, twice [m]. pace: largest step [s], and steps of a body by
     which its contacts are counted before they touch. search_requested: 1 when a path comes near its
-    horizon. outer_waits: 1 while outer faces wait for the first break to be free.
+    horizon. outer_waits: WAITING while outer faces wait for the first break.
     """
 
     def __init__(self, tables: Tables, state: State):

@@ -13,7 +13,6 @@ compares the pairs of which ``until`` lies below the new horizons. Results do no
 times of searches.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import taichi as ti
@@ -24,6 +23,7 @@ from taichi_dem.contact.verlet_list import NearPairs, VerletList
 from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.ordered import Once, Phases, RunningSums, Some, tasks
 from taichi_dem.kit.products import norm
 from taichi_dem.kit.types import vec3
 from taichi_dem.methods import Method
@@ -42,8 +42,8 @@ _CAPACITIES = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 class BroadPhase:
     """Finds the pairs that are near and their spheres, for the store of a ``Contacts``.
 
-    start_pairs: takes in the pairs of a search. limits: ``StabilityLimits`` that are told of pairs,
-    None where no step needs them.
+    pair_phases: phases that take in the pairs of a search. limits: ``StabilityLimits`` that are
+    told of pairs, None where no step needs them.
     everywhere: 1 when the next search compares all pairs, as is needed once bodies have been moved
     by hand. mark: FREE, VISITED or COMPARED for each body, 0 for one within a solid; free: those
     marked, in order; searched: tick of the last search. searches: their number. full: the list
@@ -52,10 +52,10 @@ class BroadPhase:
 
     scratch_fields = ("free", "free_count", "mark")
 
-    def __init__(self, contacts: Contacts, start_pairs: Callable[[], Any], limits: Any):
+    def __init__(self, contacts: Contacts, pair_phases: Phases, limits: Any):
         n = contacts.tables.capacity.bodies
         self.contacts, self.store = contacts, contacts.store
-        self.start_pairs, self.limits = start_pairs, limits
+        self.pair_phases, self.limits = pair_phases, limits
         self.has_limits = limits is not None
         self.tables, self.state = contacts.tables, contacts.state
         self.free, self.mark = (ti.field(ti.i32, shape=n) for _ in range(2))
@@ -67,6 +67,10 @@ class BroadPhase:
         self.near_pairs = NearPairs(contacts, self.neighbours)
         self.full = self.near_pairs.full
         self.searches = ti.field(ti.i32, shape=())
+        ends = self._is_free, self._put_free, self._end_free
+        self.listing = RunningSums(self._body_count, n, 1, *ends)
+        self.phases = self._phases(n)
+        self.tasks = tasks(self.phases, n)
 
     def load(self, model: Model, method: Method) -> None:
         """Load the limits of the lists; the first search makes all of them."""
@@ -104,36 +108,52 @@ class BroadPhase:
                 "lie in each other"
             )
 
-    @property
-    def phases(self) -> tuple[tuple[Callable[..., Any], Callable[..., Any]], ...]:
-        """Phases of a search in order, as pairs of a count and a function of an index."""
+    def _phases(self, n) -> Phases:
+        """Phases of a search in order, for at most n bodies."""
+        bodies = Some(self._body_count, n, light=True)
+        free, light = Some(self._free_bodies, n), Some(self._free_bodies, n, light=True)
+        anew, amended = Some(self._all_anew, n), Some(self._all_amended, n)
         return (
-            (self._once, self._list_free),
-            (self._free_bodies, self._choose),
-            (self._once, self._begin),
-            (self._all_anew, self.neighbours.list_anew),
-            (self.neighbours.making, self.neighbours.grid.fill),
-            (self._all_anew, self.neighbours.count),
-            (self.neighbours.making, self.neighbours.allot),
-            (self._all_anew, self.neighbours.fill),
-            (self._all_amended, self.neighbours.amend),
-            (self._free_bodies, self._visit),
-            (self._once, self._number_pairs),
-            (self._free_bodies, self._update_pairs),
-            (self._once, self._end),
+            *self.breaks.phases(bodies),
+            (bodies, self._mark_free),
+            *self.listing.phases,
+            (free, self._choose),
+            (Once(), self._begin),
+            (anew, self.neighbours.list_anew),
+            *self.neighbours.grid.phases,
+            (anew, self.neighbours.count),
+            *self.neighbours.allotting.phases,
+            (Once(), self.neighbours.check_room),
+            (anew, self.neighbours.fill),
+            (amended, self.neighbours.amend),
+            (free, self._visit),
+            (light, self._count_row),
+            *self.near_pairs.numbering.phases,
+            (light, self._release),
+            (free, self._update_pairs),
+            (Once(), self._end_pairs),
+            *self.near_pairs.second.phases,
+            *self.pair_phases,
+            (Once(), self._end),
         )
 
     @ti.kernel
     def _search(self):
-        for count, item in ti.static(self.phases):
-            if ti.static(backend.is_cpu()):
-                for a in range(count()):
-                    item(a)
+        for serial, phases in ti.static(self.tasks):
+            if ti.static(serial):
+                ti.loop_config(serialize=True)
+                for _ in range(1):
+                    for members, item in ti.static(phases):
+                        for a in range(members.count(0)):
+                            item(members.pick(a))
+            elif ti.static(backend.is_cpu()):
+                for a in range(phases[0][0].count(0)):
+                    phases[0][1](phases[0][0].pick(a))
             else:
-                for a in range(ti.static(1 if count == self._once else self.mark.shape[0])):
-                    if a < count():
-                        item(a)
-                        self.state.check_loops(count())
+                for a in range(ti.static(phases[0][0].most)):
+                    if a < phases[0][0].count(0):
+                        phases[0][1](phases[0][0].pick(a))
+                        self.state.check_loops(phases[0][0].count(0))
 
     @ti.func
     def is_requested(self):
@@ -158,22 +178,21 @@ class BroadPhase:
         return self.neighbours.amending() * self.tables.body_count[None]
 
     @ti.func
-    def _once(self):
-        return 1
-
-    @ti.func
     def _begin(self, one):
         self.neighbours.begin()
         self.searched[None] = self.state.tick[None]
         self.store.pack_if_sparse()
 
     @ti.func
-    def _end(self, one):
+    def _end_pairs(self, one):
+        """Take over the numbers of pairs; no list of them holds any when one is full."""
         if self.neighbours.full[None] == 1:
             self.full[None] = 3
         self.neighbours.end()
-        self.near_pairs.index_second()
-        self.start_pairs()
+        self.near_pairs.end()
+
+    @ti.func
+    def _end(self, one):
         self.everywhere[None] = 0
         self.searches[None] = self.searches[None] + 1
         # A full row of neighbours requires another search, which rebuilds the list.
@@ -181,17 +200,28 @@ class BroadPhase:
         self.contacts.search_requested[None] = ti.cast(again, ti.i32)
 
     @ti.func
-    def _list_free(self, one):
+    def _mark_free(self, i):
+        """Mark a body that others can touch."""
+        self.mark[i] = self.breaks.is_free(i)
+        self.contacts.free[i] = self.mark[i]
+
+    @ti.func
+    def _body_count(self):
+        return self.tables.body_count[None]
+
+    @ti.func
+    def _is_free(self, i):
+        return ti.Vector([ti.cast(self.mark[i] == FREE, ti.i32)])
+
+    @ti.func
+    def _put_free(self, i, before, value):
         """List the bodies that others can touch, in order of their index."""
-        count = 0
-        self.breaks.note()
-        for i in range(self.tables.body_count[None]):
-            self.mark[i] = self.breaks.is_free(i)
-            self.contacts.free[i] = self.mark[i]
-            if self.mark[i] == FREE:
-                self.free[count] = i
-                count += 1
-        self.free_count[None] = count
+        if value[0] == 1:
+            self.free[before[0]] = i
+
+    @ti.func
+    def _end_free(self, total):
+        self.free_count[None] = total[0]
         self.full[None] = 0
 
     @ti.func
@@ -236,8 +266,14 @@ class BroadPhase:
         self.neighbours.note_found(k, i, count, self.contacts.paths(i, j) + gap, keeps)
 
     @ti.func
-    def _number_pairs(self, one):
-        self.near_pairs.number(self.free, self.free_count[None])
+    def _count_row(self, a):
+        """Count what of the row of a free body is near, comes, and goes."""
+        self.near_pairs.count_row(self.free[a])
+
+    @ti.func
+    def _release(self, a):
+        """Free the slots of the pairs of a free body that are near no longer."""
+        self.near_pairs.release(self.free[a])
 
     @ti.func
     def _update_pairs(self, a):
@@ -245,6 +281,7 @@ class BroadPhase:
         i = self.free[a]
         if self.full[None] == 0:
             if self.near_pairs.row_is_new[i] == 1:
+                self.near_pairs.renew_row(i)
                 for k in range(self.neighbours.first[i], self.neighbours.last[i]):
                     if self.neighbours.slot[k] >= 0:
                         self._update_pair(k, self.neighbours.slot[k])

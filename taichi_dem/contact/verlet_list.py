@@ -7,10 +7,11 @@ Of its pairs those that are near are visited, in order.
 
 import taichi as ti
 
-from taichi_dem.contact.cell_grid import CellGrid, Reach, group
+from taichi_dem.contact.cell_grid import CellGrid, Reach
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.types import real
+from taichi_dem.kit.ordered import Grouping, RunningSums, Some
+from taichi_dem.kit.types import ivec3, real
 from taichi_dem.methods import Method
 from taichi_dem.state.capacity import SPARE_NEIGHBOURS
 from taichi_dem.state.model import Model
@@ -33,8 +34,11 @@ class VerletList:
     contacts; is_new: 1 while they are not written yet. changed: 1 for a row whose near pairs may
     have changed.
     reach: the ``Reach`` that bodies may not leave. stale: STALE when all rows are to be rebuilt.
-    limit: entries that the scene allows. full: 1 when they are exceeded.
+    limit: entries that the scene allows. full: 1 when they are exceeded. wanted: entries that the
+    row of each body is to have.
     """
+
+    scratch_fields = ("wanted",)
 
     def __init__(self, contacts: Contacts):
         n = contacts.tables.capacity.bodies
@@ -42,7 +46,7 @@ class VerletList:
         self.store, self.capacity = contacts.store, contacts.tables.capacity.neighbour_entries
         self.limit = ti.field(ti.i32, shape=())
         self.reach = Reach(contacts)
-        self.grid = CellGrid(self.tables, self.reach)
+        self.grid = CellGrid(self.tables, self.reach, self.making)
         self.first = ti.field(ti.i32, shape=n + 1)
         self.last, self.changed = (ti.field(ti.i32, shape=n) for _ in range(2))
         # Stored contiguously: every search reads many entries that are no longer in the cache.
@@ -54,6 +58,9 @@ class VerletList:
         )
         self.stale = ti.field(ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
+        self.wanted = ti.field(ti.i32, shape=n)
+        allotted = self._wanted, self._allot, self._end_allotting
+        self.allotting = RunningSums(self._listed_anew, n, 1, *allotted)
 
     def load(self, model: Model, method: Method) -> None:
         """Set the limit of a scene; the next search rebuilds the list."""
@@ -92,20 +99,35 @@ class VerletList:
     def count(self, i):
         """Count the neighbours of body i; near pairs that are none of them find room besides."""
         near = self.store.first_of[i + 1] - self.store.first_of[i]
-        self.first[i + 1] = self._visit(i, 0, False) + ti.max(near, SPARE)
+        self.wanted[i] = self._visit(i, 0, False) + ti.max(near, SPARE)
 
     @ti.func
-    def allot(self, one):
-        """Allot a row of the list to every body."""
-        self.first[0] = 0
-        for i in range(self.tables.body_count[None]):
-            self.first[i + 1] = self.first[i + 1] + self.first[i]
-        if self.first[self.tables.body_count[None]] > self.limit[None]:
-            self.full[None] = 1
-            for i in range(self.tables.body_count[None] + 1):
-                self.first[i] = 0
-        for i in range(self.tables.body_count[None]):
-            self.last[i] = self.first[i]
+    def _listed_anew(self):
+        return self.making() * self.tables.body_count[None]
+
+    @ti.func
+    def _wanted(self, i):
+        return ti.Vector([self.wanted[i]])
+
+    @ti.func
+    def _allot(self, i, before, value):
+        """Allot a row of the list to body i."""
+        self.first[i], self.last[i] = before[0], before[0]
+
+    @ti.func
+    def _end_allotting(self, total):
+        self.first[self.tables.body_count[None]] = total[0]
+
+    @ti.func
+    def check_room(self, one):
+        """Empty all rows where they exceed the limit."""
+        if self.making() == 1:
+            n = self.tables.body_count[None]
+            if self.first[n] > self.limit[None]:
+                self.full[None] = 1
+                for i in range(n):
+                    self.first[i], self.last[i] = 0, 0
+                self.first[n] = 0
 
     @ti.func
     def fill(self, i):
@@ -252,11 +274,12 @@ class NearPairs:
 
     neighbours: the ``VerletList``, whose rows are in order. Of body i: row: slots of its near
     pairs, from neighbours.first[i] on; row_count: their number; row_spheres: number of their sphere
-    pairs; row_is_new: 1 where they may have changed. full: 1 or 2 when there is no capacity for
-    pairs or for sphere pairs.
+    pairs; row_is_new: 1 where they may have changed; wanted: slots that it takes, places of sphere
+    pairs that it takes, and slots that it frees, then those of all bodies before; total: of all.
+    full: 1 or 2 when there is no capacity for pairs or for sphere pairs.
     """
 
-    scratch_fields = ("row_is_new",)
+    scratch_fields = ("row_is_new", "wanted", "total")
 
     def __init__(self, contacts: Contacts, neighbours: VerletList):
         self.tables, self.contacts, self.store = contacts.tables, contacts, contacts.store
@@ -265,75 +288,122 @@ class NearPairs:
         self.row = ti.field(ti.i32, shape=neighbours.capacity)
         self.row_count, self.row_spheres = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.row_is_new = ti.field(ti.i32, shape=n)
+        self.wanted = ti.Vector.field(3, ti.i32, shape=n)
+        self.total = ti.Vector.field(3, ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
+        rows = self._row_sums, self._begin_row, self._end_rows
+        self.numbering = RunningSums(self._body_count, n, 5, *rows)
+        # For every body the near pairs in which it is second, in order.
+        self.second = Grouping(
+            self.store.second_start,
+            self.store.second_slot,
+            Some(self._body_count, n, light=True),
+            Some(self._near_count, self.store.slots, light=True),
+            self._second_of,
+            self._slot_at,
+        )
 
     @ti.func
-    def number(self, free: ti.template(), count):
-        """Number the near pairs in order; new ones get slots, others lose theirs.
+    def count_row(self, i):
+        """Count the near pairs of which body i is the first, and what they want where it changes.
 
-        free: the bodies that can touch others, count of them; the rest are in no pair.
+        Pairs that only hold a pending impulse leave at the next search.
         """
-        for a in range(count):
-            i = free[a]
-            self.row_is_new[i] = self.neighbours.changed[i]
-            if self.row_is_new[i] == 1:
-                self._renew_row(i)
-        self._count_rows()
-        if self.full[None] != 0:
-            self._clear_order()
+        self.row_is_new[i] = self.neighbours.changed[i]
+        self.wanted[i] = ivec3(0)
+        if self.row_is_new[i] == 1:
+            count, spheres, waiting, wanted = 0, 0, 0, ivec3(0)
+            for k in range(self.neighbours.first[i], self.neighbours.last[i]):
+                found = self.neighbours.found[k]
+                spheres += found
+                if found > 0:
+                    count += 1
+                    wanted[0] += ti.cast(self.neighbours.slot[k] < 0, ti.i32)
+                    wanted[1] += found * self.neighbours.is_new[k]
+                elif self._leaves(k):
+                    wanted[2] += 1
+                elif self.neighbours.slot[k] >= 0:
+                    count += 1
+                    waiting = 1
+            self.row_count[i], self.row_spheres[i], self.wanted[i] = count, spheres, wanted
+            self.neighbours.changed[i] = waiting
 
     @ti.func
-    def _renew_row(self, i):
-        """List the near pairs of which body i is the first."""
-        start, count, spheres, waiting = self.neighbours.first[i], 0, 0, 0
+    def _body_count(self):
+        return self.tables.body_count[None]
+
+    @ti.func
+    def _row_sums(self, i):
+        found = ti.Vector.zero(ti.i32, 5)
+        if self.contacts.free[i] == 1:
+            wanted = self.wanted[i]
+            found[0], found[1] = self.row_count[i], self.row_spheres[i]
+            found[2], found[3], found[4] = wanted[0], wanted[1], wanted[2]
+        return found
+
+    @ti.func
+    def _begin_row(self, i, before, value):
+        self.store.first_of[i] = before[0]
+        self.wanted[i] = ivec3(before[2], before[3], before[4])
+
+    @ti.func
+    def _end_rows(self, total):
+        """Take over the numbers of all; find whether there is room for them."""
+        self.store.first_of[self.tables.body_count[None]] = total[0]
+        self.store.near_count[None], self.store.sphere_count[None] = total[0], total[1]
+        self.total[None] = ivec3(total[2], total[3], total[4])
+        if self.store.lacks_slots(total[2], total[4]):
+            self.full[None] = 1
+        if self.store.lacks_places(total[3]):
+            self.full[None] = 2
+
+    @ti.func
+    def release(self, i):
+        """Free the slots of pairs of body i that are near no longer, when its row changes."""
+        if self.full[None] == 0 and self.row_is_new[i] == 1:
+            place = self.wanted[i][2]
+            for k in range(self.neighbours.first[i], self.neighbours.last[i]):
+                if self._leaves(k):
+                    self.store.release(self.neighbours.slot[k], place)
+                    self.neighbours.slot[k] = -1
+                    place += 1
+
+    @ti.func
+    def _leaves(self, k):
+        """Whether entry k gives its slot back: nothing of the pair is near, and nothing waits."""
+        p, leaves = self.neighbours.slot[k], False
+        if p >= 0 and self.neighbours.found[k] == 0:
+            leaves = not self.store.waits(p)
+        return leaves
+
+    @ti.func
+    def renew_row(self, i):
+        """List the near pairs of which body i is the first, new ones in slots of their own."""
+        start, count, wanted = self.neighbours.first[i], 0, self.wanted[i]
+        fresh, place = wanted[0], self.store.sphere_end[None] + wanted[1]
         for k in range(start, self.neighbours.last[i]):
             p, found = self.neighbours.slot[k], self.neighbours.found[k]
-            stays = found > 0
-            if p >= 0 and found == 0:
-                stays = self.store.waits(p)
-                waiting |= ti.cast(stays, ti.i32)
-                if not stays:
-                    self.store.release(p)
-                    self.neighbours.slot[k] = -1
-            if stays:
-                self.row[start + count] = self._slot_of(k, i)
+            if p < 0 and found > 0:
+                p = self.store.allocate(fresh, self.total[None][2], i, self.neighbours.body[k])
+                self.neighbours.slot[k] = p
+                fresh += 1
+            if p >= 0:
+                if found > 0 and self.neighbours.is_new[k] == 1:
+                    self.store.reserve_spheres(p, place)
+                    place += found
+                self.row[start + count] = p
                 count += 1
-                spheres += found
-        self.row_count[i], self.row_spheres[i] = count, spheres
-        # Pairs that only hold a pending impulse leave at the next search.
-        self.neighbours.changed[i] = waiting
 
     @ti.func
-    def _slot_of(self, k, i):
-        """Slot of entry k of body i, new or not, with places for sphere pairs just found."""
-        p = self.neighbours.slot[k]
-        if p < 0:
-            p = self.store.allocate(i, self.neighbours.body[k])
-            self.neighbours.slot[k] = p
-        if p < 0:
-            self.full[None] = 1
-        elif self.neighbours.is_new[k] == 1:
-            if self.store.reserve_spheres(p, self.neighbours.found[k]) == 1:
-                self.full[None] = 2
-        return p
-
-    @ti.func
-    def _count_rows(self):
-        pairs, spheres = 0, 0
-        for i in range(self.tables.body_count[None]):
-            self.store.first_of[i] = pairs
-            if self.contacts.free[i] == 1:
-                pairs += self.row_count[i]
-                spheres += self.row_spheres[i]
-        self.store.first_of[self.tables.body_count[None]] = pairs
-        self.store.near_count[None], self.store.sphere_count[None] = pairs, spheres
-
-    @ti.func
-    def _clear_order(self):
-        """List nothing: the run ends with an error."""
-        self.store.near_count[None] = 0
-        for i in range(self.tables.body_count[None] + 1):
-            self.store.first_of[i] = 0
+    def end(self):
+        """Take over what rows have taken and freed; list nothing when there is no room."""
+        if self.full[None] == 0:
+            total = self.total[None]
+            self.store.take(total[0], total[1], total[2])
+        else:
+            self.store.near_count[None] = 0
+            for i in range(self.tables.body_count[None] + 1):
+                self.store.first_of[i] = 0
 
     @ti.func
     def put_row(self, i):
@@ -343,14 +413,12 @@ class NearPairs:
             self.store.near_slot[first + k] = self.row[start + k]
 
     @ti.func
-    def index_second(self):
-        """List for every body the near pairs in which it is second, in order."""
-        start, slots, count = ti.static(
-            self.store.second_start, self.store.second_slot, self.store.near_count
-        )
-        group(start, slots, self.tables.body_count[None], count[None], self._second_of)
-        for a in range(count[None]):
-            slots[a] = self.store.near_slot[slots[a]]
+    def _near_count(self):
+        return self.store.near_count[None]
+
+    @ti.func
+    def _slot_at(self, a):
+        return self.store.near_slot[a]
 
     @ti.func
     def _second_of(self, a):

@@ -83,14 +83,22 @@ class FieldTree:
                 f"this needs {self.bytes / 1e9:.3g} GB and fields of {longest} entries, which this "
                 f"device does not take: {self.advice}{fits}"
             )
-        check_memory(self.bytes, self.advice)
+        if backend.in_host_memory():
+            check_memory(self.bytes, self.advice)
 
     def _allocate(self):
         """Take the memory of the declared fields."""
         self._check_size()
         # Taichi takes it off its list of trees that are not finalized, and expects it there.
         impl.get_runtime().initialize_fields_builder(self._builder)
-        self._tree = self._builder.finalize(raise_warning=False)
+        try:
+            self._tree = self._builder.finalize(raise_warning=False)
+        except RuntimeError as error:
+            # Taichi does not tell how much memory of a card is free.
+            raise CapacityError(
+                f"this needs {self.bytes / 1e9:.3g} GB, which the device refuses "
+                f"({' '.join(str(error).split())}): {self.advice}"
+            ) from None
         if backend.is_cpu():
             address = _address(self._anchor) - _offset(self._anchor.snode.ptr)[1]
             _base(self._builder.root.ptr)

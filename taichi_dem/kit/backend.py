@@ -54,6 +54,11 @@ def is_cpu() -> bool:
     return impl.current_cfg().arch not in GPUS.values()
 
 
+def in_host_memory() -> bool:
+    """Whether fields take memory of this machine: Vulkan's software driver does, CUDA does not."""
+    return impl.current_cfg().arch != ti.cuda
+
+
 def probe() -> None:
     """Find out what the device that Taichi has just started on does wrong.
 

@@ -10,12 +10,15 @@ import weakref
 from collections.abc import Hashable, Iterable, Sequence
 from typing import Any
 
+import taichi as ti
+
 from taichi_dem.kit import backend, runtime
 from taichi_dem.kit.allocation import CapacityError, FieldTree
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.field_memory import fields_of
 
 
+@ti.data_oriented
 class Engine:
     """Base of engines: fields in one ``FieldTree``.
 
@@ -38,6 +41,7 @@ class Engine:
         self.tree = FieldTree(self.advice, (self.capacity[0], self.counted))
         with self.tree:
             self.declare()
+        self.tree_fields = tuple(one.field for one in fields_of(self))
 
     def declare(self) -> None:
         """Declare all fields; no field may be used here."""
@@ -65,11 +69,17 @@ class Engine:
     def clear(self) -> None:
         """Set all fields to zero, as they are in a new engine."""
         if self._used and not backend.is_cpu():
-            for one in fields_of(self):
-                one.field.fill(0)
+            self._fill()
         elif self._used:
             self.tree.clear()
         self._used = True
+
+    @ti.kernel
+    def _fill(self):
+        # One kernel: Taichi would compile one a field.
+        for field in ti.static(self.tree_fields):
+            for entry in ti.grouped(field):
+                field[entry] = 0
 
 
 #: All pools of the process.

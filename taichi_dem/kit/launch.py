@@ -6,6 +6,9 @@ import numpy as np
 from taichi.lang import impl
 from taichi.lang.exception import handle_exception_from_cpp
 
+from taichi_dem.kit import backend
+from taichi_dem.kit.errors import InputError
+
 
 class Launch:
     """A kernel of an object, called with the same templates and other values each time.
@@ -33,12 +36,12 @@ class Launch:
                 context.set_arg_int((place,), value)
         try:
             program.launch_kernel(compiled, context)
+            if not returns:
+                return None
+            program.synchronize()
+            return context.get_struct_ret_int((0,))
         except Exception as error:
-            raise handle_exception_from_cpp(error) from None
-        if not returns:
-            return None
-        program.synchronize()
-        return context.get_struct_ret_int((0,))
+            raise _failed(error) from None
 
     def queue(self, *values: int | np.ndarray) -> None:
         """Run it some time soon, in order, without waiting for what it returns; whole numbers."""
@@ -48,7 +51,10 @@ class Launch:
         program, compiled, context, _ = self._ready
         for place, value in enumerate(values):
             context.set_arg_int((place,), value)
-        program.launch_kernel(compiled, context)
+        try:
+            program.launch_kernel(compiled, context)
+        except Exception as error:
+            raise _failed(error) from None
 
     def _prepared(self, values):
         """Taichi's program, the compiled kernel, its context, and whether it returns a number."""
@@ -57,3 +63,14 @@ class Launch:
         found, program = kernel.compiled_kernels[key], impl.get_runtime().prog
         compiled = program.compile_kernel(program.config(), program.get_device_caps(), found)
         return program, compiled, found.make_launch_context(), kernel.return_type is not None
+
+
+def _failed(error):
+    """What to raise for an error of a launch: a device can be lost, or taken by another program."""
+    if backend.is_cpu():
+        return handle_exception_from_cpp(error)
+    words = " ".join(str(error).split())
+    return InputError(
+        f"the device does not answer any more ({words}): go on from the last checkpoint, or start "
+        "again with arch 'cpu'"
+    )

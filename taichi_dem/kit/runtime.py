@@ -312,6 +312,8 @@ def _initialise(wanted):
             offline_cache=keeps,
             offline_cache_file_path=folder,
             random_seed=0,
+            # Loops over phases are unrolled; Taichi warns of more than 32.
+            unrolling_limit=0,
         )
     # Taichi falls back to the CPU with a mere warning.
     got = impl.current_cfg().arch

@@ -14,6 +14,7 @@ from taichi_dem import step_control as steps
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.elasticity.rates import inverse_root
 from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.ordered import Places
 from taichi_dem.kit.products import matmul, matmul_transposed, transposed_matmul
 from taichi_dem.kit.types import mat3, real
 from taichi_dem.methods import Method
@@ -194,7 +195,7 @@ def spring_limit(rate2):
 
 
 @ti.data_oriented
-class StabilityLimits:
+class StabilityLimits(Places):
     """Rates of every body, and the list of bodies whose rates must be updated.
 
     dashpot_table, spring_table: largest eigenvalue of the bonds' block by the set of intact
@@ -309,11 +310,10 @@ class StabilityLimits:
             self.notice_pair(p, self.contact_limits.count_within_margin(p), event)
 
     @ti.func
-    def done(self):
-        """Empty the list."""
-        for a in range(self.listed_count[None]):
-            self.events[self.listed[a]] = 0
-        self.listed_count[None] = 0
+    def refresh_last(self, i):
+        """Find the rates of a body for which nothing else is to be done."""
+        self.refresh(i)
+        self.events[i] = 0
 
     @ti.func
     def refresh(self, i):

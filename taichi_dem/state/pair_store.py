@@ -120,19 +120,34 @@ class PairStore:
         return values(self.body, slots), counts, values(self.deepest, slots)
 
     @ti.func
-    def allocate(self, i, j):
-        """Slot for a pair of two bodies, all of it zero; -1 where none is left."""
-        p, left = -1, self.free_count[None] - 1
+    def lacks_slots(self, fresh, freed):
+        """Whether so many new pairs find no slots, once so many have been freed."""
+        spare = self.free_count[None] + freed + self.slot_limit[None] - self.used_end[None]
+        return fresh > spare
+
+    @ti.func
+    def lacks_places(self, spheres):
+        """Whether so many new sphere pairs find no places."""
+        return self.sphere_end[None] + spheres > self.sphere_limit[None]
+
+    @ti.func
+    def allocate(self, nth, freed, i, j):
+        """Slot of the nth new pair of a search that has freed some, all of it zero."""
+        left = self.free_count[None] + freed - 1 - nth
+        p = self.used_end[None] - 1 - left
         if left >= 0:
             p = self.free[left]
-            self.free_count[None] = left
-        elif self.used_end[None] < self.slot_limit[None]:
-            p = self.used_end[None]
-            self.used_end[None] = p + 1
-        if p >= 0:
-            self.body[p] = [i, j]
-            self.clear_slot(p)
+        self.body[p] = [i, j]
+        self.clear_slot(p)
         return p
+
+    @ti.func
+    def take(self, fresh, spheres, freed):
+        """Take over what a search has allocated, reserved and freed."""
+        left = self.free_count[None] + freed - fresh
+        self.free_count[None] = ti.max(left, 0)
+        self.used_end[None] = self.used_end[None] + ti.max(-left, 0)
+        self.sphere_end[None] = self.sphere_end[None] + spheres
 
     @ti.func
     def clear_slot(self, p):
@@ -144,11 +159,10 @@ class PairStore:
         self.columns.clear(p)
 
     @ti.func
-    def release(self, p):
-        """Free the slot of a pair and the places of its sphere pairs."""
+    def release(self, p, nth):
+        """Free the slot of a pair, the nth of a search, and the places of its sphere pairs."""
         self.remove_spheres(p)
-        self.free[self.free_count[None]] = p
-        self.free_count[None] = self.free_count[None] + 1
+        self.free[self.free_count[None] + nth] = p
 
     @ti.func
     def waits(self, p):
@@ -161,14 +175,9 @@ class PairStore:
         self.first[p], self.last[p] = 0, 0
 
     @ti.func
-    def reserve_spheres(self, p, count):
-        """Find new places for the sphere pairs of a pair; 1 when there are none."""
-        start = self.sphere_end[None]
-        lacking = ti.cast(start + count > self.sphere_limit[None], ti.i32)
-        if lacking == 0:
-            self.sphere_place[p], self.owner[start] = start, p
-            self.sphere_end[None] = start + count
-        return lacking
+    def reserve_spheres(self, p, place):
+        """Keep new places for the sphere pairs of a pair, from this one on."""
+        self.sphere_place[p], self.owner[place] = place, p
 
     @ti.func
     def replace_spheres(self, p, count):

@@ -193,6 +193,7 @@ class Advance(BondStep, ContactForce, BodyLoads):
         then.
         """
         noticed = self.limits.events[i] != 0
+        self.limits.events[i] = 0
         if ti.static(self.schedule.sleeps):
             noticed = noticed and self.schedule.sleeping.awake[i] != ASLEEP
         if noticed:

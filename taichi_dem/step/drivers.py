@@ -17,6 +17,7 @@ from taichi_dem.kit import backend, runtime
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.launch import Launch
+from taichi_dem.kit.ordered import tasks
 from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.phases import Step
 
@@ -29,6 +30,7 @@ _MAX_SUBSTEPS = 1 << 24
 #: How a parallel substep ended, as bits: at the end or a halt; a search is requested; the device
 #: has ended a loop too early; more sweeps are needed.
 _HALTED, _SEARCH, _CUT_SHORT, _UNSOLVED = 1, 2, 4, 8
+_ENDS = 15
 #: Substeps that a GPU is given at a time.
 QUEUED = 16
 #: Reason why the resident driver cannot run, for a sentence.
@@ -117,9 +119,9 @@ class Resident:
         ti.loop_config(serialize=True)
         for _ in range(1):
             while self.step.search.is_requested() == 1:
-                for count, item in ti.static(self.step.search.phases):
-                    for a in range(count()):
-                        item(a)
+                for members, item in ti.static(self.step.search.phases):
+                    for a in range(members.count(0)):
+                        item(members.pick(a))
 
 
 @ti.data_oriented
@@ -135,8 +137,10 @@ class Parallel:
     def __init__(self, step: Step):
         self.step, self.on_gpu, self.state = step, not backend.is_cpu(), 0
         self.queued = QUEUED if self.on_gpu else 1
-        # As many as the steps before have needed; none is known where there is more than one part.
-        self.sweeps = 1 if len(step.parts) == 1 else 0
+        # As many as the steps before have needed; none is known at the start.
+        self.sweeps = 0
+        bodies = step.state.position.shape[0]
+        self.tasks = tuple(tasks(part, bodies) for part in step.parts)
         self._parts = tuple(Launch(self._run, part) for part in range(len(step.parts)))
 
     def begin(self) -> None:
@@ -165,11 +169,13 @@ class Parallel:
         if self.queued > 1:
             # At least as many substeps are left as largest steps: all of them do something.
             left = (end_tick - int(values(self.step.state.tick))) // MACRO_TICKS
-            count = max(1, min(left, self.queued if self.sweeps else 1))
+            known = self.sweeps > 0 or len(self._parts) == 1
+            count = max(1, min(left, self.queued if known else 1))
         while not self._substeps(end_tick, count):
             if time.perf_counter() - start > CALL_SECONDS:
                 break
-            count = min(2 * count, self.queued)
+            # Those queued behind a substep that asked for a search have done nothing.
+            count = max(1, count // 2) if self.state & _SEARCH else min(2 * count, self.queued)
 
     def _substeps(self, end_tick, count):
         """Run some substeps, or to a search that is requested; nonzero at the end or a halt."""
@@ -177,11 +183,9 @@ class Parallel:
             assign(self.step.ended, 0)
         for _ in range(count - 1):
             self._substep(end_tick).queue(end_tick, 1, 1)
-        self.state = self._substep(end_tick)(end_tick, 1, 1)
+        self._take(self._substep(end_tick)(end_tick, 1, 1))
         if self.state & _UNSOLVED:
             self._finish_sweeps(end_tick)
-        elif self.sweeps > 1:
-            self.sweeps -= 1
         if self.state & _CUT_SHORT:
             raise backend.cut_short("of this scene", "a smaller mesh")
         if self.state & _SEARCH:
@@ -204,17 +208,27 @@ class Parallel:
         """Go on with a substep in which more sweeps are needed than were queued."""
         assign(self.step.ended, 0)
         while self._parts[1](end_tick, 1, 1):
-            self.sweeps += 1
-        self.sweeps += 1
-        self.state = self._parts[-1](end_tick, 1, 1)
+            pass
+        self._take(self._parts[-1](end_tick, 1, 1))
+
+    def _take(self, found):
+        """Take over how the last substep ended, and how many sweeps the next one may need."""
+        self.state, self.sweeps = found & _ENDS, found // (_ENDS + 1)
 
     @ti.kernel
     def _run(self, part: ti.template(), end_tick: ti.i64, rest: ti.i32, bonds: ti.i32) -> ti.i32:
         # bonds, rest: 1 to run the phase of the bonds, and all others; 0 and 0 compile the kernel.
         low = ti.static(self.step.schedule.low)
-        for active, item in ti.static(self.step.parts[part]):
+        for serial, phases in ti.static(self.tasks[part]):
+            active, item = ti.static(phases[0])
             is_of_start = ti.static(self.step.is_of_start(item))
-            if ti.static(self.on_gpu):
+            if ti.static(serial):
+                ti.loop_config(serialize=True)
+                for _ in range(self._share(part, False, rest, bonds)):
+                    for members, each in ti.static(phases):
+                        for a in range(members.count(low[None])):
+                            each(members.pick(a))
+            elif ti.static(self.on_gpu):
                 # The length of a loop is a task of its own there, and starts 131,072 threads.
                 for a in range(ti.static(active.most)):
                     if a < self._share(part, is_of_start, rest, bonds) * active.count(low[None]):
@@ -251,7 +265,10 @@ class Parallel:
                 if self.step.waits(part) == 1:
                     found = _UNSOLVED
                 self.step.ended[None] = found
-            found = self.step.ended[None]
+                # As many sweeps as this substep has made, or one fewer than were wanted before it.
+                wanted = ti.max(self.step.wanted[None] - 1, self.step.sweeps())
+                self.step.wanted[None] = wanted
+            found = self.step.ended[None] + (_ENDS + 1) * self.step.wanted[None]
         return found
 
 

@@ -4,23 +4,20 @@ One in 1024 of the bonds is looked at in every substep, by a hash of the number 
 result decides what is looked at, and nothing that the audit does remains.
 """
 
-from collections.abc import Callable
-from typing import Any
-
 import taichi as ti
 
 from taichi_dem.contact.search import BroadPhase
+from taichi_dem.kit import backend
+from taichi_dem.kit.ordered import Once, Phases, Places
 from taichi_dem.kit.products import squared
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
-from taichi_dem.step.implicit.pairs import COLOURS
-from taichi_dem.step.multirate.lists import Colour, Once, Places
+from taichi_dem.step.implicit.pairs import WIDE
+from taichi_dem.step.multirate.lists import Colour
 from taichi_dem.step.multirate.schedule import Schedule
 
 #: One bond in so many is looked at; a power of two.
 RATE = 1024
-#: Pairs of a list and the function that is called with each member that is active.
-Phases = tuple[tuple[Any, Callable[..., Any]], ...]
 
 
 @ti.func
@@ -84,15 +81,17 @@ class Step:
 
     search: the ``BroadPhase`` that does so, None for a scene without contact. start_phases: those
     of the start of a run before the bonds of the first tick, which the step's kernel evaluates,
-    and after them. ended: bits of the parallel driver by which the last substep ended, or 0.
+    and after them. ended: bits of the parallel driver by which the last substep ended, or 0;
+    wanted: sweeps that the next one may need.
     """
 
-    scratch_fields = ("ended",)
+    scratch_fields = ("ended", "wanted")
 
     def __init__(self, advance: Advance, search: BroadPhase | None):
         self.advance, self.schedule, self.search = advance, advance.schedule, search
         self.has_contact = search is not None
-        self.state, self.ended = advance.state, ti.field(ti.i32, shape=())
+        self.state = advance.state
+        self.ended, self.wanted = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.audit = Audit(self.schedule) if self.schedule.sleeps else None
         self.parts = self._parts()
         self.phases = self._phases()
@@ -107,11 +106,11 @@ class Step:
         if schedule.sleeps:
             sleeping = schedule.sleeping
             phases += (bodies, sleeping.begin), (bodies, sleeping.begin_beside)
-        return (*phases, (bodies, self.first_level), (Once(), schedule.start_all))
+        return (*phases, (bodies, self.first_level), *schedule.start_phases())
 
     def _after_bonds(self):
         """Bonds that sleep have acted once, and leave the list."""
-        return ((Once(), self.schedule.list_members),) if self.schedule.sleeps else ()
+        return self.schedule.start_end_phases()
 
     @ti.func
     def first_level(self, i):
@@ -142,7 +141,7 @@ class Step:
         audited = ((Once(), audit.choose), (audit, audit.visit)) if audit is not None else ()
         return (
             (schedule.bodies, self.advance.body),
-            (Once(), schedule.reorder),
+            *schedule.reordering(),
             (schedule.bonds, self.advance.bond),
             *audited,
         )
@@ -164,15 +163,20 @@ class Step:
         """1 where a part is called for once more: never here."""
         return 0
 
+    @ti.func
+    def sweeps(self):
+        """Sweeps of the last substep."""
+        return 0
+
     def _retimed(self):
         """Phases that update rates and wake bodies, where the method requires it."""
         limits = self.schedule.limits
         if limits is None:
             return ()
-        phases: Phases = ((limits, limits.refresh),)
+        phases: Phases = ((limits, limits.refresh_last),)
         if self.schedule.controlled:
-            phases += ((limits, self.advance.wake_up),)
-        return (*phases, (Once(), self.schedule.apply_changes))
+            phases = (limits, limits.refresh), (limits, self.advance.wake_up)
+        return (*phases, *self.schedule.applying())
 
     def is_of_start(self, item: object) -> bool:
         """Whether a phase also belongs to the start of a run: that of the bonds does."""
@@ -184,7 +188,8 @@ class Step:
         for members, item in ti.static(self.start_phases[last]):
             for a in range(members.count(0)):
                 item(members.pick(a))
-                self.state.check_loops(a + 1)
+                if ti.static(backend.most_rounds() > 0):
+                    self.state.check_loops(a + 1)
 
     @ti.func
     def halted(self):
@@ -232,7 +237,7 @@ class SolvedStep(Step):
         before: Phases = ()
         after: Phases = ()
         if self.has_contact:
-            before = (schedule.pairs, solver.pairs.begin), (Once(), solver.pairs.sort)
+            before = (schedule.pairs, solver.pairs.begin), *solver.pairs.phases
             after = ((schedule.pairs, solver.pairs.book),)
         before += (Once(), schedule.advance_clock), *self._rested(), (Once(), solver.begin)
         before += ((schedule.bodies, advance.predict),)
@@ -247,12 +252,17 @@ class SolvedStep(Step):
             phases += tuple((colour, solver.bonds.visit) for colour in colours)
         if self.has_contact:
             first, most = solver.pairs.colour_first, self.schedule.pairs.most
-            colours = (Colour(first, c, most) for c in range(COLOURS))
+            colours = (Colour(first, c, most) for c in range(WIDE))
             phases += tuple((colour, solver.pairs.visit) for colour in colours)
             phases += ((Once(), solver.pairs.visit_last),)
         if solver.has_ground:
             phases += ((self.schedule.bodies, solver.ground.visit),)
         return (*phases, (Once(), solver.check_convergence))
+
+    @ti.func
+    def sweeps(self):
+        """Sweeps of the last substep."""
+        return self.advance.solver.sweeps[None]
 
     @ti.func
     def waits(self, part: ti.template()):

@@ -11,6 +11,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.ordered import Places
 from taichi_dem.kit.products import dot, norm, squared
 from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.mesh.topology import parts_of
@@ -20,7 +21,6 @@ from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS, NEVER
 from taichi_dem.step.bond import motion_of
-from taichi_dem.step.multirate.lists import Places
 
 ASLEEP, AWAKE, STIRRED = range(3)
 #: Bodies whose momenta are summed one after the other.

@@ -88,3 +88,28 @@ def test_a_launch_that_falls_short_is_an_error(arch):
     rounds = found.pop("rounds")
     for package, sentence in found.items():
         assert (f"{rounds} rounds" in sentence) == (rounds > 0), package
+
+
+#: Most launches of a substep beside its sweeps, of a sweep, and reads of the host.
+MOST = {
+    "uniform": (5.3, 0, 0.13),
+    "limited": (7.2, 0, 0.12),
+    "uniform with contact": (8.6, 0, 0.3),
+    "controlled with contact": (20, 0, 0.3),
+    "solved": (14, 9, 0.3),
+    "solved with contact": (30, 19, 0.3),
+}
+
+
+@pytest.mark.parametrize("arch", PRESENT)
+def test_substeps_are_queued(arch):
+    """Launches and reads of a substep; those of a contact search are counted apart.
+
+    Launches <= fixed ones + (sweeps + 1) those of a sweep: as many sweeps are queued as the steps
+    before have needed, and one more.
+    """
+    found = json.loads(said("-m", "tests.devices.launches", arch).splitlines()[-1])
+    for name, (fixed, of_sweep, reads) in MOST.items():
+        one = found[name]
+        assert one["launches"] <= fixed + of_sweep * (one["sweeps"] + 1), name
+        assert one["reads"] <= reads, name

@@ -34,7 +34,7 @@ METHODS = {
     "uniform": Uniform(5e-8, **LIMITED),
     "drifted": Multirate(8e-8, 1e-5, neighbour="drifted", **LIMITED),
     "controlled": Multirate(8e-8, 1e-5, control=StepControl(dashpot_floor=1e-8), **LIMITED),
-    "implicit": ImplicitDashpots(4e-7, sweeps=(10, 10)),
+    "implicit": ImplicitDashpots(4e-7, sweeps=(4, 4)),
 }
 UNTIL = 4.8e-6
 FILLINGS = {

@@ -35,7 +35,7 @@ class Sorter:
     def fill(self):
         """Take in all members."""
         for _ in range(1):
-            self.list.fill(False)
+            self.list.listing.sort()
 
     @ti.kernel
     def move(self, member: ti.i32, key: ti.i32):

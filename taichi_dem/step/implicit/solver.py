@@ -8,7 +8,7 @@ from taichi_dem.kit.types import real, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.state.model import Model
 from taichi_dem.step.implicit.bonds import BOND_COLOURS, BondDashpots
-from taichi_dem.step.implicit.pairs import PairDashpots
+from taichi_dem.step.implicit.pairs import LEFT, PairDashpots
 from taichi_dem.step.implicit.velocities import GroundSweeps, Velocities
 from taichi_dem.step.multirate.schedule import Schedule
 
@@ -69,7 +69,7 @@ class Solver:
                 for g in range(self.bonds.colour_first[BOND_COLOURS]):
                     self.bonds.visit(g)
             if ti.static(self.has_contact):
-                for a in range(self.pairs.count[None]):
+                for a in range(self.pairs.colour_first[LEFT]):
                     self.pairs.visit(a)
             if ti.static(self.has_ground):
                 for a in range(self.schedule.bodies.count(0)):

@@ -1,39 +1,16 @@
-"""Lists of members for a phase: those active at a tick, by falling level; all; one."""
+"""Lists of members for a phase: those active at a tick, by falling level; all; of one colour."""
 
 from collections.abc import Callable
 from typing import Any
 
 import taichi as ti
 
+from taichi_dem.kit.ordered import CountingSort, Places
 from taichi_dem.state.timeline import MAX_LEVEL
 
 
 @ti.data_oriented
-class Places:
-    """Base of lists whose members are the numbers 0 .. count - 1; most: the largest count."""
-
-    most: int
-
-    @ti.func
-    def pick(self, a):
-        """The place itself."""
-        return a
-
-
-@ti.data_oriented
-class Once(Places):
-    """List of one member, for phases that run once a substep."""
-
-    most = 1
-
-    @ti.func
-    def count(self, low):
-        """One."""
-        return 1
-
-
-@ti.data_oriented
-class Everyone:
+class Everyone(Places):
     """List of all bodies, bonds or near pairs of a scene, active or not.
 
     number: field of how many. most: the largest. slots: field of their numbers, None for 0 ..
@@ -58,7 +35,7 @@ class Everyone:
 
 
 @ti.data_oriented
-class Colour:
+class Colour(Places):
     """Members of one colour: those from colour_first[colour] on, in order; most: of all colours."""
 
     def __init__(self, colour_first: ti.Field, colour: int, most: int):
@@ -76,19 +53,21 @@ class Colour:
 
 
 @ti.data_oriented
-class ActiveList:
+class ActiveList(Places):
     """Indices in order of falling key; end[k] counts the members with a key of at least k.
 
     everyone: all members. key_of: function that gives a member's key, negative for one that is not
     to be listed. order: the members; index: where in it each one is; key: each one's key, -1 for
-    one that is not listed. The order within a key does not matter: nothing that is computed depends
-    on it.
+    one that is not listed. listing: lists all members by their keys. The order within a key does
+    not matter: nothing that is computed depends on it.
     """
 
     def __init__(self, everyone: Everyone, key_of: Callable[..., Any]):
         self.everyone, self.most, self.key_of = everyone, everyone.most, key_of
         self.order, self.index, self.key = (ti.field(ti.i32, shape=self.most) for _ in range(3))
         self.end = ti.field(ti.i32, shape=MAX_LEVEL + 2)
+        keys = MAX_LEVEL + 1, self._note, self._kept, self._put, self._end
+        self.listing = CountingSort(self._number, self.most, everyone.pick, *keys, falling=True)
 
     @ti.func
     def count(self, low):
@@ -101,28 +80,23 @@ class ActiveList:
         return self.order[a]
 
     @ti.func
-    def fill(self, alike: ti.template()):
-        """List all members by their keys, or all alike, with the lowest."""
-        for k in range(MAX_LEVEL + 2):
-            self.end[k] = 0
-        for a in range(self.everyone.count(0)):
-            m, key = self.everyone.pick(a), 0
-            if ti.static(not alike):
-                key = self.key_of(m)
-            self.key[m] = key
-            if key >= 0:
-                self.end[key] = self.end[key] + 1
-        total = 0
-        for back in range(MAX_LEVEL + 1):
-            members = self.end[MAX_LEVEL - back]
-            self.end[MAX_LEVEL - back] = total
-            total += members
-        for a in range(self.everyone.count(0)):
-            m = self.everyone.pick(a)
-            key = self.key[m]
-            if key >= 0:
-                self._put(m, self.end[key])
-                self.end[key] = self.end[key] + 1
+    def _number(self):
+        return self.everyone.count(0)
+
+    @ti.func
+    def _note(self, m):
+        """Note the present key of a member."""
+        key = self.key_of(m)
+        self.key[m] = key
+        return key
+
+    @ti.func
+    def _kept(self, m):
+        return self.key[m]
+
+    @ti.func
+    def _end(self, key, last):
+        self.end[key] = last
 
     @ti.func
     def renew(self, m):

@@ -25,7 +25,8 @@ class Members:
             i, j = slots[0] >> 2, slots[1] >> 2
             key = self._key(i, j)
             if ti.static(self.sleeps):
-                if not self.sleeping.both_awake(i, j):
+                # At the start those that sleep act once.
+                if not self.sleeping.both_awake(i, j) and self.starting[None] == 0:
                     key = -1
         return key
 
@@ -64,17 +65,8 @@ class Members:
         return key
 
     @ti.func
-    def list_members(self, one):
-        """Fill the lists of bodies and bonds, in their order."""
-        self.bodies.fill(False)
-        self.bonds.fill(False)
-
-    @ti.func
-    def admit_woken(self, moved: ti.template()):
-        """List the bodies woken since the last call, and the bonds that now act.
-
-        moved: whether bodies have moved since bonds were evaluated.
-        """
+    def admit_woken(self):
+        """List the bodies woken since the last call, and the bonds that now act."""
         sleeping = self.sleeping
         for a in range(sleeping.woken_count[None]):
             i = sleeping.woken[a]
@@ -83,9 +75,41 @@ class Members:
                 b = self.tables.face_bond[4 * i + f]
                 if b >= 0:
                     if self.bonds.insert(b):
-                        sleeping.left_out[b] = sleeping.left_out_now(b, self.seconds(1), moved)
+                        sleeping.left_out[b] = sleeping.left_out_now(b, self.seconds(1), True)
         sleeping.unsorted[None] = sleeping.unsorted[None] + sleeping.woken_count[None]
         sleeping.woken_count[None] = 0
+
+    @ti.func
+    def admit_in_search(self, a):
+        """Note what the bonds of a body woken by a search have left out, before all are listed."""
+        self._admit(a, False)
+
+    @ti.func
+    def admit_in_step(self, a):
+        """The same in a step, in which bodies have moved since bonds were evaluated."""
+        self._admit(a, True)
+
+    @ti.func
+    def _admit(self, a, moved: ti.template()):
+        sleeping, i = self.sleeping, self.sleeping.woken[a]
+        for f in range(4):
+            b = self.tables.face_bond[4 * i + f]
+            if b >= 0:
+                if self.bonds.key[b] < 0 and self.bond_key(b) >= 0:
+                    sleeping.left_out[b] = sleeping.left_out_now(b, self.seconds(1), moved)
+
+    @ti.func
+    def woken_count(self):
+        """Number of bodies woken since they were listed."""
+        return self.sleeping.woken_count[None]
+
+    @ti.func
+    def end_listing(self, one):
+        """All members are listed: none has changed or been woken since."""
+        self.changed_count[None] = 0
+        if ti.static(self.sleeps):
+            self.starting[None], self.sleeping.woken_count[None] = 0, 0
+        self.find_finest(0)
 
     @ti.func
     def sort_woken(self, one):
@@ -97,7 +121,8 @@ class Members:
             self.sleeping.renew_bound()
             if self.sleeping.unsorted[None] > 0:
                 self.sleeping.unsorted[None] = 0
-                self.list_members(0)
+                self.bodies.listing.sort()
+                self.bonds.listing.sort()
 
     @ti.func
     def move_entries(self, i):
@@ -145,8 +170,13 @@ class LevelLimit:
     @ti.func
     def spread(self, i):
         """Note the level of body i, and list those it touches that are too coarse."""
-        self.listed_level[i] = self.state.level[i]
+        self.note(i)
         self._visit(i, self.state.level[i], True)
+
+    @ti.func
+    def note(self, i):
+        """Note the level of body i."""
+        self.listed_level[i] = self.state.level[i]
 
     @ti.func
     def _visit(self, i, level, lists: ti.template()):

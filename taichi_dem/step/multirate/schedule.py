@@ -10,7 +10,9 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
+from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import assign, raise_to, values
+from taichi_dem.kit.ordered import Once, Phases, Some, side_by_side
 from taichi_dem.kit.types import real
 from taichi_dem.methods import Method
 from taichi_dem.stability.body_limits import StabilityLimits
@@ -75,6 +77,10 @@ class Schedule(Members):
         self.wanted, self.changed_count = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.changed = ti.field(ti.i32, shape=2 * capacity.bodies + 2 * capacity.bonds + 1)
         self.evaluations = ti.field(ti.i64, shape=6)
+        self._lists = (self.bodies, self.bonds, *([self.pairs] if self.has_contact else []))
+        if self.sleeps:
+            self.starting = ti.field(ti.i32, shape=())
+            self._woken = Some(self.woken_count, capacity.bodies)
 
     def load(self, model: Model, method: Method, sleep: float) -> None:
         """Load the steps of a method; sleep: see ``Scene``."""
@@ -130,6 +136,8 @@ class Schedule(Members):
         self.state.tick[None] = self.state.tick[None] + ticks_of(self.finest[None])
         self.low[None] = coarsest_active(self.state.tick[None])
         self.wanted[None] = 0
+        if ti.static(self.has_limits and not self.controlled and not self.has_contact):
+            self.forget(0)
 
     @ti.func
     def choose_level(self, i, speed2):
@@ -167,10 +175,81 @@ class Schedule(Members):
         """Note that body i has another level, or has lost a bond."""
         self.changed[ti.atomic_add(self.changed_count[None], 1)] = i
 
+    def reordering(self) -> Phases:
+        """Phases that bring changed members to their places, and count a tick's evaluations."""
+        return self._rearranging(self.reorder, self.end_reordering)
+
+    def applying(self) -> Phases:
+        """Phases that do so after bodies have been brought to the present, and clear their list."""
+        if self.controlled:
+            return ((Once(), self.forget), *self._rearranging(self.rearrange, self.end_listing))
+        # Without contact nothing is noted before the clock moves on.
+        return ((Once(), self.forget),) if self.has_contact else ()
+
+    def _rearranging(self, move, end) -> Phases:
+        """A CPU moves the members that have changed; a GPU lists all: one of its threads is slow.
+
+        Where all have one level, members change when a bond breaks: seldom enough.
+        """
+        if backend.is_cpu() or self.uniform:
+            return ((Once(), move),)
+        phases: Phases = ()
+        if self.spreads:
+            changed = Some(self._changed_count, self.changed.shape[0])
+            phases += ((changed, self.spread),)
+        if self.sleeps:
+            phases += ((self._woken, self.admit_in_step),)
+        return (*phases, *self._listing(*self._lists), (Once(), end))
+
+    def _listing(self, *lists):
+        return side_by_side(*(one.listing.phases for one in lists))
+
+    def start_phases(self) -> Phases:
+        """Phases that fill all lists at the start of a run."""
+        phases: Phases = ((Once(), self.begin_lists),)
+        if self.spreads:
+            phases += ((self.bodies.everyone, self.level_limit.note),)
+        return (*phases, *self._listing(*self._lists), (Once(), self.end_listing))
+
+    def start_end_phases(self) -> Phases:
+        """Phases after the bonds have acted once: those that sleep leave the list."""
+        return self._listing(self.bodies, self.bonds) if self.sleeps else ()
+
+    def pair_phases(self) -> Phases:
+        """Phases that take in the pairs of a new contact search; neighbours may reach further.
+
+        All lists are filled again, which restores contiguous visits; moving entries destroys them
+        with time (5 % of the time of a run).
+        """
+        phases: Phases = ()
+        end: Phases = ()
+        if self.sleeps:
+            near = self.pairs.everyone
+            phases = (near, self.awaken_pair), (self._woken, self.admit_in_search)
+            end = ((Once(), self.end_search),)
+        if self.uniform and not self.sleeps:
+            return self._listing(self.pairs)
+        return (*phases, *self._listing(*self._lists), *end)
+
+    @ti.func
+    def forget(self, one):
+        """Empty the list of bodies whose rates have been updated."""
+        self.limits.listed_count[None] = 0
+
     @ti.func
     def reorder(self, one):
         """Move the entries of changed bodies, and count the evaluations of this tick."""
-        self._rearrange()
+        self.rearrange(0)
+        self._count_tick()
+
+    @ti.func
+    def end_reordering(self, one):
+        """The same where all members have been listed."""
+        self.end_listing(0)
+        self._count_tick()
+
+    @ti.func
+    def _count_tick(self):
         low = self.low[None]
         self.evaluations[0] = self.evaluations[0] + 1
         self.evaluations[1] = self.evaluations[1] + self.bodies.count(low)
@@ -179,58 +258,46 @@ class Schedule(Members):
         self.evaluations[5] = self.evaluations[5] + self.bonds.count(low)
 
     @ti.func
-    def apply_changes(self, one):
-        """Move entries after bodies have been brought to the present, and clear their list."""
-        self.limits.done()
-        if ti.static(self.controlled):
-            self._rearrange()
-
-    @ti.func
-    def _rearrange(self):
+    def rearrange(self, one):
+        """Move the entries of changed bodies."""
         if ti.static(self.uniform):
             self._level_all()
         if ti.static(self.sleeps):
-            self.admit_woken(True)
+            self.admit_woken()
         for a in range(self.changed_count[None]):
             self.move_entries(self.changed[a])
             if ti.static(self.spreads):
-                self.level_limit.spread(self.changed[a])
+                self.spread(a)
         self.changed_count[None] = 0
-        self._find_finest()
+        self.find_finest(0)
 
     @ti.func
-    def start_all(self, one):
-        """Fill all lists."""
+    def spread(self, a):
+        """List bodies that are too coarse beside one that has changed."""
+        self.level_limit.spread(self.changed[a])
+
+    @ti.func
+    def _changed_count(self):
+        return self.changed_count[None]
+
+    @ti.func
+    def begin_lists(self, one):
+        """Give all bodies one level where they have one only; bonds that sleep act once."""
         if ti.static(self.uniform):
             self._level_all()
-        self.changed_count[None] = 0
-        if ti.static(self.spreads):
-            for i in range(self.tables.body_count[None]):
-                self.level_limit.listed_level[i] = self.state.level[i]
-        self.list_members(0)
         if ti.static(self.sleeps):
-            # Those that sleep act once.
-            self.bonds.fill(True)
-        if ti.static(self.has_contact):
-            self.pairs.fill(False)
-        self._find_finest()
+            self.starting[None] = 1
 
     @ti.func
-    def start_pairs(self):
-        """Take in the pairs of a new contact search; neighbours may now reach further.
+    def end_search(self, one):
+        """The bodies woken by a search are listed."""
+        self.sleeping.woken_count[None] = 0
 
-        All lists are filled again, which restores contiguous visits; moving entries destroys them
-        with time (5 % of the time of a run).
-        """
-        if ti.static(self.sleeps):
-            for a in range(self.store.near_count[None]):
-                for side in ti.static(range(2)):
-                    pair = self.store.body[self.store.near_slot[a]]
-                    self.sleeping.awaken(pair[side])
-            self.admit_woken(False)
-        self.pairs.fill(False)
-        if ti.static(not self.uniform):
-            self.list_members(0)
+    @ti.func
+    def awaken_pair(self, p):
+        """Wake both bodies of a pair."""
+        for side in ti.static(range(2)):
+            self.sleeping.awaken(self.store.body[p][side])
 
     @ti.func
     def _level_all(self):
@@ -240,7 +307,8 @@ class Schedule(Members):
                 self.state.level[i] = self.wanted[None]
 
     @ti.func
-    def _find_finest(self):
+    def find_finest(self, one):
+        """Find the finest level present."""
         if ti.static(self.uniform):
             self.finest[None] = self.wanted[None]
         else:

@@ -1,0 +1,353 @@
+"""Lists and sums in a fixed order, made by any number of threads to the same bits.
+
+Each class has ``phases``: pairs of a list and of what is done with each of its places. Places of
+one phase may be visited side by side, phases follow one another. A driver makes a loop of each, or
+of several that are short.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import taichi as ti
+
+from taichi_dem.kit import backend, runtime
+
+#: Places of a chunk at least, and chunks at most: few threads of a CPU, many of a GPU.
+_CPU, _GPU = (1024, 64), (64, 512)
+#: Bodies up to which a CPU makes light phases on one thread: to wake the others takes 30 us.
+_SERIAL_UP_TO = 32768
+#: A list, and the function that is called with each of its members.
+Phases = tuple[tuple[Any, Callable[..., Any]], ...]
+
+
+def is_serial(places: int) -> bool:
+    """Whether one thread makes light phases over so many places at most."""
+    settings: Any = runtime.settings()
+    return settings.arch == "cpu" and (places <= _SERIAL_UP_TO or settings.threads == 1)
+
+
+def tasks(phases: Phases, bodies: int) -> tuple[tuple[bool, Phases], ...]:
+    """Phases by the loops that a parallel driver makes of them: whether on one thread, and which.
+
+    bodies: their largest number. A GPU makes each phase a loop of its own.
+    """
+    found: list[tuple[bool, Phases]] = []
+    for phase in phases:
+        members = phase[0]
+        serial = backend.is_cpu() and members.most == 1
+        serial = serial or (members.light and is_serial(bodies))
+        if serial and found and found[-1][0]:
+            found[-1] = True, (*found[-1][1], phase)
+        else:
+            found.append((serial, (phase,)))
+    return tuple(found)
+
+
+@ti.data_oriented
+class Places:
+    """Base of lists whose members are the numbers 0 .. count - 1.
+
+    most: the largest count. light: whether to visit a member takes some nanoseconds only.
+    """
+
+    most: int
+    light = False
+
+    @ti.func
+    def pick(self, a):
+        """The place itself."""
+        return a
+
+
+@ti.data_oriented
+class Once(Places):
+    """List of one member, for phases that run once."""
+
+    most = 1
+
+    @ti.func
+    def count(self, low):
+        """One."""
+        return 1
+
+
+@ti.data_oriented
+class Some(Places):
+    """As many places as a function says, at most ``most``; light: as of ``Places``."""
+
+    def __init__(self, number: Callable[..., Any], most: int, light: bool = False):
+        self.number, self.most, self.light = number, most, light
+
+    @ti.func
+    def count(self, low):
+        """Number of places."""
+        return self.number()
+
+
+@ti.data_oriented
+class Joined(Places):
+    """Phases that need nothing of each other as one; visit: what is done with each place."""
+
+    light = True
+
+    def __init__(self, phases: Phases):
+        mosts = [members.most for members, _ in phases]
+        self.parts = tuple((*phase, sum(mosts[:k])) for k, phase in enumerate(phases))
+        self.most = sum(mosts)
+
+    @ti.func
+    def count(self, low):
+        """Room of all."""
+        return self.most
+
+    @ti.func
+    def visit(self, a):
+        """Visit the member of the list to which a place belongs, if there is one."""
+        for members, item, begin in ti.static(self.parts):
+            if begin <= a and a < begin + members.most and a - begin < members.count(0):
+                item(members.pick(a - begin))
+
+
+def side_by_side(*several: Phases) -> Phases:
+    """Phases of several that need nothing of each other; on a GPU one loop for the first of all."""
+    if backend.is_cpu():
+        return tuple(phase for phases in several for phase in phases)
+    return tuple((joined, joined.visit) for joined in map(Joined, zip(*several)))
+
+
+@ti.data_oriented
+class Chunks(Places):
+    """Chunks of the places of a list, each of which is visited in order.
+
+    most_places: the largest number of places; number: function that gives the present one.
+    """
+
+    light = True
+
+    def __init__(self, number: Callable[..., Any], most_places: int):
+        self.number = number
+        self.least, self.most = _CPU if backend.is_cpu() else _GPU
+        self.most = min(self.most, -(-most_places // self.least))
+        if is_serial(most_places):
+            self.most = 1
+
+    @ti.func
+    def count(self, low):
+        """Number of chunks."""
+        count = ti.min(self.number(), 1)
+        if ti.static(self.most > 1):
+            size = self._size(self.number())
+            count = (self.number() + size - 1) // size
+        return count
+
+    @ti.func
+    def _size(self, number):
+        """Places of a chunk; the last one may have fewer."""
+        return ti.max(self.least, (number + self.most - 1) // self.most)
+
+    @ti.func
+    def span(self, c):
+        """First place of a chunk, and one past its last."""
+        first, last = 0, self.number()
+        if ti.static(self.most > 1):
+            size = self._size(last)
+            first, last = c * size, ti.min(last, (c + 1) * size)
+        return first, last
+
+
+@ti.data_oriented
+class RunningSums:
+    """Sums of the numbers of all places before a place, several at a time.
+
+    number, most: as of ``Chunks``. value: function of a place, gives a vector of ``width`` whole
+    numbers. put: function that is called with each place, the sum of the values before it, and its
+    value. end: is called with the sum of all, after the last.
+    """
+
+    scratch_fields = ("total",)
+
+    def __init__(
+        self,
+        number: Callable[..., Any],
+        most: int,
+        width: int,
+        value: Callable[..., Any],
+        put: Callable[..., Any],
+        end: Callable[..., Any],
+    ):
+        self.chunks, self.width = Chunks(number, most), width
+        self.value, self.put, self.end = value, put, end
+        self.total = ti.Vector.field(width, ti.i32, shape=self.chunks.most)
+        self.phases: Phases = ((self.chunks, self._give),)
+        if self.chunks.most > 1:
+            self.phases = (self.chunks, self._add), *self.phases
+
+    @ti.func
+    def _add(self, c):
+        """Add up a chunk."""
+        first, last = self.chunks.span(c)
+        total = ti.Vector.zero(ti.i32, self.width)
+        for a in range(first, last):
+            total += self.value(a)
+        self.total[c] = total
+
+    @ti.func
+    def _give(self, c):
+        """Give each place of a chunk its sum."""
+        first, last = self.chunks.span(c)
+        total = ti.Vector.zero(ti.i32, self.width)
+        if ti.static(self.chunks.most > 1):
+            for d in range(c):
+                total += self.total[d]
+        for a in range(first, last):
+            value = self.value(a)
+            self.put(a, total, value)
+            total += value
+        if c == self.chunks.count(0) - 1:
+            self.end(total)
+
+
+@ti.data_oriented
+class CountingSort:
+    """Sorts members by few keys; those of one key keep their order.
+
+    number, most: as of ``Chunks``. pick: function of a place, gives its member. keys: their number.
+    key_of: function of a member, negative for one that is left out. kept: gives the key that it has
+    noted, or found before. put: function of a member and where it comes. end: function that is
+    called with each key and one past the last place of its members. falling: from the highest key
+    down, else up.
+    """
+
+    scratch_fields = ("counts",)
+
+    def __init__(
+        self,
+        number: Callable[..., Any],
+        most: int,
+        pick: Callable[..., Any],
+        keys: int,
+        key_of: Callable[..., Any],
+        kept: Callable[..., Any],
+        put: Callable[..., Any],
+        end: Callable[..., Any],
+        falling: bool = False,
+    ):
+        self.chunks, self.pick, self.keys = Chunks(number, most), pick, keys
+        self.key_of, self.kept, self.put, self.end = key_of, kept, put, end
+        self.falling = falling
+        self.counts = ti.field(ti.i32, shape=(self.chunks.most, keys))
+        self.phases: Phases = (
+            (self.chunks, self.tally),
+            (Once(), self.begin_each),
+            (self.chunks, self.place),
+        )
+
+    @ti.func
+    def tally(self, c):
+        """Count the members of a chunk by key."""
+        for key in range(self.keys):
+            self.counts[c, key] = 0
+        first, last = self.chunks.span(c)
+        for a in range(first, last):
+            key = self.key_of(self.pick(a))
+            if key >= 0:
+                self.counts[c, key] = self.counts[c, key] + 1
+
+    @ti.func
+    def begin_each(self, one):
+        """Find where the members of each chunk and key begin."""
+        total = 0
+        for k in range(self.keys):
+            key = k
+            if ti.static(self.falling):
+                key = self.keys - 1 - k
+            for c in range(self.chunks.count(0)):
+                count = self.counts[c, key]
+                self.counts[c, key] = total
+                total += count
+            self.end(key, total)
+
+    @ti.func
+    def place(self, c):
+        """Put the members of a chunk where they come."""
+        first, last = self.chunks.span(c)
+        for a in range(first, last):
+            m = self.pick(a)
+            key = self.kept(m)
+            if key >= 0:
+                self.put(m, self.counts[c, key])
+                self.counts[c, key] = self.counts[c, key] + 1
+
+    @ti.func
+    def sort(self):
+        """All of it, by one thread."""
+        for c in range(self.chunks.count(0)):
+            self.tally(c)
+        self.begin_each(0)
+        for c in range(self.chunks.count(0)):
+            self.place(c)
+
+
+@ti.data_oriented
+class Grouping:
+    """Lists members by many keys: those of key c, in order, at order[first[c]] .. first[c + 1].
+
+    keys, number: lists of all keys and of the members. key_of: function of a member, gives its key.
+    named: function of a member, gives what is written for it.
+    """
+
+    def __init__(
+        self,
+        first: ti.Field,
+        order: ti.Field,
+        keys: Some,
+        members: Some,
+        key_of: Callable[..., Any],
+        named: Callable[..., Any],
+    ):
+        self.first, self.order, self.keys = first, order, keys
+        self.key_of, self.named = key_of, named
+        # Zero between two calls: each member that is counted is placed.
+        self.counts = ti.field(ti.i32, shape=keys.most)
+        sums = RunningSums(keys.number, keys.most, 1, self._count_of, self._begin, self._end)
+        self.phases: Phases = (
+            (members, self._count),
+            *sums.phases,
+            (members, self._place),
+            (keys, self._put_in_order),
+        )
+
+    @ti.func
+    def _count(self, a):
+        ti.atomic_add(self.counts[self.key_of(a)], 1)
+
+    @ti.func
+    def _count_of(self, c):
+        return ti.Vector([self.counts[c]])
+
+    @ti.func
+    def _begin(self, c, before, value):
+        self.first[c] = before[0]
+
+    @ti.func
+    def _end(self, total):
+        self.first[self.keys.number()] = total[0]
+
+    @ti.func
+    def _place(self, a):
+        """Put a member anywhere among those of its key."""
+        key = self.key_of(a)
+        self.order[self.first[key] + ti.atomic_sub(self.counts[key], 1) - 1] = a
+
+    @ti.func
+    def _put_in_order(self, c):
+        """Put the members of a key in order, and write what they are named."""
+        start, end = self.first[c], self.first[c + 1]
+        for k in range(start + 1, end):
+            a, place = self.order[k], k
+            while place > start and self.order[ti.max(place - 1, 0)] > a:
+                self.order[place] = self.order[place - 1]
+                place -= 1
+            self.order[place] = a
+        for k in range(start, end):
+            self.order[k] = self.named(self.order[k])
