@@ -41,7 +41,6 @@ class Engine:
         self.tree = FieldTree(self.advice, (self.capacity[0], self.counted))
         with self.tree:
             self.declare()
-        self.tree_fields = tuple(one.field for one in fields_of(self))
 
     def declare(self) -> None:
         """Declare all fields; no field may be used here."""
@@ -77,7 +76,7 @@ class Engine:
     @ti.kernel
     def _fill(self):
         # One kernel: Taichi would compile one a field.
-        for field in ti.static(self.tree_fields):
+        for field in ti.static([one.field for one in fields_of(self)]):
             for entry in ti.grouped(field):
                 field[entry] = 0
 
