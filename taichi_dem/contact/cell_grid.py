@@ -78,7 +78,7 @@ class Reach:
 class CellGrid:
     """Sorts all bodies by cell, so that neighbours are sought in the cells nearby only.
 
-    making: function that is 1 where the next search fills it.
+    number: function that gives the bodies to sort, all where the next search does so, else none.
     ball: radius of the ball around a body within which others are near whose balls it meets [m].
     member: bodies, cell by cell.
     """
@@ -87,10 +87,10 @@ class CellGrid:
         *("first", "member", "cell", "counts", "corner", "edge", "largest", "bounds"),
     )
 
-    def __init__(self, tables: Tables, reach: Reach, making: Callable[..., Any]):
+    def __init__(self, tables: Tables, reach: Reach, number: Callable[..., Any]):
         n = tables.capacity.bodies
         self.tables, self.placed_at, self.ball = tables, reach.placed_at, reach.ball
-        self.making = making
+        self.number = number
         self.first = ti.field(ti.i32, shape=4 * n + 66)
         self.member = ti.field(ti.i32, shape=n)
         self.cell = ti.field(ti.i32, shape=n)
@@ -99,26 +99,26 @@ class CellGrid:
         self.edge = ti.field(real, shape=())
         self.largest = ti.field(real, shape=())
         cells = Some(self._cell_count, 4 * n + 65, light=True)
-        bodies = Some(self._body_count, n, light=True)
+        bodies = Some(number, n, light=True)
         parts = cells, bodies, self._cell_of_member, self._itself
         self.grouping = Grouping(self.first, self.member, *parts)
-        self.chunks = Chunks(self._body_count, n)
+        self.chunks = Chunks(number, n)
         self.bounds = ti.Matrix.field(3, 3, real, shape=self.chunks.most)
         self.phases: Phases = (
             (self.chunks, self._bound),
-            (Some(making, 1), self._size),
+            (Some(self._once, 1), self._size),
             (bodies, self._find_cell),
             *self.grouping.phases,
         )
 
     @ti.func
-    def _body_count(self):
-        return self.making() * self.tables.body_count[None]
+    def _once(self):
+        return ti.min(self.number(), 1)
 
     @ti.func
     def _cell_count(self):
         counts = self.counts[None]
-        return self.making() * counts[0] * counts[1] * counts[2]
+        return self._once() * counts[0] * counts[1] * counts[2]
 
     @ti.func
     def _find_cell(self, i):

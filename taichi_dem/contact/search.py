@@ -112,7 +112,7 @@ class BroadPhase:
         """Phases of a search in order, for at most n bodies."""
         bodies = Some(self._body_count, n, light=True)
         free, light = Some(self._free_bodies, n), Some(self._free_bodies, n, light=True)
-        anew, amended = Some(self._all_anew, n), Some(self._all_amended, n)
+        anew, amended = Some(self.neighbours.listed_anew, n), Some(self._all_amended, n)
         return (
             *self.breaks.phases(bodies),
             (bodies, self._mark_free),
@@ -168,10 +168,6 @@ class BroadPhase:
     @ti.func
     def _free_bodies(self):
         return self.free_count[None]
-
-    @ti.func
-    def _all_anew(self):
-        return self.neighbours.making() * self.tables.body_count[None]
 
     @ti.func
     def _all_amended(self):

@@ -46,7 +46,7 @@ class VerletList:
         self.store, self.capacity = contacts.store, contacts.tables.capacity.neighbour_entries
         self.limit = ti.field(ti.i32, shape=())
         self.reach = Reach(contacts)
-        self.grid = CellGrid(self.tables, self.reach, self.making)
+        self.grid = CellGrid(self.tables, self.reach, self.listed_anew)
         self.first = ti.field(ti.i32, shape=n + 1)
         self.last, self.changed = (ti.field(ti.i32, shape=n) for _ in range(2))
         # Stored contiguously: every search reads many entries that are no longer in the cache.
@@ -60,7 +60,7 @@ class VerletList:
         self.full = ti.field(ti.i32, shape=())
         self.wanted = ti.field(ti.i32, shape=n)
         allotted = self._wanted, self._allot, self._end_allotting
-        self.allotting = RunningSums(self._listed_anew, n, 1, *allotted)
+        self.allotting = RunningSums(self.listed_anew, n, 1, *allotted)
 
     def load(self, model: Model, method: Method) -> None:
         """Set the limit of a scene; the next search rebuilds the list."""
@@ -102,7 +102,8 @@ class VerletList:
         self.wanted[i] = self._visit(i, 0, False) + ti.max(near, SPARE)
 
     @ti.func
-    def _listed_anew(self):
+    def listed_anew(self):
+        """Number of bodies whose rows are being rebuilt: all or none."""
         return self.making() * self.tables.body_count[None]
 
     @ti.func
@@ -298,9 +299,9 @@ class NearPairs:
             self.store.second_start,
             self.store.second_slot,
             Some(self._body_count, n, light=True),
-            Some(self._near_count, self.store.slots, light=True),
+            Some(self.store.number, self.store.slots, light=True),
             self._second_of,
-            self._slot_at,
+            self.store.slot_at,
         )
 
     @ti.func
@@ -411,14 +412,6 @@ class NearPairs:
         start, first = self.neighbours.first[i], self.store.first_of[i]
         for k in range(self.row_count[i]):
             self.store.near_slot[first + k] = self.row[start + k]
-
-    @ti.func
-    def _near_count(self):
-        return self.store.near_count[None]
-
-    @ti.func
-    def _slot_at(self, a):
-        return self.store.near_slot[a]
 
     @ti.func
     def _second_of(self, a):

@@ -120,6 +120,16 @@ class PairStore:
         return values(self.body, slots), counts, values(self.deepest, slots)
 
     @ti.func
+    def number(self):
+        """Number of near pairs."""
+        return self.near_count[None]
+
+    @ti.func
+    def slot_at(self, a):
+        """Slot of the pair at a place of all near pairs."""
+        return self.near_slot[a]
+
+    @ti.func
     def lacks_slots(self, fresh, freed):
         """Whether so many new pairs find no slots, once so many have been freed."""
         spare = self.free_count[None] + freed + self.slot_limit[None] - self.used_end[None]

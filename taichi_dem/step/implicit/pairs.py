@@ -79,7 +79,7 @@ class PairDashpots:
         self.touching, self.order, self.colour = (ti.field(ti.i32, shape=pairs) for _ in range(3))
         self.colour_first = ti.field(ti.i32, shape=LEFT + 2)
         keys = LEFT + 1, self._key, self._key, self._list, self._end_colour
-        self.colouring = CountingSort(self._near_count, pairs, self._slot, *keys)
+        self.colouring = CountingSort(self.store.number, pairs, self.store.slot_at, *keys)
 
     @property
     def phases(self) -> Phases:
@@ -89,7 +89,7 @@ class PairDashpots:
         a free one come last. Candidates that do not touch are left out, so that no skin changes the
         order. A pair can be coloured once all before it at both bodies are: few wait for long.
         """
-        near = Some(self._near_count, self.store.slots, light=True)
+        near = Some(self.store.number, self.store.slots, light=True)
         tally, begin, place = self.colouring.phases
         if is_serial(self.tables.capacity.bodies):
             return ((near, self._colour), tally, begin, place)
@@ -143,14 +143,6 @@ class PairDashpots:
                 for a in range(first, last):
                     self._colour(a)
                 self.colouring.tally(c)
-
-    @ti.func
-    def _near_count(self):
-        return self.store.near_count[None]
-
-    @ti.func
-    def _slot(self, a):
-        return self.store.near_slot[a]
 
     @ti.func
     def _key(self, p):

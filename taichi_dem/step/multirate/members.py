@@ -109,7 +109,7 @@ class Members:
         self.changed_count[None] = 0
         if ti.static(self.sleeps):
             self.starting[None], self.sleeping.woken_count[None] = 0, 0
-        self.find_finest(0)
+        self._find_finest()
 
     @ti.func
     def sort_woken(self, one):

@@ -269,7 +269,7 @@ class Schedule(Members):
             if ti.static(self.spreads):
                 self.spread(a)
         self.changed_count[None] = 0
-        self.find_finest(0)
+        self._find_finest()
 
     @ti.func
     def spread(self, a):
@@ -307,8 +307,7 @@ class Schedule(Members):
                 self.state.level[i] = self.wanted[None]
 
     @ti.func
-    def find_finest(self, one):
-        """Find the finest level present."""
+    def _find_finest(self):
         if ti.static(self.uniform):
             self.finest[None] = self.wanted[None]
         else:
