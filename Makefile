@@ -67,7 +67,7 @@ attack: $(STAMP) ## attack it with hostile values, files, sessions and environme
 	$(BIN)/python -m pytest -q -n 2 -m attack tests/attack --attacks 20 $(ATTACK_OPTIONS)
 
 test-gpu: $(STAMP) ## compare each device here with the CPU (as root on Debian or Ubuntu it installs Vulkan's software driver)
-	@$(BIN)/python -c "from taichi_dem.kit import device; raise SystemExit(not backend.is_present('vulkan'))" || \
+	@$(BIN)/python -c "from taichi_dem.kit import backend; raise SystemExit(not backend.is_present('vulkan'))" || \
 	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	    echo "Installing $(VULKAN_PACKAGES)."; export DEBIAN_FRONTEND=noninteractive; \
 	    { apt-get update && apt-get install -y --no-install-recommends $(VULKAN_PACKAGES); } >/dev/null || \

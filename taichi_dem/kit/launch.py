@@ -1,4 +1,4 @@
-"""Launches of a kernel from a context that is made once: 6 us of Python instead of 100."""
+"""Launches of a compiled kernel: 6 us of Python instead of the 100 of a call."""
 
 from typing import Any
 
@@ -27,7 +27,19 @@ class Launch:
             found = self._kernel(*self._templates, *values)
             self._ready = self._prepared(values)
             return found
-        program, compiled, context, returns = self._ready
+        return self._launched(values, waits=self._ready[-1])
+
+    def queue(self, *values: int | np.ndarray) -> None:
+        """Run it some time soon, in order, without waiting for what it returns."""
+        if self._ready is None:
+            self(*values)
+        else:
+            self._launched(values, waits=False)
+
+    def _launched(self, values, waits):
+        program, compiled, make_context, _ = self._ready
+        # One a launch: CUDA's leaves the address of the device's copy of the values in it.
+        context = make_context()
         for place, value in enumerate(values):
             if isinstance(value, np.ndarray):
                 where = value.ctypes.data, value.nbytes, value.shape
@@ -36,33 +48,20 @@ class Launch:
                 context.set_arg_int((place,), value)
         try:
             program.launch_kernel(compiled, context)
-            if not returns:
-                return None
-            program.synchronize()
-            return context.get_struct_ret_int((0,))
+            if waits:
+                program.synchronize()
+                return context.get_struct_ret_int((0,))
         except Exception as error:
             raise _failed(error) from None
-
-    def queue(self, *values: int | np.ndarray) -> None:
-        """Run it some time soon, in order, without waiting for what it returns; whole numbers."""
-        if self._ready is None:
-            self(*values)
-            return
-        program, compiled, context, _ = self._ready
-        for place, value in enumerate(values):
-            context.set_arg_int((place,), value)
-        try:
-            program.launch_kernel(compiled, context)
-        except Exception as error:
-            raise _failed(error) from None
+        return None
 
     def _prepared(self, values):
-        """Taichi's program, the compiled kernel, its context, and whether it returns a number."""
+        """Taichi's program, the compiled kernel, what makes a context, and whether it returns."""
         kernel, owner = self._kernel._primal, self._kernel._kernel_owner
         key = kernel.ensure_compiled(owner, *self._templates, *values)
         found, program = kernel.compiled_kernels[key], impl.get_runtime().prog
         compiled = program.compile_kernel(program.config(), program.get_device_caps(), found)
-        return program, compiled, found.make_launch_context(), kernel.return_type is not None
+        return program, compiled, found.make_launch_context, kernel.return_type is not None
 
 
 def _failed(error):

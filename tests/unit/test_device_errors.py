@@ -24,9 +24,34 @@ class Lost:
 @pytest.mark.parametrize("call", [Launch.__call__, Launch.queue])
 def test_a_lost_device_is_told_with_what_to_do(call, monkeypatch):
     launch = Launch(None)
-    launch._ready = (Lost(), None, Lost(), True)
+    launch._ready = (Lost(), None, Lost, True)
     monkeypatch.setattr(backend, "is_cpu", lambda: False)
     with pytest.raises(InputError, match=r"^the device does not answer any more .*checkpoint, or"):
+        call(launch, 1)
+
+
+class OneLaunch:
+    """A context as CUDA's: its launch leaves an address of the device where values are written."""
+
+    spent = False
+
+    def set_arg_int(self, place, value):
+        """Take an argument."""
+        assert not self.spent
+
+
+class Spending:
+    """A program that spends contexts."""
+
+    def launch_kernel(self, compiled, context):
+        """Note it."""
+        context.spent = True
+
+
+def test_a_context_is_launched_once():
+    launch = Launch(None)
+    launch._ready = (Spending(), None, OneLaunch, False)
+    for call in (Launch.__call__, Launch.queue) * 2:
         call(launch, 1)
 
 
