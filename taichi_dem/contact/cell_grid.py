@@ -102,7 +102,7 @@ class CellGrid:
         bodies = Some(number, n, light=True)
         parts = cells, bodies, self._cell_of_member, self._itself
         self.grouping = Grouping(self.first, self.member, *parts)
-        self.chunks = Chunks(number, n)
+        self.chunks = Chunks(bodies)
         self.bounds = ti.Matrix.field(3, 3, real, shape=self.chunks.most)
         self.phases: Phases = (
             (self.chunks, self._bound),

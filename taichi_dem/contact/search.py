@@ -68,7 +68,7 @@ class BroadPhase:
         self.full = self.near_pairs.full
         self.searches = ti.field(ti.i32, shape=())
         ends = self._is_free, self._put_free, self._end_free
-        self.listing = RunningSums(self._body_count, n, 1, *ends)
+        self.listing = RunningSums(Some(self._body_count, n, light=True), 1, *ends)
         self.phases = self._phases(n)
         self.tasks = tasks(self.phases, n)
 

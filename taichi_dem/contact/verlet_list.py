@@ -60,7 +60,7 @@ class VerletList:
         self.full = ti.field(ti.i32, shape=())
         self.wanted = ti.field(ti.i32, shape=n)
         allotted = self._wanted, self._allot, self._end_allotting
-        self.allotting = RunningSums(self.listed_anew, n, 1, *allotted)
+        self.allotting = RunningSums(Some(self.listed_anew, n), 1, *allotted)
 
     def load(self, model: Model, method: Method) -> None:
         """Set the limit of a scene; the next search rebuilds the list."""
@@ -292,13 +292,14 @@ class NearPairs:
         self.wanted = ti.Vector.field(3, ti.i32, shape=n)
         self.total = ti.Vector.field(3, ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
+        bodies = Some(self._body_count, n, light=True)
         rows = self._row_sums, self._begin_row, self._end_rows
-        self.numbering = RunningSums(self._body_count, n, 5, *rows)
+        self.numbering = RunningSums(bodies, 5, *rows)
         # For every body the near pairs in which it is second, in order.
         self.second = Grouping(
             self.store.second_start,
             self.store.second_slot,
-            Some(self._body_count, n, light=True),
+            bodies,
             Some(self.store.number, self.store.slots, light=True),
             self._second_of,
             self.store.slot_at,

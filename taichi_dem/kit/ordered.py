@@ -6,6 +6,7 @@ of several that are short.
 """
 
 from collections.abc import Callable
+from itertools import zip_longest
 from typing import Any
 
 import taichi as ti
@@ -13,7 +14,9 @@ import taichi as ti
 from taichi_dem.kit import backend, runtime
 
 #: Places of a chunk at least, and chunks at most: few threads of a CPU, many of a GPU.
-_CPU, _GPU = (1024, 64), (64, 512)
+_CPU, _GPU = (1024, 64), (32, 4096)
+#: Chunks of which the sums are added up first where there are more.
+_GROUP = 64
 #: Bodies up to which a CPU makes light phases on one thread: to wake the others takes 30 us.
 _SERIAL_UP_TO = 32768
 #: A list, and the function that is called with each of its members.
@@ -85,6 +88,25 @@ class Some(Places):
 
 
 @ti.data_oriented
+class When(Places):
+    """A list that is empty unless a function says 1."""
+
+    def __init__(self, due: Callable[..., Any], members: Any):
+        self.due, self.members = due, members
+        self.most, self.light = members.most, members.light
+
+    @ti.func
+    def count(self, low):
+        """Number of members now."""
+        return self.due() * self.members.count(low)
+
+    @ti.func
+    def pick(self, a):
+        """Member at place a."""
+        return self.members.pick(a)
+
+
+@ti.data_oriented
 class Joined(Places):
     """Phases that need nothing of each other as one; visit: what is done with each place."""
 
@@ -112,33 +134,32 @@ def side_by_side(*several: Phases) -> Phases:
     """Phases of several that need nothing of each other; on a GPU one loop for the first of all."""
     if backend.is_cpu():
         return tuple(phase for phases in several for phase in phases)
-    return tuple((joined, joined.visit) for joined in map(Joined, zip(*several)))
+    together = (tuple(filter(None, phases)) for phases in zip_longest(*several))
+    return tuple((joined, joined.visit) for joined in map(Joined, together))
 
 
 @ti.data_oriented
 class Chunks(Places):
-    """Chunks of the places of a list, each of which is visited in order.
-
-    most_places: the largest number of places; number: function that gives the present one.
-    """
+    """Chunks of the places of a list, each of which is visited in order; at least ``fewest``."""
 
     light = True
 
-    def __init__(self, number: Callable[..., Any], most_places: int):
-        self.number = number
+    def __init__(self, members: Any, fewest: int = 0):
+        self.members, self.fewest = members, fewest
         self.least, self.most = _CPU if backend.is_cpu() else _GPU
-        self.most = min(self.most, -(-most_places // self.least))
-        if is_serial(most_places):
+        self.most = min(self.most, -(-members.most // self.least))
+        if is_serial(members.most):
             self.most = 1
 
     @ti.func
     def count(self, low):
         """Number of chunks."""
-        count = ti.min(self.number(), 1)
+        number = self.members.count(0)
+        count = ti.min(number, 1)
         if ti.static(self.most > 1):
-            size = self._size(self.number())
-            count = (self.number() + size - 1) // size
-        return count
+            size = self._size(number)
+            count = (number + size - 1) // size
+        return ti.max(count, self.fewest)
 
     @ti.func
     def _size(self, number):
@@ -148,7 +169,7 @@ class Chunks(Places):
     @ti.func
     def span(self, c):
         """First place of a chunk, and one past its last."""
-        first, last = 0, self.number()
+        first, last = 0, self.members.count(0)
         if ti.static(self.most > 1):
             size = self._size(last)
             first, last = c * size, ti.min(last, (c + 1) * size)
@@ -157,30 +178,34 @@ class Chunks(Places):
 
 @ti.data_oriented
 class RunningSums:
-    """Sums of the numbers of all places before a place, several at a time.
+    """Sums of the numbers of all places of a list before a place, several at a time.
 
-    number, most: as of ``Chunks``. value: function of a place, gives a vector of ``width`` whole
-    numbers. put: function that is called with each place, the sum of the values before it, and its
-    value. end: is called with the sum of all, after the last.
+    value: function of a place, gives a vector of ``width`` whole numbers. put: function that is
+    called with each place, the sum of the values before it, and its value. end: is called with the
+    sum of all, after the last.
     """
 
-    scratch_fields = ("total",)
+    scratch_fields = ("total", "of_group")
 
     def __init__(
         self,
-        number: Callable[..., Any],
-        most: int,
+        places: Any,
         width: int,
         value: Callable[..., Any],
         put: Callable[..., Any],
         end: Callable[..., Any],
     ):
-        self.chunks, self.width = Chunks(number, most), width
+        self.chunks, self.width = Chunks(places), width
         self.value, self.put, self.end = value, put, end
-        self.total = ti.Vector.field(width, ti.i32, shape=self.chunks.most)
-        self.phases: Phases = ((self.chunks, self._give),)
-        if self.chunks.most > 1:
-            self.phases = (self.chunks, self._add), *self.phases
+        most = self.chunks.most
+        self.total = ti.Vector.field(width, ti.i32, shape=most)
+        self.grouped = most > _GROUP
+        before: Phases = ((self.chunks, self._add),) if most > 1 else ()
+        if self.grouped:
+            groups = Some(self._groups, -(-most // _GROUP), light=True)
+            self.of_group = ti.Vector.field(width, ti.i32, shape=groups.most)
+            before += ((groups, self._add_group),)
+        self.phases: Phases = (*before, (self.chunks, self._give))
 
     @ti.func
     def _add(self, c):
@@ -192,13 +217,40 @@ class RunningSums:
         self.total[c] = total
 
     @ti.func
+    def _groups(self):
+        """Number of groups of chunks."""
+        return (self.chunks.count(0) + _GROUP - 1) // _GROUP
+
+    @ti.func
+    def _add_group(self, g):
+        """Add up a group of chunks."""
+        self.of_group[g] = self._sum(g * _GROUP, ti.min((g + 1) * _GROUP, self.chunks.count(0)))
+
+    @ti.func
+    def _sum(self, first, last):
+        """Sum of some chunks."""
+        total = ti.Vector.zero(ti.i32, self.width)
+        for c in range(first, last):
+            total += self.total[c]
+        return total
+
+    @ti.func
+    def _before(self, c):
+        """Sum of all chunks before one."""
+        total = ti.Vector.zero(ti.i32, self.width)
+        if ti.static(self.grouped):
+            for g in range(c // _GROUP):
+                total += self.of_group[g]
+            total += self._sum(c // _GROUP * _GROUP, c)
+        elif ti.static(self.chunks.most > 1):
+            total = self._sum(0, c)
+        return total
+
+    @ti.func
     def _give(self, c):
         """Give each place of a chunk its sum."""
         first, last = self.chunks.span(c)
-        total = ti.Vector.zero(ti.i32, self.width)
-        if ti.static(self.chunks.most > 1):
-            for d in range(c):
-                total += self.total[d]
+        total = self._before(c)
         for a in range(first, last):
             value = self.value(a)
             self.put(a, total, value)
@@ -209,22 +261,19 @@ class RunningSums:
 
 @ti.data_oriented
 class CountingSort:
-    """Sorts members by few keys; those of one key keep their order.
+    """Sorts the members of a list by few keys; those of one key keep their order.
 
-    number, most: as of ``Chunks``. pick: function of a place, gives its member. keys: their number.
-    key_of: function of a member, negative for one that is left out. kept: gives the key that it has
-    noted, or found before. put: function of a member and where it comes. end: function that is
-    called with each key and one past the last place of its members. falling: from the highest key
-    down, else up.
+    keys: their number. key_of: function of a member, negative for one that is left out. kept: gives
+    the key that it has noted, or found before. put: function of a member and where it comes. end:
+    function that is called with each key and one past the last place of its members. falling: from
+    the highest key down, else up.
     """
 
     scratch_fields = ("counts",)
 
     def __init__(
         self,
-        number: Callable[..., Any],
-        most: int,
-        pick: Callable[..., Any],
+        members: Any,
         keys: int,
         key_of: Callable[..., Any],
         kept: Callable[..., Any],
@@ -232,60 +281,79 @@ class CountingSort:
         end: Callable[..., Any],
         falling: bool = False,
     ):
-        self.chunks, self.pick, self.keys = Chunks(number, most), pick, keys
+        self.chunks, self.members, self.keys = Chunks(members, fewest=1), members, keys
         self.key_of, self.kept, self.put, self.end = key_of, kept, put, end
         self.falling = falling
-        self.counts = ti.field(ti.i32, shape=(self.chunks.most, keys))
+        # Members of each key and chunk, in the order of the sort; then those that come before them.
+        self.counts = ti.field(ti.i32, shape=self.chunks.most * keys)
+        places = Some(self._places, self.chunks.most * keys, light=True)
+        before = RunningSums(places, 1, self._count, self._begin, self._end)
         self.phases: Phases = (
             (self.chunks, self.tally),
-            (Once(), self.begin_each),
+            *before.phases,
             (self.chunks, self.place),
         )
+
+    @ti.func
+    def _places(self):
+        return self.keys * self.chunks.count(0)
+
+    @ti.func
+    def at(self, c, key):
+        """Place of a chunk and a key in ``counts``."""
+        if ti.static(self.falling):
+            key = self.keys - 1 - key
+        return key * self.chunks.count(0) + c
 
     @ti.func
     def tally(self, c):
         """Count the members of a chunk by key."""
         for key in range(self.keys):
-            self.counts[c, key] = 0
+            self.counts[self.at(c, key)] = 0
         first, last = self.chunks.span(c)
         for a in range(first, last):
-            key = self.key_of(self.pick(a))
+            key = self.key_of(self.members.pick(a))
             if key >= 0:
-                self.counts[c, key] = self.counts[c, key] + 1
+                at = self.at(c, key)
+                self.counts[at] = self.counts[at] + 1
 
     @ti.func
-    def begin_each(self, one):
-        """Find where the members of each chunk and key begin."""
-        total = 0
-        for k in range(self.keys):
-            key = k
+    def _count(self, at):
+        return ti.Vector([self.counts[at]])
+
+    @ti.func
+    def _begin(self, at, before, value):
+        """Take over where the members of a chunk and key begin."""
+        self.counts[at] = before[0]
+        chunks = self.chunks.count(0)
+        if at % chunks == chunks - 1:
+            key = at // chunks
             if ti.static(self.falling):
-                key = self.keys - 1 - k
-            for c in range(self.chunks.count(0)):
-                count = self.counts[c, key]
-                self.counts[c, key] = total
-                total += count
-            self.end(key, total)
+                key = self.keys - 1 - key
+            self.end(key, before[0] + value[0])
+
+    @ti.func
+    def _end(self, total):
+        """Nothing is left to do."""
 
     @ti.func
     def place(self, c):
         """Put the members of a chunk where they come."""
         first, last = self.chunks.span(c)
         for a in range(first, last):
-            m = self.pick(a)
+            m = self.members.pick(a)
             key = self.kept(m)
             if key >= 0:
-                self.put(m, self.counts[c, key])
-                self.counts[c, key] = self.counts[c, key] + 1
+                at = self.at(c, key)
+                self.put(m, self.counts[at])
+                self.counts[at] = self.counts[at] + 1
 
     @ti.func
     def sort(self):
         """All of it, by one thread."""
-        for c in range(self.chunks.count(0)):
-            self.tally(c)
-        self.begin_each(0)
-        for c in range(self.chunks.count(0)):
-            self.place(c)
+        for members, item in ti.static(self.phases):
+            for a in range(members.count(0)):
+                item(members.pick(a))
 
 
 @ti.data_oriented
@@ -300,8 +368,8 @@ class Grouping:
         self,
         first: ti.Field,
         order: ti.Field,
-        keys: Some,
-        members: Some,
+        keys: Any,
+        members: Any,
         key_of: Callable[..., Any],
         named: Callable[..., Any],
     ):
@@ -309,7 +377,7 @@ class Grouping:
         self.key_of, self.named = key_of, named
         # Zero between two calls: each member that is counted is placed.
         self.counts = ti.field(ti.i32, shape=keys.most)
-        sums = RunningSums(keys.number, keys.most, 1, self._count_of, self._begin, self._end)
+        sums = RunningSums(keys, 1, self._count_of, self._begin, self._end)
         self.phases: Phases = (
             (members, self._count),
             *sums.phases,
@@ -331,7 +399,7 @@ class Grouping:
 
     @ti.func
     def _end(self, total):
-        self.first[self.keys.number()] = total[0]
+        self.first[self.keys.count(0)] = total[0]
 
     @ti.func
     def _place(self, a):

@@ -1,7 +1,6 @@
 """What reports read of a run, by tables that kernels fill, and what they keep of it."""
 
 import contextlib
-import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar, NamedTuple
 
@@ -21,8 +20,8 @@ from taichi_dem.step.advance import Advance
 from taichi_dem.step.multirate.half_step import HalfStep
 from taichi_dem.step.multirate.schedule import Schedule
 
-#: Bodies up to which loops over them are serial; rounds of the serial sum over a pair.
-_FEW, _SUMS = 4096, 14
+#: Bodies up to which loops over them are serial.
+_FEW = 4096
 
 
 @ti.data_oriented
@@ -77,8 +76,6 @@ class Readings:
         pushed = self._room("pushed", int(values(self.tables.body_count)), 6)
         count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
         table = self._room("contacts", count, 21)
-        if _SUMS * count > (backend.most_rounds() or math.inf):
-            raise backend.cut_short("over these contacts", "a smaller mesh")
         if count:
             self._launch_push(table, pushed)
         return table, pushed
@@ -106,13 +103,20 @@ class Readings:
             table[a, 17] = found.stored
             for k in ti.static(range(3)):
                 table[a, 18 + k] = self.contacts.store.heat[p][k]
-        # In the order of the pairs, so that no thread changes a bit.
-        ti.loop_config(serialize=True)
-        for side in range(2):
-            for a in range(self.contacts.store.near_count[None]):
-                i = self.contacts.store.body[self.contacts.store.near_slot[a]][side]
+        ti.loop_config(serialize=ti.static(self.small))
+        for i in range(self.tables.body_count[None]):
+            # In the order of the pairs, so that no thread changes a bit.
+            for a in range(self.contacts.store.first_of[i], self.contacts.store.first_of[i + 1]):
                 for k in range(6):
-                    pushed[i, k] = pushed[i, k] + table[a, 6 * side + k]
+                    pushed[i, k] = pushed[i, k] + table[a, k]
+            start, end = (
+                self.contacts.store.second_start[i],
+                self.contacts.store.second_start[i + 1],
+            )
+            for s in range(start, end):
+                a = self.contacts.store.place_of(self.contacts.store.second_slot[s])
+                for k in range(6):
+                    pushed[i, k] = pushed[i, k] + table[a, 6 + k]
 
     def bodies(self) -> np.ndarray:
         """Kinetic energy, work of loads, supports, contact heats, ground's heat [J], (n, 7)."""

@@ -130,6 +130,14 @@ class PairStore:
         return self.near_slot[a]
 
     @ti.func
+    def place_of(self, p):
+        """Place of a near pair among all near pairs."""
+        place = self.first_of[self.body[p][0]]
+        while self.near_slot[place] != p:
+            place += 1
+        return place
+
+    @ti.func
     def lacks_slots(self, fresh, freed):
         """Whether so many new pairs find no slots, once so many have been freed."""
         spare = self.free_count[None] + freed + self.slot_limit[None] - self.used_end[None]

@@ -95,7 +95,7 @@ MOST = {
     "uniform": (5.3, 0, 0.13),
     "limited": (7.2, 0, 0.12),
     "uniform with contact": (8.6, 0, 0.3),
-    "controlled with contact": (20, 0, 0.3),
+    "controlled with contact": (23, 0, 0.3),
     "solved": (14, 9, 0.3),
     "solved with contact": (30, 19, 0.3),
 }

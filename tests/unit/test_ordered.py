@@ -12,6 +12,16 @@ MOST, KEYS = 6000, 7
 
 
 @ti.data_oriented
+class Mirrored(Some):
+    """Members from the last one down."""
+
+    @ti.func
+    def pick(self, a):
+        """Member at place a."""
+        return MOST - 1 - a
+
+
+@ti.data_oriented
 class Lists:
     """Sums, a sort by few keys and groups by many of numbers that a test sets."""
 
@@ -20,10 +30,11 @@ class Lists:
         self.key, self.before, self.place = (ti.field(ti.i32, shape=MOST) for _ in range(3))
         self.last, self.total = ti.field(ti.i32, shape=KEYS), ti.field(ti.i32, shape=())
         self.first, self.order = ti.field(ti.i32, shape=MOST + 1), ti.field(ti.i32, shape=MOST)
-        sums = RunningSums(self._count, MOST, 1, self._value, self._put, self._end)
+        numbers, mirrored = Some(self._count, MOST), Mirrored(self._count, MOST)
+        sums = RunningSums(numbers, 1, self._value, self._put, self._end)
         ways = KEYS, self._key, self._key, self._put_place, self._end_key
-        sort = CountingSort(self._count, MOST, self._mirrored, *ways)
-        lists = Some(self._group_count, MOST), Some(self._count, MOST)
+        sort = CountingSort(mirrored, *ways)
+        lists = Some(self._group_count, MOST), numbers
         groups = Grouping(self.first, self.order, *lists, self._group, self._twice)
         phases = (*side_by_side(sort.phases[:2], sums.phases), *sort.phases[2:], *groups.phases)
         self.tasks = ordered.tasks(phases, MOST)
@@ -54,10 +65,6 @@ class Lists:
     @ti.func
     def _end(self, total):
         self.total[None] = total[0]
-
-    @ti.func
-    def _mirrored(self, a):
-        return MOST - 1 - a
 
     @ti.func
     def _key(self, m):

@@ -79,7 +79,7 @@ class PairDashpots:
         self.touching, self.order, self.colour = (ti.field(ti.i32, shape=pairs) for _ in range(3))
         self.colour_first = ti.field(ti.i32, shape=LEFT + 2)
         keys = LEFT + 1, self._key, self._key, self._list, self._end_colour
-        self.colouring = CountingSort(self.store.number, pairs, self.store.slot_at, *keys)
+        self.colouring = CountingSort(schedule.pairs.everyone, *keys)
 
     @property
     def phases(self) -> Phases:
@@ -90,11 +90,11 @@ class PairDashpots:
         order. A pair can be coloured once all before it at both bodies are: few wait for long.
         """
         near = Some(self.store.number, self.store.slots, light=True)
-        tally, begin, place = self.colouring.phases
+        tally, *begin, place = self.colouring.phases
         if is_serial(self.tables.capacity.bodies):
-            return ((near, self._colour), tally, begin, place)
+            return ((near, self._colour), tally, *begin, place)
         rounds = ((near, self._colour),) * _ROUNDS[not backend.is_cpu()]
-        return (*rounds, tally, (Once(), self._colour_rest), begin, place)
+        return (*rounds, tally, (Once(), self._colour_rest), *begin, place)
 
     @ti.func
     def _colour(self, a):
@@ -138,7 +138,7 @@ class PairDashpots:
     def _colour_rest(self, one):
         """Colour what the rounds have left, one after the other."""
         for c in range(self.colouring.chunks.count(0)):
-            if self.colouring.counts[c, LEFT] > 0:
+            if self.colouring.counts[self.colouring.at(c, LEFT)] > 0:
                 first, last = self.colouring.chunks.span(c)
                 for a in range(first, last):
                     self._colour(a)

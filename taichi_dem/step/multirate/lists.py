@@ -67,7 +67,7 @@ class ActiveList(Places):
         self.order, self.index, self.key = (ti.field(ti.i32, shape=self.most) for _ in range(3))
         self.end = ti.field(ti.i32, shape=MAX_LEVEL + 2)
         keys = MAX_LEVEL + 1, self._note, self._kept, self._put, self._end
-        self.listing = CountingSort(self._number, self.most, everyone.pick, *keys, falling=True)
+        self.listing = CountingSort(everyone, *keys, falling=True)
 
     @ti.func
     def count(self, low):
@@ -78,10 +78,6 @@ class ActiveList(Places):
     def pick(self, a):
         """Member at place a."""
         return self.order[a]
-
-    @ti.func
-    def _number(self):
-        return self.everyone.count(0)
 
     @ti.func
     def _note(self, m):

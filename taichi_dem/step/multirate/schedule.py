@@ -12,7 +12,7 @@ import taichi as ti
 from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import assign, raise_to, values
-from taichi_dem.kit.ordered import Once, Phases, Some, side_by_side
+from taichi_dem.kit.ordered import Once, Phases, Some, When, side_by_side
 from taichi_dem.kit.types import real
 from taichi_dem.methods import Method
 from taichi_dem.stability.body_limits import StabilityLimits
@@ -187,7 +187,7 @@ class Schedule(Members):
         return ((Once(), self.forget),) if self.has_contact else ()
 
     def _rearranging(self, move, end) -> Phases:
-        """A CPU moves the members that have changed; a GPU lists all: one of its threads is slow.
+        """A CPU moves the members that have changed; a GPU, of which one thread is slow, lists all.
 
         Where all have one level, members change when a bond breaks: seldom enough.
         """
@@ -199,7 +199,17 @@ class Schedule(Members):
             phases += ((changed, self.spread),)
         if self.sleeps:
             phases += ((self._woken, self.admit_in_step),)
-        return (*phases, *self._listing(*self._lists), (Once(), end))
+        listing = self._listing(*self._lists)
+        due = tuple((When(self._has_changed, members), item) for members, item in listing)
+        return (*phases, *due, (Once(), end))
+
+    @ti.func
+    def _has_changed(self):
+        """1 where a member has another key than when it was listed."""
+        changed = self.changed_count[None]
+        if ti.static(self.sleeps):
+            changed += self.woken_count()
+        return ti.cast(changed > 0, ti.i32)
 
     def _listing(self, *lists):
         return side_by_side(*(one.listing.phases for one in lists))
