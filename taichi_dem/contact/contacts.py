@@ -82,12 +82,12 @@ class Contacts:
     def place(self, i, j):
         """Rotation and place [m] of body j in the frame of body i."""
         branch = self.state.position[j] - self.state.position[i]
-        return place_in(self.state.rotation[i], self.state.rotation[j], branch)
+        return place_in(self.state.rotation(i), self.state.rotation(j), branch)
 
     @ti.func
     def _gap_of_spheres(self, i, j, a, b):
-        on_first = matvec(self.state.rotation[i], self.tables.sphere[a].xyz)
-        on_second = matvec(self.state.rotation[j], self.tables.sphere[b].xyz)
+        on_first = matvec(self.state.rotation(i), self.tables.sphere[a].xyz)
+        on_second = matvec(self.state.rotation(j), self.tables.sphere[b].xyz)
         apart = self.state.position[j] + on_second - self.state.position[i] - on_first
         return norm(apart) - self.tables.sphere[a][3] - self.tables.sphere[b][3]
 

@@ -14,27 +14,32 @@ _ROWS = ti.types.ndarray(dtype=ti.f64, ndim=2)
 _MATRICES = ti.types.ndarray(dtype=ti.f64, ndim=3)
 
 
-def turned_bodies(
-    orientation: np.ndarray, spin: np.ndarray, inertia: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation matrices (n, 3, 3) and angular momenta (n, 3) [kg m^2/s] of n bodies.
+def angular_momenta(orientation: np.ndarray, spin: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """Angular momenta (n, 3) of n bodies [kg m^2/s].
 
     orientation: unit quaternions (n, 4). spin: in world axes (n, 3) [rad/s]. inertia: in body axes
     (n, 3, 3) [kg m^2].
     """
-    rotation, momentum = np.empty((len(spin), 3, 3)), np.empty((len(spin), 3))
-    _turn(orientation, spin, inertia, rotation, momentum)
-    return rotation, momentum
+    found = np.empty((len(spin), 3))
+    _find_momenta(orientation, spin, inertia, found)
+    return found
 
 
-def spins(rotation: np.ndarray, inertia_inverse: np.ndarray, momentum: np.ndarray) -> np.ndarray:
+def rotations(orientation: np.ndarray) -> np.ndarray:
+    """Rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
+    found = np.empty((len(orientation), 3, 3))
+    _find_rotations(orientation, found)
+    return found
+
+
+def spins(orientation: np.ndarray, inertia_inverse: np.ndarray, momentum: np.ndarray) -> np.ndarray:
     """World spins (n, 3) [rad/s] of n bodies.
 
-    rotation: matrices (n, 3, 3). inertia_inverse: in body axes (n, 3, 3) [1/(kg m^2)]. momentum:
-    angular, in world axes (n, 3) [kg m^2/s].
+    orientation: unit quaternions (n, 4). inertia_inverse: in body axes (n, 3, 3) [1/(kg m^2)].
+    momentum: angular, in world axes (n, 3) [kg m^2/s].
     """
     found = np.empty_like(momentum)
-    _find_spins(rotation, inertia_inverse, momentum, found)
+    _find_spins(orientation, inertia_inverse, momentum, found)
     return found
 
 
@@ -51,24 +56,33 @@ def _matrix(matrices: ti.template(), i):
     return found
 
 
+@ti.func
+def _rotation(rows: ti.template(), i):
+    return rotation_matrix(vec4(rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3]))
+
+
 @ti.kernel
-def _turn(
-    orientation: _ROWS, spin: _ROWS, inertia: _MATRICES, rotation: _MATRICES, momentum: _ROWS
-):
+def _find_momenta(orientation: _ROWS, spin: _ROWS, inertia: _MATRICES, found: _ROWS):
     for i in range(spin.shape[0]):
-        turn = vec4(orientation[i, 0], orientation[i, 1], orientation[i, 2], orientation[i, 3])
-        axes = rotation_matrix(turn)
-        own = transposed_matvec(axes, _vector(spin, i))
-        found = matvec(axes, matvec(_matrix(inertia, i), own))
+        rotation = _rotation(orientation, i)
+        own = transposed_matvec(rotation, _vector(spin, i))
+        momentum = matvec(rotation, matvec(_matrix(inertia, i), own))
         for r in ti.static(range(3)):
-            momentum[i, r] = found[r]
-            for c in ti.static(range(3)):
-                rotation[i, r, c] = axes[r, c]
+            found[i, r] = momentum[r]
 
 
 @ti.kernel
-def _find_spins(rotation: _MATRICES, inertia_inverse: _MATRICES, momentum: _ROWS, found: _ROWS):
+def _find_rotations(orientation: _ROWS, found: _MATRICES):
+    for i in range(orientation.shape[0]):
+        rotation = _rotation(orientation, i)
+        for r, c in ti.static(ti.ndrange(3, 3)):
+            found[i, r, c] = rotation[r, c]
+
+
+@ti.kernel
+def _find_spins(orientation: _ROWS, inertia_inverse: _MATRICES, momentum: _ROWS, found: _ROWS):
     for i in range(momentum.shape[0]):
-        spin = spin_of(_matrix(rotation, i), _matrix(inertia_inverse, i), _vector(momentum, i))
+        inverse = _matrix(inertia_inverse, i)
+        spin = spin_of(_rotation(orientation, i), inverse, _vector(momentum, i))
         for r in ti.static(range(3)):
             found[i, r] = spin[r]

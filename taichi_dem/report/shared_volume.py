@@ -13,6 +13,7 @@ import taichi as ti
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.tetrahedra import points_of_parts
+from taichi_dem.physics.rotation_arrays import rotations
 from taichi_dem.report.readings import Kept, Run
 from taichi_dem.scene import remedy
 
@@ -110,7 +111,7 @@ class SharedVolume(Kept):
     def _now(self):
         """Positions [m] and rotations of the bodies."""
         state, here = self.run.state, slice(self.run.model.body_count)
-        return values(state.position, here), values(state.rotation, here)
+        return values(state.position, here), rotations(values(state.orientation, here))
 
     def corners(self, bodies: Any = slice(None)) -> np.ndarray:
         """Corners of some bodies at present [m], (n, 4, 3)."""

@@ -136,7 +136,7 @@ class ContactLimits:
         if side == 1:
             i, j = j, i
         branch, margin = self.state.position[j] - self.state.position[i], self.margin(i, j)
-        turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
+        turn, offset = place_in(self.state.rotation(i), self.state.rotation(j), branch)
         for k in range(self.store.first[p], self.store.last[p]):
             own, other = self.store.sphere[k][0], self.store.sphere[k][1]
             if side == 1:

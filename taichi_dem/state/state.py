@@ -14,7 +14,8 @@ from taichi_dem.kit.types import mat3, real, vec3
 from taichi_dem.materials.body_materials import MOST
 from taichi_dem.mesh.topology import Topology
 from taichi_dem.physics.fracture import coulomb_limit
-from taichi_dem.physics.rotation_arrays import spins, turned_bodies
+from taichi_dem.physics.rotation import rotation_matrix
+from taichi_dem.physics.rotation_arrays import angular_momenta, rotations, spins
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.state.model import Model
 from taichi_dem.state.tables import Tables
@@ -110,13 +111,13 @@ class State:
     """Motion of the bodies, pending impulses, fracture and the energy account.
 
     position [m], velocity [m/s], orientation (unit quaternion, scalar first), angular_momentum [kg
-    m^2/s] in world axes; rotation (matrix) and spin [rad/s] follow from them and are stored so that
-    neighbours need not compute them. A body's motion is that of its own last tick.
+    m^2/s] in world axes; spin [rad/s] follows from them and is stored so that neighbours need not
+    compute it. A body's motion is that of its own last tick.
     level: step dt0 / 2^level. bound: its criterion, an index into ``step_control.CRITERIA``.
     last_tick: when the body was last advanced. lag: time [s] by which what it has taken of each
     load is behind its position.
     slot: impulse [N s] and its moment about the body's centre [N m s] that face f of body i has
-    gathered since then, entry 4 i + f.
+    gathered since then, or in the last substep where all bonds act in each, entry 4 i + f.
     broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
     carries contact spheres; with contact only.
     bond_heat: energy taken from each bond by dashpots, slip and release [J]; not for elastic bonds.
@@ -142,7 +143,6 @@ class State:
         self.tables = tables
         self.activity = Activity(tables) if tables.on_demand else None
         self.orientation = ti.Vector.field(4, real, shape=n)
-        self.rotation = ti.Matrix.field(3, 3, real, shape=n)
         self.position, self.velocity = (ti.Vector.field(3, real, shape=n) for _ in range(2))
         self.spin, self.angular_momentum = (ti.Vector.field(3, real, shape=n) for _ in range(2))
         self.level, self.bound = (ti.field(ti.i32, shape=n) for _ in range(2))
@@ -203,9 +203,8 @@ class State:
             if part is not None:
                 rows[:] = part
         inertia = values(self.tables.inertia, slice(self.body_count))
-        found = turned_bodies(whole[1], whole[3], inertia)
-        names = (*_GIVEN, "rotation", "angular_momentum")
-        for name, part in zip(names, (*whole, *found)):
+        momenta = angular_momenta(whole[1], whole[3], inertia)
+        for name, part in zip((*_GIVEN, "angular_momentum"), (*whole, momenta)):
             assign(getattr(self, name), part)
 
     @ti.func
@@ -237,11 +236,16 @@ class State:
             self.passed[b][limit] = self.tick[None]
 
     @ti.func
+    def rotation(self, i):
+        """Matrix that turns coordinates of body i into world coordinates."""
+        return rotation_matrix(self.orientation[i])
+
+    @ti.func
     def body_motion(self, i, time, step, since, until):
         """Present motion of body i, for loads in a step [s] from a time: ``BodyMotion``."""
         return BodyMotion(
             position=self.position[i],
-            rotation=self.rotation[i],
+            rotation=self.rotation(i),
             velocity=self.velocity[i],
             spin=self.spin[i],
             time=time,
@@ -285,14 +289,15 @@ class State:
         found = self.stored()
         # The stored spin is that of the orientation before the last turn.
         inverse = values(self.tables.inertia_inverse, slice(self.body_count))
-        found["spin"] = spins(found["rotation"], inverse, found["angular_momentum"])
+        found["spin"] = spins(found["orientation"], inverse, found["angular_momentum"])
         return found
 
     def stored(self) -> dict[str, np.ndarray]:
         """The same arrays with the spin that the fields have, that before the last turn."""
         here = slice(self.body_count)
-        names = (*_GIVEN, "angular_momentum", "rotation", "level")
-        return {name: values(getattr(self, name), here) for name in names}
+        names = (*_GIVEN, "angular_momentum", "level")
+        found = {name: values(getattr(self, name), here) for name in names}
+        return {**found, "rotation": rotations(found["orientation"])}
 
     def fields(self) -> dict[str, ti.Field]:
         """Every field that changes, and those of the bound effects, by name."""

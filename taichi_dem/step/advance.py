@@ -18,7 +18,7 @@ import taichi as ti
 from taichi_dem.kit.products import cross, dot, norm, squared, stacked
 from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.physics.ground import braked_twist, twist_of
-from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, world_tensor
+from taichi_dem.physics.rotation import mean_spin, spin_of, turned, world_tensor
 from taichi_dem.physics.wrench import plus, zero_block
 from taichi_dem.step.bond import BondStep
 from taichi_dem.step.contact_force import ContactForce, TangentialSprings
@@ -100,7 +100,7 @@ class BodyLoads:
             if effect.acts_on(i):
                 total, joined = plus(total, effect.resistance(i)), 1
         if joined == 1:
-            rotation, mass = self.state.rotation[i], self.tables.mass[i]
+            rotation, mass = self.state.rotation(i), self.tables.mass[i]
             velocity, spin = braked_twist(
                 mass,
                 world_tensor(rotation, self.tables.inertia[i]),
@@ -215,9 +215,7 @@ class Advance(BondStep, ContactForce, BodyLoads):
     def _drift(self, i, elapsed, velocity, momentum, spin):
         """Move and turn body i from a spin; note its displacement, and a runaway; wake others."""
         turning = self._turning(i, elapsed, momentum, spin)
-        orientation = turned(self.state.orientation[i], turning, elapsed)
-        self.state.orientation[i] = orientation
-        self.state.rotation[i] = rotation_matrix(orientation)
+        self.state.orientation[i] = turned(self.state.orientation[i], turning, elapsed)
         self.state.position[i] = self.state.position[i] + elapsed * velocity
         self.state.last_tick[i] = self.state.tick[None]
         if ti.static(self.tables.on_demand):
@@ -233,7 +231,7 @@ class Advance(BondStep, ContactForce, BodyLoads):
     def _turning(self, i, elapsed, momentum, spin):
         """World spin in the middle of the step [rad/s], as supports allow."""
         inverse = self.tables.inertia_inverse[i]
-        turning = mean_spin(self.state.rotation[i], inverse, momentum, spin, elapsed)
+        turning = mean_spin(self.state.rotation(i), inverse, momentum, spin, elapsed)
         for effect in ti.static(self.tables.supports):
             if effect.acts_on(i):
                 turning = spin
@@ -247,7 +245,8 @@ class Advance(BondStep, ContactForce, BodyLoads):
             taken = self.state.slot[4 * i + f]
             linear += taken[0:3]
             angular += taken[3:6]
-            self.state.slot[4 * i + f] = 0.0 * taken
+            if ti.static(not self.schedule.every_bond_acts):
+                self.state.slot[4 * i + f] = 0.0 * taken
         if ti.static(self.has_contact):
             pushed, twisted = self.contacts.gather(i)
             linear += pushed
@@ -268,7 +267,7 @@ class Advance(BondStep, ContactForce, BodyLoads):
     @ti.func
     def spin(self, i, momentum):
         """World spin of body i at an angular momentum, in its present orientation."""
-        return spin_of(self.state.rotation[i], self.tables.inertia_inverse[i], momentum)
+        return spin_of(self.state.rotation(i), self.tables.inertia_inverse[i], momentum)
 
     @ti.func
     def allowed(self, i, time, step, velocity, momentum):
@@ -279,7 +278,7 @@ class Advance(BondStep, ContactForce, BodyLoads):
         for effect in ti.static(self.tables.supports):
             if effect.acts_on(i):
                 velocity, momentum = effect.held(
-                    i, time, step, self.state.rotation[i], velocity, momentum
+                    i, time, step, self.state.rotation(i), velocity, momentum
                 )
         return velocity, momentum
 
@@ -297,7 +296,7 @@ class Advance(BondStep, ContactForce, BodyLoads):
             if effect.acts_on(i):
                 before, spun = velocity, momentum
                 velocity, momentum = effect.held(
-                    i, half, elapsed, self.state.rotation[i], velocity, momentum
+                    i, half, elapsed, self.state.rotation(i), velocity, momentum
                 )
                 held = 1
                 if squared(velocity - before) + squared(momentum - spun) > 0.0:

@@ -3,7 +3,7 @@
 import taichi as ti
 
 from taichi_dem.kit.products import cross, dot, squared, stacked, transposed_matvec
-from taichi_dem.kit.types import vec2, vec3
+from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.stability.body_limits import RELEASE
 
@@ -16,8 +16,8 @@ def motion_of(step, b):
     return bond_motion(
         step.tables.bond_frame[b],
         step.state.position[j] - step.state.position[i],
-        step.state.rotation[i],
-        step.state.rotation[j],
+        step.state.rotation(i),
+        step.state.rotation(j),
         step.state.velocity[j] - step.state.velocity[i],
         step.state.spin[i],
         step.state.spin[j],
@@ -125,12 +125,14 @@ class BondStep:
         """Add opposite impulses to master and slave; moment is about the slave's centre."""
         linear = transposed_matvec(motion.axes, impulse)
         angular = transposed_matvec(motion.axes, moment)
-        self._add(slots[0], linear, angular + cross(motion.branch, linear))
-        self._add(slots[1], -linear, -angular)
+        self._push(slots[0], stacked(linear, angular + cross(motion.branch, linear)))
+        self._push(slots[1], stacked(-linear, -angular))
 
     @ti.func
-    def _add(self, slot, linear, angular):
-        self.state.slot[slot] = self.state.slot[slot] + stacked(linear, angular)
+    def _push(self, slot, impulse):
+        if ti.static(not self.schedule.every_bond_acts):
+            impulse += self.state.slot[slot]
+        self.state.slot[slot] = impulse
 
     @ti.func
     def _stored(self, b, motion):
@@ -170,6 +172,8 @@ class BondStep:
         tick = self.state.tick[None]
         self.state.broken_tick[b] = tick
         for side in ti.static(range(2)):
+            if ti.static(self.schedule.every_bond_acts):
+                self.state.slot[slots[side]] = ti.Vector.zero(real, 6)
             if ti.static(self.has_contact):
                 self.state.exposed_tick[slots[side]] = tick
             self.schedule.note_change(slots[side] >> 2)

@@ -137,7 +137,8 @@ class ContactForce:
         i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
         # Most candidates do not touch: tested in the first body's frame, at half the cost.
-        turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
+        rotation = self.state.rotation(i)
+        turn, offset = place_in(rotation, self.state.rotation(j), branch)
         found, scale, m = PairForces(), 1.0, self.tables.pair(i, j)
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
@@ -146,7 +147,7 @@ class ContactForce:
             if ti.static(self.has_limits):
                 found.near_count += ti.cast(self.contacts.law.is_within(near, margin), ti.i32)
             if self.contacts.law.is_within(near, 0.0):
-                met = self.contacts.law.meeting(near, k, self.state.rotation[i])
+                met = self.contacts.law.meeting(near, k, rotation)
                 overlap, normal, arm = met.overlap, met.normal, met.arm
                 velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
                 rate = dot(velocity, normal)
@@ -191,7 +192,7 @@ class ContactForce:
         """Friction on the second sphere and the spring's part of it [N]; energy of slipping [J]."""
         rub, stuck, spent = vec3(0.0), vec3(0.0), 0.0
         if ti.static(self.springs.present):
-            rotation, bound = self.state.rotation[i], self.tables.friction.limit(m, push)
+            rotation, bound = self.state.rotation(i), self.tables.friction.limit(m, push)
             if ti.static(stepping):
                 self.springs.follow(k, rotation, normal, elapsed * slide)
                 spent = self.springs.slip(m, k, rotation, bound, elapsed * slide)

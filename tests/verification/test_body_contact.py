@@ -95,8 +95,9 @@ def test_an_overlap_at_the_start_is_at_rest_until_it_shrinks():
 
 
 @ti.kernel
-def _gap(law: ti.template(), position: ti.template(), rotation: ti.template()) -> ti.f64:
-    turn, offset = place_in(rotation[0], rotation[1], position[1] - position[0])
+def _gap(law: ti.template(), state: ti.template()) -> ti.f64:
+    branch = state.position[1] - state.position[0]
+    turn, offset = place_in(state.rotation(0), state.rotation(1), branch)
     return law.gap(0, 1, turn, offset)
 
 
@@ -109,7 +110,7 @@ def test_bodies_that_move_less_than_their_gap_do_not_touch():
         orientation /= np.linalg.norm(orientation)
         place = placed.model.centre[0] + random.standard_normal(3) * 0.03
         placed.put(place, orientation)
-        gap = _gap(law, state.position, state.rotation)
+        gap = _gap(law, state)
         if gap > 1e-5:
             tried += 1
             for way in (*np.eye(3), *-np.eye(3)):

@@ -70,7 +70,7 @@ class SolvedAdvance(Advance):
 
         The momentum follows from the change of the spin: without impulses it stays, to the bit.
         """
-        velocities, rotation = self.solver.velocities, self.state.rotation[i]
+        velocities, rotation = self.solver.velocities, self.state.rotation(i)
         twist = velocities.twist[i]
         velocity = twist[0:3]
         change = transposed_matvec(rotation, twist[3:6] - self.state.spin[i])
@@ -88,7 +88,7 @@ class SolvedAdvance(Advance):
         """Compute the velocity per impulse of body i in its present orientation."""
         velocities, inverse = self.solver.velocities, self.tables.inertia_inverse[i]
         velocities.lightness[i] = self.tables.mass_inverse[i]
-        velocities.turn[i] = world_tensor(self.state.rotation[i], inverse)
+        velocities.turn[i] = world_tensor(self.state.rotation(i), inverse)
         if ti.static(velocities.has_supports):
             self._support(i)
 

@@ -170,7 +170,7 @@ class BondDashpots:
     @ti.func
     def _refresh(self, b, g, n, i, j, branch):
         dt = self.schedule.step_seconds[0]
-        axes = matmul_transposed(self.tables.bond_frame[b], self.state.rotation[i])
+        axes = matmul_transposed(self.tables.bond_frame[b], self.state.rotation(i))
         along = self.tables.dashpot.traction(b, vec3(1.0, 1.0, 1.0))
         # A trace of the springs keeps the block invertible where a coefficient is zero.
         stiffness = self.tables.bond_stiffness[b]
@@ -179,9 +179,9 @@ class BondDashpots:
         for r, c in ti.static(ti.ndrange(3, 3)):
             scaled[r, c] = axes[r, c] * along[r]
         law = (self.theta[0] * dt * self.tables.unit_area[b]) * transposed_matmul(axes, scaled)
-        block = zero_block()
+        block, rotation = zero_block(), self.state.rotation(j)
         for q in range(3):
-            arm = matvec(self.state.rotation[j], self.tables.vertex_slave[3 * b + q])
+            arm = matvec(rotation, self.tables.vertex_slave[3 * b + q])
             block = plus(block, point_block(arm, law))
         solved = inverse(plus(inverse(block), self.velocities.mobility(i, j, branch)))
         for r, c in ti.static(ti.ndrange(3, 3)):

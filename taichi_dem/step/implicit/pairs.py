@@ -167,7 +167,8 @@ class PairDashpots:
         i, j = pair[0], pair[1]
         dt = self.schedule.step_seconds[0]
         branch = self.state.position[j] - self.state.position[i]
-        turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
+        rotation = self.state.rotation(i)
+        turn, offset = place_in(rotation, self.state.rotation(j), branch)
         ahead, m = dt * self.contacts.approach(i, j), self.tables.pair(i, j)
         if ti.static(self.of_bodies):
             # Bodies have no area of contact before they touch.
@@ -182,7 +183,7 @@ class PairDashpots:
         for k in range(start, self.store.last[p]):
             near = self.contacts.look(k, i, j, turn, offset, ahead, True)
             if self.contacts.law.is_within(near, ahead):
-                met = self.contacts.law.meeting(near, k, self.state.rotation[i])
+                met = self.contacts.law.meeting(near, k, rotation)
                 overlap, normal, arm = met.overlap, met.normal, met.arm - branch
                 self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
                 # Spheres still apart may approach until they touch, at the end of the step.
@@ -202,8 +203,8 @@ class PairDashpots:
                     self.pull[end] = vec3(0.0)
                     if depth > 0.0:
                         way = self._way(i, j, branch, arm, normal, elapsed)
-                        self.springs.follow(k, self.state.rotation[i], normal, way)
-                        self.pull[end] = dt * self.springs.force(m, k, self.state.rotation[i])
+                        self.springs.follow(k, rotation, normal, way)
+                        self.pull[end] = dt * self.springs.force(m, k, rotation)
                 end += 1
             else:
                 self.impulse[k] = vec3(0.0)
@@ -368,7 +369,8 @@ class PairDashpots:
         pair, dt = self.store.body[p], self.schedule.step_seconds[0]
         i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
-        turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
+        rotation = self.state.rotation(i)
+        turn, offset = place_in(rotation, self.state.rotation(j), branch)
         found, m = PairForces(), self.tables.pair(i, j)
         for k in range(self.store.first[p], self.store.last[p]):
             pushed = self.impulse[k] / dt
@@ -376,7 +378,7 @@ class PairDashpots:
             if squared(pushed) > 0.0 or self.contacts.may_meet(k, i, j, 0.0):
                 a, b = self.store.sphere[k][0], self.store.sphere[k][1]
                 near = self.contacts.law.nearest(a, b, turn, offset)
-                met = self.contacts.law.meeting(near, k, self.state.rotation[i])
+                met = self.contacts.law.meeting(near, k, rotation)
                 arm = met.arm - branch
                 found.force += pushed
                 found.moment_i -= cross(met.arm, pushed)
@@ -391,7 +393,7 @@ class PairDashpots:
                 found.dragged += (spring - pressed) * rate
                 rub = pushed - pressed * met.normal
                 if ti.static(self.springs.present):
-                    rub -= self.springs.force(m, k, self.state.rotation[i])
+                    rub -= self.springs.force(m, k, rotation)
                 found.rubbed -= dot(rub, velocity)
                 found.rub += norm(rub)
                 found.bound += self.tables.friction.limit(m, pressed)
@@ -402,7 +404,7 @@ class PairDashpots:
     @ti.func
     def _slip(self, m, p, c, i, j, pressed):
         """Limit a spring in a step; return its impulse [N s] and the energy of slipping [J]."""
-        k, normal, rotation = self.entry[c], self.normal[c], self.state.rotation[i]
+        k, normal, rotation = self.entry[c], self.normal[c], self.state.rotation(i)
         dt = self.schedule.step_seconds[0]
         bound = self.tables.friction.limit(m, pressed) / dt
         way = self._way(i, j, self.branch[p], self.arm[c], normal, self.elapsed[p])

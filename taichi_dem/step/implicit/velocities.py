@@ -139,7 +139,7 @@ class GroundSweeps:
         """
         dt, resistance = self.schedule.step_seconds[0], self.tables.ground[e].resistance(i)
         twist, mass = self.velocities.twist[i], self.tables.mass[i]
-        rotation = self.state.rotation[i]
+        rotation = self.state.rotation(i)
         inertia = world_tensor(rotation, self.tables.inertia[i])
         force, moment = twist_of(
             resistance,

@@ -39,6 +39,8 @@ class Schedule(Members):
     limits: the ``StabilityLimits`` of the bodies, None where the rule needs none. controlled:
     whether they choose the steps, and bodies may be brought to the present between their own times;
     applied_until then holds the time up to which bonds and pairs have applied their impulses.
+    every_bond_acts: whether each that holds does in every substep: its impulse then replaces the
+    last one, which its bodies have taken, instead of being added to it.
     beside: where the pairs of a body begin, their slots, and the place of the other body in them.
     level_limit: largest difference of levels between neighbours. evaluations: substeps, bodies
     advanced, bonds and pairs evaluated, and the bonds and pairs that one step for all would have
@@ -54,6 +56,7 @@ class Schedule(Members):
         self.sleeps = tables.on_demand
         self.sleeping = Sleeping(tables, state) if self.sleeps else None
         self.controlled, self.uniform = method.control is not None, method.uniform
+        self.every_bond_acts = self.uniform and not self.controlled and not self.sleeps
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
         self.store, self.has_contact = getattr(contacts, "store", None), contacts is not None
         self.beside: tuple = ()
