@@ -33,7 +33,7 @@ class BondProbe:
         self.centre = self.model.centre
         self._slots = values(self.tables.bond_slots, 0)
         fields = self.state.fields()
-        ends = "_unit", "_slip", "broken_tick", "exposed_tick", "bond_heat"
+        ends = "_unit", "_slip", "broken_tick", "exposed_tick", "bond_drag", "bond_heat"
         self._changing = [(f, values(f)) for name, f in fields.items() if name.endswith(ends)]
 
     def reset(self):
@@ -80,7 +80,9 @@ class BondProbe:
     @property
     def heat(self):
         """Energy taken by dashpots, slip and release [J]."""
-        return values(self.state.bond_heat, 0)
+        drag = getattr(self.state, "bond_drag", None)
+        taken = 0.0 if drag is None else values(drag, 0)
+        return np.array([taken, *values(self.state.bond_heat, 0)])
 
     @property
     def broken(self):

@@ -207,10 +207,11 @@ class Readings:
     @ti.func
     def _visit_bond(self, table: ti.template(), b):
         table[b, 0] = self.advance.bond_energy(b)
-        if ti.static(self.tables.has_bond_heat):
-            for k in ti.static(range(3)):
-                table[b, 1 + k] = self.state.bond_heat[b][k]
-            table[b, 1] = table[b, 1] + self.half_step.bond_heat(b)
+        if ti.static(self.advance.has_dashpot):
+            table[b, 1] = self.state.bond_drag[b] + self.half_step.bond_drag(b)
+        if ti.static(not self.tables.bond.is_null):
+            for k in ti.static(range(2)):
+                table[b, 2 + k] = self.state.bond_heat[b][k]
         holds = self.state.broken_tick[b] < 0
         for q in range(3):
             u = 3 * b + q

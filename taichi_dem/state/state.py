@@ -120,7 +120,8 @@ class State:
     gathered since then, or in the last substep where all bonds act in each, entry 4 i + f.
     broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
     carries contact spheres; with contact only.
-    bond_heat: energy taken from each bond by dashpots, slip and release [J]; not for elastic bonds.
+    bond_drag: energy taken from each bond by its dashpots [J], bond_heat: by slip and by release;
+    where bonds have dashpots, or a law. The first changes in every step, the second seldom.
     contact_heat: energy taken by sphere dashpots and by friction, and energy injected by releases
     [J], booked to the first body of a pair; with contact only. injected_tick: last tick whose
     releases have been booked there.
@@ -151,8 +152,10 @@ class State:
             self.lag = ti.Vector.field(len(tables.loads), real, shape=n)
         self.slot = ti.Vector.field(6, real, shape=tables.capacity.faces)
         self.broken_tick = ti.field(ti.i64, shape=bonds)
-        if tables.has_bond_heat:
-            self.bond_heat = ti.Vector.field(3, real, shape=bonds)
+        if tables.dashpot.name:
+            self.bond_drag = ti.field(real, shape=bonds)
+        if not tables.bond.is_null:
+            self.bond_heat = ti.Vector.field(2, real, shape=bonds)
         if tables.has_contact:
             self.exposed_tick = ti.field(ti.i64, shape=tables.capacity.faces)
             self.contact_heat = ti.Vector.field(3, real, shape=n)

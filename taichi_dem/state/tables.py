@@ -59,7 +59,6 @@ class Tables:
         self.loads, self.supports, self.ground = (tuple(by_role[role]) for role in MANY)
         self.effects = tuple(effect for role in ROLES for effect in by_role[role])
         self.has_contact = self.contact is not None
-        self.has_bond_heat = bool(self.dashpot.name) or not bond.is_null
         if self.has_contact:
             self._declare_spheres(self.capacity)
 

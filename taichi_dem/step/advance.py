@@ -170,7 +170,6 @@ class Advance(BondStep, ContactForce, BodyLoads):
         self.has_dashpot = bool(tables.dashpot.name)
         self.limits, self.has_limits = schedule.limits, schedule.has_limits
         self.limited = self.has_limits and schedule.limits.limited
-        self.has_heat = self.has_dashpot or tables.bond.rubs
 
     @ti.func
     def body(self, i):

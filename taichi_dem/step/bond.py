@@ -66,21 +66,30 @@ class BondStep:
             area = self.tables.unit_area[b]
             if failed == 0:
                 self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
-                if ti.static(self.has_heat):
-                    heat = area * vec3(dragged * dt, slipped, 0.0)
-                    self.state.bond_heat[b] = self.state.bond_heat[b] + heat
+                if ti.static(self.has_dashpot):
+                    self._book_drag(b, area * (dragged * dt))
+                if ti.static(self.tables.bond.rubs):
+                    if slipped != 0.0:
+                        self._book_heat(b, area * vec2(slipped, 0.0))
                 if ti.static(self.solves_bonds):
                     self.solver.bonds.begin(b, i, j, motion.branch)
             else:
-                if ti.static(self.tables.has_bond_heat):
-                    heat = area * vec3(0.0, slipped, self._stored(b, motion))
-                    if ti.static(self.solves_bonds):
-                        # Booked for the step before: it was full, though a unit fails now.
-                        heat[0] = dragged * (area * dt)
-                    self.state.bond_heat[b] = self.state.bond_heat[b] + heat
+                if ti.static(self.has_dashpot and self.solves_bonds):
+                    # Booked for the step before: it was full, though a unit fails now.
+                    self._book_drag(b, dragged * (area * dt))
+                if ti.static(not self.tables.bond.is_null):
+                    self._book_heat(b, area * vec2(slipped, self._stored(b, motion)))
                 self._release(b, slots)
                 if ti.static(self.solves_bonds):
                     self.solver.bonds.end(b)
+
+    @ti.func
+    def _book_drag(self, b, energy):
+        self.state.bond_drag[b] = self.state.bond_drag[b] + energy
+
+    @ti.func
+    def _book_heat(self, b, energies):
+        self.state.bond_heat[b] = self.state.bond_heat[b] + energies
 
     @ti.func
     def by_law(self, m, b, u, stiffness, opening):

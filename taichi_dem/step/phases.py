@@ -222,7 +222,9 @@ class SolvedStep(Step):
     @ti.func
     def undo(self, b):
         """Book no heat of bond b, whose evaluation booked a step before the start."""
-        if ti.static(self.advance.tables.has_bond_heat):
+        if ti.static(self.advance.has_dashpot):
+            self.state.bond_drag[b] = 0.0 * self.state.bond_drag[b]
+        if ti.static(not self.advance.tables.bond.is_null):
             self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
         if ti.static(self.schedule.sleeps and self.advance.solver.has_bonds):
             if self.schedule.bonds.key[b] < 0:

@@ -29,7 +29,7 @@ NAMES = {
 }
 #: What must have the same bits.
 BITS = (
-    "position velocity orientation angular_momentum broken_tick bond_heat contact_heat "
+    "position velocity orientation angular_momentum broken_tick bond_drag bond_heat contact_heat "
     "load_work load_impulse softening_unit shear_slip_slip"
 ).split()
 

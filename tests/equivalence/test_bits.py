@@ -32,8 +32,8 @@ STEPS = 2700
 HELD = Multirate(dt0=1e-8, distance=2e-7)
 #: What a run says about the bodies and bonds, not about candidate lists.
 MOTION = (
-    "position velocity orientation angular_momentum level last_tick broken_tick bond_heat "
-    "load_work load_impulse softening_unit shear_slip_slip"
+    "position velocity orientation angular_momentum level last_tick broken_tick bond_drag "
+    "bond_heat load_work load_impulse softening_unit shear_slip_slip"
 ).split()
 
 

@@ -101,7 +101,7 @@ class HalfStep:
         return velocity, momentum, account
 
     @ti.func
-    def bond_heat(self, b):
+    def bond_drag(self, b):
         """Energy [J] by which the booked heat of a bond's dashpots is behind the present."""
         heat = 0.0
         if ti.static(self.advance.has_dashpot and self.staggered):
