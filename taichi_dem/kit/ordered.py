@@ -154,12 +154,14 @@ class Chunks(Places):
     @ti.func
     def count(self, low):
         """Number of chunks."""
-        number = self.members.count(0)
-        count = ti.min(number, 1)
+        count = self.fewest
         if ti.static(self.most > 1):
+            number = self.members.count(0)
             size = self._size(number)
-            count = (number + size - 1) // size
-        return ti.max(count, self.fewest)
+            count = ti.max((number + size - 1) // size, count)
+        elif ti.static(self.fewest == 0):
+            count = ti.min(self.members.count(0), 1)
+        return count
 
     @ti.func
     def _size(self, number):
@@ -303,7 +305,9 @@ class CountingSort:
         """Place of a chunk and a key in ``counts``."""
         if ti.static(self.falling):
             key = self.keys - 1 - key
-        return key * self.chunks.count(0) + c
+        if ti.static(self.chunks.most > 1):
+            key = key * self.chunks.count(0) + c
+        return key
 
     @ti.func
     def tally(self, c):
@@ -325,9 +329,11 @@ class CountingSort:
     def _begin(self, at, before, value):
         """Take over where the members of a chunk and key begin."""
         self.counts[at] = before[0]
-        chunks = self.chunks.count(0)
-        if at % chunks == chunks - 1:
+        chunks, key = 1, at
+        if ti.static(self.chunks.most > 1):
+            chunks = self.chunks.count(0)
             key = at // chunks
+        if at == key * chunks + chunks - 1:
             if ti.static(self.falling):
                 key = self.keys - 1 - key
             self.end(key, before[0] + value[0])

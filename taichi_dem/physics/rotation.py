@@ -32,14 +32,15 @@ def quaternion_product(p, q):
 @ti.func
 def rotation_matrix(q):
     """Matrix that turns body coordinates into world coordinates, for a unit quaternion q."""
-    xx, yy, zz = q[1] * q[1], q[2] * q[2], q[3] * q[3]
-    xy, xz, yz = q[1] * q[2], q[1] * q[3], q[2] * q[3]
-    wx, wy, wz = q[0] * q[1], q[0] * q[2], q[0] * q[3]
+    axis = q.yzw
+    squares, products, turns = axis * axis, axis * axis.yzx, q[0] * axis.zxy
+    diagonal = 1.0 - 2.0 * (squares.yzx + squares.zxy)
+    above, below = 2.0 * (products - turns), 2.0 * (products + turns)
     return mat3(
         [
-            [1.0 - 2.0 * (yy + zz), 2.0 * (xy - wz), 2.0 * (xz + wy)],
-            [2.0 * (xy + wz), 1.0 - 2.0 * (xx + zz), 2.0 * (yz - wx)],
-            [2.0 * (xz - wy), 2.0 * (yz + wx), 1.0 - 2.0 * (xx + yy)],
+            [diagonal[0], above[0], below[2]],
+            [below[0], diagonal[1], above[1]],
+            [above[2], below[1], diagonal[2]],
         ]
     )
 
