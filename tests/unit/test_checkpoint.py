@@ -10,10 +10,24 @@ import pytest
 
 import ca_damper
 import taichi_dem
-from taichi_dem import CONCRETE, At, Checkpoint, Collector, InputError, Scene, Uniform, simulate
+from taichi_dem import (
+    CONCRETE,
+    At,
+    Checkpoint,
+    Collector,
+    ImplicitDashpots,
+    InputError,
+    Scene,
+    Simulation,
+    Uniform,
+    effects,
+    simulate,
+)
 from taichi_dem.kit.checkpoint import Interrupted, read_checkpoint, write_checkpoint
+from taichi_dem.kit.field_memory import fields_of
 from taichi_dem.kit.restart import CheckpointWriter
-from taichi_dem.mesh.shapes import pair
+from taichi_dem.mesh.shapes import bar, pair
+from tests.scenes import paper_effects
 
 IDENTITY = {"version": "1", "mesh": "a cube"}
 ARRAYS = {"field/a.b": np.arange(12.0).reshape(4, 3), "part/none": np.zeros((0, 2))}
@@ -33,6 +47,16 @@ def test_what_is_written_comes_back_bit_by_bit(path):
     for name, array in ARRAYS.items():
         assert arrays[name].dtype == array.dtype
         assert np.array_equal(arrays[name], array)
+
+
+def test_fields_are_named_by_attributes_but_for_lanes():
+    """A list of fields on the way to them would rename what a checkpoint of before has."""
+    given = bar(0.1, 0.05, (2, 1, 1)), CONCRETE, paper_effects(kind=effects.SphereContact)[:-1]
+    engine = Simulation(Scene(*given), ImplicitDashpots(4e-7)).engine
+    names = [field.name for field in fields_of(engine) if field.kind == "saved"]
+    numbered = {name for name in names if any(part.isdigit() for part in name.split("."))}
+    assert numbered == {f"advance.solver.bonds.{row}.{n}" for row in "abc" for n in range(3)}
+    assert {"state.position", "schedule.evaluations", "contacts.store.body"} <= set(names)
 
 
 #: Whose representation tells a checkpoint which run it is of.
