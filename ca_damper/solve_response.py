@@ -16,12 +16,14 @@ from ca_damper.accuracy.estimate import STEP_ORDER, Estimate
 from ca_damper.accuracy.job import Job, Stage
 from ca_damper.accuracy.runs import SceneRuns
 from ca_damper.accuracy.search import Search
+from ca_damper.automaton import Automaton
 from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import Filling, check_filling
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
 from ca_damper.report.progress import OpenEnded
 from ca_damper.runs.response import Grid
+from ca_damper.spheres import Spheres
 from taichi_dem.kit.bars.answer import (
     Answer,
     ErrorParts,
@@ -31,6 +33,7 @@ from taichi_dem.kit.bars.answer import (
     cost_curve,
     doubted,
 )
+from taichi_dem.kit.bars.budget import Source
 from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.bars.step import step_part
 from taichi_dem.kit.display import counted
@@ -46,6 +49,9 @@ _SHORTER = 1.5
 _ONE_SEED = (
     "the spread from seed to seed was not measured and is not in the bar: two seeds or more show it"
 )
+
+#: The other kind of grains, whose answer tells what a filling leaves out.
+_OTHER: dict[type, type] = {Automaton: Spheres, Spheres: Automaton}
 
 
 def solve_response(
@@ -194,6 +200,7 @@ def _answer(done: Search, found: Estimate) -> Answer:
         plan=_plan(done),
         result=done.readings.response(done.ratios_of(goal), seeds, done.at.dt),
         shortfall=found.shortfall(job.tolerance, done.ended),
+        sources=_sources(done, parts),
     )
     clusters = found.clusters(job.tolerance)
     if len(clusters) > 1:
@@ -205,6 +212,21 @@ def _answer(done: Search, found: Estimate) -> Answer:
     if job.is_drawn and len(seeds) == 1:
         made = doubted(made, _ONE_SEED)
     return replace(made, cost_curve=_cost_curve(done, made))
+
+
+def _sources(done, parts):
+    """Sources of error: those of the bar, and the filling, which no seed or step can tell."""
+    seeds, cycles = counted(len(done.at.seeds), "seed"), counted(done.longest(), "cycle")
+    found = [
+        Source("step", parts.step, f"{done.at.dt:.3g} s and longer ones", done.runs.cpu_s),
+        Source("chance", parts.chance, seeds, 0.0),
+        Source("sampling", parts.sampling, f"up to {cycles}, and what is left of the start", 0.0),
+    ]
+    other = _OTHER.get(type(done.job.filling))
+    if other is not None:
+        words = f"not measured: ask the same of {other.__name__}()"
+        found.append(Source("filling", math.nan, words, done.runs.cpu_s))
+    return tuple(found)
 
 
 def _told(goal, value, parts):

@@ -1,14 +1,27 @@
 """An output of a scene to a tolerance: the program chooses method and step, and gives a bar."""
 
 import math
+from collections.abc import Iterable
 
 from taichi_dem.accuracy.runs import Job
 from taichi_dem.accuracy.search import Search
+from taichi_dem.accuracy.sources import MEASURED
 from taichi_dem.goals import Goal
 from taichi_dem.kit.bars.answer import Answer, Plan, known_partings
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress import Listener
 from taichi_dem.kit.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive, whole
+from taichi_dem.kit.validation import (
+    AUTO,
+    SMALLEST,
+    between,
+    choice,
+    instance,
+    positive,
+    several,
+    whole,
+)
+from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.scene import Scene, kind_of
 
 
@@ -21,6 +34,8 @@ def solve(
     confidence: float = 0.95,
     budget_s: float | None = None,
     plan: Plan | None = None,
+    sources: Iterable[str] = ("step",),
+    meshes: Iterable[Mesh] | None = None,
     progress: Listener | str | None = AUTO,
 ) -> Answer:
     """Output of a scene at a time, with an error bar as narrow as asked.
@@ -42,14 +57,20 @@ def solve(
     plan : Plan, optional
         Plan of the answer to a question of a similar scene: begin at the steps that were enough
         there.
+    sources : iterable of str, default ("step",)
+        Sources of error that are measured, and so in the bar: ``"step"``, always; ``"contact"``,
+        against a contact law of finer resolution; ``"mesh"``, over other meshes. Others are named
+        as not measured.
+    meshes : iterable of Mesh, optional
+        Other meshes of the same body and size, at least two, for the source ``"mesh"``.
     progress : callable or str or None, default "auto"
         As in ``simulate``.
 
     Returns
     -------
     Answer
-        Value, error bar and cost; ``shortfall`` says why a bar is wider than asked, and what would
-        help.
+        Value, error bar, its sources and cost; ``shortfall`` says why a bar is wider than asked,
+        and what would help.
 
     Raises
     ------
@@ -71,9 +92,26 @@ def solve(
     between("confidence", confidence, SMALLEST, math.nextafter(1.0, 0.0))
     budget = math.inf if budget_s is None else positive("budget_s", budget_s)
     first = 0 if plan is None else whole("begin of plan", instance("plan", plan, Plan).begin, 0, 99)
-    job = Job(scene, until, goal, tolerance, confidence)
+    named = _sources(sources)
+    others = () if meshes is None else several("meshes", meshes, _mesh)
+    if ("mesh" in named) != bool(others) or len(others) == 1:
+        raise InputError(
+            "meshes must be two or more where sources name the mesh, and none elsewhere, "
+            f"got {len(others)} and sources {', '.join(named)}"
+        )
+    job = Job(scene, until, goal, tolerance, confidence, named, others)
     with reporting(progress, goal.name) as report_progress:
         answer = Search(job, budget, report_progress, first).answer()
     if math.isfinite(answer.plan.parting_s):
         known_partings[kind_of(scene)] = answer.plan.parting
     return answer
+
+
+def _sources(given):
+    """Names of sources, with that of the step."""
+    found = several("sources", given, lambda name, one: choice(name, one, MEASURED))
+    return tuple(name for name in MEASURED if name in ("step", *found))
+
+
+def _mesh(name, given):
+    return instance(name, given, Mesh)

@@ -12,6 +12,7 @@ from taichi_dem.goals import Goal
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.progress import Listener, Progress
 from taichi_dem.kit.timing import clock
+from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.methods import ImplicitDashpots, Method, Uniform
 from taichi_dem.output.record import Frame
@@ -41,13 +42,18 @@ _FRAMES = 32
 
 @dataclass(frozen=True)
 class Job:
-    """A question. until: end of the run [s]. tolerance: error that is allowed, a share."""
+    """A question. until: end of the run [s]. tolerance: error that is allowed, a share.
+
+    sources: names of those that are measured. meshes: others of the same size.
+    """
 
     scene: Scene
     until: float
     goal: Goal
     tolerance: float
     confidence: float
+    sources: tuple[str, ...] = ("step",)
+    meshes: tuple[Mesh, ...] = ()
 
     @cached_property
     def solves(self) -> bool:
@@ -113,7 +119,7 @@ class Runs:
     """
 
     def __init__(self, job: Job, listen: Listener | None):
-        self.job, self._listen = job, listen
+        self.job, self.listen = job, listen
         self.seconds, self.count, self.failure = 0.0, 0, ""
         self.results: dict[int, Result] = {}
         self.cost: dict[int, float] = {}
@@ -183,9 +189,9 @@ class Runs:
             spent = max(spent - result.report.compile_seconds, result.report.run_cpu_seconds)
         self.seconds, self.count = self.seconds + spent, self.count + 1
         self.cost.setdefault(level, spent)
-        if self._listen is not None:
+        if self.listen is not None:
             share = 1.0 - 1.0 / (1.0 + _GROWTH * self.count)
-            self._listen(Progress(share, self.seconds, "stepping", counted(self.count, "run")))
+            self.listen(Progress(share, self.seconds, "stepping", counted(self.count, "run")))
         return result
 
     def _simulated(self, level, twin, tight, frames, brief):

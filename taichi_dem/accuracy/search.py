@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from taichi_dem.accuracy.runs import Job, Runs
+from taichi_dem.accuracy.sources import Beside
 from taichi_dem.kit.bars.answer import (
     Answer,
     ErrorParts,
@@ -16,8 +18,10 @@ from taichi_dem.kit.bars.answer import (
     cost_curve,
     doubted,
 )
+from taichi_dem.kit.bars.budget import Source
 from taichi_dem.kit.bars.chance import clusters_of, mean_and_deviation, t_quantile
 from taichi_dem.kit.bars.step import StepError, step_error
+from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.validation import told_apart
 from taichi_dem.report.energy_balance import open_account
@@ -60,6 +64,7 @@ class Search:
             self._reduce(parts)
             parts = self._parts()
         job, last = self.job, self.levels[-1]
+        sources, parts = self._budget(parts)
         parting = self.runs.parting(self.twins_at) if parts.chance > self._allowed else math.inf
         words, spent = job.in_words(last), self.runs.seconds - pilot_s
         short = f"{100.0 * job.tolerance:g} % was not reached: {self.why}" if self.why else ""
@@ -74,9 +79,31 @@ class Search:
             result=self.runs.results[last],
             cost_curve=self._cost_curve(),
             shortfall=short,
+            sources=sources,
         )
         made = self._branched(made) if parts.chance > self._allowed else made
         return doubted(made, *self._doubts(self.runs.results[last].report))
+
+    def _budget(self, parts: ErrorParts) -> tuple[tuple[Source, ...], ErrorParts]:
+        """All sources of error, and the parts with those beside the step that were measured.
+
+        No step mends these: where one of them is wider than allowed, that is said.
+        """
+        runs, first, last = self.runs, self.levels[0], self.levels[-1]
+        halves = f"half of a step: {counted(runs.count, 'run')}"
+        twins = counted(self.count, "twin") if self.count else "nothing lets twins part"
+        found = [
+            Source("step", math.hypot(parts.step, parts.solver), halves, runs.seconds),
+            Source("chance", parts.chance, twins, 0.0),
+        ]
+        report = runs.results[last].report
+        beside = Beside(self.job, runs, first, report, lambda more: self._affords(more, first))
+        found += beside.sources()
+        measured = {one.name: one.error for one in found[2:] if one.measured and one.error}
+        for name, error in measured.items():
+            if error > self._allowed and not self.why:
+                self.why = f"the {name} moves it by {self._percent(error)}, which no step mends"
+        return tuple(found), replace(parts, **measured)
 
     def _branched(self, made: Answer) -> Answer:
         """The answer with its branches, where twins come to a few ends; else as it is."""

@@ -32,7 +32,7 @@ from taichi_dem.state.pair_store import PairStore
 
 #: Largest number of parts of an edge, overlap [m2] that counts as none, and distance from which on
 #: the rays to a face are left out at once, as a share of the size of their body.
-_MOST_PARTS, _NONE, _FAR = 8, 1e-28, 0.02
+MOST_PARTS, _NONE, _FAR = 8, 1e-28, 0.02
 
 
 @ti.data_oriented
@@ -92,7 +92,7 @@ class BodyContact(SphereContact):
         neighbours_per_body: int = 192,
         pairs_per_body: int = 48,
     ):
-        self.parts = whole("parts", parts, 2, _MOST_PARTS)
+        self.parts = whole("parts", parts, 2, MOST_PARTS)
         super().__init__(3, outer_faces, skin, neighbours_per_body, pairs_per_body, pairs_per_body)
 
     def numbers(self, material: Material) -> tuple[float, ...]:
@@ -120,7 +120,7 @@ class BodyContact(SphereContact):
         self.volume, self.face_area, self.far = (
             ti.field(real, shape=capacity.bodies) for _ in range(3)
         )
-        self.ends = ti.Vector.field(4, real, shape=4 * _MOST_PARTS**2)
+        self.ends = ti.Vector.field(4, real, shape=4 * MOST_PARTS**2)
         self.end_count, self.least_weight = ti.field(ti.i32, shape=()), ti.field(real, shape=())
 
     def declare_columns(self, store: PairStore) -> None:
@@ -140,7 +140,7 @@ class BodyContact(SphereContact):
         assign(self.volume, volumes(model.mesh))
         assign(self.far, _FAR * np.cbrt(volumes(model.mesh)))
         assign(self.face_area, area.max(axis=1))
-        assign(self.ends, np.concatenate([ends, np.zeros((4 * _MOST_PARTS**2 - len(ends), 4))]))
+        assign(self.ends, np.concatenate([ends, np.zeros((4 * MOST_PARTS**2 - len(ends), 4))]))
         assign(self.end_count, len(ends))
         assign(self.least_weight, ends[ends > 0.0].min())
 

@@ -4,12 +4,16 @@ import math
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import reduce
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from taichi_dem.kit.bars.budget import Source, table
 from taichi_dem.kit.bars.chance import mean_and_deviation, share_error, t_quantile
 from taichi_dem.kit.display import by_fields, counted
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Tolerances of which an answer tells the cost.
 TOLERANCES = (0.1, 0.03, 0.01, 0.003)
@@ -35,12 +39,18 @@ class ErrorParts:
         Spread of runs that differ by one rounding or by their seeds, in the unit of the value.
     sampling : float or ndarray, default 0.0
         Error of the time over which a mean was taken, in the unit of the value.
+    contact : float, default 0.0
+        Error of the resolution of the contact law, in the unit of the value, where it was measured.
+    mesh : float, default 0.0
+        Spread over meshes of one size, in the unit of the value, where it was measured.
     """
 
     step: Values = 0.0
     solver: Values = 0.0
     chance: Values = 0.0
     sampling: Values = 0.0
+    contact: Values = 0.0
+    mesh: Values = 0.0
 
     @property
     def total(self) -> Values:
@@ -182,6 +192,8 @@ class Answer:
         run itself is in doubt. ``""`` where it is neither.
     branches : tuple of Branch, default ()
         Ends to which the runs of a question without a single answer came, the most frequent first.
+    sources : tuple of Source, default ()
+        Sources of error by name, measured or not, with what each has cost or would.
 
     Examples
     --------
@@ -200,6 +212,12 @@ class Answer:
     cost_curve: Sequence[Expense] = ()
     shortfall: str = ""
     branches: tuple[Branch, ...] = ()
+    sources: tuple[Source, ...] = ()
+
+    @property
+    def budget(self) -> "pd.DataFrame":
+        """Sources of error as rows: error, whether the bar has it, how, CPU seconds [s]."""
+        return table(self.sources)
 
     @property
     def error(self) -> Values:
@@ -224,12 +242,18 @@ class Answer:
         return not self.shortfall
 
     def __str__(self):
-        lines = [f"{self._bar()} ({self.parts}); {self.plan}", self.shortfall]
+        lines = [f"{self._bar()} ({self.parts}{self._unmeasured()}); {self.plan}"]
+        lines += [one.in_words(self.unit) for one in self.sources] + [self.shortfall]
         # What the report of the finest run warns of; a Response has none.
         needs = getattr(getattr(self.result, "report", None), "needs", ())
         return "\n".join(filter(None, [*lines, *(f"warning: {need}" for need in needs)]))
 
     __repr__ = __str__
+
+    def _unmeasured(self):
+        """What the bar does not have, in words."""
+        names = [one.name for one in self.sources if not one.measured]
+        return f"; not in it: {', '.join(names)}" if names else ""
 
     def _bar(self):
         if isinstance(self.value, np.ndarray):

@@ -1,0 +1,121 @@
+"""Sources of error beside the step: resolution of the contact law, mesh, what was left out."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from taichi_dem.accuracy.runs import Job, Runs
+from taichi_dem.kit.bars.budget import Source
+from taichi_dem.kit.bars.chance import mean_and_deviation, t_quantile
+from taichi_dem.laws.body_contact import MOST_PARTS, BodyContact
+from taichi_dem.laws.roles import LISTED
+from taichi_dem.laws.sphere_contact import SphereContact
+from taichi_dem.scene import Scene
+
+#: Sources that ``solve`` measures when asked; chance and what is left out are always looked at.
+MEASURED = ("step", "contact", "mesh")
+#: Parts of an edge by which bodies meet that stand for the limit of spheres.
+_FINE = 6
+#: Times that a run with four times the rays takes longer, about.
+_RAYS = 4.0
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Measures what no shorter step mends, by runs at the level of the coarsest one.
+
+    There it is as large, and costs least. runs: those of the question. report: of the finest one.
+    affords: whether the budget lets so many runs be made.
+    """
+
+    job: Job
+    runs: Runs
+    level: int
+    report: Any
+    affords: Callable[[float], bool]
+
+    def sources(self) -> Iterator[Source]:
+        """Those that the scene has: measured where the question asks for it."""
+        law = self.job.scene.effect("contact")
+        if law is not None:
+            yield self._contact(law)
+        yield self._mesh()
+        yield self._left_out()
+
+    def _contact(self, law):
+        """Error of the resolution of the contact law."""
+        if not self.report.pair_evaluations:
+            return Source("contact", 0.0, "no bodies came near", 0.0)
+        finer, share = finer_law(law)
+        if finer is None:
+            return Source("contact", math.nan, "not measured: no finer law is known")
+        words = f"one run with BodyContact(parts={finer.parts})"
+        if not self._measures("contact", _RAYS):
+            return self._unmeasured("contact", words, _RAYS)
+        values, seconds = self._values([with_contact(self.job.scene, finer)])
+        error = share * abs(values[0] - self.runs.value(self.level)) if values else math.inf
+        return Source("contact", error, words if values else f"{words} diverged", seconds)
+
+    def _mesh(self):
+        """Spread over meshes of one size: half-width for the value on one of them."""
+        if not self._measures("mesh", len(self.job.meshes)):
+            return self._unmeasured("mesh", "give other meshes of this size", 2.0)
+        count = f"{len(self.job.meshes) + 1} meshes"
+        values, seconds = self._values(
+            [replace(self.job.scene, mesh=mesh) for mesh in self.job.meshes]
+        )
+        if len(values) < len(self.job.meshes):
+            return Source("mesh", math.inf, f"{count}, a run of which diverged", seconds)
+        spread = mean_and_deviation([self.runs.value(self.level), *values])[1]
+        error = spread * t_quantile(self.job.confidence, len(values))
+        return Source("mesh", error, f"spread over {count}", seconds)
+
+    def _measures(self, name, runs):
+        return name in self.job.sources and self.affords(runs)
+
+    def _unmeasured(self, name, words, runs):
+        seconds = runs * self.runs.cost[self.level]
+        return Source(name, math.nan, f"not measured: {words}", seconds)
+
+    def _values(self, scenes):
+        """Values of scenes whose runs did not diverge, and the CPU time of all [s]."""
+        made = [Runs(replace(self.job, scene=scene), self.runs.listen) for scene in scenes]
+        found = [runs.value(self.level) for runs in made]
+        seconds = sum(runs.seconds for runs in made)
+        return [value for value in found if value is not None], seconds
+
+    def _left_out(self):
+        """What is left out where effects act on demand: nothing, or nobody knows how much."""
+        found = self.report.certificate
+        if found is None:
+            return Source("left out", 0.0, "each listed effect acts in every step", 0.0)
+        if found.holds:
+            return Source("left out", 0.0, "the certificate holds", 0.0)
+        return Source("left out", math.nan, "not measured: the certificate does not hold")
+
+
+def finer_law(law: Any) -> tuple[BodyContact | None, float]:
+    """A contact law of finer resolution, and the error of the given one over their difference.
+
+    The rays of bodies converge with the second power of the parts of an edge. Spheres do not
+    converge to bodies, which are what they stand for.
+    """
+    if isinstance(law, BodyContact):
+        parts = min(2 * law.parts, MOST_PARTS)
+        if parts == law.parts:
+            return None, math.nan
+        lists = law.skin, law.neighbours_per_body, law.pairs_per_body
+        return BodyContact(parts, law.outer_faces, *lists), 1.0 / (1.0 - (law.parts / parts) ** 2)
+    if isinstance(law, SphereContact):
+        return BodyContact(_FINE, law.outer_faces), 1.0
+    return None, math.nan
+
+
+def with_contact(scene: Scene, law: Any) -> Scene:
+    """The scene with another contact law."""
+    if scene.effects.word == LISTED:
+        effects = [law if one.role == law.role else one for one in scene.effects]
+        return replace(scene, effects=effects)
+    loads = [one for one in scene.loads if one.role != law.role]
+    return replace(scene, effects=scene.effects.word, loads=[*loads, law])

@@ -1,0 +1,59 @@
+"""The error budget of an answer: each source of error, measured or not, and its price."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Source:
+    """One source of error of an answer; the bar has those that were measured.
+
+    Parameters
+    ----------
+    name : str
+        Name.
+    error : float or ndarray
+        Half-width of its part of the bar, in the unit of the value; nan where it was not measured.
+    how : str
+        How it was measured, or what would measure it.
+    seconds : float, default nan
+        CPU time that its measure has taken, or would take [s]; nan where that is not known.
+    """
+
+    name: str
+    error: Any
+    how: str
+    seconds: float = math.nan
+
+    @property
+    def measured(self) -> bool:
+        """Whether the bar has it."""
+        return not np.isnan(self.error).any()
+
+    def in_words(self, unit: str) -> str:
+        """A line: name, half-width or nothing, how, and the price."""
+        largest = float(np.abs(self.error).max(initial=0.0)) if self.measured else math.nan
+        bar = f"+-{largest:.2g}{f' {unit}' if unit != '1' else ''}" if self.measured else "?"
+        price = f", {self.seconds:.2g} s" if self.seconds > 0.0 else ""
+        return f"  {self.name:9} {bar:14} {self.how}{price}"
+
+
+def table(sources: Sequence[Source]) -> "pd.DataFrame":
+    """Sources as rows: error, whether the bar has it, how, and CPU seconds, by name."""
+    # Imported here: most answers are printed only, and pandas takes half a second.
+    import pandas as pd
+
+    columns = {
+        "error": [one.error for one in sources],
+        "in_bar": [one.measured for one in sources],
+        "how": [one.how for one in sources],
+        "cpu_s": [one.seconds for one in sources],
+    }
+    return pd.DataFrame(columns, index=pd.Index([one.name for one in sources], name="source"))

@@ -1,0 +1,158 @@
+"""Sources of error beside the step: each is measured by its formula, or named as not measured."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from taichi_dem import CONCRETE, InputError, Scene, effects, goals, solve
+from taichi_dem.accuracy import sources
+from taichi_dem.accuracy.runs import Job
+from taichi_dem.accuracy.sources import Beside, finer_law, with_contact
+from taichi_dem.effects import BodyContact, SphereContact
+from taichi_dem.kit.bars.answer import Answer, ErrorParts, Plan
+from taichi_dem.kit.bars.budget import Source
+from taichi_dem.kit.bars.chance import t_quantile
+from taichi_dem.mesh.shapes import bar
+from tests.accuracy.small_bar import BROKEN_UNTIL, UNTIL, broken_bar, struck_bar
+
+BAR = bar(0.1, 0.05, (2, 1, 1))
+HOLDS = SimpleNamespace(holds=True)
+
+
+def touching(law=None, word=None):
+    """A scene with a contact law."""
+    given = [effects.GasPressure("left", peak=5e6, rise=1e-5), *([law] if law else [])]
+    if word:
+        return Scene(BAR, CONCRETE, word, loads=given)
+    return Scene(BAR, CONCRETE, given)
+
+
+@pytest.fixture
+def found(monkeypatch):
+    """Sources by name of a question whose runs have the values of a formula of their scene."""
+
+    def sources_of(scene, formula, asked=("step",), meshes=(), pairs=1, certificate=None, budget=9):
+        class Runs:
+            seconds, listen, cost = 2.0, None, {0: 1.0}
+
+            def __init__(self, job, listen=None):
+                self.job = job
+
+            def value(self, level):
+                return formula(self.job.scene)
+
+        monkeypatch.setattr(sources, "Runs", Runs)
+        job = Job(scene, UNTIL, goals.kinetic_energy(), 0.01, 0.95, asked, tuple(meshes))
+        report = SimpleNamespace(pair_evaluations=pairs, certificate=certificate)
+        beside = Beside(job, Runs(job), 0, report, lambda runs: runs <= budget)
+        return {one.name: one for one in beside.sources()}
+
+    return sources_of
+
+
+def by_rays(scene):
+    """3 + 0.9 / parts^2: what a law of second order gives; spheres are off by 0.5."""
+    law = scene.effect("contact")
+    return 3.5 if type(law) is SphereContact else 3.0 + 0.9 / law.parts**2
+
+
+@pytest.mark.parametrize("parts", [2, 3, 4, 5])
+@pytest.mark.parametrize("word", ["", "auto", "all"])
+def test_rays_have_the_error_that_their_order_tells(found, parts, word):
+    one = found(touching(BodyContact(parts), word), by_rays, ("step", "contact"))["contact"]
+    assert one.error == pytest.approx(0.9 / parts**2, rel=1e-9)
+    assert one.seconds == 2.0
+
+
+def test_spheres_are_as_far_off_as_bodies_say(found):
+    one = found(touching(SphereContact()), by_rays, ("step", "contact"))["contact"]
+    assert one.error == pytest.approx(abs(3.5 - by_rays(touching(BodyContact(6)))), rel=1e-9)
+
+
+def test_what_cannot_be_measured_is_named(found):
+    """The finest law; a law that nobody refines; a spent budget; other meshes that lack."""
+    scene = touching(BodyContact(sources.MOST_PARTS))
+    assert not found(scene, by_rays, ("step", "contact"))["contact"].measured
+    assert finer_law(object())[0] is None
+    spent = found(touching(BodyContact(3)), by_rays, ("step", "contact"), budget=1)
+    assert not spent["contact"].measured and not spent["mesh"].measured
+    asked = found(touching(BodyContact(3)), by_rays)
+    assert not asked["contact"].measured and asked["contact"].seconds > 1.0
+
+
+def test_contact_is_no_source_where_there_is_none(found):
+    assert "contact" not in found(touching(), lambda scene: 3.0)
+    apart = found(touching(BodyContact(3)), by_rays, pairs=0)
+    assert apart["contact"].measured and apart["contact"].error == 0.0
+
+
+def test_meshes_spread_as_student_says(found):
+    """The half-width for one of n + 1 values that scatter: t of n degrees times their deviation."""
+    sizes = [0.1, 0.12, 0.09, 0.13]
+    meshes = [bar(size, 0.05, (2, 1, 1)) for size in sizes[1:]]
+    one = found(touching(), _length, ("step", "mesh"), meshes)["mesh"]
+    assert one.error == pytest.approx(t_quantile(0.95, 3) * np.std(sizes, ddof=1), rel=1e-9)
+
+
+def _length(scene):
+    return float(np.ptp(scene.mesh.points[:, 0]))
+
+
+def test_runs_that_diverge_leave_no_bound(found):
+    diverging = found(
+        touching(BodyContact(3)),
+        lambda scene: 3.0 if scene.effect("contact").parts == 3 and scene.mesh is BAR else None,
+        ("step", "contact", "mesh"),
+        [bar(0.2, 0.05, (2, 1, 1))] * 2,
+    )
+    assert diverging["contact"].error == diverging["mesh"].error == math.inf
+
+
+@pytest.mark.parametrize("certificate", [None, HOLDS, SimpleNamespace(holds=False)], ids=str)
+def test_a_certificate_that_does_not_hold_is_a_source_without_a_measure(found, certificate):
+    one = found(touching(), lambda scene: 3.0, certificate=certificate)["left out"]
+    assert one.measured == (certificate is None or certificate.holds)
+
+
+@pytest.mark.parametrize("word", ["", "auto"])
+def test_a_scene_with_another_contact_keeps_all_else(word):
+    scene = touching(BodyContact(3), word)
+    other = with_contact(scene, BodyContact(6))
+    assert other.effect("contact").parts == 6 and other.on_demand == scene.on_demand
+    assert [type(one) for one in other.effects] == [type(one) for one in scene.effects]
+
+
+def test_a_bar_names_what_it_does_not_have():
+    listed = Source("step", 0.3, "two runs"), Source("mesh", math.nan, "not measured: ask")
+    plan = Plan("a method", 2, 1.0, 0.0)
+    words = str(Answer("way", "mm", 3.0, ErrorParts(step=0.3), 0.1, 0.95, plan, sources=listed))
+    assert "(step 0.3; not in it: mesh)" in words and "not measured: ask" in words
+
+
+def test_a_bar_is_the_root_of_the_squares_of_its_sources():
+    """Of a real scene; what only the contact breaks is refused in words."""
+    given = {"until": BROKEN_UNTIL, "goal": goals.kinetic_energy(), "progress": None}
+    answer = solve(broken_bar(), tolerance=0.05, sources=["contact"], **given)
+    budget = answer.budget
+    assert budget.index.tolist() == ["step", "chance", "contact", "mesh", "left out"]
+    assert budget.in_bar.tolist() == [True, True, True, False, True]
+    assert answer.error == pytest.approx(np.sqrt((budget.error[budget.in_bar] ** 2).sum()))
+    wide = answer.parts.contact > 0.05 * answer.value
+    assert answer.reached != wide and ("the contact moves it" in answer.shortfall) == wide
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"sources": ["luck"]}, "sources must be one of step, contact, mesh, got 'luck'"),
+        ({"sources": ["mesh"]}, "meshes must be two or more where sources name the mesh"),
+        ({"sources": ["mesh"], "meshes": [BAR]}, "meshes must be two or more"),
+        ({"meshes": [BAR, BAR]}, "and none elsewhere, got 2 and sources step"),
+        ({"sources": ["mesh"], "meshes": ["a mesh"]}, "meshes must be"),
+    ],
+)
+def test_bad_sources_are_refused(given, words):
+    with pytest.raises(InputError, match=words):
+        solve(struck_bar(), until=UNTIL, goal=goals.kinetic_energy(), **given)
