@@ -6,9 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from taichi_dem import goals
-from taichi_dem.accuracy import search
+from taichi_dem import CONCRETE, Scene, goals
+from taichi_dem.accuracy import search, sources
 from taichi_dem.accuracy.runs import Job
+from taichi_dem.effects import BodyContact
+from taichi_dem.mesh.shapes import bar
 from tests.accuracy.small_bar import UNTIL, struck_bar
 
 
@@ -17,10 +19,12 @@ class MadeUpRuns:
 
     formula(level, twin): a value, None for a run that diverges. moved: way of a usual body between
     two levels. events: whether anything broke. certificate: of each run. residual: energy [J] that
-    it leaves unexplained, of 1 J. A run at level k takes 2^k seconds.
+    it leaves unexplained, of 1 J. pairs: evaluations of contacts. A run at level k takes 2^k
+    seconds.
     """
 
-    formula, moved, events, certificate, residual = None, 0.0, False, None, 0.0
+    formula, moved, events, certificate, residual, pairs = None, 0.0, False, None, 0.0, 0
+    listen = None
 
     def __init__(self, job, listen):
         self.seconds, self.count, self.failure = 0.0, 0, "it diverged"
@@ -34,7 +38,7 @@ class MadeUpRuns:
             self.cost[level] = 2.0**level
             report = SimpleNamespace(
                 broken_faces=int(self.events),
-                pair_evaluations=0,
+                pair_evaluations=self.pairs,
                 bond_slip=None,
                 certificate=self.certificate,
                 energy_balance={"kinetic": 1.0, "residual": self.residual},
@@ -129,6 +133,21 @@ def test_an_answer_whose_energy_is_lost_is_not_reached(searched):
         answer = searched(job(), lambda level, twin: 3.0, residual=residual)
         assert answer.reached == reached
     assert "leaves 0.6 J unexplained" in answer.shortfall
+
+
+@pytest.mark.parametrize(("off", "reached"), [(0.02, True), (0.3, False)])
+def test_what_only_a_source_beside_the_step_breaks_is_refused_in_words(
+    searched, monkeypatch, off, reached
+):
+    """Of second order in 1/parts: bodies with twice the rays differ by 3/4 of the error."""
+    formula = staticmethod(lambda level, twin: 3.0 + 0.75 * off)
+    monkeypatch.setattr(sources, "Runs", type("Finer", (MadeUpRuns,), {"formula": formula}))
+    scene = Scene(bar(0.1, 0.05, (1, 1, 1)), CONCRETE, [BodyContact(3)])
+    asked = Job(scene, UNTIL, goals.kinetic_energy(), 0.01, 0.95, ("step", "contact"))
+    answer = searched(asked, lambda level, twin: 3.0, pairs=1)
+    assert answer.error == answer.parts.contact == pytest.approx(off, rel=1e-9)
+    assert answer.reached == reached
+    assert ("the contact moves it by 10 %, which no step mends" in answer.shortfall) != reached
 
 
 def test_the_mean_of_runs_that_scatter_is_found(searched):
