@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from _effects import KNOWN_LISTS, WARM, FrozenBatch, FrozenScene, scene_of
+from _threads import thread_job
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
 from taichi_dem.mesh.shapes import bar
 
@@ -57,3 +58,10 @@ def test_a_frozen_scene_goes_on_with_the_bits_of_its_run_as_often_as_it_is_asked
             broken = run.state.broken()
             assert np.array_equal(frozen.simulation.state.broken(), broken)
     assert run.report().broken_faces > 0
+
+
+def test_a_block_is_stepped_by_one_method_after_another():
+    """All fields are cleared between two, those of the copy in memory too."""
+    found = thread_job("", (2, 1, 1), ["explicit_limited", "implicit"], 1, steps=2, repeats=1)
+    for one in found.values():
+        assert one["bodies"] == 12 and one["bandwidth"] > 0.0
