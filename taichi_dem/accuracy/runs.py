@@ -141,6 +141,12 @@ class Runs:
             self._known[key] = None if result.diverged else self.job.goal.value(result)
         return self._known[key]
 
+    def release(self) -> None:
+        """Give the engine back, which another scene can use; a later run sets up another."""
+        if self._simulation is not None:
+            self._simulation.close()
+        self._simulation = None
+
     def parting(self, level: int) -> float:
         """Time at which a twin has left the run at a level by the tolerance [s]; infinite if never.
 

@@ -80,10 +80,14 @@ class Beside:
 
     def _values(self, scenes):
         """Values of scenes whose runs did not diverge, and the CPU time of all [s]."""
-        made = [Runs(replace(self.job, scene=scene), self.runs.listen) for scene in scenes]
-        found = [runs.value(self.level) for runs in made]
-        seconds = sum(runs.seconds for runs in made)
-        return [value for value in found if value is not None], seconds
+        values, seconds = [], 0.0
+        self.runs.release()
+        for scene in scenes:
+            made = Runs(replace(self.job, scene=scene), self.runs.listen)
+            values.append(made.value(self.level))
+            seconds += made.seconds
+            made.release()
+        return [value for value in values if value is not None], seconds
 
     def _left_out(self):
         """What is left out where effects act on demand: nothing, or nobody knows how much."""

@@ -44,6 +44,9 @@ def found(monkeypatch):
             def value(self, level):
                 return formula(self.job.scene)
 
+            def release(self):
+                """Nothing is held."""
+
         monkeypatch.setattr(sources, "Runs", Runs)
         job = Job(scene, UNTIL, goals.kinetic_energy(), 0.01, 0.95, asked, tuple(meshes))
         report = SimpleNamespace(pair_evaluations=pairs, certificate=certificate)
