@@ -366,7 +366,7 @@ class CountingSort:
 class Grouping:
     """Lists members by many keys: those of key c, in order, at order[first[c]] .. first[c + 1].
 
-    keys, number: lists of all keys and of the members. key_of: function of a member, gives its key.
+    keys, members: lists of both. key_of: function of a member, gives its key.
     named: function of a member, gives what is written for it.
     """
 

@@ -12,7 +12,7 @@ from taichi_dem.accuracy import sources
 from taichi_dem.accuracy.runs import Job
 from taichi_dem.accuracy.sources import Beside, finer_law, with_contact
 from taichi_dem.effects import BodyContact, SphereContact
-from taichi_dem.kit.bars.answer import Answer, ErrorParts, Plan
+from taichi_dem.kit.bars.answer import Answer, Branch, ErrorParts, Plan, branched
 from taichi_dem.kit.bars.budget import Source
 from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.mesh.shapes import bar
@@ -133,6 +133,18 @@ def test_a_bar_names_what_it_does_not_have():
     plan = Plan("a method", 2, 1.0, 0.0)
     words = str(Answer("way", "mm", 3.0, ErrorParts(step=0.3), 0.1, 0.95, plan, sources=listed))
     assert "(step 0.3; not in it: mesh)" in words and "not measured: ask" in words
+
+
+def test_a_branch_keeps_what_was_measured_beside_the_step():
+    """Its bar is the root of the squares of the sources that it names."""
+    listed = [Source(name, 1.0, "runs") for name in ("step", "chance", "contact", "mesh")]
+    parts = ErrorParts(step=0.6, solver=0.8, chance=1.0, contact=1.0, mesh=1.0)
+    plan = Plan("a method", 2, 1.0, 0.0)
+    one = Answer("way", "mm", 3.0, parts, 0.1, 0.95, plan, sources=tuple(listed))
+    ends = (Branch(2.0, 0.1, 0.5, 0.3, (0,)), Branch(4.0, 0.1, 0.5, 0.3, (1,)))
+    found = branched(one, ends, 0.3, "run", "came to {} ends")
+    assert found.error == pytest.approx(np.sqrt((found.budget.error**2).sum()), rel=1e-12)
+    assert found.parts.contact == found.parts.mesh == 1.0 and found.parts.chance == 0.1
 
 
 def test_a_bar_is_the_root_of_the_squares_of_its_sources():

@@ -284,8 +284,11 @@ def branched(
     each = "; ".join(branch.in_words(answer.unit, f"{run}s") for branch in branches)
     words = f"no single number: {total} {ends.format(len(branches))}: {each}"
     first = branches[0]
-    parts = ErrorParts(step=step, solver=answer.parts.solver, chance=first.error)
-    return replace(answer, value=first.value, parts=parts, shortfall=words, branches=branches)
+    parts = replace(answer.parts, step=step, chance=first.error, sampling=0.0)
+    told = {"step": np.hypot(step, parts.solver), "chance": first.error, "sampling": 0.0}
+    sources = tuple(replace(one, error=told.get(one.name, one.error)) for one in answer.sources)
+    kept = replace(answer, value=first.value, parts=parts, sources=sources)
+    return replace(kept, shortfall=words, branches=branches)
 
 
 def branches_of(
