@@ -37,7 +37,7 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-physics test-rest test-experiments test-slow test-quadrants test-gpu attack fuzz lint bench \
+.PHONY: help venv demo test test-physics test-rest test-experiments test-slow test-quadrants test-gpu attack fuzz lint bench coverage \
   gallery lessons docs mesh wheel release-check clean
 
 help: ## print this list
@@ -98,6 +98,9 @@ lint: $(STAMP) ## check style, format and types
 
 bench: $(STAMP) ## measure speed
 	$(BIN)/python experiments/bench.py $(BENCH_OPTIONS)
+
+coverage: $(STAMP) ## ask 120 questions, and count the error bars that hold the truth
+	$(BIN)/python experiments/bar_coverage.py $(COVERAGE_OPTIONS)
 
 gallery: $(STAMP) ## run all experiments and show them on one page (GALLERY_OPTIONS=--quick: minutes)
 	$(BIN)/python experiments/gallery.py $(GALLERY_OPTIONS)

@@ -6,7 +6,7 @@ the step leave a bar that is narrow enough. Nothing begins again that can go on.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,14 +16,13 @@ from ca_damper.accuracy.estimate import STEP_ORDER, Estimate
 from ca_damper.accuracy.job import Job, Stage
 from ca_damper.accuracy.runs import SceneRuns
 from ca_damper.accuracy.search import Search
-from ca_damper.automaton import Automaton
+from ca_damper.accuracy.sources import MEASURED, filling_source, other_filling
 from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import Filling, check_filling
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
 from ca_damper.report.progress import OpenEnded
 from ca_damper.runs.response import Grid
-from ca_damper.spheres import Spheres
 from taichi_dem.kit.bars.answer import (
     Answer,
     ErrorParts,
@@ -32,6 +31,7 @@ from taichi_dem.kit.bars.answer import (
     branches_of,
     cost_curve,
     doubted,
+    with_source,
 )
 from taichi_dem.kit.bars.budget import Source
 from taichi_dem.kit.bars.chance import t_quantile
@@ -40,7 +40,16 @@ from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress import Listener
 from taichi_dem.kit.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive, several, shown
+from taichi_dem.kit.validation import (
+    AUTO,
+    SMALLEST,
+    between,
+    choice,
+    instance,
+    positive,
+    several,
+    shown,
+)
 
 # A run that diverges is repeated at a shorter step so often.
 _MOST_SHORTENED = 6
@@ -49,9 +58,6 @@ _SHORTER = 1.5
 _ONE_SEED = (
     "the spread from seed to seed was not measured and is not in the bar: two seeds or more show it"
 )
-
-#: The other kind of grains, whose answer tells what a filling leaves out.
-_OTHER: dict[type, type] = {Automaton: Spheres, Spheres: Automaton}
 
 
 def solve_response(
@@ -66,6 +72,7 @@ def solve_response(
     ratios: tuple[float, float] | None = None,
     seeds: int | Sequence[int] | None = None,
     plan: Plan | None = None,
+    sources: Iterable[str] = ("step",),
     progress: Listener | str | None = AUTO,
 ) -> Any:
     """Value of one or several goals, with an error bar.
@@ -95,6 +102,9 @@ def solve_response(
     plan : Plan, optional
         Plan of an earlier answer for this filling and as many particles: begin at its step, seeds
         and cycles.
+    sources : iterable of str, default ("step",)
+        Sources of error that are measured, and so in the bar: ``"step"``, always; ``"filling"``,
+        by the same question to grains of the other kind, ``Spheres`` or ``Automaton``.
     progress : callable or str or None, default "auto"
         As in ``frequency_response``.
 
@@ -120,6 +130,7 @@ def solve_response(
     >>> solve_response(Automaton(), particles=30, goal=goals.peak_rms())  # doctest: +SKIP
     """
     check_filling(filling)
+    other = _other(filling, sources)
     oscillator = Oscillator() if oscillator is None else oscillator
     instance("oscillator", oscillator, Oscillator)
     one = Grid(filling, particles, 1.0, 1 if seeds is None else seeds, oscillator, None)
@@ -143,7 +154,55 @@ def solve_response(
         open_ended.end()
     failures = search.runs.failures
     answers = tuple(doubted(_answer(search, found), *failures) for found in estimates)
+    others = _others(question, other, answers, progress)
+    answers = tuple(_with_filling(*pair, filling) for pair in zip(answers, others))
     return answers if isinstance(goal, (list, tuple)) else answers[0]
+
+
+def _other(filling, sources):
+    """Filling that is asked too, None where sources do not name it; InputError where none is."""
+    named = several("sources", sources, lambda name, one: choice(name, one, MEASURED))
+    other = other_filling(filling) if "filling" in named else None
+    if "filling" in named and other is None:
+        raise InputError(
+            "sources must not have 'filling' unless there are grains of another kind, got "
+            f"{shown(filling)}"
+        )
+    return other
+
+
+def _others(question, other, answers, progress):
+    """Answers of the other filling to the same goals, for each the sentence where it has none.
+
+    None for each where it is not asked.
+    """
+    left = question.budget_s - answers[0].plan.seconds
+    if other is None:
+        return [None] * len(answers)
+    if left <= 0.0:
+        return ["the budget is spent"] * len(answers)
+    try:
+        return solve_response(
+            other,
+            particles=question.particles,
+            goal=question.goals,
+            tolerance=question.tolerance,
+            confidence=question.confidence,
+            budget_s=None if math.isinf(left) else left,
+            oscillator=question.oscillator,
+            ratios=question.span,
+            seeds=question.fixed,
+            progress=progress,
+        )
+    except (InputError, SimulationDiverged) as ended:
+        return [f"{type(other).__name__}() has no answer: {ended}"] * len(answers)
+
+
+def _with_filling(answer, other, filling):
+    """The answer with its filling as a source of error, where there is another."""
+    source = filling_source(answer, filling, other)
+    made = answer if source is None else with_source(answer, source)
+    return doubted(made, other) if isinstance(other, str) else made
 
 
 def _stage_of(plan, filling, particles):
@@ -215,18 +274,13 @@ def _answer(done: Search, found: Estimate) -> Answer:
 
 
 def _sources(done, parts):
-    """Sources of error: those of the bar, and the filling, which no seed or step can tell."""
+    """Sources of error that runs of the question show."""
     seeds, cycles = counted(len(done.at.seeds), "seed"), counted(done.longest(), "cycle")
-    found = [
+    return (
         Source("step", parts.step, f"{done.at.dt:.3g} s and longer ones", done.runs.cpu_s),
         Source("chance", parts.chance, seeds, 0.0),
         Source("sampling", parts.sampling, f"up to {cycles}, and what is left of the start", 0.0),
-    ]
-    other = _OTHER.get(type(done.job.filling))
-    if other is not None:
-        words = f"not measured: ask the same of {other.__name__}()"
-        found.append(Source("filling", math.nan, words, done.runs.cpu_s))
-    return tuple(found)
+    )
 
 
 def _told(goal, value, parts):

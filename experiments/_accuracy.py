@@ -4,13 +4,16 @@ import math
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 
 import ca_damper as ca
 import taichi_dem as dem
+from _questions import BlastQuestion, DamperQuestion
 from taichi_dem.accuracy.runs import Job, Runs
 from taichi_dem.kit import study
 from taichi_dem.kit.bars.chance import t_quantile
-from taichi_dem.simulate import result_of
+from taichi_dem.kit.checkpoint import digest, identity_of
+from taichi_dem.simulate import result_of, run_identity
 
 #: A reference: first seed, cycles; its step is so much shorter, less so at a peak of spheres.
 FIRST_SEED, TRANSIENT, MEASURED, QUARTER, PEAK_OF_SPHERES = 1001, 120, 80, 4, 2
@@ -25,7 +28,7 @@ SCANNED, HOPELESS = range(6), 100
 
 
 def reference_values(question, answer):
-    """Independent values whose mean is what the bar should hold, one a seed.
+    """Independent values whose mean is what the bar should hold, one a seed; and their step [s].
 
     Exact for a filling that is a mass and nothing else. Else at a finer step, with other seeds, an
     automaton's peak at half the spacing; of several motions those nearest to the answer.
@@ -34,8 +37,8 @@ def reference_values(question, answer):
     if isinstance(filling, (ca.Empty, ca.RigidMass)):
         mass = question.particles * filling.particle_mass
         if goal.kind == "extreme":
-            return np.array([o.peak(mass)[goal.unit == "m"]])
-        return np.array([float(o.rms(goal.ratios[0] * o.natural_frequency, mass))])
+            return np.array([o.peak(mass)[goal.unit == "m"]]), 0.0
+        return np.array([float(o.rms(goal.ratios[0] * o.natural_frequency, mass))]), 0.0
     ratios, finer = answer.result.ratios, QUARTER
     if goal.kind == "extreme" and isinstance(filling, ca.Spheres):
         finer = PEAK_OF_SPHERES
@@ -53,7 +56,7 @@ def reference_values(question, answer):
         values = np.concatenate([values, _values_of(found, goal, answer)])
         if values.std() <= SHARP * answer.error * math.sqrt(len(values)):
             break
-    return values
+    return values, job["dt"]
 
 
 def _values_of(found, goal, answer):
@@ -102,47 +105,114 @@ def answered(question, repeats=2):
     return answer, min(spent)
 
 
-def judged_blast(question):
-    """A question to the blast answered, beside the value at a step 16 times finer.
+def asked_blast(question):
+    """Answer to a question to the blast, CPU time [s], step of the truth [s], and its measure."""
+    answer, seconds = answered(question, 1)
+    job, level = job_of(question), answer.plan.begin + 1 + FINER
+    step = job.method(level).dt0
 
-    None where one of them is refused: a bar that is crushed to rubble fills its lists.
+    def measure():
+        true = Runs(job, None).value(level)
+        return math.nan if true is None else true, 0.0, step
+
+    return answer, seconds, step, measure
+
+
+def asked_damper(question):
+    """The same of a question to the damper: the mean of finer runs with other seeds."""
+    answer = ca.solve_response(**question.arguments())
+
+    def measure():
+        true, step = reference_values(question, answer)
+        count, doubt = len(true), 0.0
+        if count > 1:
+            doubt = t_quantile(0.95, count - 1) * float(true.std(ddof=1)) / math.sqrt(count)
+        return float(true.mean()), doubt, step
+
+    spheres_peak = isinstance(question.filling, ca.Spheres) and question.goal.kind == "extreme"
+    finer = PEAK_OF_SPHERES if spheres_peak else QUARTER
+    return answer, answer.plan.seconds, float(answer.result.dt.max()) / finer, measure
+
+
+#: How each kind of question is asked.
+ASKED = {BlastQuestion: asked_blast, DamperQuestion: asked_damper}
+
+
+class References:
+    """True values by battery and number, with the step of the runs that gave them.
+
+    path: of those that are kept.
+    """
+
+    def __init__(self, path):
+        self.kept = pd.read_csv(path, index_col=["battery", "number"]) if path.exists() else None
+        self.used = {}
+
+    def of(self, battery, number, question):
+        """Function (step, bar, measure): true value and half-width of its own bar.
+
+        step: of the runs at most [s]. bar: half-width of the answer, at most as wide as which that
+        of the truth may be. measure: makes the runs, where none that are kept will do: true value,
+        half-width, and step.
+        """
+
+        def known(step, bar, measure):
+            content, found = content_of(question), None
+            if self.kept is not None and (battery, number) in self.kept.index:
+                row = self.kept.loc[(battery, number)]
+                fine = row.step <= (1.0 + 1e-9) * step
+                sharp = not row.doubt > bar
+                found = row if row.content == content and fine and sharp else None
+            if found is None:
+                true, doubt, fine = measure()
+                told = {"content": content, "question": str(question)}
+                found = {**told, "step": fine, "true": true, "doubt": doubt}
+            self.used[battery, number] = dict(found)
+            return found["true"], found["doubt"]
+
+        return known
+
+    def write(self, path):
+        """Write those that were asked for, and the others that are kept."""
+        kept = {} if self.kept is None else self.kept.to_dict("index")
+        rows = [[*key, *row.values()] for key, row in sorted({**kept, **self.used}.items())]
+        study.write_rows(path, rows, "battery number content question step true doubt")
+
+
+def content_of(question):
+    """A word for all that a question is made of."""
+    if isinstance(question, BlastQuestion):
+        identity = run_identity(question.scene, job_of(question).method(0))
+        parts = [words for name, words in identity.items() if name != "version"]
+        return digest([str(question), *parts])
+    parts = question.filling, question.oscillator
+    return digest([str(question), *map(identity_of, parts)])
+
+
+def measured(step, bar, measure):
+    """The truth as runs made for it give it, see ``References.of``."""
+    return measure()[:2]
+
+
+def judged(question, reference=measured):
+    """An answer beside the truth; None where the question is refused.
+
+    reference: as ``measured``. deviation: how far the value is off, in half-widths of the bar
+    and of what is not known of the truth. single: whether both are one number.
     """
     try:
-        answer, seconds = answered(question)
-        true = Runs(job_of(question), None).value(answer.plan.begin + 1 + FINER)
-    except dem.InputError as refused:
+        answer, seconds, step, measure = ASKED[type(question)](question)
+        true, doubt = reference(step, answer.error, measure)
+    except (dem.InputError, dem.SimulationDiverged) as refused:
         return print(f"left out: {question}: {refused}")
-    return judged("blast", question, answer, seconds, math.nan if true is None else true)
-
-
-def judged_damper(question):
-    """A question to the damper answered, beside the mean of finer runs with other seeds.
-
-    None where its budget ends before there is anything to tell.
-    """
-    try:
-        answer = ca.solve_response(**question.arguments())
-    except dem.InputError:
-        return None
-    true, doubt = reference_values(question, answer), 0.0
-    if len(true) > 1:
-        doubt = t_quantile(0.95, len(true) - 1) * float(true.std(ddof=1)) / math.sqrt(len(true))
-    return judged("damper", question, answer, answer.plan.seconds, float(true.mean()), doubt)
-
-
-def judged(kind, question, answer, seconds, true, doubt=0.0):
-    """An answer beside the true value; doubt: half-width at 95 % of the bar of that.
-
-    deviation: how far it is off, in half-widths of its bar. single: whether it is one number.
-    """
     off, width = float(answer.value) - true, math.hypot(answer.error, doubt)
     far = off / width if width else (math.copysign(math.inf, off) if off else 0.0)
     return SimpleNamespace(
-        **{"kind": kind, "seed": question.seed, "question": str(question), "cpu_s": seconds},
+        **{"question": str(question), "cpu_s": seconds, "parts": str(answer.parts)},
         **{"value": float(answer.value), "error": float(answer.error), "true": true},
         **{"holds": int(abs(off) <= width), "reached": int(answer.reached), "deviation": far},
-        **{"tolerance_percent": 100.0 * question.tolerance, "answer": answer},
-        single=not answer.branches,
+        **{"doubt": doubt, "answer": answer},
+        single=not answer.branches and math.isfinite(width + abs(off)),
     )
 
 

@@ -1,19 +1,21 @@
 """Questions with a tolerance, drawn at random by seeds.
 
-To the blast they ask about bars under gas pressure; to the damper about small scenes with short
-transients, so that a reference at a quarter of the step is affordable.
+To the blast they ask about bars under gas pressure, the paper's block and beams and plates under
+blows; to the damper about small scenes with short transients, so that references are affordable.
 """
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 import ca_damper as ca
 import taichi_dem as dem
+from _meshes import with_moved_nodes
 from ca_damper import goals as damper_goals
-from taichi_dem import effects, goals
+from taichi_dem import effects, goals, shapes
 from taichi_dem.kit.display import counted
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, placed_together, single
@@ -37,13 +39,16 @@ FILLINGS = (
 )
 #: CPU seconds that an answer may take, and a peak of spheres, which are dearer.
 BUDGET_S, PEAK_OF_SPHERES_S = 4.0, 12.0
+#: Of the paper's block: ends of runs, and how far its nodes are moved at most [powers of ten, m].
+BLOCK_LASTS, BLOCK_MOVED = (-4.3, -3.0), (-4.0, -2.6)
+#: Share of the meshes whose bodies are numbered at random, and of those whose nodes are moved.
+RENUMBERED = 0.5
 
 
 @dataclass(frozen=True)
 class BlastQuestion:
     """A question about a scene: the value of a goal at a time [s], to a tolerance."""
 
-    seed: int
     scene: dem.Scene
     until: float
     goal: goals.Goal
@@ -52,11 +57,12 @@ class BlastQuestion:
     def __str__(self):
         bodies = counted(self.scene.mesh.body_count, "body")
         names = " ".join(effect.name for effect in self.scene.effects if effect.name)
-        return f"bar of {bodies} to {self.until:.3g} s: {self.goal.name}; {names}"
+        share = f"{100.0 * self.tolerance:.2g} %"
+        return f"{bodies} to {self.until:.3g} s: {self.goal.name} to {share}; {names}"
 
 
-def blast_question(seed):
-    """The question to the blast with a number."""
+def bar_question(*seed):
+    """A question about a bar of concrete-like bonds under gas pressure on its left end."""
     random = np.random.default_rng(seed)
     mesh, edge = _bar(random)
     stiffer, damped = _power(random, STIFFNESS), _power(random, DAMPING)
@@ -66,12 +72,48 @@ def blast_question(seed):
     constants = {name: stiffer * getattr(dem.CONCRETE, name) for name in springs}
     constants.update({name: damped * getattr(dem.CONCRETE, name) for name in dashpots})
     material = replace(dem.CONCRETE, **constants)
-    wave = np.sqrt(material.normal_stiffness * edge / material.density)
-    travel = float(np.ptp(mesh.points[:, 0]) / wave)
+    travel = float(np.ptp(mesh.points[:, 0])) / _wave_speed(material, edge)
     until = travel * _power(random, LASTS)
     scene = dem.Scene(mesh, material, _effects(random, travel))
     goal = _goal(random, scene)
-    return BlastQuestion(seed, scene, until, goal, _power(random, TOLERANCE))
+    return BlastQuestion(scene, until, goal, _power(random, TOLERANCE))
+
+
+def block_question(*seed):
+    """A question about the paper's block with nodes moved and bodies numbered at random."""
+    random = np.random.default_rng(seed)
+    mesh = dem.read_mesh(dem.PAPER_BLOCK)
+    if random.random() < RENUMBERED:
+        mesh = _renumbered(mesh, random)
+    if random.random() < RENUMBERED:
+        mesh = with_moved_nodes(mesh, _power(random, BLOCK_MOVED), int(random.integers(2**31)))
+    loads = [effects.GasPressure(rise=1.33e-4 * _power(random, (-0.5, 0.3)))]
+    scene = dem.Scene(mesh, dem.CONCRETE, "auto", loads=loads)
+    until = _power(random, BLOCK_LASTS)
+    goal = goals.hole_displacement() if random.random() < 0.5 else _goal(random, scene, "hole")
+    return BlastQuestion(scene, until, goal, _power(random, TOLERANCE))
+
+
+def part_question(*seed):
+    """A question about a beam, plate or cylinder under a short blow on its top."""
+    random = np.random.default_rng(seed)
+    length, element = _power(random, (-1.0, 0.0)), random.uniform(0.3, 0.6)
+    slender = {"width": 0.3 * length, "height": 0.3 * length}
+    element *= 0.3 * length
+    mesh = (
+        partial(shapes.beam, length=length, **slender),
+        partial(shapes.cylinder, radius=0.2 * length, height=length),
+        partial(shapes.plate, width=length, height=0.6 * length, thickness=0.2 * length),
+    )[random.integers(3)](element=element)
+    if random.random() < RENUMBERED:
+        mesh = _renumbered(mesh, random)
+    travel = length / _wave_speed(dem.CONCRETE, element)
+    rise, fall = (travel * _power(random, (-2.0, 0.0)) for _ in range(2))
+    blow = effects.Pressure.triangle("top", _power(random, (6.0, 8.0)), rise, fall)
+    loads = [blow] + ([effects.Fixed("bottom")] if random.random() < FIXED else [])
+    scene = dem.Scene(mesh, dem.CONCRETE, "auto", loads=loads)
+    until = travel * _power(random, LASTS)
+    return BlastQuestion(scene, until, _goal(random, scene, "top"), _power(random, TOLERANCE))
 
 
 def paper_question(until, tolerance):
@@ -79,7 +121,7 @@ def paper_question(until, tolerance):
     scene = dem.Scene(
         dem.read_mesh(dem.PAPER_BLOCK), dem.CONCRETE, "auto", loads=[effects.GasPressure()]
     )
-    return BlastQuestion(0, scene, until, goals.hole_displacement(), tolerance)
+    return BlastQuestion(scene, until, goals.hole_displacement(), tolerance)
 
 
 def dropped_question(until):
@@ -102,7 +144,12 @@ def dropped_question(until):
         effects.Fixed("floor_left"),
     ]
     scene = dem.Scene(placed_together(parts), dem.CONCRETE, chosen)
-    return BlastQuestion(0, scene, until, goals.displacement("base"), 0.01)
+    return BlastQuestion(scene, until, goals.displacement("base"), 0.01)
+
+
+def _wave_speed(material, edge):
+    """Speed of a wave through bodies of an edge [m/s]."""
+    return math.sqrt(material.normal_stiffness * edge / material.density)
 
 
 def _power(random, between):
@@ -138,19 +185,25 @@ def _effects(random, travel):
     return found
 
 
-def _goal(random, scene):
-    """One of the goals that the scene has."""
+def _renumbered(mesh, random):
+    """The mesh with its bodies in another order."""
+    order = random.permutation(mesh.body_count)
+    return checked_mesh(mesh.points, mesh.tetrahedra[order], mesh.groups)
+
+
+def _goal(random, scene, group="left"):
+    """One of the goals that the scene has; group: whose displacement may be one."""
     body = int(random.integers(scene.mesh.body_count))
     choices = [
-        goals.displacement("left"),
+        goals.displacement(group),
         goals.body_displacement(body),
         goals.kinetic_energy(),
+        goals.peak_speed(body),
     ]
-    choices += [goals.peak_speed(body), goals.largest_fragment()]
     if scene.effect("dashpot") is not None:
         choices.append(goals.energy_share("bond_dashpot"))
     if scene.effect("contact") is not None:
-        choices.append(goals.broken_faces())
+        choices += [goals.broken_faces(), goals.largest_fragment()]
     return choices[random.integers(len(choices))]
 
 
@@ -158,7 +211,6 @@ def _goal(random, scene):
 class DamperQuestion:
     """A question to ``solve_response``: goal at a tolerance, of a filling on an oscillator."""
 
-    seed: int
     filling: Any
     particles: int
     oscillator: ca.Oscillator
@@ -167,22 +219,21 @@ class DamperQuestion:
 
     def arguments(self):
         """Arguments of ``solve_response``."""
-        given = {name: value for name, value in vars(self).items() if name != "seed"}
         dear = isinstance(self.filling, ca.Spheres) and self.goal.kind == "extreme"
-        return {**given, "budget_s": PEAK_OF_SPHERES_S if dear else BUDGET_S, "progress": None}
+        return {**vars(self), "budget_s": PEAK_OF_SPHERES_S if dear else BUDGET_S, "progress": None}
 
     def __str__(self):
         o, share = self.oscillator, 100.0 * self.tolerance
         places = f"{o.natural_frequency:.1f} Hz, damping {o.damping_ratio:.3f}"
         return (
-            f"{self.seed}: {self.filling.label} x {self.particles}, {self.goal.name} to "
+            f"{self.filling.label} x {self.particles}, {self.goal.name} to "
             f"{share:.2g} %, {places}, mass {o.mass:.3f} kg, y0 {1e3 * o.base_amplitude:.2f} mm"
         )
 
 
-def damper_question(seed):
-    """The question to the damper with a number."""
-    rng = np.random.default_rng([2604, seed])
+def damper_question(*seed):
+    """A question about a filling on an oscillator that is much like the paper's."""
+    rng = np.random.default_rng([2604, *seed])
     weights = np.array([weight for _, weight in FILLINGS], dtype=float)
     filling = FILLINGS[rng.choice(len(FILLINGS), p=weights / weights.sum())][0]
     most = 20 if isinstance(filling, ca.Spheres) else 40
@@ -199,4 +250,4 @@ def damper_question(seed):
     if not isinstance(filling, (ca.Empty, ca.RigidMass)):
         asked += [damper_goals.loss_factor_at(ratio), damper_goals.apparent_mass_at(ratio)]
     goal = asked[int(rng.integers(len(asked)))]
-    return DamperQuestion(seed, filling, particles, oscillator, goal, tolerance)
+    return DamperQuestion(filling, particles, oscillator, goal, tolerance)

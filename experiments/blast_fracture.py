@@ -87,9 +87,7 @@ def options_parser():
     words = "auto: only where they act; all: everywhere; by default auto"
     made.add_argument("--effects", choices=WORDS, default=WORDS[0], help=words)
     made.add_argument("--compare", action="store_true", help="run it with the paper's contact too")
-    study.add_accuracy(made, "the displacement of the hole")
-    words = "with --accuracy, also measure the error of this source: contact"
-    made.add_argument("--budget", choices=("contact",), help=words)
+    study.add_accuracy(made, "the displacement of the hole", "contact")
     study.add_pictures(made)
     return made
 
@@ -134,8 +132,6 @@ def run(options):
         words = "must be left out with --with and --without: it runs two lists"
         raise dem.InputError(f"compare {words}")
     scene = chosen_scene(options, options.added)
-    if options.budget and options.accuracy is None:
-        raise dem.InputError("budget must be left out without --accuracy, got contact")
     if options.accuracy is not None:
         return run_to_accuracy(scene, options)
     print_quality(scene)
@@ -186,7 +182,7 @@ def run_to_accuracy(scene, options):
     at = study.output_paths(options.out)
     in_a_hole = "hole" in scene.mesh.groups
     goal = dem.goals.hole_displacement() if in_a_hole else dem.goals.kinetic_energy()
-    asked = {"tolerance": options.accuracy, "sources": ["step", options.budget or "step"]}
+    asked = {"tolerance": options.accuracy, "sources": study.accuracy_sources(options)}
     answer = dem.solve(scene, until=options.until, goal=goal, **asked)
     study.show_answer(f"blast, {options.until:g} s", answer)
     study.write_accuracy(options.out, (), [((), answer)])

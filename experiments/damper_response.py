@@ -4,6 +4,7 @@
     python experiments/damper_response.py --fillings ca_static  # the best automaton: a minute
     python experiments/damper_response.py --quick
     python experiments/damper_response.py --accuracy 1%         # the peaks alone, with error bars
+    python experiments/damper_response.py --accuracy 5% --budget filling --fillings dem
 
 Every particle number, frequency and seed is a scene; all scenes of a filling run as one batch.
 Bands are the lowest and highest of the seeds, lines their median. A rigid mass of the particles'
@@ -13,7 +14,8 @@ possible. A quick run takes spheres and the automaton with static contact.
 
 With --accuracy, place and height of the peaks are found to that share of their value: the program
 chooses frequencies, steps, seeds and cycles, whatever the other options say of them, and prints
-each answer with its error bar and what it cost. Nothing else is run then.
+each answer with its error bar and what it cost. With --budget filling the same is asked of grains
+of the other kind, too. Nothing else is run then.
 
 Responses and sweeps save themselves at their end, on Ctrl-C, and as often as --checkpoint-every
 says; the same command with --resume goes on from there and repeats nothing.
@@ -62,7 +64,7 @@ def options_parser():
     """Options of this experiment."""
     made = study.parser(NAME, __doc__, settings=SETTINGS)
     study.add_checkpoints(made)
-    study.add_accuracy(made, "the peaks")
+    study.add_accuracy(made, "the peaks", "filling")
     return made
 
 
@@ -100,6 +102,7 @@ def run_to_accuracy(options):
     for label in options.fillings:
         for n in options.particles:
             job = {"particles": n, "goal": asked, "tolerance": options.accuracy}
+            job["sources"] = study.accuracy_sources(options)
             with ca.ProgressBar(f"{label}, {n} particles") as bar:
                 answers = ca.solve_response(FILLINGS[label], **job, progress=bar)
             for answer in answers:

@@ -38,7 +38,7 @@ class Goal(BaseGoal):
         ``"value"``: at the end. ``"extreme"``: over the run, of which its Results then have a time
         series. ``"count"``: a value that changes in steps, as a whole number does.
     averaged : bool, default False
-        Whether the mean over runs is asked for that differ by one rounding, see ``mean``.
+        Whether the mean over runs is asked for that differ by chance, see ``mean``.
     check : callable or None, optional
         Function of a Scene that raises InputError where the scene lacks what is asked for.
 
@@ -68,7 +68,7 @@ class Goal(BaseGoal):
             )
 
     def mean(self) -> "Goal":
-        """Return the goal of the mean over runs that differ by one rounding.
+        """Return the goal of the mean over runs that differ by chance.
 
         Returns
         -------

@@ -7,6 +7,7 @@ import math
 from typing import Any, NamedTuple
 
 import taichi_dem as dem
+from _meshes import with_moved_nodes
 from _page import png_like_the_first
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, styled
 from taichi_dem.kit.session_thread import session
@@ -18,20 +19,31 @@ UNTIL = 1.2e-4
 #: Tolerances to choose from [%], and the first.
 TOLERANCES, FIRST = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03, 0.01), 3.0
 PAGE, WAIT = "what_an_answer_costs", "Asking."
-ALT = "Answers with their bars, bars and true errors, and CPU time over the error allowed"
+ALT = "Answers with their bars, sources of error, bars and true errors, and CPU time"
 CONTROLS = {"tolerance": (TOLERANCES, FIRST, "largest error that you allow [%]")}
 #: Step of the truth [s], a tenth or less of those of answers to 0.03 %.
 FINEST = 1e-8
+#: Other meshes of the bar, and how far their nodes are moved at most [m]: a tenth of an element.
+MESHES, MOVED = 3, 0.1 * LENGTH / CELLS[0]
 GOAL = dem.goals.displacement("right")
 NANO = 1e6
 
 
 class Asked(NamedTuple):
-    """The answer to a choice, all answers so far by tolerance [%], and the true value [mm]."""
+    """The answer to a choice, all answers so far by tolerance [%], and the true value [mm].
+
+    mesh: the source of error that a step does not mend.
+    """
 
     chosen: Any
     answers: dict
     truth: float
+    mesh: Any
+
+    def shares(self):
+        """Half-widths by source, as shares of the truth [%]."""
+        parts = {"step": self.chosen.error, "mesh": self.mesh.error}
+        return {name: 100.0 * error / self.truth for name, error in parts.items()}
 
     def error(self, tolerance):
         """Error of an answer, a share of the truth."""
@@ -56,6 +68,15 @@ def solved(tolerance):
 
 
 @session.remember
+def mesh_source():
+    """The mesh as a source of error: the spread over meshes of this size."""
+    meshes = [with_moved_nodes(scene().mesh, MOVED, seed) for seed in range(MESHES)]
+    asked = {"tolerance": 0.01 * TOLERANCES[0], "sources": ["mesh"], "meshes": meshes}
+    found = dem.solve(scene(), until=UNTIL, goal=GOAL, **asked, progress=None)
+    return next(one for one in found.sources if one.name == "mesh")
+
+
+@session.remember
 def truth():
     """The value at a step far finer than those of any answer [mm]."""
     method = dem.ImplicitDashpots(FINEST, sweeps=(2, 400), tolerance=1e-9)
@@ -69,7 +90,8 @@ def answer(tolerance):
     # The truth first: it compiles, and no answer's price has that in it.
     true, answers = truth(), session.kept("answers by tolerance", dict)
     answers[nearest] = solved(nearest)
-    return Asked(answers[nearest], dict(sorted(answers.items(), reverse=True)), true)
+    known = dict(sorted(answers.items(), reverse=True))
+    return Asked(answers[nearest], known, true, mesh_source())
 
 
 def compile_all():
@@ -87,7 +109,8 @@ def words(asked):
         f"You allow {100.0 * found.tolerance:g} %. The far end has moved by "
         f"**{value:.{digits}f} ± {error:.{digits}f} nm**, after **{found.plan.runs} runs** and "
         f"**{found.plan.seconds:.2g} s** of one core ({found.plan.method}).{outcome} "
-        f"The truth is **{true:.{digits}f} nm**."
+        f"The truth is **{true:.{digits}f} nm**, of this mesh: others of its size move it by "
+        f"± {asked.shares()['mesh']:.1f} %, which no step mends ({asked.mesh.seconds:.2g} s)."
     )
 
 
@@ -95,9 +118,10 @@ def picture(asked):
     """Values with their bars, bars and errors over what was asked, seconds over it; PNG bytes."""
     with styled(0, size=(10.0, 6.0)) as (figure, _):
         panels = figure.subplot_mosaic(
-            [["values", "values"], ["errors", "price"]], height_ratios=(0.75, 1.0)
+            [["values", "budget"], ["errors", "price"]], height_ratios=(0.75, 1.0)
         )
         _values(panels["values"], asked)
+        _budget(panels["budget"], asked)
         _errors(panels["errors"], asked)
         _price(panels["price"], asked)
         return png_like_the_first(figure, "answer")
@@ -113,9 +137,21 @@ def _values(axes, asked):
     axes.axvline(true, color=GREY, lw=4.0, alpha=0.5, label="truth")
     axes.set_yticks(range(count), [f"{one:g} %" for one in TOLERANCES])
     axes.set(xlabel="far end moved by [nm]", ylabel="error allowed")
-    axes.set(xlim=(0.85 * true, 1.15 * true), ylim=(count - 0.4, -0.6))
-    axes.set_title("each answer with its bar, which holds the truth in 95 of 100 cases")
+    axes.set(xlim=(0.82 * true, 1.18 * true), ylim=(count - 0.4, -0.6))
+    axes.set_title("each answer with its bar, of the step")
     axes.legend(loc="lower left")
+
+
+def _budget(axes, asked):
+    """Half-widths by source of the chosen answer, beside the error allowed."""
+    shares = asked.shares()
+    axes.barh([*shares], [*shares.values()], color=[RED, BLUE])
+    axes.axvline(100.0 * asked.chosen.tolerance, color=GREY, ls=":", label="what you allow")
+    axes.set(xscale="log", xlim=(1e-3, 1e2), xlabel="half-width [%]")
+    axes.set_title("sources of error of the chosen answer")
+    axes.invert_yaxis()
+    axes.minorticks_off()
+    axes.legend(loc="upper right")
 
 
 def _errors(axes, asked):

@@ -1,4 +1,4 @@
-"""Runs of one question: by level of the step, and twins that differ by one rounding."""
+"""Runs of one question: by level of the step, and twins that differ by chance."""
 
 import math
 from dataclasses import dataclass, replace
@@ -29,11 +29,14 @@ _FEWEST, _MOST_TIMES = 8, 64
 #: Sweeps of a step at most, and by how much better they agree to see their error.
 _MOST_SWEEPS, _TIGHT = 1000, 8
 #: Rows of the time series of the coarsest run in which an extreme is looked for, of any run, and of
-#: one without an extreme: its report finds at them what is missing or creeps.
+#: one without an extreme whose report is read: it finds at them what is missing or creeps.
 _ROWS, _MOST_ROWS, _LOOKS = 100, 6400, 4
 _EPSILON = np.finfo(np.float64).eps
 #: How far a twin's bodies are displaced at the start, as a share of the size of the solid.
 _ROUNDING = 1e-12
+#: How many more steps a twin makes at most, as a share, and which part of these each: what breaks
+#: by the luck of when a step ends breaks otherwise, and shares of the golden ratio lie far apart.
+_MORE_STEPS, _GOLDEN = 0.3, 0.5 * (math.sqrt(5.0) - 1.0)
 #: Share of the whole that the first run is taken for.
 _GROWTH = 0.3
 #: Frames of a run, at which twins are compared.
@@ -86,28 +89,31 @@ class Job:
             step = float(step_report(self.scene).borne("solved", "contact").min())
         return step
 
-    def method(self, level: int, tight: bool = False) -> Method:
+    def method(self, level: float, tight: bool = False, twin: int = 0) -> Method:
         """Method at a level, of the longest stable step over 2^level.
 
         tight: whether its sweeps must agree 8 times as well. Sweeps end at differences that fall
-        with the step: one family goes to the exact solution.
+        with the step: one family goes to the exact solution. twin: see ``Runs.value``.
         """
-        step = self.until / (self._coarsest[0] * 2**level)
+        more = 1.0 + _MORE_STEPS * math.fmod(twin * _GOLDEN, 1.0)
+        step = self.until / round(self._coarsest[0] * 2.0**level * more)
         if not self.solves:
             return Uniform(step)
-        finer, coarse = 2**level * (_TIGHT if tight else 1), ImplicitDashpots(step)
+        finer, coarse = 2.0**level * (_TIGHT if tight else 1), ImplicitDashpots(step)
         fewest, most = coarse.sweeps
-        sweeps = fewest, min(_MOST_SWEEPS, most * finer)
+        sweeps = fewest, min(_MOST_SWEEPS, math.ceil(most * finer))
         return replace(coarse, tolerance=coarse.tolerance / finer, sweeps=sweeps)
 
-    def in_words(self, level: int) -> str:
+    def in_words(self, level: float) -> str:
         """Method and step in words."""
         name = "solved dashpots" if self.solves else "one explicit step for all"
         return f"{name}, {self.method(level).dt0:.2g} s"
 
-    def rows(self, level: int) -> int:
+    def rows(self, level: float, brief: bool = False) -> int:
         """Rows of the time series of a run at a level, of which an extreme needs ever more."""
-        return min(_MOST_ROWS, _ROWS * 2**level) if self.goal.kind == "extreme" else _LOOKS
+        if self.goal.kind != "extreme":
+            return 1 if brief else _LOOKS
+        return min(_MOST_ROWS, round(_ROWS * 2.0**level))
 
 
 class Runs:
@@ -121,16 +127,22 @@ class Runs:
     def __init__(self, job: Job, listen: Listener | None):
         self.job, self.listen = job, listen
         self.seconds, self.count, self.failure = 0.0, 0, ""
-        self.results: dict[int, Result] = {}
-        self.cost: dict[int, float] = {}
+        self.results: dict[float, Result] = {}
+        self.cost: dict[float, float] = {}
         self._simulation: Simulation | None = None
-        self._known: dict[tuple[int, int, bool], float | None] = {}
+        self._known: dict[tuple[float, int, bool], float | None] = {}
 
-    def value(self, level: int, twin: int = 0, tight: bool = False) -> Any:
+    def eventful(self, level: float) -> bool:
+        """Whether anything broke, touched or slipped in the undisturbed run at a level."""
+        report = self.results[level].report
+        return report.broken_faces > 0 or report.pair_evaluations > 0 or bool(report.bond_slip)
+
+    def value(self, level: float, twin: int = 0, tight: bool = False) -> Any:
         """Goal of a run at a level; None for one that diverged.
 
-        twin: 0 for the scene as it is, else the seed of its disturbance. tight: see
-        ``Job.method``.
+        twin: 0 for the scene as it is, else the number of one that differs by chance: it begins
+        displaced by one rounding, and makes up to 30 % more steps where that run is eventful.
+        tight: see ``Job.method``.
         """
         key = level, twin, tight
         if key not in self._known:
@@ -147,8 +159,8 @@ class Runs:
             self._simulation.close()
         self._simulation = None
 
-    def parting(self, level: int) -> float:
-        """Time at which a twin has left the run at a level by the tolerance [s]; infinite if never.
+    def parting(self, level: float) -> float:
+        """Time at which one rounding has come to the tolerance, at a level [s]; infinite if never.
 
         By the way of a usual body, to a fraction of the run. Makes two runs.
         """
@@ -158,20 +170,20 @@ class Runs:
                 return float(frame.time_s)
         return math.inf
 
-    def frames(self, level: int, twin: int) -> tuple[Frame, ...]:
-        """Frames of a run at a level, made for them."""
+    def frames(self, level: float, twin: int) -> tuple[Frame, ...]:
+        """Frames of a run at a level, made for them; of a twin that makes no more steps."""
         return self._timed(level, twin, False, _FRAMES).frames
 
-    def change(self, coarse: int, fine: int) -> float:
+    def change(self, coarse: float, fine: float) -> float:
         """Difference of the displacements of all bodies at two levels, as a share of the finer."""
         return _apart(self.results[coarse].frames[-1], self.results[fine].frames[-1])
 
-    def peak_change(self, coarse: int, fine: int) -> float:
+    def peak_change(self, coarse: float, fine: float) -> float:
         """Difference of a usual body's largest speed at two levels, as a share of the finer."""
         slower, faster = (self.results[level].peak_speed for level in (coarse, fine))
         return _share(np.abs(slower - faster), faster, _EPSILON * faster.max())
 
-    def leap(self, coarse: int, fine: int) -> float:
+    def leap(self, coarse: float, fine: float) -> float:
         """Change of a number of broken faces between two levels that may go unseen, as a share.
 
         Faces that broke in one of the runs only, taken to add up like steps to either side.
@@ -179,7 +191,7 @@ class Runs:
         first, second = (np.isnan(self.results[level].broken_time) for level in (coarse, fine))
         return math.sqrt((first != second).sum()) / max(1, int((~second).sum()))
 
-    def same_breaks(self, coarse: int, fine: int) -> bool:
+    def same_breaks(self, coarse: float, fine: float) -> bool:
         """Whether the same faces broke at two levels."""
         broken = (~np.isnan(self.results[level].broken_time) for level in (coarse, fine))
         return np.array_equal(*broken)
@@ -202,7 +214,8 @@ class Runs:
 
     def _simulated(self, level, twin, tight, frames, brief):
         """Result of a run; the simulation of the first is used again, which is not set up anew."""
-        method = self.job.method(level, tight)
+        moved = twin > 0 and frames == 1 and level in self.results and self.eventful(level)
+        method = self.job.method(level, tight, twin if moved else 0)
         if self._simulation is None:
             self._simulation = Simulation(self.job.scene, method)
         else:
@@ -210,7 +223,7 @@ class Runs:
         simulation = self._simulation
         if twin:
             simulation.state.set_motion(**_displaced(simulation, twin))
-        looks: Any = {"samples": self.job.rows(level), "frames": frames, "progress": None}
+        looks: Any = {"samples": self.job.rows(level, brief), "frames": frames, "progress": None}
         until = self.job.until
         return result_of(run_simulation, simulation, until=until, brief=brief, **looks)
 

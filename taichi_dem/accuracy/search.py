@@ -2,24 +2,24 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
 
 from taichi_dem.accuracy.runs import Job, Runs
-from taichi_dem.accuracy.sources import Beside
+from taichi_dem.accuracy.sources import Beside, awake_price
+from taichi_dem.accuracy.twins import MANY, Twins
 from taichi_dem.kit.bars.answer import (
     Answer,
     ErrorParts,
     Plan,
-    branched,
-    branches_of,
     cost_curve,
     doubted,
+    with_source,
 )
 from taichi_dem.kit.bars.budget import Source
-from taichi_dem.kit.bars.chance import clusters_of, mean_and_deviation, t_quantile
+from taichi_dem.kit.bars.chance import mean_and_deviation
 from taichi_dem.kit.bars.step import StepError, step_error
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
@@ -28,17 +28,12 @@ from taichi_dem.report.energy_balance import open_account
 
 #: Halvings of the step until one is stable, and from there on; of one refinement.
 _MOST_COARSE, _MOST_FINE, _MOST_AT_ONCE = 6, 7, 2
-#: Share of what is allowed below which a single twin is enough to know of chance, and a difference
-#: of two in standard deviations of one, at most, in 95 of 100 cases.
-_NEGLIGIBLE, _TWO = 0.25, 2.8
-#: Runs of which a spread is taken at first, and at most.
-_FEW, _MANY = 6, 96
-#: Runs there must be of each end, on average, to call it one: more ends are a distribution.
-_OF_EACH = 3
+#: Level above the first at which a smooth run is made again, with 5/4 of the steps, and any other.
+_NEAR, _HALF = math.log2(1.25), 1
+#: Levels at which twins are run, at most: chance by the luck of when a step ends falls with it.
+_TRIED = 3
 #: Spread over what is allowed from which on no mean of runs has it.
 _HOPELESS = 1e6
-#: Share of all bodies that a run with all effects is compared with, at least.
-_LEAST_AWAKE = 1e-3
 
 
 class Search:
@@ -48,13 +43,14 @@ class Search:
     """
 
     def __init__(
-        self, job: Job, budget: float, listen: Callable[[Any], Any] | None, first: int = 0
+        self, job: Job, budget: float, listen: Callable[[Any], Any] | None, first: float = 0
     ):
         self.job, self.budget = job, budget
         self.runs = Runs(job, listen)
-        self.levels, self.why = [first], ""
-        # Twins so far, and their level.
-        self.count, self.twins_at = 0, first
+        self.levels: list[float] = [first]
+        self.twins = Twins(job, self.runs, self._affords)
+        # Why no more is done, and whether as single runs part at every level.
+        self.why, self.hopeless = "", False
 
     def answer(self) -> Answer:
         """The answer, after all runs that it needs."""
@@ -63,9 +59,8 @@ class Search:
         while not self.why and parts.total > self._allowed:
             self._reduce(parts)
             parts = self._parts()
-        job, last = self.job, self.levels[-1]
-        sources, parts = self._budget(parts)
-        parting = self.runs.parting(self.twins_at) if parts.chance > self._allowed else math.inf
+        job, last, beside = self.job, self.levels[-1], tuple(self._beside().sources())
+        parting = self.runs.parting(self.twins.level) if parts.chance > self._allowed else math.inf
         words, spent = job.in_words(last), self.runs.seconds - pilot_s
         short = f"{100.0 * job.tolerance:g} % was not reached: {self.why}" if self.why else ""
         made = Answer(
@@ -75,76 +70,57 @@ class Search:
             parts=parts,
             tolerance=job.tolerance,
             confidence=job.confidence,
-            plan=Plan(words, self.runs.count, pilot_s, spent, last - 1, parting),
+            plan=Plan(words, self.runs.count, pilot_s, spent, math.ceil(last) - 1, parting),
             result=self.runs.results[last],
-            cost_curve=self._cost_curve(),
+            cost_curve=self._cost_curve(parts.chance),
             shortfall=short,
-            sources=sources,
+            sources=self._sources(parts),
         )
-        made = self._branched(made) if parts.chance > self._allowed else made
+        if parts.chance > self._allowed:
+            made = self.twins.branched(made, self._allowed, self._step().error)
+        made = reduce(with_source, beside, made)
         return doubted(made, *self._doubts(self.runs.results[last].report))
 
-    def _budget(self, parts: ErrorParts) -> tuple[tuple[Source, ...], ErrorParts]:
-        """All sources of error, and the parts with those beside the step that were measured.
+    def _sources(self, parts):
+        """Sources of error that runs of this question show, with the CPU time of all of them."""
+        runs = self.runs
+        falling = f"{counted(runs.count, 'run')} at falling steps"
+        twins = counted(self.twins.count, "twin") if self.twins.count else "nothing lets twins part"
+        step = Source("step", math.hypot(parts.step, parts.solver), falling, runs.seconds)
+        return step, Source("chance", parts.chance, twins, 0.0)
 
-        No step mends these: where one of them is wider than allowed, that is said.
-        """
-        runs, first, last = self.runs, self.levels[0], self.levels[-1]
-        halves = f"half of a step: {counted(runs.count, 'run')}"
-        twins = counted(self.count, "twin") if self.count else "nothing lets twins part"
-        found = [
-            Source("step", math.hypot(parts.step, parts.solver), halves, runs.seconds),
-            Source("chance", parts.chance, twins, 0.0),
-        ]
-        report = runs.results[last].report
-        beside = Beside(self.job, runs, first, report, lambda more: self._affords(more, first))
-        found += beside.sources()
-        measured = {one.name: one.error for one in found[2:] if one.measured and one.error}
-        for name, error in measured.items():
-            if error > self._allowed and not self.why:
-                self.why = f"the {name} moves it by {self._percent(error)}, which no step mends"
-        return tuple(found), replace(parts, **measured)
-
-    def _branched(self, made: Answer) -> Answer:
-        """The answer with its branches, where twins come to a few ends; else as it is."""
-        values = np.array(self._sample(self.twins_at))
-        clusters = clusters_of(values, 0.0, 0.5 * self._allowed)
-        few = 2 <= len(clusters) <= len(values) // _OF_EACH
-        if self.job.goal.averaged or not few:
-            return made
-        branches = branches_of(values, clusters, range(len(values)), self._step().error, 1.0)
-        ends = "that differ by one rounding came to {} ends"
-        return branched(made, branches, made.parts.step, "run", ends)
+    def _beside(self):
+        """What measures the sources that no step of this question mends."""
+        first, report = self.levels[0], self.runs.results[self.levels[-1]].report
+        return Beside(self.job, self.runs, first, report, lambda more: self._affords(more, first))
 
     def _begin(self):
-        """Find the longest step that is stable, and go on to half of it."""
+        """Find the longest step that is stable, and make the run again with a shorter one."""
         while self.runs.value(self.levels[0]) is None:
             self.levels[0] += 1
             if self.levels[0] > _MOST_COARSE:
                 raise SimulationDiverged(self.runs.failure)
-        first, needed = self.levels[0], self.runs.seconds + 2.0 * self.runs.cost[self.levels[0]]
+        first = self.levels[0]
+        # By little shorter steps, only what changes smoothly tells its error.
+        second = first + (_NEAR if self._smooth else _HALF)
+        needed = self.runs.seconds + 2.0 ** (second - first) * self.runs.cost[first]
         if needed > self.budget:
             got, least = told_apart(self.budget, needed, 2)
             raise InputError(f"budget_s must leave time for two runs, {least} s here, got {got}")
-        if self.runs.value(first + 1) is None:
+        if self.runs.value(second) is None:
             raise SimulationDiverged(self.runs.failure)
-        self.levels.append(first + 1)
-        self.twins_at = first
+        self.levels.append(second)
+        self.twins.level = first
 
     @property
     def _allowed(self):
         return self.job.tolerance * abs(self._value(self.levels[-1]))
 
-    def _sample(self, level):
-        """Values of a run and its twins that did not diverge, as many as were asked for."""
-        found = (self.runs.value(level, twin) for twin in range(self.count + 1))
-        return [value for value in found if value is not None]
-
     def _value(self, level):
         """Value at a level; where one run means little, the mean over a run and its twins."""
         if not self.job.goal.averaged:
             return self.runs.value(level)
-        return mean_and_deviation(self._sample(level))[0]
+        return mean_and_deviation(self.twins.sample(level))[0]
 
     def _step(self, count: int | None = None) -> StepError:
         """Error of the step, and of sweeps whose tolerance falls with it; count: of levels."""
@@ -153,15 +129,15 @@ class Search:
         # An output that changes by less than a usual body's may do so by chance.
         usual = {"count": self.runs.leap, "extreme": self.runs.peak_change}
         change = usual.get(self.job.goal.kind, self.runs.change)
-        # What breaks or touches does so within a step, and where the times of samples lie by a
-        # largest speed is chance: only first order is trusted then.
-        smooth = self.job.goal.kind == "value" and not self._eventful
+        least = change(*levels[-2:]) * abs(values[-1])
+        if self._counts_breaks:
+            least = max(least, 1.0)
         return step_error(
             values,
-            self.job.declared if smooth else 1.0,
-            [2.0**-level for level in levels],
-            least=change(*levels[-2:]) * abs(values[-1]),
-            smooth=smooth,
+            self.job.declared if self._smooth else 1.0,
+            [self.job.method(level).dt0 for level in levels],
+            least=least,
+            smooth=self._smooth,
             confidence=self.job.confidence,
         )
 
@@ -177,48 +153,34 @@ class Search:
         return ErrorParts(step=_beside(step, sweeps), solver=sweeps, chance=chance)
 
     def _spread(self):
-        """Half-width by which runs that differ by one rounding spread, of one or of their mean.
+        """Half-width of the part of chance."""
+        return self.twins.spread(self.levels, self._allowed, len(self.levels) > _TRIED)
 
-        To halve the step disturbs a run far more than a rounding does: where nothing comes of
-        that, nothing is there that could let twins part.
+    @property
+    def _smooth(self):
+        """Whether the declared order of the step's error may be trusted.
+
+        What breaks or touches does so within a step, and where the times of samples lie by a
+        largest speed is chance: only first order is trusted then.
         """
-        coarse, averaged = self.twins_at, self.job.goal.averaged
-        if self.count == 0:
-            if not averaged and self._is_calm():
-                return 0.0
-            if not self._affords(1.0, coarse):
-                return math.inf
-            self.count = 1
-        if self.count == 1 and not averaged:
-            here, twin = self.runs.value(coarse), self.runs.value(coarse, 1)
-            apart = math.inf if twin is None else _TWO * abs(twin - here)
-            if apart <= _NEGLIGIBLE * self._allowed:
-                return apart
-        if self.count < _FEW - 1 and self._affords(_FEW - 1.0 - self.count, coarse):
-            self.count = _FEW - 1
-        found = self._sample(coarse)
-        if len(found) <= self.count:
-            return math.inf
-        spread = mean_and_deviation(found)[1] * t_quantile(self.job.confidence, len(found) - 1)
-        return spread / math.sqrt(len(found)) if averaged else spread
-
-    def _is_calm(self):
-        """Whether half the step moves a usual body by little, and breaks the same faces."""
-        last = self.levels[-2:]
-        change = self.runs.change(*last)
-        return change <= _NEGLIGIBLE * self.job.tolerance and self.runs.same_breaks(*last)
+        return self.job.goal.kind == "value" and not self._eventful
 
     @property
     def _eventful(self):
         """Whether anything broke, touched or slipped: then one rounding may decide."""
+        return self.runs.eventful(self.levels[-1])
+
+    @property
+    def _counts_breaks(self):
+        """Whether a whole number is asked for where faces broke: a finer run may break one more."""
         report = self.runs.results[self.levels[-1]].report
-        return report.broken_faces > 0 or report.pair_evaluations > 0 or bool(report.bond_slip)
+        return self.job.goal.kind == "count" and report.broken_faces > 0
 
     def _reduce(self, parts):
         """Make the runs that narrow the largest part, or say why there are none."""
         averaged = self.job.goal.averaged
-        if not averaged and len(self.levels) > 2 and parts.chance > self._allowed:
-            self.why = self._chaotic()
+        if not averaged and len(self.levels) > _TRIED and parts.chance > self._allowed:
+            self.why, self.hopeless = self._chaotic(), True
         elif averaged and parts.chance > 0.5 * parts.total:
             self._add_twins(parts)
         else:
@@ -226,11 +188,10 @@ class Search:
 
     def _chaotic(self):
         """Why no single run answers, and what would."""
-        found = self._sample(self.twins_at)
-        if len(found) <= self.count:
-            return f"runs that differ by one rounding diverged: {self.runs.failure}"
-        width = t_quantile(self.job.confidence, math.inf) * mean_and_deviation(found)[1]
-        words = f"runs that differ by one rounding spread by {self._percent(width)}"
+        width = self.twins.deviation()
+        if math.isinf(width):
+            return f"runs that differ by chance diverged: {self.runs.failure}"
+        words = f"runs that differ by chance spread by {self._percent(width)}"
         if not self._allowed or not width / self._allowed < _HOPELESS:
             return words
         needed = max(2, math.ceil(2.0 * (width / self._allowed) ** 2))
@@ -241,14 +202,18 @@ class Search:
         )
 
     def _add_twins(self, parts):
-        if self.count + 1 >= _MANY:
-            self.why = f"the mean of {self.count + 1} runs has {self._percent(parts.total)}"
-        elif self._affords((self.count + 1) * len(self.levels), self.levels[0]):
-            self.count = min(_MANY - 1, 2 * self.count + 1)
+        count = self.twins.count + 1
+        if count >= MANY:
+            self.why = f"the mean of {count} runs has {self._percent(parts.total)}"
+        elif self._affords(count * len(self.levels), self.levels[0]):
+            self.twins.count = min(MANY, 2 * count) - 1
 
     def _refine(self, parts):
         """Go on to half the step, or to the one that the order of a smooth run calls for."""
         last, more = self.levels[-1], 1
+        if self._counts_breaks and self._allowed < 1.0:
+            self.why = "what breaks is known to one face at best"
+            return
         if last - self.levels[0] >= _MOST_FINE:
             self.why = f"half of a step of {self.job.method(last).dt0:.2g} s changes as much"
             return
@@ -257,21 +222,22 @@ class Search:
             more = int(min(_MOST_AT_ONCE, max(1, wanted)))
         while more > 1 and not self._affords(2.0**more, last):
             more, self.why = more - 1, ""
-        if self._affords(2.0**more * (self.count + 1 if self.job.goal.averaged else 1), last):
+        each = self.twins.count + 1 if self.job.goal.averaged else 1
+        if self._affords(2.0**more * each, last):
             if self.runs.value(last + more) is None:
                 self.why = f"a smaller step diverged: {self.runs.failure}"
             else:
                 self.levels.append(last + more)
                 if not self.job.goal.averaged and parts.chance > self._allowed:
-                    # At the step before, twins may have parted by the step alone.
-                    self.count, self.twins_at = 0, last
+                    self.twins.go_to(last)
 
     def _affords(self, runs, level):
         """Whether the budget lets some runs as long as that at a level be made."""
         needed = runs * self.runs.cost[level]
-        if self.runs.seconds + needed > self.budget:
-            self.why = f"the budget is spent: the next runs would take {needed:.2g} s"
-        return not self.why
+        if self.runs.seconds + needed <= self.budget:
+            return True
+        self.why = f"the budget is spent: the next runs would take {needed:.2g} s"
+        return False
 
     def _percent(self, error):
         size = abs(self._value(self.levels[-1]))
@@ -283,12 +249,14 @@ class Search:
         yield from open_account(report.energy_balance, report.round_off_J)
         found = report.certificate
         if found is not None and not found.holds:
-            seconds = self.runs.seconds / max(_LEAST_AWAKE, 1.0 - found.asleep)
             why = f"the certificate of its run does not hold, as {found.failure}"
-            yield f"{why}, about {seconds:.2g} s"
+            yield f"{why}, about {awake_price(self.runs, found):.2g} s"
 
-    def _cost_curve(self):
-        """Cost of other tolerances: what the runs cost that were enough for them, or would be."""
+    def _cost_curve(self, chance):
+        """Cost of other tolerances: what the runs cost that were enough for them, or would be.
+
+        chance: half-width of its part. What no single run has is left out.
+        """
         levels, size = self.levels, abs(self._value(self.levels[-1]))
         others = self.runs.seconds - sum(self.runs.cost[level] for level in levels)
         paid = others + np.cumsum([self.runs.cost[level] for level in levels])
@@ -296,13 +264,15 @@ class Search:
 
         def cost(tolerance):
             for step, seconds in stages:
-                if step.error <= tolerance * size:
+                if max(step.error, chance) <= tolerance * size:
                     return float(seconds), True
             unseen = 1.0 if self._eventful else self.job.declared
-            more = _halvings(step.error, tolerance * size, step.order if step.regular else unseen)
+            order = step.order if step.regular else unseen
+            more = _halvings(max(step.error, chance), tolerance * size, order)
             return float(seconds) * 2.0**more, False
 
-        return tuple(cost_curve(self.job.tolerance, cost))
+        curve = cost_curve(self.job.tolerance, cost)
+        return tuple(one for one in curve if not self.hopeless or one.tolerance * size >= chance)
 
 
 def _beside(whole, part):

@@ -22,6 +22,14 @@ def broken():
     return solve(broken_bar(), until=BROKEN_UNTIL, goal=ENERGY, progress=None)
 
 
+def test_twins_of_a_scene_without_events_differ_by_rounding_alone():
+    """The mean over them is no dearer than ten runs, as their step is that of their run."""
+    goal = goals.displacement("right").mean()
+    answer = solve(struck_bar(), until=UNTIL, goal=goal, tolerance=0.003, progress=None)
+    assert answer.reached and answer.parts.chance < 1e-6 * answer.value
+    assert answer.plan.runs <= 30
+
+
 @pytest.mark.parametrize("goal", [goals.displacement("right"), ENERGY], ids=lambda goal: goal.name)
 def test_a_bar_of_an_elastic_scene_holds(goal):
     answer = solve(struck_bar(), until=UNTIL, goal=goal, tolerance=0.003, progress=None)

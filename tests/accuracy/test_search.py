@@ -1,15 +1,17 @@
 """Which runs a search makes, and what it says, over runs that are made up."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, goals
+from taichi_dem import CONCRETE, InputError, Scene, goals
 from taichi_dem.accuracy import search, sources
 from taichi_dem.accuracy.runs import Job
 from taichi_dem.effects import BodyContact
+from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.mesh.shapes import bar
 from tests.accuracy.small_bar import UNTIL, struck_bar
 
@@ -47,6 +49,9 @@ class MadeUpRuns:
             )
             self.results[level] = SimpleNamespace(report=report)
         return self.known[key]
+
+    def eventful(self, level):
+        return self.events
 
     def release(self):
         """Nothing is held."""
@@ -110,7 +115,7 @@ def test_bars_of_a_power_law_hold_and_are_not_too_wide(searched, tolerance, orde
 
 def test_a_value_that_agrees_by_chance_has_the_bar_of_what_usual_bodies_do(searched):
     answer = searched(job(0.1), lambda level, twin: 3.0, moved=0.06)
-    assert answer.error == pytest.approx(0.5 * 0.06 * 3.0)
+    assert answer.error == pytest.approx(1.1 / 3.0 * 0.06 * 3.0)
 
 
 def test_twins_that_scatter_get_no_single_number(searched):
@@ -121,6 +126,82 @@ def test_twins_that_scatter_get_no_single_number(searched):
     assert 0.3 < answer.parts.chance < 3.0
 
 
+def test_chance_that_falls_with_the_step_is_followed(searched):
+    """Every other twin is off by 0.2 / 4^level of what may be off by 0.15: two levels are enough.
+
+    A single twin tells a half-width of 12.7 times its difference, 0.63; six tell 3.6 times their
+    standard deviation, 0.1.
+    """
+    answer = searched(
+        job(0.05),
+        lambda level, twin: 3.0 + 0.2 * 4.0**-level * (twin % 2),
+        events=True,
+        moved=0.02,
+    )
+    assert answer.reached and answer.plan.begin == 1
+    six = np.array([3.0, 3.05] * 3)
+    wide = math.sqrt(2.0) * t_quantile(0.95, 5) * six.std(ddof=1)
+    assert answer.parts.chance == pytest.approx(wide)
+
+
+def test_levels_that_agree_once_twins_have_parted_are_asked_again(searched):
+    """From level 2 on bodies move alike; each other twin is off by ten times what is allowed."""
+    ways = {"change": lambda self, coarse, fine: 0.1 * (fine < 3)}
+    answer = searched(
+        job(0.01),
+        lambda level, twin: 3.0 + 0.3 * (twin % 2) * (level < 4),
+        **ways,
+        same_breaks=lambda self, *levels: True,
+        events=True,
+    )
+    assert len(answer.branches) == 2 and not answer.reached
+
+
+@pytest.mark.parametrize("value", [52.0, 520.0])
+def test_a_count_of_what_breaks_is_known_to_one_at_best(searched, value):
+    """To 1 %, which is half of a face, or five; all levels agree."""
+    many = job(0.01, goals.broken_faces())
+    answer = searched(many, lambda level, twin: value, events=True, moved=0.0)
+    assert answer.error == 1.0 and answer.reached == (value > 100.0)
+    assert ("known to one face at best" in answer.shortfall) != answer.reached
+    none = searched(many, lambda level, twin: 0.0, moved=0.0)
+    assert none.error == 0.0 and none.reached
+
+
+def test_costs_that_chance_keeps_from_single_runs_are_predicted_or_left_out(searched):
+    """Asked to 10 %, what falls with the step may do for 1 %; what never falls will not."""
+
+    def falls(level, twin):
+        return 3.0 + 0.1 * 2.0**-level + 0.006 * 2.0**-level * (twin % 2)
+
+    falling = searched(job(0.1), falls, events=True, moved=1e-3)
+    known = {one.tolerance: one.measured for one in falling.cost_curve}
+    assert known[0.1] and 0.01 in known and not known[0.003]
+    hopeless = searched(job(0.01), scattered(0.3), events=True, moved=0.1)
+    assert all(
+        one.tolerance * hopeless.value >= hopeless.parts.chance for one in hopeless.cost_curve
+    )
+
+
+@pytest.mark.parametrize("events", [True, False])
+def test_runs_are_made_again_with_a_quarter_more_steps_where_nothing_happens(searched, events):
+    answer = searched(job(0.5), power(1.0), events=events, moved=0.02)
+    steps = answer.plan.seconds - 1.0 - 1.0 * events
+    assert steps == pytest.approx(2.0 if events else 1.25), "a twin of an eventful run is the third"
+    least = 1.0 + (2.0 if events else 1.25)
+    assert searched(job(0.5), power(1.0), budget=least, events=events, moved=0.02).plan.runs == 2
+    with pytest.raises(InputError, match="budget_s must leave time for two runs"):
+        searched(job(0.5), power(1.0), budget=0.99 * least, events=events)
+
+
+def test_a_twin_makes_up_to_30_percent_more_steps():
+    asked = replace(job(), until=20.0 * UNTIL)
+    for level in (0, 1, math.log2(1.25)):
+        steps = [round(asked.until / asked.method(level, twin=twin).dt0) for twin in range(6)]
+        assert steps[0] == min(steps) and max(steps) <= 1.3 * steps[0] + 0.5
+        assert len(set(steps)) == 6
+
+
 @pytest.mark.parametrize("failure", ["", "an audit found 1 miss"])
 def test_a_certificate_that_does_not_hold_is_never_reached(searched, failure):
     """All levels agree: the bar is zero."""
@@ -128,6 +209,10 @@ def test_a_certificate_that_does_not_hold_is_never_reached(searched, failure):
     answer = searched(job(), lambda level, twin: 3.0, certificate=certificate)
     assert answer.error == 0.0 and answer.reached == (not failure)
     assert failure in answer.shortfall
+    left = answer.sources[-1]
+    assert left.name == "left out" and left.measured == (not failure)
+    # Half of the bodies slept: awake they would take twice the time.
+    assert left.seconds == (2.0 * answer.plan.seconds if failure else 0.0)
 
 
 def test_an_answer_whose_energy_is_lost_is_not_reached(searched):

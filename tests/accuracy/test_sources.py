@@ -12,14 +12,14 @@ from taichi_dem.accuracy import sources
 from taichi_dem.accuracy.runs import Job
 from taichi_dem.accuracy.sources import Beside, finer_law, with_contact
 from taichi_dem.effects import BodyContact, SphereContact
-from taichi_dem.kit.bars.answer import Answer, Branch, ErrorParts, Plan, branched
+from taichi_dem.kit.bars.answer import Answer, Branch, ErrorParts, Plan, branched, with_source
 from taichi_dem.kit.bars.budget import Source
 from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.mesh.shapes import bar
 from tests.accuracy.small_bar import BROKEN_UNTIL, UNTIL, broken_bar, struck_bar
 
 BAR = bar(0.1, 0.05, (2, 1, 1))
-HOLDS = SimpleNamespace(holds=True)
+HOLDS, FAILS = SimpleNamespace(holds=True), SimpleNamespace(holds=False, asleep=0.5)
 
 
 def touching(law=None, word=None):
@@ -114,7 +114,7 @@ def test_runs_that_diverge_leave_no_bound(found):
     assert diverging["contact"].error == diverging["mesh"].error == math.inf
 
 
-@pytest.mark.parametrize("certificate", [None, HOLDS, SimpleNamespace(holds=False)], ids=str)
+@pytest.mark.parametrize("certificate", [None, HOLDS, FAILS], ids=str)
 def test_a_certificate_that_does_not_hold_is_a_source_without_a_measure(found, certificate):
     one = found(touching(), lambda scene: 3.0, certificate=certificate)["left out"]
     assert one.measured == (certificate is None or certificate.holds)
@@ -126,6 +126,24 @@ def test_a_scene_with_another_contact_keeps_all_else(word):
     other = with_contact(scene, BodyContact(6))
     assert other.effect("contact").parts == 6 and other.on_demand == scene.on_demand
     assert [type(one) for one in other.effects] == [type(one) for one in scene.effects]
+
+
+@pytest.mark.parametrize("value", [2.0, 0.0])
+def test_what_is_reached_is_as_narrow_as_asked_with_all_sources(value):
+    """Drawn parts of a bar: the sum of their squares decides, and each step keeps the doubts."""
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        step, *others = value * 0.05 * rng.uniform(0.0, 1.5, 3) + (value == 0.0) * rng.random(3)
+        made = Answer(
+            *("goal", "m", value, ErrorParts(step=step), 0.05, 0.95, Plan("none", 1, 0.0, 0.0)),
+            shortfall="" if step <= 0.05 * value else "the step",
+            sources=(Source("step", step, "two runs"),),
+        )
+        for name, error in zip(("contact", "mesh"), others):
+            made = with_source(made, Source(name, error, "measured"))
+        assert made.error == pytest.approx(np.linalg.norm([step, *others]))
+        assert made.reached == (made.error <= 0.05 * value)
+        assert made.budget.error.tolist() == [step, *others]
 
 
 def test_a_bar_names_what_it_does_not_have():

@@ -36,13 +36,16 @@ class ErrorParts:
     solver : float or ndarray, default 0.0
         Error of sweeps that end early, in the unit of the value.
     chance : float or ndarray, default 0.0
-        Spread of runs that differ by one rounding or by their seeds, in the unit of the value.
+        Spread of runs that differ by chance, in when their steps end or by their seeds, in the unit
+        of the value.
     sampling : float or ndarray, default 0.0
         Error of the time over which a mean was taken, in the unit of the value.
     contact : float, default 0.0
         Error of the resolution of the contact law, in the unit of the value, where it was measured.
     mesh : float, default 0.0
         Spread over meshes of one size, in the unit of the value, where it was measured.
+    filling : float or ndarray, default 0.0
+        Distance from grains of the other kind, in the unit of the value, where it was measured.
     """
 
     step: Values = 0.0
@@ -51,6 +54,7 @@ class ErrorParts:
     sampling: Values = 0.0
     contact: Values = 0.0
     mesh: Values = 0.0
+    filling: Values = 0.0
 
     @property
     def total(self) -> Values:
@@ -270,6 +274,33 @@ def _in_words(value, error, unit):
 def doubted(answer: Answer, *reasons: str) -> Answer:
     """The answer, which is not reached where there are reasons to doubt its run."""
     return replace(answer, shortfall="; ".join(filter(None, (answer.shortfall, *reasons))))
+
+
+def with_source(answer: Answer, source: Source) -> Answer:
+    """The answer with a source of error that no step mends.
+
+    Its part of the bar is there where it was measured; wider than allowed, it is a doubt.
+    """
+    others = tuple(one for one in answer.sources if one.name != source.name)
+    made = replace(answer, sources=(*others, source))
+    if not source.measured or not np.any(source.error):
+        return made
+    made = replace(made, parts=replace(answer.parts, **{source.name: source.error}))
+    if largest(made.error) <= made.tolerance * largest(made.value):
+        return made
+    told = "" if made.shortfall else f"{100.0 * made.tolerance:g} % was not reached: "
+    moves = f"the {source.name} moves it by {_share(source.error, made)}"
+    if largest(source.error) > made.tolerance * largest(made.value):
+        return doubted(made, f"{told}{moves}, which no step mends")
+    if largest(answer.error) > made.tolerance * largest(made.value):
+        return made
+    return doubted(made, f"{told}{moves}, with the rest the bar is {_share(made.error, made)}")
+
+
+def _share(error, answer):
+    """A half-width as a share of the value in words, of a value of zero as it is."""
+    size = largest(answer.value)
+    return f"{100.0 * largest(error) / size:.2g} %" if size else f"{largest(error):.2g} about zero"
 
 
 def branched(

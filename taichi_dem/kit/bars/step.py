@@ -61,7 +61,7 @@ def step_error(
     None. least: difference that is believed, at least, of the last two values: what they may have
     in common by chance. smooth: whether nothing happens at an instant, so that the declared order
     may be trusted before it was seen.
-    Where no order is seen, the error is that of first order; of a smooth run 1.5 times that of
+    Where no order is seen, the error is that of first order; of a smooth run 1.1 times that of
     the declared one.
     """
     if steps is None:
@@ -74,7 +74,7 @@ def step_error(
         if order > _LEAST_ORDER:
             trusted = min(order, declared)
             return StepError(wider * SAFETY * last / (shrinking**trusted - 1.0), trusted)
-    unseen = 1.5 / (shrinking**declared - 1.0) if smooth else 1.0 / (shrinking - 1.0)
+    unseen = 1.1 / (shrinking**declared - 1.0) if smooth else 1.0 / (shrinking - 1.0)
     return StepError(wider * unseen * last)
 
 

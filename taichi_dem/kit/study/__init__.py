@@ -4,6 +4,7 @@ from taichi_dem.kit.provenance import processor
 from taichi_dem.kit.study.costly_work import cached, call_all, call_in_process, digest
 from taichi_dem.kit.study.program import (
     Parser,
+    accuracy_sources,
     add_accuracy,
     add_checkpoints,
     add_pictures,

@@ -199,10 +199,21 @@ def checkpoint_of(
     return {"checkpoint": checkpoint, "resume": path if goes_on else None}
 
 
-def add_accuracy(made: ArgumentParser, what: str) -> None:
-    """Add the option --accuracy; what: is found to that share of its value, in words."""
+def add_accuracy(made: ArgumentParser, what: str, source: str) -> None:
+    """Add the options --accuracy and --budget.
+
+    what: is found to that share of its value, in words. source: of error, beside the step, that is
+    measured when asked.
+    """
     words = f"find {what} to this share of their value, such as 1%%, and nothing else"
     made.add_argument("--accuracy", type=tolerance, default=None, help=words)
+    words = f"with --accuracy, also measure the error of this source: {source}"
+    made.add_argument("--budget", choices=(source,), help=words)
+
+
+def accuracy_sources(options: Namespace) -> list[str]:
+    """Sources of error that --accuracy and --budget ask for."""
+    return ["step", options.budget] if options.budget else ["step"]
 
 
 def check_accuracy(options: Namespace, others: Iterable[str] = ()) -> None:
@@ -235,6 +246,8 @@ def main(
             return run_sweep(run, made, options, given)
         if options.workers is not None:
             raise InputError(f"workers must be left out without --sweep, got {options.workers}")
+        if getattr(options, "budget", None) and options.accuracy is None:
+            raise InputError(f"budget must be left out without --accuracy, got {options.budget}")
         _take_settings(options, made.settings)
         options.started = time.perf_counter()
         options.entry = made.entry or entry_of(run)

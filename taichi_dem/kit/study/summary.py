@@ -213,8 +213,15 @@ class Table:
 
     def show(self, rows: Iterable[Row]) -> None:
         """Print the columns that have a header."""
+        header, cells = self.cells(rows)
+        print_table(cells, header)
+        print()
+
+    def cells(self, rows: Iterable[Row]) -> tuple[list[str], list[list[str]]]:
+        """Headers of the columns that have one, and their cells in words, a list a row."""
         shown = [(key, one) for key, one in self.columns.items() if one.header]
-        show_rows([*rows], {one.header: (key, one.format) for key, one in shown})
+        cells = [[_cell(row[key], one.format) for key, one in shown] for row in rows]
+        return [one.header for _, one in shown], cells
 
     def figures(
         self, row: Row, name: str = "{key}", paper: Mapping[str, Any] = {}
