@@ -33,23 +33,14 @@ from taichi_dem.kit.bars.answer import (
     doubted,
     with_source,
 )
-from taichi_dem.kit.bars.budget import Source
+from taichi_dem.kit.bars.budget import Source, named_sources
 from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.bars.step import step_part
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress import Listener
 from taichi_dem.kit.progress_bar import reporting
-from taichi_dem.kit.validation import (
-    AUTO,
-    SMALLEST,
-    between,
-    choice,
-    instance,
-    positive,
-    several,
-    shown,
-)
+from taichi_dem.kit.validation import AUTO, SMALLEST, between, instance, positive, several, shown
 
 # A run that diverges is repeated at a shorter step so often.
 _MOST_SHORTENED = 6
@@ -161,9 +152,10 @@ def solve_response(
 
 def _other(filling, sources):
     """Filling that is asked too, None where sources do not name it; InputError where none is."""
-    named = several("sources", sources, lambda name, one: choice(name, one, MEASURED))
-    other = other_filling(filling) if "filling" in named else None
-    if "filling" in named and other is None:
+    if "filling" not in named_sources(sources, MEASURED):
+        return None
+    other = other_filling(filling)
+    if other is None:
         raise InputError(
             "sources must not have 'filling' unless there are grains of another kind, got "
             f"{shown(filling)}"

@@ -64,10 +64,12 @@ GIVEN = ("density", "fracture_energy", "friction_angle", "damping_ratio")
 GIVEN += ("tensile_strength", "cohesion")
 #: Rounds of static solves and of tests at most; a constant changes by this factor at most.
 SOLVES, ROUNDS, FACTOR = 8, 6, 10.0
-SHOWN = {
-    **{"target": ("target", ""), "asked": ("asked", ".5g"), "found": ("found", ".5g")},
-    "misfit": ("misfit", "+.2%"),
-}
+SHOWN = study.Table(
+    target=("target", "target"),
+    asked=("asked", "asked", ".5g"),
+    found=("found", "found", ".5g"),
+    misfit=("misfit", "misfit", "+.2%"),
+)
 
 
 class Unbroken(Exception):
@@ -189,7 +191,7 @@ def run(options):
         | {"misfit": float(misfit_of(name, asked, found[name]))}
         for name, asked in targets.items()
     ]
-    study.show_rows(rows, SHOWN)
+    SHOWN.show(rows)
     print(*filter(None, (complaint(row, history, tolerance) for row in rows)), sep="\n")
     lines = [f"{name}={value!r}," for name, value in constants.items()]
     print("\n    ".join(["Material.from_elastic(", *lines]) + "\n)\n")

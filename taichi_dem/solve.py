@@ -8,6 +8,7 @@ from taichi_dem.accuracy.search import Search
 from taichi_dem.accuracy.sources import MEASURED
 from taichi_dem.goals import Goal
 from taichi_dem.kit.bars.answer import Answer, Plan, known_partings
+from taichi_dem.kit.bars.budget import named_sources
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress import Listener
 from taichi_dem.kit.progress_bar import reporting
@@ -15,7 +16,6 @@ from taichi_dem.kit.validation import (
     AUTO,
     SMALLEST,
     between,
-    choice,
     instance,
     positive,
     several,
@@ -92,7 +92,7 @@ def solve(
     between("confidence", confidence, SMALLEST, math.nextafter(1.0, 0.0))
     budget = math.inf if budget_s is None else positive("budget_s", budget_s)
     first = 0 if plan is None else whole("begin of plan", instance("plan", plan, Plan).begin, 0, 99)
-    named = _sources(sources)
+    named = named_sources(sources, MEASURED)
     others = () if meshes is None else several("meshes", meshes, _mesh)
     if ("mesh" in named) != bool(others) or len(others) == 1:
         raise InputError(
@@ -105,12 +105,6 @@ def solve(
     if math.isfinite(answer.plan.parting_s):
         known_partings[kind_of(scene)] = answer.plan.parting
     return answer
-
-
-def _sources(given):
-    """Names of sources, with that of the step."""
-    found = several("sources", given, lambda name, one: choice(name, one, MEASURED))
-    return tuple(name for name in MEASURED if name in ("step", *found))
 
 
 def _mesh(name, given):

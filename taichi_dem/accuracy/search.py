@@ -16,10 +16,11 @@ from taichi_dem.kit.bars.answer import (
     Plan,
     cost_curve,
     doubted,
+    share_in_words,
     with_source,
 )
 from taichi_dem.kit.bars.budget import Source
-from taichi_dem.kit.bars.chance import mean_and_deviation
+from taichi_dem.kit.bars.chance import mean_and_deviation, t_quantile
 from taichi_dem.kit.bars.step import StepError, step_error
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
@@ -188,7 +189,7 @@ class Search:
 
     def _chaotic(self):
         """Why no single run answers, and what would."""
-        width = self.twins.deviation()
+        width = t_quantile(self.job.confidence, math.inf) * self.twins.deviation()
         if math.isinf(width):
             return f"runs that differ by chance diverged: {self.runs.failure}"
         words = f"runs that differ by chance spread by {self._percent(width)}"
@@ -240,9 +241,7 @@ class Search:
         return False
 
     def _percent(self, error):
-        size = abs(self._value(self.levels[-1]))
-        unit = self.job.goal.unit
-        return f"{100.0 * error / size:.2g} %" if size else f"{error:.2g} {unit} about zero"
+        return share_in_words(error, self._value(self.levels[-1]), self.job.goal.unit)
 
     def _doubts(self, report):
         """Reasons to doubt the finest run, and what would settle each."""

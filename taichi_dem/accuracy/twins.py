@@ -59,12 +59,9 @@ class Twins:
                 return bar
         if self.count < _FEW - 1 and self.affords(_FEW - 1.0 - self.count, self.level):
             self.count = _FEW - 1
-        found = self.sample(self.level)
-        if len(found) <= self.count:
-            return math.inf
-        spread = mean_and_deviation(found)[1] * t_quantile(self.job.confidence, len(found) - 1)
+        spread = self.deviation() * t_quantile(self.job.confidence, self.count)
         # Of a single value the truth is another one, as far from the mean.
-        return spread / math.sqrt(len(found)) if averaged else math.sqrt(2.0) * spread
+        return spread / math.sqrt(self.count + 1) if averaged else math.sqrt(2.0) * spread
 
     def _is_calm(self, coarse, fine):
         """Whether half the step moves a usual body by little, and breaks the same faces."""
@@ -73,11 +70,9 @@ class Twins:
         return little and self.runs.same_breaks(coarse, fine)
 
     def deviation(self) -> float:
-        """Half-width by which single runs spread; infinite where one diverged."""
+        """Standard deviation of single runs; infinite where one diverged."""
         found = self.sample(self.level)
-        if len(found) <= self.count:
-            return math.inf
-        return t_quantile(self.job.confidence, math.inf) * mean_and_deviation(found)[1]
+        return mean_and_deviation(found)[1] if len(found) > self.count else math.inf
 
     def branched(self, made: Answer, allowed: float, step: float) -> Answer:
         """The answer with its branches, where twins come to a few ends; else as it is.

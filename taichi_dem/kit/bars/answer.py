@@ -281,26 +281,26 @@ def with_source(answer: Answer, source: Source) -> Answer:
 
     Its part of the bar is there where it was measured; wider than allowed, it is a doubt.
     """
-    others = tuple(one for one in answer.sources if one.name != source.name)
-    made = replace(answer, sources=(*others, source))
+    made = replace(answer, sources=(*answer.sources, source))
     if not source.measured or not np.any(source.error):
         return made
     made = replace(made, parts=replace(answer.parts, **{source.name: source.error}))
     if largest(made.error) <= made.tolerance * largest(made.value):
         return made
     told = "" if made.shortfall else f"{100.0 * made.tolerance:g} % was not reached: "
-    moves = f"the {source.name} moves it by {_share(source.error, made)}"
+    moves = f"the {source.name} moves it by {share_in_words(source.error, made.value, made.unit)}"
     if largest(source.error) > made.tolerance * largest(made.value):
         return doubted(made, f"{told}{moves}, which no step mends")
     if largest(answer.error) > made.tolerance * largest(made.value):
         return made
-    return doubted(made, f"{told}{moves}, with the rest the bar is {_share(made.error, made)}")
+    whole = share_in_words(made.error, made.value, made.unit)
+    return doubted(made, f"{told}{moves}, with the rest the bar is {whole}")
 
 
-def _share(error, answer):
-    """A half-width as a share of the value in words, of a value of zero as it is."""
-    size = largest(answer.value)
-    return f"{100.0 * largest(error) / size:.2g} %" if size else f"{largest(error):.2g} about zero"
+def share_in_words(error: Values, value: Values, unit: str) -> str:
+    """A half-width as a share of its value, of a value of zero in its unit."""
+    size, half = largest(value), largest(error)
+    return f"{100.0 * half / size:.2g} %" if size else f"{half:.2g} {unit} about zero"
 
 
 def branched(

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from taichi_dem.kit.validation import choice, several
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -43,6 +45,15 @@ class Source:
         bar = f"+-{largest:.2g}{f' {unit}' if unit != '1' else ''}" if self.measured else "?"
         price = f", {self.seconds:.2g} s" if self.seconds > 0.0 else ""
         return f"  {self.name:9} {bar:14} {self.how}{price}"
+
+
+def named_sources(given: Any, known: Sequence[str]) -> tuple[str, ...]:
+    """Names of sources to measure, in the order of those that are known; the first one always is.
+
+    Raises InputError for another name.
+    """
+    found = several("sources", given, lambda name, one: choice(name, one, known))
+    return tuple(name for name in known if name in (known[0], *found))
 
 
 def table(sources: Sequence[Source]) -> "pd.DataFrame":

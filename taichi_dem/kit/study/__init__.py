@@ -28,7 +28,6 @@ from taichi_dem.kit.study.summary import (
     figure,
     finish,
     show_answer,
-    show_rows,
     versions,
     write_accuracy,
     write_rows,

@@ -185,7 +185,7 @@ class Column(NamedTuple):
 
     value: dotted name of an attribute of the subject of a row, place in a subject that is a tuple,
     or a function of it. A column without a header is not printed, one without a unit is no figure.
-    format: as of ``show_rows``.
+    format: as in an f-string; one that ends with % is of a share in percent.
     """
 
     value: str | int | Callable[[Any], Any]
@@ -248,16 +248,6 @@ def write_rows(path: Any, rows: Sequence, names: str | Sequence[str] | None = No
     names = names.split() if isinstance(names, str) else names
     columns: list[Any] = list(zip(*rows)) or [()] * len(names)
     write_csv(path, dict(zip(names, columns)))
-
-
-def show_rows(rows: Sequence[Mapping[str, Any]], formats: Mapping[str, tuple[str, str]]) -> None:
-    """Print rows; formats: header -> (key, format of the value as in an f-string).
-
-    A format that ends with % is of a share in percent.
-    """
-    columns = formats.values()
-    print_table([[_cell(row[key], form) for key, form in columns] for row in rows], [*formats])
-    print()
 
 
 def _cell(value, form):
