@@ -6,9 +6,9 @@
 Questions about bars under gas pressure are drawn at random. Price: CPU time of ``solve`` over that
 of the cheapest single run, with any of our methods and steps, that is as near to the truth as was
 asked; found by scanning, with the truth known. The longest stable step is near enough for most
-questions, so that nothing is spared by a coarser one: two runs, of which the second has 5/4 of the
-steps, cost 2.25 times as much as the first alone, and that is what we expect. Where bonds break,
-twins tell what chance does: five runs more.
+questions, so that nothing is spared by a coarser one: two runs, of which the second makes a tenth
+more steps, cost 2.1 times as much as the first alone, and that is what we expect. Where bonds
+break, twins tell what chance does: five runs more.
 
 Besides, what 10, 3, 1 and 0.3 % cost for the paper's block and for the paper's damper, over runs
 with steps tuned by hand; and bodies dropped on a slab, of which no single run can tell. Whether the

@@ -16,7 +16,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, finite, flag, instance, shown, whole, word
 from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.output.fragments import fragment_of_body
-from taichi_dem.output.hole_monitor import HoleMonitor
+from taichi_dem.output.hole_monitor import hole_of
 from taichi_dem.report.energy_balance import TERMS
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
@@ -138,7 +138,7 @@ def hole_displacement(group: str = "hole") -> Goal:
     """
 
     def found(result):
-        monitor = HoleMonitor(result.model, group)
+        monitor = hole_of(result.model, group)
         return 1e3 * monitor.radial_displacement(result.frames[-1].position)
 
     return Goal("hole displacement", "mm", found, check=_has_group(group))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.elasticity.rates import bond_rates, springs_of
+from taichi_dem.elasticity.rates import largest_bond_rate, springs_of
 from taichi_dem.goals import Goal
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.progress import Listener, Progress
@@ -26,11 +26,13 @@ from taichi_dem.stability.step_report import step_report
 #: Fewest steps of a run, and how many times shorter than springs bear they begin at most where the
 #: history of a load or support is to be resolved.
 _FEWEST, _MOST_TIMES = 8, 64
+#: Less than a whole step more, by which last bits of the longest step make none.
+_LESS = 1.0 - 1e-9
 #: Sweeps of a step at most, and by how much better they agree to see their error.
 _MOST_SWEEPS, _TIGHT = 1000, 8
 #: Rows of the time series of the coarsest run in which an extreme is looked for, of any run, and of
 #: one without an extreme whose report is read: it finds at them what is missing or creeps.
-_ROWS, _MOST_ROWS, _LOOKS = 100, 6400, 4
+_ROWS, _MOST_ROWS, _LOOKS = 100, 6400, 2
 _EPSILON = np.finfo(np.float64).eps
 #: How far a twin's bodies are displaced at the start, as a share of the size of the solid.
 _ROUNDING = 1e-12
@@ -70,7 +72,7 @@ class Job:
         longest = self._longest_step()
         step = max(min(longest, change), longest / _MOST_TIMES)
         # A pulse within a step is a kick, which lies between the steps of two levels by chance.
-        return max(_FEWEST, math.ceil(self.until / step)), 2.0 if step <= change else 1.0
+        return max(_FEWEST, math.ceil(_LESS * self.until / step)), 2.0 if step <= change else 1.0
 
     @property
     def declared(self) -> float:
@@ -83,8 +85,8 @@ class Job:
         Without bonds that of contacts, which is not needed where no whole face ever touches.
         """
         mesh, material = self.scene.mesh, self.scene.body_materials
-        rates = bond_rates(mesh, topology_of(mesh), material.density, springs_of(material))
-        step = float(spring_step(rates).min())
+        given = mesh, topology_of(mesh), material.density, springs_of(material)
+        step = float(spring_step(largest_bond_rate(*given)))
         if math.isinf(step):
             step = float(step_report(self.scene).borne("solved", "contact").min())
         return step

@@ -29,8 +29,8 @@ from taichi_dem.report.energy_balance import open_account
 
 #: Halvings of the step until one is stable, and from there on; of one refinement.
 _MOST_COARSE, _MOST_FINE, _MOST_AT_ONCE = 6, 7, 2
-#: Level above the first at which a smooth run is made again, with 5/4 of the steps, and any other.
-_NEAR, _HALF = math.log2(1.25), 1
+#: Level above the first at which a smooth run is made again, by a tenth more steps, and another.
+_NEAR, _HALF = math.log2(1.1), 1
 #: Levels at which twins are run, at most: chance by the luck of when a step ends falls with it.
 _TRIED = 3
 #: Spread over what is allowed from which on no mean of runs has it.
@@ -55,6 +55,13 @@ class Search:
 
     def answer(self) -> Answer:
         """The answer, after all runs that it needs."""
+        try:
+            return self._answered()
+        finally:
+            # Else the next question waits until the garbage of this one is collected.
+            self.runs.release()
+
+    def _answered(self):
         self._begin()
         parts, pilot_s = self._parts(), self.runs.seconds
         while not self.why and parts.total > self._allowed:

@@ -76,6 +76,27 @@ def subset_rates(
 
     subsets: bit f of each stands for the bond at local face f; the default is all sixteen.
     """
+    root, blocks = _roots_and_blocks(mesh, topology, density, coefficients)
+    rates = np.zeros((mesh.body_count, len(subsets)))
+    for part in parts_in_cache(mesh.body_count):
+        for column, subset in enumerate(subsets):
+            intact = [face for face in range(4) if subset >> face & 1]
+            total = blocks[part][:, intact].sum(axis=1)
+            rates[part, column] = scaled_eigenvalues(root[part], total)
+    return np.maximum(rates, 0.0)
+
+
+def largest_bond_rate(
+    mesh: Mesh, topology: Topology, density: Density, coefficients: tuple[Constant, Constant]
+) -> float:
+    """Largest of ``bond_rates``, in a tenth of the time: by LAPACK, so but for its last bits."""
+    root, blocks = _roots_and_blocks(mesh, topology, density, coefficients)
+    scaled = product(root, product(blocks.sum(axis=1), transposed(root)))
+    return max(0.0, float(np.linalg.eigvalsh(scaled).max()))
+
+
+def _roots_and_blocks(mesh, topology, density, coefficients):
+    """``inverse_root`` of every body, (n, 6, 6), and the blocks of its four bonds, (n, 4, 6, 6)."""
     mass, centre, inertia = body_properties(mesh, density)
     body, face = np.nonzero(topology.body_bond >= 0)
     laws = per_bond(mesh, topology, density, coefficients)[topology.body_bond[body, face]]
@@ -84,14 +105,7 @@ def subset_rates(
     area, law = face_laws(mesh.points, vertices, laws)
     arms = mesh.points[vertices] - centre[body][:, None]
     blocks[body, face] = area[:, None, None] / 3.0 * point_blocks(arms, law)
-    root = inverse_root(mass, inertia)
-    rates = np.zeros((mesh.body_count, len(subsets)))
-    for part in parts_in_cache(mesh.body_count):
-        for column, subset in enumerate(subsets):
-            intact = [face for face in range(4) if subset >> face & 1]
-            total = blocks[part][:, intact].sum(axis=1)
-            rates[part, column] = scaled_eigenvalues(root[part], total)
-    return np.maximum(rates, 0.0)
+    return inverse_root(mass, inertia), blocks
 
 
 def face_laws(

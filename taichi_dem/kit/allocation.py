@@ -8,6 +8,7 @@ On a CPU an array lies where each field does (``array_of``): reading or writing 
 import contextlib
 import ctypes
 import math
+import mmap
 import os
 import weakref
 from typing import Any
@@ -28,6 +29,8 @@ from taichi_dem.kit.errors import InputError
 MOST_TREES = 480
 #: Share of the free memory that a tree may take.
 _SHARE = 0.9
+#: Bytes of a tree from which on giving its pages back is faster than to overwrite them.
+_LARGE = 2**23
 #: Taichi's lists of fields without a place.
 _FIELDS = ("global_vars", "grad_vars", "dual_vars", "matrix_fields")
 
@@ -108,7 +111,9 @@ class FieldTree:
         """Set all bytes to zero; on a CPU only."""
         ti.sync()
         root = self._builder.root.ptr
-        _array_at(_base(root), np.uint8, (root.cell_size_bytes,))[:] = 0
+        memory = _array_at(_base(root), np.uint8, (root.cell_size_bytes,))
+        first, end = _given_back(_base(root), memory)
+        memory[:first], memory[end:] = 0, 0
 
     def destroy(self) -> None:
         """Free the memory; the fields must not be used any more."""
@@ -116,6 +121,22 @@ class FieldTree:
         _destroyed.add(self._builder.root.ptr.id)
         self._tree.destroy()
         self._tree = None
+
+
+def _given_back(address, memory):
+    """Bytes from one number to another that are zero, as their pages were given back to the system.
+
+    Most lists are long and hardly used: only the pages in use are made anew when they are written.
+    """
+    page = mmap.PAGESIZE
+    first, end = -address % page, (address + len(memory)) // page * page - address
+    if len(memory) < _LARGE or not hasattr(mmap, "MADV_DONTNEED"):
+        return 0, 0
+    memory[first] = 1
+    words = map(ctypes.c_size_t, (address + first, end - first))
+    refused = ctypes.CDLL(None).madvise(*words, mmap.MADV_DONTNEED)
+    # Of memory that is shared with others, the system keeps what is in it.
+    return (0, 0) if refused or memory[first] else (first, end)
 
 
 class _Declared:

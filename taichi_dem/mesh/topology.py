@@ -6,6 +6,7 @@ Local face f of a body is the face opposite its local vertex f. Bonds of one col
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -60,8 +61,9 @@ class Topology:
         return len(self.outer_body)
 
 
+@lru_cache(maxsize=1)
 def topology_of(mesh: Mesh) -> Topology:
-    """Match the faces of all bodies."""
+    """Match the faces of all bodies; that of the last mesh is kept, which several ask for."""
     rows, share = _bonded_faces(mesh)
     order = np.lexsort((rows[:, 1] // 4, rows[:, 0] // 4))
     rows, share = rows[order].astype(np.int32), share[order]

@@ -86,6 +86,13 @@ class HoleMonitor:
         return float(length(position[self.bodies[self.monitored]] - self.first[self.monitored]))
 
 
+def hole_of(model: Model, group: str) -> HoleMonitor:
+    """The monitor of a group, which is made once for a model."""
+    if group not in model.holes:
+        model.holes[group] = HoleMonitor(model, group)
+    return model.holes[group]
+
+
 @dataclass(frozen=True, eq=False)
 class Attenuation:
     """Peak velocities of bodies over their scaled distance from a hole.
@@ -163,7 +170,7 @@ def attenuation_of(
     -------
     Attenuation
     """
-    hole, points = HoleMonitor(model, group), model.mesh.points
+    hole, points = hole_of(model, group), model.mesh.points
     radius = hole.radius if radius is None else positive("radius", radius)
     away = model.centre - hole.axis_point
     away = np.linalg.norm(away - np.outer(away @ hole.axis, hole.axis), axis=1)

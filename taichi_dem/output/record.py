@@ -15,7 +15,7 @@ from taichi_dem.kit.validation import FileName, file_stem, instance, several
 from taichi_dem.loads.pressure import GasPressure
 from taichi_dem.mesh.files import write_pvd, write_vtu
 from taichi_dem.mesh.tetrahedra import area_vectors
-from taichi_dem.output.hole_monitor import HoleMonitor
+from taichi_dem.output.hole_monitor import hole_of
 from taichi_dem.simulation import Simulation
 from taichi_dem.state.model import Model
 from taichi_dem.state.timeline import MAX_LEVEL, NEVER
@@ -86,7 +86,7 @@ class Recorder:
     def __init__(self, simulation: Simulation, *groups: str):
         self.simulation = simulation
         self.model = simulation.model
-        self.holes = {group: HoleMonitor(self.model, group) for group in groups}
+        self.holes = {group: hole_of(self.model, group) for group in groups}
         loads = enumerate(self.model.loads)
         self.gas = [place for place, load in loads if isinstance(load, GasPressure)]
         self.rows: list[dict[str, float]] = []
@@ -95,6 +95,10 @@ class Recorder:
 
     def compile(self) -> None:
         """Compile all that recording needs, so that nothing later keeps Ctrl-C waiting."""
+        engine = self.simulation.engine
+        if engine.records:
+            return
+        engine.records = True
         self.sample()
         self.snapshot()
         self.rows, self.frames = [], []

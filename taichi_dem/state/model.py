@@ -32,7 +32,8 @@ class Model:
     with the numbers that its contacts have in the mesh.
     topology: its faces and bonds. body_mass [kg], centre [m] and body_inertia [kg m^2], body_radius
     [m] (of the ball around a body): an entry a body. by_role: lists of effects; loads, supports and
-    ground: those of these roles. contact: the effect of this role, None without.
+    ground: those of these roles. contact: the effect of this role, None without. holes: monitors of
+    holes by group, see ``hole_monitor.hole_of``.
     Source: Konno et al., section 2.
     """
 
@@ -52,6 +53,7 @@ class Model:
         self.loads, self.supports, self.ground = (tuple(self.by_role[role]) for role in MANY)
         self.contact: Any = next(iter(self.by_role["contact"]), None)
         self.has_contact = self.contact is not None
+        self.holes: dict[str, Any] = {}
 
     def harmless(self) -> "Model":
         """A copy with the materials with which silent effects never act."""

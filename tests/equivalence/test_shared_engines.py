@@ -14,11 +14,17 @@ from taichi_dem import (
     Simulation,
     Uniform,
     effects,
+    goals,
+    solve,
 )
 from taichi_dem.engine import ENGINES
+from taichi_dem.kit import allocation, engine_pool
+from taichi_dem.kit.allocation import FieldTree, assign, values
 from taichi_dem.kit.types import vec3
 from taichi_dem.laws.base import Effect
 from taichi_dem.mesh.shapes import bar, single
+from tests import arch
+from tests.accuracy.small_bar import struck_bar
 
 #: Largest steps of a run: bonds break at the left end, and what they held touches.
 STEPS = 60
@@ -125,6 +131,33 @@ def test_an_engine_goes_on_to_the_next_when_its_simulation_is_gone_or_closed():
     for call in (lambda: second.time_s, lambda: second.advance_to(1), second.close):
         with pytest.raises(InputError, match="this simulation has been closed"):
             call()
+
+
+def test_the_engine_of_an_answer_is_idle_at_once(monkeypatch):
+    """Without the collector of garbage, which takes longer than a small run."""
+
+    def refused():
+        raise AssertionError("the next question waits for the collector of garbage")
+
+    monkeypatch.setattr(engine_pool.gc, "collect", refused)
+    asked = {"until": 2e-6, "tolerance": 0.5, "progress": None}
+    answers = [solve(struck_bar(), goal=goals.kinetic_energy(), **asked) for _ in range(3)]
+    assert len({answer.value for answer in answers}) == 1
+
+
+@pytest.mark.skipif(arch.chosen() != "cpu", reason="another device clears by a kernel")
+def test_cleared_memory_is_zero_to_the_last_byte():
+    """That of a list so long that its pages are given back, and of one that begins in a page."""
+    for count in (1000, allocation._LARGE // 8 + 1000):
+        tree = FieldTree()
+        with tree:
+            first, last = ti.field(ti.i32, shape=3), ti.field(ti.f64, shape=count)
+        for _ in range(2):
+            assign(first, 7)
+            assign(last, np.arange(1.0, count + 1.0))
+            tree.clear()
+            assert not values(first).any() and not values(last).any()
+        tree.destroy()
 
 
 @ti.data_oriented

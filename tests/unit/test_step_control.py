@@ -21,8 +21,8 @@ from taichi_dem import (
     read_mesh,
     step_report,
 )
-from taichi_dem.elasticity.rates import bond_rates, dashpots_of, springs_of
-from taichi_dem.mesh.shapes import bar, pair
+from taichi_dem.elasticity.rates import bond_rates, dashpots_of, largest_bond_rate, springs_of
+from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.mesh.topology import faces_of_group, topology_of
 from taichi_dem.stability.body_limits import dashpot_limit, dashpot_step, spring_limit, spring_step
 from taichi_dem.stability.step_report import stable_together
@@ -152,3 +152,11 @@ def test_largest_rate_of_the_whole_mesh_is_bounded_by_the_report(mesh, law, name
     fastest = bond_rates(mesh, top, CONCRETE.density, law(CONCRETE)).max()
     whole = bonds.largest_rate(getattr(bonds, name))
     assert fastest * (1.0 - 1e-9) <= whole <= 2.0 * fastest * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("mesh", [pair(0.05, 0.02), bar(0.2, 0.05, (4, 2, 1)), single(0.05)])
+def test_largest_rate_of_all_bodies_by_lapack(mesh):
+    """Both are backward stable: they differ by some units in the last place of the largest."""
+    given = mesh, topology_of(mesh), CONCRETE.density, springs_of(CONCRETE)
+    largest = bond_rates(*given).max()
+    assert abs(largest_bond_rate(*given) - largest) <= 36 * np.finfo(float).eps * largest
