@@ -126,7 +126,7 @@ def let_go(options: Namespace, name: str) -> None:
     write_text(at("caption.txt"), " ".join(words) + "\n")
     for sentence in words:
         show_paragraph(sentence)
-    print(f"\n{report}\n")
+    study.show_report(options, report)
     draw = partial(picture, decays, (rigid, shown), options)
     study.finish(options, name, figures_of(decays, options), reports.values(), draw=draw)
     if report.certificate is not None:

@@ -49,7 +49,7 @@ from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import GREY, picture
 from taichi_dem.kit.provenance import peak_memory_mb
 from taichi_dem.mesh.shapes import in_space_order
-from taichi_dem.output.hole_monitor import HoleMonitor
+from taichi_dem.output.hole_monitor import hole_of
 from taichi_dem.plot.view import draw_lines, shades
 
 NAME = "blast_block"
@@ -142,19 +142,20 @@ def in_space(axes, triangles, time_ms, box, look):
 def run(options):
     """Run, picture, print."""
     scene = Scene(in_space_order(mesh_of(options)), CONCRETE, paper_effects())
-    print_quality(scene)
+    if options.verbose:
+        print_quality(scene)
     method = ImplicitDashpots(BLOCK_STEP)
     result = simulate(scene, method=method, title="blasting", **run_options(options))
     started, at = time.perf_counter(), study.output_paths(options.out)
     report, fall = result.report, result.attenuation("hole", HOLE_RADIUS)
-    plot_deep_cracks(at("cracks.png"), result, HoleMonitor(result.model, "hole").axis_point)
+    plot_deep_cracks(at("cracks.png"), result, hole_of(result.model, "hole").axis_point)
     result.plot.attenuation("hole", nearest=FROM_RADII, path=at("peaks.png"))
     result.plot.energy(path=at("energy.png"))
     peaks = {"distance_radii": fall.distance, "peak_speed_m_s": fall.speed}
     write_csv(at("peaks.csv"), {**peaks, "nearer_to_hole": fall.inner.astype(int)})
     drawing, step_ms = time.perf_counter() - started, 1e3 * report.run_cpu_seconds / report.substeps
     moved = float(result.series["hole_radial_displacement_mm"][-1])
-    print(f"\n{report}\n")
+    study.show_report(options, report)
     figures = {
         "tetrahedra": (report.body_count, "1"),
         "broken_faces": (report.broken_faces, "1"),

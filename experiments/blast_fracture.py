@@ -134,15 +134,16 @@ def run(options):
     scene = chosen_scene(options, options.added)
     if options.accuracy is not None:
         return run_to_accuracy(scene, options)
-    print_quality(scene)
-    print("", *dem.estimated_effects(scene, options.until), "", sep="\n")
+    if options.verbose:
+        print_quality(scene)
+        print("", *dem.estimated_effects(scene, options.until), "", sep="\n")
     try:
         result = dem.simulate(scene, method=method, title="blasting", **run_options(options))
     except dem.SimulationDiverged as error:
         if error.result.frames:
             picture(error.result, options)
         raise
-    print(f"\n{result.report}\n")
+    study.show_report(options, result.report)
     figures, reports = figures_of(result), [result.report]
     if options.compare:
         spheres = run_with_spheres(options, method)

@@ -22,7 +22,7 @@ from taichi_dem import At, InputError, Multirate, Uniform, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import styles_of
-from taichi_dem.output.hole_monitor import HoleMonitor
+from taichi_dem.output.hole_monitor import hole_of
 from taichi_dem.plot.series import level_columns, level_shares, plot_levels
 
 NAME = "blast_multirate"
@@ -76,7 +76,7 @@ class Instant:
 
     def observe(self, view):
         """Look at the run."""
-        hole, place = HoleMonitor(view.model, "hole"), view.motion()["position"]
+        hole, place = hole_of(view.model, "hole"), view.motion()["position"]
         self.report, self.radial_mm = view.report(), 1e3 * float(hole.radial_displacement(place))
         self.moved_mm = 1e3 * float(hole.monitored_displacement(place))
 

@@ -66,7 +66,7 @@ def run(options: Namespace) -> None:
     given: dict[str, Any] = {name: getattr(options, name) for name in names}
     method = ImplicitDashpots(4e-7)
     result = simulate(scene, method=method, title="blasting", output=options.out, **given)
-    print(f"{result.report}\n")
+    study.show_report(options, result.report)
     draw = partial(picture, result, options)
     study.finish(options, NAME, figures_of(result), [result.report], draw=draw)
 

@@ -93,7 +93,7 @@ class Result:
             drawn["The block"] = picture()
         title = f"Result: {counted(self.model.body_count, 'body')}, {self.report.outcome}"
         shown = [embedded(figure._repr_png_(), words) for words, figure in drawn.items()]
-        return titled(title, *shown, verbatim(str(self.report)), warning=self.diverged)
+        return titled(title, *shown, verbatim(self.report.details()), warning=self.diverged)
 
     @property
     def certificate(self) -> Certificate | None:

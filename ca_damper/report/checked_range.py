@@ -28,17 +28,12 @@ class CheckedRange:
     warning: str = ""
     knows_motion: bool = True
 
-    def rows(self) -> list[tuple[str, str]]:
-        """Lines of the report.
-
-        Returns
-        -------
-        list of (str, str)
-            Name and text of each.
-        """
+    @property
+    def finding(self) -> str:
+        """What of the scenes lies outside, in words."""
         found = f"outside: {'; '.join(self.outside)}" if self.outside else "inside"
         open_part = "" if self.knows_motion else ", but for the motion, which was not looked at"
-        return [("checked with", self.words), ("", f"{found}{open_part}")]
+        return f"{found}{open_part}"
 
 
 class Driven(NamedTuple):

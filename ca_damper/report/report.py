@@ -6,7 +6,7 @@ from typing import Any
 
 from ca_damper.report.certificate import Certificate
 from ca_damper.report.checked_range import CheckedRange
-from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.display import BRIEF, counted, in_brief, in_lines
 from taichi_dem.kit.effect_usage import Advice, EffectUse
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.validation import FileName, fraction, instance
@@ -156,46 +156,66 @@ class Report:
             return []
         return [*(f"acted: {line}" for line in found.acted()), *found.left_out_lines()]
 
-    def _diverged_rows(self):
-        """Number of scenes that diverged, and the first of them."""
-        if not self.diverged:
-            return ()
-        words = f"{len(self.diverged):,} of them; nan for these and all on one structure with them"
-        return ("diverged", words), ("", self.diverged[0])
-
-    def _bound_row(self):
+    def _bound(self):
         """Bound of the step, and the step relative to it."""
         if self.step_bound is None:
-            return ()
+            return ""
         most, why = self.step_bound
-        return (("step bound by", f"{why}: {most:.3g} s, {self.dt_s[1] / most:.2g} of it taken"),)
+        return f"{why}: {most:.3g} s, {self.dt_s[1] / most:.2g} of it taken"
+
+    def _rows(self):
+        """All lines by name."""
+        gone = f"{len(self.diverged):,} of them; nan for these and all on one structure with them"
+        checked = self.checked
+        acted = (f"{use.effect}: {use}" for use in self.effect_activity)
+        return {
+            "method": f"{self.method}, container on the {self.mount}",
+            "excitation": "\n".join(self.excitation),
+            "effects": "\n".join([", ".join(self.effects) or "none", *acted, *self._certified()]),
+            "scenes": f"{self.scenes:,} with {_range(self.particles)} particles",
+            "simulated": f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s",
+            "diverged": f"{gone}\n{self.diverged[0]}" if self.diverged else "",
+            "step bound by": self._bound(),
+            "momentum error": f"{self.momentum_error:.2g} of what was exchanged",
+            "known of the error": self.known_error.replace("; ", "\n"),
+            "checked with": f"{checked.words}\n{checked.finding}" if checked is not None else "",
+            "steps": f"{self.scene_steps:,} of scenes, {self.particle_steps:,} of particles",
+            "evaluations": f"{self.container_evaluations:,} of the container's motion",
+            "time": (
+                f"{self.compile_seconds:.1f} s before the first step, {self.run_seconds:.1f} s run "
+                f"({1e-6 * self.particle_steps_per_second:.3g} million particle steps a second)"
+            ),
+        }
+
+    def details(self) -> str:
+        """All figures.
+
+        Returns
+        -------
+        str
+            A table of some twelve lines, and one for each effect and signal.
+        """
+        return in_lines(self._rows())
 
     def __str__(self):
-        """A table of some twelve lines, and one for each effect and signal."""
-        step, *others = self.known_error.split("; ")
-        rows = [
-            ("method", f"{self.method}, container on the {self.mount}"),
-            *(("excitation", words) for words in self.excitation),
-            ("effects", ", ".join(self.effects) or "none"),
-            *(("", f"{use.effect}: {use}") for use in self.effect_activity),
-            *(("", line) for line in self._certified()),
-            ("scenes", f"{self.scenes:,} with {_range(self.particles)} particles"),
-            ("simulated", f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s"),
-            *self._diverged_rows(),
-            *self._bound_row(),
-            ("momentum error", f"{self.momentum_error:.2g} of what was exchanged"),
-            ("known of the error", step),
-            *(("", part) for part in others),
-            *(self.checked.rows() if self.checked is not None else ()),
-            ("steps", f"{self.scene_steps:,} of scenes, {self.particle_steps:,} of particles"),
-            ("evaluations", f"{self.container_evaluations:,} of the container's motion"),
-            (
-                "time",
-                f"{self.compile_seconds:.1f} s before the first step, {self.run_seconds:.1f} s run "
-                f"({1e-6 * self.particle_steps_per_second:.3g} million particle steps a second)",
-            ),
-        ]
-        return "\n".join(f"{name:18s} {text}" for name, text in rows)
+        """At most fifteen lines: what came out, how sure, how long; then how.
+
+        All else by ``details``.
+        """
+        rows = self._rows()
+        brief = {
+            "result": f"{rows['scenes']}, {rows['simulated']}",
+            "error": self.known_error,
+            "time": rows["time"],
+            "method": rows["method"],
+            "excitation": "; ".join(self.excitation),
+            "effects": ", ".join(self.effects) or "none",
+            "diverged": rows["diverged"],
+            "step bound by": rows["step bound by"],
+            "checked range": self.checked.finding if self.checked is not None else "",
+            "certificate": self.certificate.verdict if self.certificate else "",
+        }
+        return in_lines(brief, (), BRIEF)
 
 
 def _range(pair):

@@ -131,7 +131,7 @@ class Response(Result):
             f"Response: {self.axes_in_words()}{some}",
             embedded(png, "RMS displacement over frequency"),
             table(self._peak_rows(rows), _PEAK_COLUMNS),
-            unfolded("All figures of the run", str(self.report)) if self.report else "",
+            unfolded("All figures of the run", self.report.details()) if self.report else "",
         )
 
     def _peak_rows(self, rows):

@@ -150,6 +150,11 @@ class BaseCertificate:
         return f"{', and '.join(faults)}: {self.remedy}" if faults else ""
 
     @property
+    def verdict(self) -> str:
+        """Whether it holds, in words."""
+        return "holds" if self.holds else f"does not hold, as {self.failure}"
+
+    @property
     def remedy(self) -> str:
         """What would settle it."""
         raise NotImplementedError
@@ -179,7 +184,7 @@ class BaseCertificate:
         """What was left out, in lines."""
         lines = [f"left out: {estimate}" for estimate in self.left_out]
         lines += [f"audit: {audit}" for audit in self.audits if audit.skipped]
-        lines += [] if self.holds else [f"this certificate does not hold, as {self.failure}"]
+        lines += [] if self.holds else [f"this certificate {self.verdict}"]
         return lines
 
     def __str__(self):

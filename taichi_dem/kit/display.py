@@ -6,7 +6,7 @@ Nothing here reads a field: an object may be shown after its Taichi session has 
 import base64
 import html
 import math
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import fields
 from inspect import signature
 from typing import Any, ClassVar
@@ -17,6 +17,8 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_bytes
 from taichi_dem.kit.validation import FileName, path_name, shown
 
+#: Lines of a report of which not all is asked for.
+BRIEF = 15
 #: Letters of a representation at a prompt.
 _LONGEST = 400
 #: Longest sequence of numbers that is listed; longer ones are shown by their ends.
@@ -87,6 +89,22 @@ def listed(values: Collection[float]) -> str:
     if len(values) <= _LISTED:
         return ", ".join(f"{value:g}" for value in values)
     return f"{min(values):g} to {max(values):g} ({len(values)} values)"
+
+
+def in_lines(rows: Mapping[str, str], warnings: Sequence[str] = (), most: int | None = None) -> str:
+    """Rows of text by name, then a line a warning; rows without text are left out.
+
+    most: lines at most, the last of which says how many are left.
+    """
+    lines = [
+        f"{'' if k else name:18s} {text}"
+        for name, texts in rows.items()
+        for k, text in enumerate(texts.splitlines())
+    ]
+    lines += [f"warning: {words}" for words in warnings]
+    if most is not None and len(lines) > most:
+        lines[most - 1 :] = [f"and {len(lines) - most + 1} more lines: report.details()"]
+    return "\n".join(lines)
 
 
 def table(rows: Iterable[Iterable[object]], head: Sequence[object] = ()) -> str:

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from taichi_dem.kit.bars.answer import known_partings
-from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.display import BRIEF, counted, in_brief, in_lines
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.methods import order_of
 from taichi_dem.report.effects import Certificate
@@ -206,14 +206,14 @@ class Report:
         return {**figures, **{name: getattr(self, name) for name in derived.split()}}
 
     def rows(self) -> dict[str, str]:
-        """Lines by name; ``""`` for what there is nothing to say of."""
+        """All lines by name; ``""`` for what there is nothing to say of."""
         varies = self.body_updates != self.body_count * self.substeps
         gain = f"{self.ideal_gain:.2f} ideal, {self.boundary_gain:.2f} with pairs at the finer step"
         swept = f"{self.sweeps:,}, {self.sweeps / max(1, self.substeps):.2f} a substep"
         unconverged = f"{self.unconverged_steps:,} substeps unconverged"
         bound = ((name.replace("_", " "), n) for name, n in self.bound_by.items())
-        broken = f"{self.broken_faces} of {self.bond_count} bonds broken"
-        counted = f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs"
+        broken = f"{self.broken_faces:,} of {self.bond_count:,} bonds broken"
+        evaluated = f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs"
         momentum = f"{self.linear_momentum_error:.1e} linear, {self.angular_momentum_error:.1e}"
         run = f"{self.run_seconds:.1f} s run ({self.run_cpu_seconds:.1f} s of CPU)"
         left_out = self.certificate.left_out_lines() if self.certificate else ()
@@ -225,7 +225,7 @@ class Report:
             "smallest step": f"{self.smallest_step_s:.3g} s",
             "steps bound by": ", ".join(f"{name} ({n} bodies)" for name, n in bound),
             "substeps": f"{self.substeps:,}",
-            "evaluations": f"{counted}, {self.body_updates:,} bodies",
+            "evaluations": f"{evaluated}, {self.body_updates:,} bodies",
             "largest bond slip": "\n".join(slip.figure for slip in self.bond_slip),
             "gain over uniform": gain if varies else "",
             "sweeps": f"{swept}, {unconverged}" if self.sweeps else "",
@@ -240,14 +240,40 @@ class Report:
             "time": f"{self.compile_seconds:.1f} s before the first step, {run}",
         }
 
+    def details(self) -> str:
+        """All figures.
+
+        Returns
+        -------
+        str
+            A table of some thirty lines, then a line for each effect that was missed.
+        """
+        return in_lines(self.rows(), self.needs)
+
     def __str__(self):
-        """A table of some twenty lines, then one line for every effect that was missed."""
-        lines = [
-            f"{'' if k else name:18s} {text}"
-            for name, texts in self.rows().items()
-            for k, text in enumerate(texts.splitlines())
-        ]
-        return "\n".join([*lines, *(f"warning: {need}" for need in self.needs)])
+        """At most fifteen lines: what came out, how sure, how long; then how, and what was missed.
+
+        All else by ``details``.
+        """
+        rows = self.rows()
+        brief = {
+            "result": f"{counted(self.body_count, 'body')} for {rows['simulated']}",
+            "error": self.known_error,
+            "time": rows["time"],
+            "method": f"{self.method}, smallest step {rows['smallest step']}",
+            "effects": self._acted(),
+            "work put in": rows["work put in"],
+            "injected": rows["injected"],
+            "certificate": self.certificate.verdict if self.certificate else "",
+        }
+        return in_lines(brief, self.needs, BRIEF)
+
+    def _acted(self):
+        """Which effects acted, and which never did."""
+        never = [use.effect for use in self.effect_activity if use.idle]
+        acted = [use.effect for use in self.effect_activity if not use.idle]
+        parts = f"{', '.join(acted)} acted" if acted else "", f"{', '.join(never)} never did"
+        return "; ".join(part for part in (parts if never else parts[:1]) if part) or "none"
 
 
 def known_error(report: Report, scene: Scene, method: Any) -> str:

@@ -136,4 +136,4 @@ def test_blows_that_no_momentum_stands_for_are_found_out():
     """What is missing is of the order of what is counted: no rounding."""
     report = shaken(Kicks(strength=2e-5, mass=0.005)).report()
     assert report.momentum_error > 0.1
-    assert f"{report.momentum_error:.2g} of what was exchanged" in str(report)
+    assert f"{report.momentum_error:.2g} of what was exchanged" in report.details()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, Uniform, read_mesh, simulate, write_paraview
+from taichi_dem.kit.display import BRIEF
 from taichi_dem.mesh.shapes import bar
 from tests.made_result import made_result
 
@@ -101,6 +102,18 @@ def test_vtkhdf_holds_what_the_pvd_series_holds(result, tmp_path):
                 start = steps["CellDataOffsets"][name][k]
                 found = root["CellData"][name][start : start + count]
                 assert np.array_equal(found, values, equal_nan=True), name
+
+
+def test_a_report_is_brief_and_loses_nothing(flown):
+    report = flown.report
+    lines = str(report).splitlines()
+    assert [line.split()[0] for line in lines[:3]] == ["result", "error", "time"]
+    assert len(lines) <= BRIEF and report.known_error in lines[1]
+    told = dataclasses.replace(report, unresolved=tuple(map(str, range(30))))
+    lines, details = str(told).splitlines(), told.details()
+    assert len(lines) == BRIEF and all(f"warning: {k}\n" in f"{details}\n" for k in range(30))
+    left = re.fullmatch(r"and (\d+) more lines: report.details\(\)", lines[-1])
+    assert f"warning: {30 - int(left[1]) - 1}" == lines[-2]
 
 
 def read_xyz(path):

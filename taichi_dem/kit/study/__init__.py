@@ -28,6 +28,7 @@ from taichi_dem.kit.study.summary import (
     figure,
     finish,
     show_answer,
+    show_report,
     versions,
     write_accuracy,
     write_rows,

@@ -148,6 +148,7 @@ def bare_parser(name: str, description: str | None) -> Parser:
     plain: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
     made = Parser(prog=f"python experiments/{name}.py", description=description, **plain)
     made.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    made.add_argument("--verbose", action="store_true", help="print all figures of a run")
     return made
 
 

@@ -101,6 +101,11 @@ def _seconds_of(options, runs):
     return seconds, list(dict.fromkeys(filter(None, errors)))
 
 
+def show_report(options: Namespace, report: Any) -> None:
+    """Print a report of a run, all of it with --verbose."""
+    print(f"\n{report.details() if options.verbose else report}\n")
+
+
 def add_to_summary(folder: str, **entries: Any) -> None:
     """Add entries, which JSON can hold, by name to the summary.json that ``finish`` wrote."""
     path = Path(folder, "summary.json")
