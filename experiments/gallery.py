@@ -7,8 +7,8 @@
 
 Open results/index.html: it needs no server. Ends with exit code 1 and a list when an experiment
 failed or is missing from the page. A new experiment gets an entry in _gallery_pages.txt; --readme
-then renews the table of README.md. --pictures takes small pictures and figures of full runs into
-docs; --readme writes these figures into the pages.
+then renews the table of docs/experiments.md. --pictures takes small pictures and figures of full
+runs into docs; --readme writes these figures into the pages.
 """
 
 import json
@@ -48,7 +48,7 @@ _TABLE = re.compile(r"(<!-- table: (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 FLAGS = {
     "quick": "run smaller jobs of under a minute",
     "reuse": "run only what has no result yet",
-    "readme": "renew the table of README.md and figures in all pages, run nothing",
+    "readme": "renew the table of experiments and figures in all pages, run nothing",
     "pictures": f"renew {SMALL_PICTURES} and the figures kept for the pages, run nothing",
 }
 
@@ -154,20 +154,18 @@ def shrink_pictures(out, folder):
     return list(filter(None, (shrink_picture(page, out, folder, *SMALL) for page in pages())))
 
 
+def table_of_experiments():
+    """All experiments as a table for a page of the docs."""
+    return markdown_table(pages(), HERE.parent / "docs", Path(SMALL_PICTURES).name)
+
+
 def renew_readme(root):
-    """Renew the table of README.md in a folder, show pictures whose place was kept for them.
-
-    Figures in the sentences of all pages become those that are kept.
-    """
-    path, table = Path(root, "README.md"), markdown_table(pages(), HERE.parent, SMALL_PICTURES)
-
-    def show(place):
-        return place[1] if Path(root, place[2]).is_file() else place[0]
-
+    """Renew the table of experiments, and in the sentences of all pages the figures."""
+    path, table = Path(root, "docs/experiments.md"), table_of_experiments()
     text = path.read_text(encoding="utf-8")
     text = re.sub(r"\| question \|.*?\n\n", lambda _: f"{table}\n", text, flags=re.DOTALL)
-    write_text(path, re.sub(r"<!-- (!\[[^]]+\]\((.+?)\)) -->", show, text))
-    for page in (path, *sorted(Path(root, "docs").glob("*.md"))):
+    write_text(path, text)
+    for page in (Path(root, "README.md"), *sorted(Path(root, "docs").glob("*.md"))):
         text = page.read_text(encoding="utf-8")
         filled = fill_figures(text, root)
         if filled != text:

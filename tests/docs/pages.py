@@ -31,6 +31,12 @@ def blocks(page):
     return [token.content for token in fences if token.info.strip().lower().startswith("py")]
 
 
+def lines(page):
+    """Commands in the shell blocks of a page, in order."""
+    fences = [token for token in tokens(page) if token.type == "fence" and token.info == "sh"]
+    return [line for fence in fences for line in fence.content.splitlines() if line]
+
+
 def links(page):
     """What a page links to and shows."""
     for token in tokens(page):

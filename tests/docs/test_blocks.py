@@ -9,7 +9,7 @@ import pytest
 
 from ca_damper.automaton.accounting import ACCOUNTINGS
 from taichi_dem import runtime
-from tests.docs.pages import PAGES, blocks
+from tests.docs.pages import FOLDER, PAGES, blocks, lines
 from tests.hard_cases.cases import assess
 from tests.processes import users_environment
 
@@ -54,6 +54,24 @@ def test_a_block_runs_as_it_stands(left_by, block, tmp_path):
     line = [sys.executable, "pasted.py"]
     done = subprocess.run(line, cwd=tmp_path, env=users_environment(), **options)
     assert done.returncode == 0 and done.stderr == "" and done.stdout, done.stderr
+
+
+#: What a new user types first; the tests themselves are part of it.
+FIRST = ("make demo", "make test")
+PASTED = [line for line in lines("README.md") if not line.startswith(FIRST)]
+
+
+@pytest.mark.parametrize("line", PASTED)
+def test_a_command_of_the_first_page_works_when_it_is_pasted(line, tmp_path):
+    """In a clean shell after ``make demo``, in a folder of links with results of its own."""
+    for one in FOLDER.iterdir():
+        if one.name != "results":
+            (tmp_path / one.name).symlink_to(one)
+    shell = {"shell": True, "executable": "/bin/sh", "cwd": tmp_path, "timeout": 600}
+    done = subprocess.run(
+        line, **shell, env=users_environment(), capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0 and done.stdout and (tmp_path / "results").is_dir(), done.stderr
 
 
 def test_the_effect_moves_a_body_as_the_leapfrog_must(left_by):

@@ -10,8 +10,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 from docs.site.conf import CONTENTS
-from gallery import SMALL_PICTURES, fill_figures, pages
-from taichi_dem.kit.study.results_page import markdown_table
+from gallery import fill_figures, table_of_experiments
 from tests.docs.pages import FOLDER, PAGES, anchors, headings, links, text_of, tokens, words
 
 PACKAGES = ("taichi_dem.", "ca_damper.")
@@ -109,9 +108,9 @@ def test_figures_are_those_kept_of_full_runs(page):
     assert not re.findall(typed, text)
 
 
-def test_the_table_of_the_first_page_is_that_of_the_gallery():
-    table = markdown_table(pages(), FOLDER, SMALL_PICTURES)
-    assert table in text_of("README.md"), "renew it: experiments/gallery.py --readme"
+def test_the_table_of_experiments_is_that_of_the_gallery():
+    table = table_of_experiments()
+    assert table in text_of("docs/experiments.md"), "renew it: experiments/gallery.py --readme"
 
 
 def test_the_site_lists_every_page_once():
