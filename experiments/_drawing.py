@@ -50,13 +50,12 @@ class FilmedRun(NamedTuple):
     colour: str
 
 
-def film_runs(path, runs, times, *, words, curve, magnify, ticks=None, footers=(), **look):
+def film_runs(path, runs, times, *, words, curve, magnify, ticks=None, **look):
     """Write a GIF of runs over the same time.
 
     runs: FilmedRuns. times: of the pictures [s]; each run shows its frame at or before. words: of
     the colour bar; ticks: its places and their names. curve: options of ``Axes.set`` for the curves
-    over time [µs]. magnify: of the displacement. footers: text below each picture. look: of the
-    bodies, as in ``draw_bodies``.
+    over time [µs]. magnify: of the displacement. look: of the bodies, as in ``draw_bodies``.
     """
     seen = {"magnify": magnify, "axis": look.pop("axis", ALONG_Z)}
     with moving_picture(path, (4.0, 4.0), 125) as (figure, shoot):
@@ -75,14 +74,9 @@ def film_runs(path, runs, times, *, words, curve, magnify, ticks=None, footers=(
             lines += below.plot(time, run.curve, ls=dashes, color=run.colour, label=run.label)
         below.set(xlabel="time [µs]", xlim=(0.0, 1.03e6 * max(times)), **curve)
         below.legend(loc="upper left")
-        # The first picture keeps room for the longest footer.
-        room = " \n" * max(text.count("\n") + 1 for text in footers or [""])
-        footer = figure.supxlabel(room, x=0.02, ha="left", fontsize=6.5, family="monospace")
-        for number, now in enumerate(times):
+        for now in times:
             for axes, run, drawn, line in zip(panels, runs, bodies, lines):
                 _show(axes, run, drawn, line, now, **seen)
-            if number and footers:
-                footer.set_text(footers[number])
             shoot()
 
 

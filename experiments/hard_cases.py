@@ -9,8 +9,11 @@ stands in the table. A method that claims the case passes with all figures withi
 margin is bound over figure, of the worst of them. A method that cannot handle it has to refuse in
 words: numbers in their place count as a failure. The cases are tests, in tests/hard_cases.
 
-Writes hard_cases.csv, a picture of each case, hard_cases_blast.png, hard_cases_damper.png,
-hard_cases.png and summary.json to results/hard_cases/.
+On the wall each case is a square; those that no method bears, and all refuse, are grey. Opened in a
+browser, a square of hard_cases.svg opens the picture of its case.
+
+Writes hard_cases.png and .svg, hard_cases.csv, a picture of each case, hard_cases_blast.png,
+hard_cases_damper.png and summary.json to results/hard_cases/.
 """
 
 import itertools
@@ -21,9 +24,25 @@ import textwrap
 from collections import Counter, defaultdict
 from functools import partial
 
+from matplotlib.patches import Rectangle
+
 from _asked import found_by
 from taichi_dem.kit import study
-from taichi_dem.kit.plot_style import BLACK, GREY, RED, line_key, picture, power, styles_of
+from taichi_dem.kit.files import write_whole
+from taichi_dem.kit.plot_style import (
+    BLACK,
+    BLUE,
+    GREY,
+    NAVY,
+    ORANGE,
+    RED,
+    SKY,
+    area_key,
+    line_key,
+    picture,
+    power,
+    styles_of,
+)
 
 NAME = "hard_cases"
 #: Of a quick run, which compile little; the tests ask all, at quick size.
@@ -33,9 +52,10 @@ SETTINGS = {
     "columns": (3, 3, study.whole(1, 8), "of the sheet, 3"),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
-#: Margins from which on more means nothing; where those stand that refuse, and those that fail.
-MOST, PLACES = 1e4, {"refused": 0.05, "failed": 0.4}
-TICKS = {0.05: "refused", 1.0: "1", 10.0: "10", 100.0: "100", MOST: "≥ 10⁴"}
+#: Least margins of the squares of the wall, their colours, and how many are side by side.
+MARGINS = {"above 100": 100.0, "10 to 100": 10.0, "2 to 10": 2.0, "1 to 2": 1.0}
+WALL = dict(zip(["failed", *reversed(MARGINS), "refused"], (RED, ORANGE, SKY, BLUE, NAVY, GREY)))
+ACROSS = 16
 
 
 def row_of(trial):
@@ -58,7 +78,7 @@ def run(options):
         sheets[f"hard_cases_{trial.case.package}"].append(trial)
     for name, own in sheets.items():
         picture_cases(folder / f"{name}.png", own, options.columns)
-    picture_margins(folder / "hard_cases.png", trials)
+    picture_wall(folder / "hard_cases.png", trials)
     shown = ("case", "method", "status", "margin", "words")
     study.print_table([[cell_of(row[key]) for key in shown] for row in rows], shown)
     ends = Counter(trial.status for trial in trials)
@@ -167,45 +187,30 @@ def verdict(own):
     return ", ".join(said)
 
 
-def picture_margins(path, trials):
-    """A panel a package, a row a case, a mark a method: its margin, or that it refuses."""
-    packages = dict.fromkeys(trial.case.package for trial in trials)
-    panels = {name: [one for one in trials if one.case.package == name] for name in packages}
-    longest = max(len(by_name(own)) for own in panels.values())
-    size = 4.6 * len(panels), 2.2 + 0.155 * longest
-    with picture(path, 1, len(panels), size, squeeze=False) as (_, axes):
-        for axis, (package, own) in zip(axes[0], panels.items()):
-            draw_margins(axis, own)
-            look = {"title_fontsize": 9.5, "alignment": "left", "loc": "lower left"}
-            look.update(bbox_to_anchor=(-0.3, 1.0), borderpad=0.0)
-            axis.legend(title=f"{package}: {len(own)} runs", **look)
+def picture_wall(path, trials):
+    """A square a case, coloured by ``level_of``; as SVG, too, where a square opens its picture."""
+    levels = {name: level_of(own) for name, own in by_name(trials).items()}
+    names = sorted(levels, key=lambda name: [*WALL].index(levels[name]))
+    counts, columns = Counter(levels.values()), min(ACROSS, len(names))
+    with picture(path, size=(5.0, 3.6), dpi=300) as (figure, axes):
+        for k, name in enumerate(names):
+            place, look = (k % columns, k // columns), {"fc": WALL[levels[name]], "lw": 0.0}
+            axes.add_patch(Rectangle(place, 0.88, 0.88, url=f"{name}.png", **look))
+        axes.set(xlim=(-0.1, columns), ylim=(-(-len(names) // columns), -0.1), aspect="equal")
+        axes.set_axis_off()
+        keys = [area_key(f"{name}: {counts[name]}", fc=colour) for name, colour in WALL.items()]
+        look = {"loc": "outside lower center", "ncols": 3, "fontsize": 9.5, "title_fontsize": 9.5}
+        figure.legend(handles=keys, title=f"{len(names)} hard cases by margin", **look)
+        write_whole(path.with_suffix(".svg"), partial(figure.savefig, format="svg"))
 
 
-def draw_margins(axis, own):
-    """Marks of all methods, those that fail as stars."""
-    cases, looks = by_name(own), looks_of(own)
-    names = list(cases)
-    failed = [trial for trial in own if trial.status == "failed"]
-    for k, (method, look) in enumerate(looks.items()):
-        spread = 0.5 * (k / max(1, len(looks) - 1) - 0.5)
-        look = {**look, "ls": "none", "mew": 0.0, "ms": 5.0}
-        for some, more in ((own, {}), (failed, {"marker": "*", "ms": 11.0, "label": None})):
-            mine = [trial for trial in some if trial.method == method]
-            level = [names.index(trial.case.name) + spread for trial in mine]
-            axis.plot([place_of(trial) for trial in mine], level, **{**look, **more})
-    if failed:
-        axis.plot([], [], "*", ms=11.0, color=BLACK, label="failed")
-    axis.axvline(1.0, color=GREY, lw=1.0, label="at the bound")
-    axis.set(xscale="log", xlim=(0.02, 2.5 * MOST), ylim=(len(cases) - 0.3, -0.7))
-    axis.set_yticks(range(len(cases)), [title_of(trials[0].case) for trials in cases.values()])
-    axis.set_xticks(list(TICKS), list(TICKS.values()))
-    axis.set_xticks([], minor=True)
-    axis.set_xlabel("margin: bound / worst figure [1]")
-
-
-def place_of(trial):
-    """Place of a trial on the axis of margins."""
-    return PLACES.get(trial.status) or min(trial.worst.margin, MOST)
+def level_of(own):
+    """Entry of the wall for the trials of a case: by the least margin of methods that bear it."""
+    ends = {trial.status for trial in own}
+    if "failed" in ends or "passed" not in ends:
+        return "failed" if "failed" in ends else "refused"
+    least = min(trial.worst.margin for trial in own if trial.worst)
+    return next(name for name, margin in MARGINS.items() if least >= margin)
 
 
 if __name__ == "__main__":

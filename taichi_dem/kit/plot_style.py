@@ -44,7 +44,7 @@ PNG_DPI, _FILE_DPI = 110, 150
 #: Okabe and Ito's colours, which colour-blind readers can distinguish.
 BLUE, RED, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#222222", "#8A8A8A"
-BROWN, VIOLET = "#8C6D31", "#6A51A3"
+BROWN, VIOLET, NAVY = "#8C6D31", "#6A51A3", "#0B2545"
 WINE, OLIVE, LIGHT_GREY = "#882255", "#999933", "#ADADAD"
 
 
@@ -152,10 +152,12 @@ def styled(
 
 
 @contextlib.contextmanager
-def picture(path: FileName | None, *shape: Any, **options: Any) -> Iterator[tuple[Figure, Any]]:
+def picture(
+    path: FileName | None, *shape: Any, dpi: Any = _FILE_DPI, **options: Any
+) -> Iterator[tuple[Figure, Any]]:
     """A figure and its axes, as of ``styled``, written as PNG when the block ends well.
 
-    path: None for no file. Raises InputError when the file cannot be written.
+    path: None for no file. dpi: pixels per inch. Raises InputError when the file cannot be written.
     """
     if path is not None:
         drawing(path)
@@ -164,7 +166,7 @@ def picture(path: FileName | None, *shape: Any, **options: Any) -> Iterator[tupl
         _write_plain_numbers(figure)
         if path is None:
             return
-        write_bytes(path, png_of(figure, _FILE_DPI))
+        write_bytes(path, png_of(figure, dpi))
 
 
 class _PlainLogFormatter(LogFormatterSciNotation):

@@ -19,7 +19,7 @@ from tests.terminal import phases_of, run_in_terminal
 pytestmark = pytest.mark.experiment
 
 #: The quick run of this one takes a few seconds.
-SMALLEST = "demo_step_too_large"
+SMALLEST = "stable_or_not"
 
 
 def test_json_is_the_summary_alone_and_the_bar_stays_on_the_terminal(tmp_path):

@@ -29,7 +29,7 @@ _MOST = 12
 #: A row by key.
 Row = dict[str, Any]
 #: Endings of what is looked at.
-_PICTURES = (".png", ".gif", ".mp4", ".html")
+_PICTURES = (".png", ".svg", ".gif", ".mp4", ".html")
 
 
 def figure(value: Any, unit: str, paper: Any = None) -> dict:
