@@ -1,7 +1,8 @@
 """Simple solids as meshes of tetrahedra of even size, without a mesh generator.
 
 All lengths in metres; x to the right, y up, z towards the viewer. ``element`` is the length of an
-edge; planes are met exactly, and round walls by polygons whose corners lie on them::
+edge; planes are met exactly, and round walls by polygons whose corners lie on them. With a seed as
+``scatter`` the mesh has no rows, along which cracks would run::
 
     from taichi_dem import shapes
 
@@ -16,16 +17,26 @@ import numpy as np
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import EDGE, in_unit
-from taichi_dem.kit.validation import FileName, direction, finite, positive, shown, told_apart
+from taichi_dem.kit.validation import (
+    FileName,
+    direction,
+    finite,
+    positive,
+    shown,
+    told_apart,
+    whole,
+)
 from taichi_dem.mesh.gmsh import filled_surface, refuse_too_many
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.shapes import circle, divided, drawn_out
 
 #: Distance from a line within which a point lies on it, in elements.
 _ON = 1e-6
+#: Largest seed.
+_MOST_SEED = 2**31 - 1
 
 
-def block(size: float | Sequence[float], *, element: float) -> Mesh:
+def block(size: float | Sequence[float], *, element: float, scatter: int | None = None) -> Mesh:
     """Make a box from the origin to (x, y, z) = ``size``.
 
     Parameters
@@ -34,6 +45,8 @@ def block(size: float | Sequence[float], *, element: float) -> Mesh:
         Lengths along x, y and z [m]; one number for a cube.
     element : float
         Length of an edge [m], at most the smallest of them.
+    scatter : int, optional
+        Seed of an unstructured mesh, 0 to 2147483647: without rows that cracks would follow.
 
     Returns
     -------
@@ -43,7 +56,7 @@ def block(size: float | Sequence[float], *, element: float) -> Mesh:
     Raises
     ------
     InputError
-        A length is no positive number, or an element does not fit.
+        A length is no positive number, an element does not fit, or ``scatter`` is no seed.
 
     Examples
     --------
@@ -53,10 +66,13 @@ def block(size: float | Sequence[float], *, element: float) -> Mesh:
     lengths = (size,) * 3 if finite(size) else direction("size", size)
     x, y, z = (positive("size", length) for length in lengths)
     element = _element(element, min(x, y, z), x * y * z)
-    return drawn_out([divided(_corners(x, y), element)], z, element, _box_sides(x, y, element))
+    sides = _box_sides(x, y, element)
+    return drawn_out([divided(_corners(x, y), element)], z, element, sides, _seed(scatter))
 
 
-def beam(*, length: float, width: float, height: float, element: float) -> Mesh:
+def beam(
+    *, length: float, width: float, height: float, element: float, scatter: int | None = None
+) -> Mesh:
     """Make a beam along x from the origin.
 
     Parameters
@@ -69,6 +85,8 @@ def beam(*, length: float, width: float, height: float, element: float) -> Mesh:
         Height along y [m].
     element : float
         Length of an edge [m], at most the smallest of them.
+    scatter : int, optional
+        Seed of an unstructured mesh, 0 to 2147483647: without rows that cracks would follow.
 
     Returns
     -------
@@ -78,7 +96,7 @@ def beam(*, length: float, width: float, height: float, element: float) -> Mesh:
     Raises
     ------
     InputError
-        A length is no positive number, or an element does not fit.
+        A length is no positive number, an element does not fit, or ``scatter`` is no seed.
 
     Examples
     --------
@@ -86,10 +104,11 @@ def beam(*, length: float, width: float, height: float, element: float) -> Mesh:
     60
     """
     given = {"length": length, "height": height, "width": width}
-    return block([positive(name, value) for name, value in given.items()], element=element)
+    lengths = [positive(name, value) for name, value in given.items()]
+    return block(lengths, element=element, scatter=scatter)
 
 
-def cylinder(*, radius: float, height: float, element: float) -> Mesh:
+def cylinder(*, radius: float, height: float, element: float, scatter: int | None = None) -> Mesh:
     """Make a cylinder that stands on the plane y = 0, with the y axis as its axis.
 
     Parameters
@@ -100,6 +119,8 @@ def cylinder(*, radius: float, height: float, element: float) -> Mesh:
         Height [m].
     element : float
         Length of an edge [m], at most the radius and the height.
+    scatter : int, optional
+        Seed of an unstructured mesh, 0 to 2147483647: without rows that cracks would follow.
 
     Returns
     -------
@@ -109,7 +130,7 @@ def cylinder(*, radius: float, height: float, element: float) -> Mesh:
     Raises
     ------
     InputError
-        A length is no positive number, or an element does not fit.
+        A length is no positive number, an element does not fit, or ``scatter`` is no seed.
 
     Notes
     -----
@@ -123,7 +144,8 @@ def cylinder(*, radius: float, height: float, element: float) -> Mesh:
     radius, height = positive("radius", radius), positive("height", height)
     element = _element(element, min(radius, height), np.pi * radius**2 * height)
     sides = {"side": _on_circle((0.0, 0.0), 2.0 * radius, element)}
-    made = drawn_out([circle((0.0, 0.0), 2.0 * radius, element)], height, element, sides)
+    outline = circle((0.0, 0.0), 2.0 * radius, element)
+    made = drawn_out([outline], height, element, sides, _seed(scatter))
     made = made.moved(turned=(-90.0, 0.0, 0.0), about=(0.0, 0.0, 0.0))
     names = {"back": "bottom", "front": "top"}
     return replace(made, groups={names.get(k, k): faces for k, faces in made.groups.items()})
@@ -136,6 +158,7 @@ def plate(
     thickness: float,
     element: float,
     hole: float | Sequence[float] | None = None,
+    scatter: int | None = None,
 ) -> Mesh:
     """Make a plate from the origin, with a hole where asked for.
 
@@ -152,6 +175,8 @@ def plate(
     hole : float or sequence of float, optional
         Centre and diameter (x, y, diameter) of a round hole through the thickness [m]; one number
         is the diameter of a hole in the middle.
+    scatter : int, optional
+        Seed of an unstructured mesh, 0 to 2147483647: without rows that cracks would follow.
 
     Returns
     -------
@@ -161,8 +186,8 @@ def plate(
     Raises
     ------
     InputError
-        A length is no positive number, an element does not fit, or a hole does not leave an element
-        of wall around it.
+        A length is no positive number, an element does not fit, a hole does not leave an element of
+        wall around it, or ``scatter`` is no seed.
 
     Examples
     --------
@@ -178,7 +203,7 @@ def plate(
         middle = _checked_hole(hole, x, y, element)
         loops.append(circle(middle[:2], middle[2], element)[::-1])
         sides["hole"] = _on_circle(middle[:2], middle[2], element)
-    return drawn_out(loops, z, element, sides)
+    return drawn_out(loops, z, element, sides, _seed(scatter))
 
 
 def from_surface(path: FileName, *, element: float, scale: float = 1.0) -> Mesh:
@@ -223,6 +248,11 @@ def _element(element, smallest, volume):
         )
     refuse_too_many(element, volume)
     return in_unit("element", element, EDGE)
+
+
+def _seed(scatter):
+    """The seed of an unstructured mesh, None for a structured one."""
+    return None if scatter is None else whole("scatter", scatter, 0, _MOST_SEED)
 
 
 def _corners(x, y):

@@ -24,6 +24,7 @@ from taichi_dem.kit.validation import flag, instance, positive, several, shown, 
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.check import COINCIDENT, joined_bodies, weld_labels
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
+from taichi_dem.mesh.scatter import scattered
 
 #: Groups of a bar: its low and high end along each axis.
 _SIDES = ("left", "right"), ("bottom", "top"), ("back", "front")
@@ -174,7 +175,11 @@ def _sides(grid, cells, tetrahedra):
 
 
 def drawn_out(
-    loops: Sequence[np.ndarray], depth: float, element: float, sides: Mapping[str, OnOutline]
+    loops: Sequence[np.ndarray],
+    depth: float,
+    element: float,
+    sides: Mapping[str, OnOutline],
+    scatter: int | None = None,
 ) -> Mesh:
     """A solid from z = 0 to a depth; groups back (z = 0), front, and the sides by name.
 
@@ -185,6 +190,8 @@ def drawn_out(
     depth, element : float [m]
     sides : dict
         Name of a group to a function that says which points of the outline are on it.
+    scatter : int, optional
+        Seed of a mesh without layers and rows, see ``scattered``.
     """
     flat, triangles = triangulated(loops, element)
     layers = max(1, round(depth / (_LAYER * element)))
@@ -194,8 +201,13 @@ def drawn_out(
     rank = np.random.default_rng(len(flat)).permutation(len(flat))
     layered = [_prisms(triangles, rank, k, len(flat)) for k in range(layers)]
     tetrahedra = np.vstack(layered)
+    if scatter is not None:
+        outline = _outline(loops)
+        arrays = points, tetrahedra, lambda x: _is_inside(x[:, :2], *outline)
+        points, tetrahedra = scattered(*arrays, element, scatter)
     groups = _groups(points, geometry.outer_faces(tetrahedra), depth, sides)
-    return checked_mesh(points, tetrahedra, groups)
+    made = checked_mesh(points, tetrahedra, groups)
+    return made if scatter is None else in_space_order(made)
 
 
 def _prisms(triangles, rank, layer, count):
@@ -235,14 +247,18 @@ def triangulated(loops: Sequence[np.ndarray], element: float) -> tuple[np.ndarra
     InputError
         Where the outline is too narrow, or too finely divided, for elements of this size.
     """
-    starts = np.vstack(loops)
-    ends = np.vstack([np.roll(loop, -1, axis=0) for loop in loops])
+    starts, ends = _outline(loops)
     draw = np.random.default_rng(1)
     points = np.vstack([starts, _inner_points(starts, ends, element)])
     for _ in range(_ROUNDS):
         found = _inner_triangles(points, starts, ends, element, draw)
         _smooth(points, found, len(starts))
     return points, found
+
+
+def _outline(loops):
+    """Starts and ends of all sides of an outline and its holes [m], two arrays (n, 2)."""
+    return np.vstack(loops), np.vstack([np.roll(loop, -1, axis=0) for loop in loops])
 
 
 def _inner_triangles(points, starts, ends, element, draw):

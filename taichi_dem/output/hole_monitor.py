@@ -8,7 +8,7 @@ import numpy as np
 from taichi_dem.kit.data_table import data_frame
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.fixed_order import dot, length, weakest_direction
-from taichi_dem.kit.validation import flag, positive
+from taichi_dem.kit.validation import flag, positive, word
 from taichi_dem.loads.pressure import GasPressure
 from taichi_dem.mesh.tetrahedra import area_vectors, unit_normals
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
@@ -88,7 +88,7 @@ class HoleMonitor:
 
 def hole_of(model: Model, group: str) -> HoleMonitor:
     """The monitor of a group, which is made once for a model."""
-    if group not in model.holes:
+    if word("group", group) not in model.holes:
         model.holes[group] = HoleMonitor(model, group)
     return model.holes[group]
 

@@ -91,7 +91,7 @@ KINDS = {
     "whole": """body columns rows count cycles divisions done every_steps force_place frame_every
         frames level_jump macro_step measured_cycles modes neighbours_per_body
         pairs_per_body particles effects.BodyContact.parts place record_every
-        recorded_samples s sample_every samples scene scenes sectors seed seeds
+        recorded_samples s sample_every samples scatter scene scenes sectors seed seeds
         spheres_per_body steps substeps sweeps threads total transient_cycles""",
     "word": """accounting accumulator arch colour dashpot driver effects friction_law
         if_diverged kind measure mount neighbour of outer_faces pair_rule rules search

@@ -1,12 +1,14 @@
 """Simple solids have their exact sizes and named sides."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from _meshes import group_area
-from taichi_dem import shapes
+from taichi_dem import InputError, shapes
 from taichi_dem.mesh.mesh import volumes
-from taichi_dem.mesh.tetrahedra import all_faces, outer_rows
+from taichi_dem.mesh.tetrahedra import LOCAL_EDGES, all_faces, outer_faces, outer_rows, unit_normals
 
 #: Name to a solid, its volume [m3] and the areas of its sides [m2]; round walls apart.
 SOLIDS = {
@@ -19,6 +21,20 @@ SOLIDS = {
         shapes.plate(width=0.2, height=0.1, thickness=0.02, element=0.01),
         0.02 * 0.02,
         {"left": 0.002, "bottom": 0.004, "top": 0.004, "front": 0.02},
+    ),
+}
+#: Name to a function that makes a solid, in rows or scattered.
+FORMS = {
+    "block": lambda scatter: shapes.block((0.1, 0.06, 0.08), element=0.02, scatter=scatter),
+    "beam": partial(shapes.beam, length=0.5, width=0.05, height=0.1, element=0.05),
+    "cylinder": partial(shapes.cylinder, radius=0.05, height=0.06, element=0.02),
+    "plate": partial(shapes.plate, width=0.11, height=0.07, thickness=0.01, element=0.01),
+    "drilled": partial(
+        shapes.plate, width=0.1, height=0.08, thickness=0.02, element=0.01, hole=0.03
+    ),
+    # Its chords are half an element long.
+    "narrow hole": partial(
+        shapes.plate, width=0.1, height=0.1, thickness=0.02, element=0.01, hole=(0.03, 0.05, 0.012)
     ),
 }
 
@@ -50,3 +66,56 @@ def test_every_outer_face_is_in_one_group():
         named = np.vstack(list(mesh.groups.values()))
         assert len(np.unique(np.sort(named, axis=1), axis=0)) == len(named)
         assert len(named) == len(outer_rows(faces))
+
+
+@pytest.mark.parametrize("seed", [0, 7])
+@pytest.mark.parametrize("name", FORMS)
+def test_a_scattered_solid_keeps_its_form_and_its_size_of_elements(name, seed):
+    rows, mesh = FORMS[name](scatter=None), FORMS[name](scatter=seed)
+    assert volumes(mesh).sum() == pytest.approx(volumes(rows).sum(), rel=1e-12)
+    assert volumes(mesh).min() > 0.0 and mesh.notes == ()
+    assert list(mesh.groups) == list(rows.groups)
+    for side in rows.groups:
+        assert group_area(mesh, side) == pytest.approx(group_area(rows, side), rel=1e-12), side
+    # A face without a partner would be an outer one in no group.
+    assert sum(map(len, mesh.groups.values())) == len(outer_faces(mesh.tetrahedra))
+    assert mesh.point_count == rows.point_count
+    assert mesh.body_count == pytest.approx(rows.body_count, rel=0.1)
+    assert smallest_angle(mesh) > 10.0
+
+
+def smallest_angle(mesh):
+    """Of all angles between two faces of a body [degrees]."""
+    normal = unit_normals(mesh.points, all_faces(mesh.tetrahedra)).reshape(-1, 4, 3)
+    a, b = normal[:, LOCAL_EDGES].transpose(2, 0, 1, 3)
+    return 180.0 - np.degrees(np.arccos((a * b).sum(axis=-1).min()))
+
+
+def test_a_seed_makes_the_same_mesh_again_and_another_one_another():
+    first, again, other = (FORMS["drilled"](scatter=seed) for seed in (3, 3, 4))
+    assert np.array_equal(first.points, again.points)
+    assert np.array_equal(first.tetrahedra, again.tetrahedra)
+    assert not np.array_equal(first.points, other.points)
+
+
+def test_scattered_edges_have_no_directions_of_their_own():
+    """Mean of cos 6 a over the angles a of edges: 1 for rows of regular triangles."""
+    options = {"width": 0.3, "height": 0.3, "thickness": 0.02, "element": 0.02}
+    rows, scattered = (shapes.plate(**options, scatter=seed) for seed in (None, 1))
+    assert in_rows(rows) > 0.8
+    # The mean of n edges at random is about the root of 1 / 2 n; the sides keep their rows.
+    assert abs(in_rows(scattered)) < 0.12
+
+
+def in_rows(mesh):
+    """Mean of cos 6 a over the edges of the front that are two elements away from its sides."""
+    edges = mesh.groups["front"][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    middle = np.abs(mesh.points[edges].mean(axis=1)[:, :2] - 0.15).max(axis=1)
+    x, y, _ = np.diff(mesh.points[edges[middle < 0.11]], axis=1)[:, 0].T
+    return float(np.cos(6.0 * np.arctan2(y, x)).mean())
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, True, "1", 2**40])
+def test_a_seed_that_is_no_whole_number_in_range_is_refused(seed):
+    with pytest.raises(InputError, match="scatter must be a whole number from 0 to 2147483647"):
+        shapes.block(0.1, element=0.05, scatter=seed)
