@@ -26,6 +26,9 @@ from taichi_dem.stability.step_report import step_report
 #: Fewest steps of a run, and how many times shorter than springs bear they begin at most where the
 #: history of a load or support is to be resolved.
 _FEWEST, _MOST_TIMES = 8, 64
+#: By how many more steps a smooth run is made again, as a share and at least: of few steps the
+#: error has not its order yet.
+_MORE, _LEAST_MORE = 0.1, 16
 #: Less than a whole step more, by which last bits of the longest step make none.
 _LESS = 1.0 - 1e-9
 #: Sweeps of a step at most, and by how much better they agree to see their error.
@@ -78,6 +81,11 @@ class Job:
     def declared(self) -> float:
         """Order of the error of a smooth run."""
         return self._coarsest[1]
+
+    def nearby(self, level: float) -> float:
+        """Level at which a smooth run is made again, with little more steps than at a level."""
+        more = max(_MORE, _LEAST_MORE / (self._coarsest[0] * 2.0**level))
+        return level + min(1.0, math.log2(1.0 + more))
 
     def _longest_step(self):
         """Longest step that all springs bear [s]: solved dashpots leave no other limit.

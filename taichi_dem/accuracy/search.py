@@ -29,8 +29,6 @@ from taichi_dem.report.energy_balance import open_account
 
 #: Halvings of the step until one is stable, and from there on; of one refinement.
 _MOST_COARSE, _MOST_FINE, _MOST_AT_ONCE = 6, 7, 2
-#: Level above the first at which a smooth run is made again, by a tenth more steps, and another.
-_NEAR, _HALF = math.log2(1.1), 1
 #: Levels at which twins are run, at most: chance by the luck of when a step ends falls with it.
 _TRIED = 3
 #: Spread over what is allowed from which on no mean of runs has it.
@@ -110,7 +108,7 @@ class Search:
                 raise SimulationDiverged(self.runs.failure)
         first = self.levels[0]
         # By little shorter steps, only what changes smoothly tells its error.
-        second = first + (_NEAR if self._smooth else _HALF)
+        second = self.job.nearby(first) if self._smooth else first + 1
         needed = self.runs.seconds + 2.0 ** (second - first) * self.runs.cost[first]
         if needed > self.budget:
             got, least = told_apart(self.budget, needed, 2)

@@ -189,15 +189,19 @@ def test_costs_that_chance_keeps_from_single_runs_are_predicted_or_left_out(sear
     )
 
 
-@pytest.mark.parametrize("events", [True, False])
-def test_runs_are_made_again_with_a_tenth_more_steps_where_nothing_happens(searched, events):
-    answer = searched(job(0.5), power(1.0), events=events, moved=0.02)
+@pytest.mark.parametrize(("events", "long", "again"), [(1, 1, 2.0), (0, 1, 2.0), (0, 20, 1.1)])
+def test_runs_are_made_again_with_a_tenth_more_steps_where_nothing_happens(
+    searched, events, long, again
+):
+    """And with 16 more at least, up to twice as many: the short run has 9."""
+    asked = replace(job(0.5), until=long * UNTIL)
+    answer = searched(asked, power(1.0), events=events, moved=0.02)
     steps = answer.plan.seconds - 1.0 - 1.0 * events
-    assert steps == pytest.approx(2.0 if events else 1.1), "a twin of an eventful run is the third"
-    least = 1.0 + (2.0 if events else 1.1)
-    assert searched(job(0.5), power(1.0), budget=least, events=events, moved=0.02).plan.runs == 2
+    assert steps == pytest.approx(again), "a twin of an eventful run is the third"
+    least = 1.0 + again * (1.0 + 1e-9)
+    assert searched(asked, power(1.0), budget=least, events=events, moved=0.02).plan.runs == 2
     with pytest.raises(InputError, match="budget_s must leave time for two runs"):
-        searched(job(0.5), power(1.0), budget=0.99 * least, events=events)
+        searched(asked, power(1.0), budget=0.99 * least, events=events)
 
 
 def test_a_twin_makes_up_to_30_percent_more_steps():
