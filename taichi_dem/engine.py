@@ -13,6 +13,7 @@ from taichi_dem.kit.engine_pool import Engine, EnginePool
 from taichi_dem.laws.base import ABSENT, PARTS_OF_BOND, Effect, bound
 from taichi_dem.laws.bond import Separable
 from taichi_dem.methods import Method, structure_of
+from taichi_dem.report.forces import Forces
 from taichi_dem.report.readings import Readings
 from taichi_dem.state.capacity import LEAST, Capacity
 from taichi_dem.state.model import ROLES, Model
@@ -78,6 +79,7 @@ class BlastEngine(Engine):
         self.step = kinds[1](self.advance, self.broad_phase)
         self.drivers = {name: driver(self.step) for name, driver in DRIVERS.items()}
         self.readings = Readings(self.tables, self.state, self.advance)
+        self.forces = Forces(self.readings)
         self.records = False
 
     def load(self, model: Model, method: Method, max_speed: float, sleep: float = 0.0) -> None:

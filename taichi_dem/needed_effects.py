@@ -134,7 +134,8 @@ def recorded_difference(first: Result, second: Result) -> float:
     if not np.array_equal(np.isnan(broken), np.isnan(second.broken_time)):
         return np.inf
     for name in history:
-        if name != "residual_J":
+        # Forces follow from places and velocities, and are nothing but rounding at rest.
+        if name != "residual_J" and not name.endswith("_N"):
             unexplained = next((rounding[unit] for unit in rounding if name.endswith(unit)), 0.0)
             scale = energy if name in joules else None
             found.append(_apart(history[name], second.series.get(name), unexplained, scale))

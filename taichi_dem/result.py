@@ -19,7 +19,7 @@ from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.observers import Received, write_receivers
-from taichi_dem.output.cracks import cracks_of, rose_of
+from taichi_dem.output.cracks import apertures_of, cracks_of, rose_of
 from taichi_dem.output.export import write_gltf, write_particles, write_vtkhdf
 from taichi_dem.output.fragments import fragment_of_body, fragments_of
 from taichi_dem.output.hole_monitor import Attenuation, attenuation_of, watched_groups
@@ -190,14 +190,48 @@ class Result:
         """
         return fragment_of_body(self.model, self.broken_time <= self.frame(frame).time_s)
 
-    def cracks(self) -> Any:
-        """Tabulate broken faces in their order: time, area, place, normal, strike, dip.
+    def cracks(self, frame: int = -1) -> Any:
+        """Tabulate broken faces in their order: time, area, aperture, place, normal, strike, dip.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame in which ``aperture_m`` is measured, the last by default; NaN for a
+            result without frames.
 
         Returns
         -------
         pandas.DataFrame
+            A row a broken face, the first first.
+
+        Raises
+        ------
+        InputError
+            Where there are frames, but none of this number.
         """
-        return cracks_of(self.model, self.broken_time)
+        unknown = np.full(self.model.bond_count, np.nan)
+        apertures = self.apertures(frame) if self.frames else unknown
+        return cracks_of(self.model, self.broken_time, apertures)
+
+    def apertures(self, frame: int = -1) -> np.ndarray:
+        """Opening of every bond, broken, softened or whole, along the normal of its face.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame, the last by default.
+
+        Returns
+        -------
+        ndarray, shape (bond_count,)
+            Mean of the three contact units [m]; negative where faces are pressed into each other.
+
+        Raises
+        ------
+        InputError
+            Where there is no such frame.
+        """
+        return apertures_of(self.model, self.frame(frame))
 
     def crack_area(self) -> Any:
         """Tabulate the area of all cracks [m^2] at the times of the history.

@@ -153,13 +153,15 @@ def run_simulation(
 ) -> Result:
     """Run a Simulation, whose motion may have been set, to a time; otherwise as ``simulate``.
 
-    brief: whether the report leaves out all that needs a comparison of the bodies at the end.
+    brief: whether the report leaves out all that needs a comparison of the bodies at the end, and
+    frames the stress.
     """
     instance("simulation", simulation, Simulation)
     scene, method = simulation.scene, simulation.method
     plan = _Plan(scene, method, until, samples, frames, observers, progress)
     with reporting(progress, title) as tell:
         simulation, recorder = _started(simulation)
+        recorder.brief = brief
         more = {"brief": brief, "start": simulation.first_motion}
         result, error = _result(simulation, recorder, CheckpointWriter(), plan, tell, **more)
     if error is not None:

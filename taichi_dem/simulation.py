@@ -21,6 +21,7 @@ from taichi_dem.methods import Method
 from taichi_dem.report.divergence import DivergenceCheck
 from taichi_dem.report.effects import certificate_of, effect_uses, on_demand
 from taichi_dem.report.energy_balance import EnergyBalance, open_account
+from taichi_dem.report.forces import Forces
 from taichi_dem.report.missing_effects import MissingEffects
 from taichi_dem.report.readings import Kept, Readings, Run
 from taichi_dem.report.report import Report, known_error
@@ -55,9 +56,10 @@ class Simulation:
     """One scene, one method, one driver, on an engine of the session.
 
     ``simulate`` makes one; it is the level below for those who step by themselves. ``tables``,
-    ``state``, ``schedule``, ``contacts``, ``broad_phase``, ``advance``, ``step`` and ``readings``
-    are the parts of its engine, which is its own as long as it lives; contacts and broad_phase are
-    None without contact. ``values`` reads their fields, which may have room for more.
+    ``state``, ``schedule``, ``contacts``, ``broad_phase``, ``advance``, ``step``, ``readings`` and
+    ``forces`` are the parts of its engine, which is its own as long as it lives; contacts and
+    broad_phase are None without contact. ``values`` reads their fields, which may have room for
+    more.
 
     Parameters
     ----------
@@ -97,6 +99,7 @@ class Simulation:
     advance: Advance = _part("advance")
     step: Step = _part("step")
     readings: Readings = _part("readings")
+    forces: Forces = _part("forces")
     contacts = _part("contacts")
     broad_phase = _part("broad_phase")
 

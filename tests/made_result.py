@@ -27,7 +27,7 @@ def frame_of(model, time_s, rng):
     """Bodies anywhere, in any position, with any velocity and angular momentum."""
     count = model.body_count
     rotation = turned(rng.normal(size=(count, 3)), rng.uniform(0.0, 3.0, count))
-    moved = 1e-3 * rng.normal(size=(count, 3))
+    moved, strain = 1e-3 * rng.normal(size=(count, 3)), rng.normal(size=(count, 3, 3))
     return Frame(
         time_s=time_s,
         position=model.centre + moved,
@@ -38,6 +38,7 @@ def frame_of(model, time_s, rng):
         damage=rng.uniform(size=count),
         bound=np.zeros(count, dtype=np.int32),
         angular_momentum=1e-3 * rng.normal(size=(count, 3)),
+        stress=1e6 * (strain + strain.swapaxes(1, 2)),
     )
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.products import matvec, norm, stacked
+from taichi_dem.kit.products import cross, matvec, norm, stacked
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.laws.sphere_contact import ONCE_BROKEN
 from taichi_dem.methods import Method
@@ -95,6 +95,18 @@ class Contacts:
     def overlap_energy(self, m, met):
         """Elastic energy of an overlap where bodies meet, a ``Meeting`` [J]."""
         return met.area * self.law.stored(m, ti.max(0.0, met.overlap))
+
+    @ti.func
+    def leverage(self, met, pushed, push):
+        """Forces on the second body times their arms from the first [N m], where bodies meet.
+
+        pushed: their sum [N]; push: that along the normal. Pressure on a face also has a couple,
+        of which a part along the normal changes no stress.
+        """
+        found = pushed.outer_product(met.arm)
+        if ti.static(self.law.meets_bodies):
+            found += met.normal.outer_product(cross(met.normal, push * met.couple))
+        return found
 
     @ti.func
     def closer(self, p, margin):

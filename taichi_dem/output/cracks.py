@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.data_table import data_frame
-from taichi_dem.kit.fixed_order import length
+from taichi_dem.kit.fixed_order import dot, length, product
 from taichi_dem.kit.validation import unit_vector, whole
 from taichi_dem.mesh.tetrahedra import area_vectors, unit_normals
+from taichi_dem.output.record import Frame
 from taichi_dem.state.model import Model
 
 #: Sine of the angle between a face and a plane below which they count as parallel.
@@ -34,7 +35,21 @@ def crack_areas(model: Model) -> np.ndarray:
     return length(area_vectors(model.mesh.points, top.vertices)) * top.bonded_share
 
 
-def cracks_of(model: Model, broken_time: np.ndarray) -> Any:
+def apertures_of(model: Model, frame: Frame) -> np.ndarray:
+    """Opening of every bond in a frame along the normal of its face [m], (bond_count,).
+
+    The mean of its three contact units, from the start on, in the axes of the master; negative
+    where faces are pressed into each other.
+    """
+    top, bonds = model.topology, model.bonds
+    branch = frame.position[top.slave] - frame.position[top.master]
+    on_slave = bonds["on_slave"].mean(axis=1)[:, :, None]
+    apart = branch + product(frame.rotation[top.slave], on_slave)[:, :, 0]
+    normal = product(frame.rotation[top.master], bonds["frame"][:, 0, :, None])[:, :, 0]
+    return dot(apart, normal) - bonds["on_master"][:, :, 0].mean(axis=1)
+
+
+def cracks_of(model: Model, broken_time: np.ndarray, aperture: np.ndarray) -> Any:
     """Tabulate the broken faces in the order in which they broke.
 
     Parameters
@@ -42,12 +57,14 @@ def cracks_of(model: Model, broken_time: np.ndarray) -> Any:
     model : Model
     broken_time : ndarray, shape (bond_count,)
         When each bond broke [s], NaN while it holds.
+    aperture : ndarray, shape (bond_count,)
+        Opening of each bond along its normal [m].
 
     Returns
     -------
     pandas.DataFrame
-        ``time_s``, ``bond``, ``area_m2``, ``crack_area_m2`` of all cracks so far, place of the
-        face at rest, its unit normal out of the master, strike and dip.
+        ``time_s``, ``bond``, ``area_m2``, ``crack_area_m2`` of all cracks so far, ``aperture_m``,
+        place of the face at rest, its unit normal out of the master, strike and dip.
 
     Notes
     -----
@@ -65,6 +82,7 @@ def cracks_of(model: Model, broken_time: np.ndarray) -> Any:
         "bond": bond,
         "area_m2": area,
         "crack_area_m2": np.cumsum(area),
+        "aperture_m": aperture[bond],
         **{f"centre_{axis}_m": place[:, k] for k, axis in enumerate("xyz")},
         **{f"{axis}_normal": normal[:, k] for k, axis in enumerate("xyz")},
         "strike_deg": strike,

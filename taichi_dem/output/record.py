@@ -11,11 +11,14 @@ import numpy as np
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.files import output_folder, remove_files, write_csv
+from taichi_dem.kit.fixed_order import largest_eigenvalues
 from taichi_dem.kit.validation import FileName, file_stem, instance, several
 from taichi_dem.loads.pressure import GasPressure
 from taichi_dem.mesh.files import write_pvd, write_vtu
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.output.hole_monitor import hole_of
+from taichi_dem.report.forces import force_names
+from taichi_dem.report.stress import body_stress
 from taichi_dem.simulation import Simulation
 from taichi_dem.state.model import Model
 from taichi_dem.state.timeline import MAX_LEVEL, NEVER
@@ -55,6 +58,17 @@ class Frame:
         Index in ``step_control.CRITERIA`` of what bounds the step, shape (body_count,).
     angular_momentum : ndarray
         About each body's own centre, in world axes [kg m^2/s], shape (body_count, 3).
+    stress : ndarray
+        Mean stress of each body [Pa], shape (body_count, 3, 3): symmetric, in world axes, tension
+        positive.
+
+    Notes
+    -----
+    The stress is the symmetric part of the sum of forces times arms from the centre, over the
+    volume at rest. Forces are those of bonds (springs, and dashpots where they act) and contacts,
+    and of loads, ground and supports on the faces of their groups, at the faces' middles. Weight,
+    loads without a group and inertia act at the centre and add nothing; what the turning of a
+    body itself asks for is left out. Dashpots have velocities of half a step before.
     """
 
     time_s: float
@@ -66,6 +80,7 @@ class Frame:
     damage: np.ndarray
     bound: np.ndarray
     angular_momentum: np.ndarray
+    stress: np.ndarray
 
     __repr__ = by_fields
 
@@ -74,21 +89,27 @@ class Frame:
         """Speed of every body [m/s], (n,)."""
         return np.linalg.norm(self.velocity, axis=1)
 
+    @property
+    def largest_stress(self) -> np.ndarray:
+        """Largest principal stress of every body [Pa], (n,), tension positive."""
+        return largest_eigenvalues(self.stress)
+
 
 class Recorder:
     """Collects samples and frames of a simulation.
 
     groups: face groups of the holes whose displacement is followed; columns of the time series
     have their names, unless there is only one. peak_speed: the largest of each body at all samples
-    so far [m/s], (body_count,).
+    so far [m/s], (body_count,). brief: whether frames are without stress, which nobody reads.
     """
 
     def __init__(self, simulation: Simulation, *groups: str):
-        self.simulation = simulation
-        self.model = simulation.model
+        self.simulation, self.model = simulation, simulation.model
+        self.brief = False
         self.holes = {group: hole_of(self.model, group) for group in groups}
         loads = enumerate(self.model.loads)
         self.gas = [place for place, load in loads if isinstance(load, GasPressure)]
+        self.forces = force_names(self.model)
         self.rows: list[dict[str, float]] = []
         self.frames: list[Frame] = []
         self.peak_speed = np.zeros(self.model.body_count)
@@ -126,6 +147,8 @@ class Recorder:
         row["load_work_J"], row["support_work_J"] = account["load_work"], account["support_work"]
         speed = np.linalg.norm(motion["velocity"], axis=1)
         row["largest_speed_m_s"] = float(speed.max())
+        for name, force in zip(self.forces, sim.forces.sums()):
+            row.update({f"{name}_{axis}_N": float(force[k]) for k, axis in enumerate("xyz")})
         self.peak_speed = np.maximum(self.peak_speed, speed)
         self.rows.append(row)
 
@@ -146,7 +169,13 @@ class Recorder:
             damage=self._body_damage(self.simulation.readings.damage()),
             bound=values(self.simulation.state.bound, slice(self.model.body_count)),
             angular_momentum=motion["angular_momentum"],
+            stress=self._stress(),
         )
+
+    def _stress(self):
+        if self.brief:
+            return np.full((self.model.body_count, 3, 3), np.nan)
+        return body_stress(self.simulation.parts, self.simulation.forces)
 
     def saved(self) -> dict[str, np.ndarray]:
         """Data for a checkpoint, arrays by name: columns of rows, stacks of frames."""
@@ -263,6 +292,8 @@ def cell_data(
         "displacement_m": frame.displacement,
         "damage": frame.damage,
         "step_bound_by": frame.bound,
+        "stress_Pa": frame.stress.reshape(-1, 9),
+        "largest_stress_Pa": frame.largest_stress,
     }
     if not model.materials.is_one:
         data["material"] = model.materials.of_body
@@ -302,10 +333,10 @@ def write_paraview(
 
     Notes
     -----
-    Cells carry body_id, level, speed_m_s, displacement_m, damage and step_bound_by, the place in
-    ``step_control.CRITERIA`` of what bounds a body's step; with several materials also material,
-    the number of each body's. An earlier series of that name is
-    removed.
+    Cells carry body_id, level, speed_m_s, displacement_m, damage, step_bound_by, the place in
+    ``step_control.CRITERIA`` of what bounds a body's step, stress_Pa, nine components by rows, and
+    largest_stress_Pa, the largest principal one; with several materials also material, the number
+    of each body's. An earlier series of that name is removed.
 
     Examples
     --------

@@ -13,7 +13,7 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.products import norm
 from taichi_dem.kit.types import vec3
-from taichi_dem.state.model import Model
+from taichi_dem.state.model import Model, sums
 from taichi_dem.state.state import PARTS, State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.advance import Advance
@@ -65,8 +65,22 @@ class Readings:
         return self._rooms[name]
 
     def contacts_now(self) -> np.ndarray:
-        """All that ``_push`` finds of the contacts of every pair, (pairs, 21)."""
+        """All that ``_push`` finds of the contacts of every pair, (pairs, 31)."""
         return self._contacts()[0].copy()
+
+    def near_bodies(self) -> np.ndarray:
+        """Bodies of every pair, in the order of ``contacts_now``, (pairs, 2)."""
+        if self.contacts is None:
+            return np.zeros((0, 2), dtype=np.int32)
+        store = self.contacts.store
+        return values(store.body)[values(store.near_slot, slice(int(values(store.near_count))))]
+
+    def contact_wrenches(self) -> np.ndarray:
+        """Force [N] and moment about its centre [N m] of the contacts on every body, (n, 6)."""
+        table, count = self._contacts()[0], int(values(self.tables.body_count))
+        bodies, per_second = self.near_bodies(), 2.0 / table[:, 21:22]
+        first, second = per_second * table[:, :6], per_second * table[:, 6:12]
+        return sums(bodies[:, 0], first, count) + sums(bodies[:, 1], second, count)
 
     def _contacts(self):
         """The same, and impulses [N s] and moments [N m s] of each body in half a step, (n, 6)."""
@@ -75,7 +89,7 @@ class Readings:
     def _pushes(self):
         pushed = self._room("pushed", int(values(self.tables.body_count)), 6)
         count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
-        table = self._room("contacts", count, 21)
+        table = self._room("contacts", count, 31)
         if count:
             self._launch_push(table, pushed)
         return table, pushed
@@ -89,7 +103,9 @@ class Readings:
         """Impulse [N s] and moment [N m s] of every pair's contacts on both bodies in half a step.
 
         Also the heat of its dashpots and friction by which the booked one is behind [J], sums of
-        friction, of its limit [N] and of its power [W], its strain and booked heats [J].
+        friction, of its limit [N] and of its power [W], its strain and booked heats [J], the step
+        [s] of the pair, and the sum of its forces on the second body times arms from the first
+        [N m], a row a component of the force.
         """
         ti.loop_config(serialize=ti.static(self.small))
         for a in range(self.contacts.store.near_count[None]):
@@ -103,6 +119,9 @@ class Readings:
             table[a, 17] = found.stored
             for k in ti.static(range(3)):
                 table[a, 18 + k] = self.contacts.store.heat[p][k]
+            table[a, 21] = 2.0 * half
+            for r, c in ti.static(ti.ndrange(3, 3)):
+                table[a, 22 + 3 * r + c] = found.leverage[r, c]
         ti.loop_config(serialize=ti.static(self.small))
         for i in range(self.tables.body_count[None]):
             # In the order of the pairs, so that no thread changes a bit.
@@ -237,7 +256,7 @@ class Readings:
     def pairs(self) -> np.ndarray:
         """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""
         table, _ = self._contacts()
-        found = table[:, 17:].copy()
+        found = table[:, 17:21].copy()
         found[:, 1:3] += table[:, 12:14]
         return found
 

@@ -1,6 +1,7 @@
 """Constants of a scene as arrays: bodies, bonds and contact spheres."""
 
 import copy
+import math
 from collections.abc import Callable, Iterable
 from functools import cached_property
 from typing import Any
@@ -162,14 +163,15 @@ class Model:
         return per_bond(self.mesh, self.topology, self.materials.density, constants)
 
 
-def sums(group: np.ndarray, of_bodies: np.ndarray) -> np.ndarray:
-    """Sums over groups of bodies of an array of each; group: number of that of each body.
+def sums(group: np.ndarray, of_members: np.ndarray, count: int = 0) -> np.ndarray:
+    """Sums over groups of an array of each member; group: number of that of each member.
 
-    of_bodies: (body_count, ...). Returns (groups, ...).
+    of_members: (members, ...). Returns (groups, ...); count: of groups, where some may be empty.
     """
-    flat = of_bodies.reshape(len(of_bodies), -1)
-    columns = [np.bincount(group, column) for column in flat.T]
-    return np.stack(columns, axis=1).reshape(-1, *of_bodies.shape[1:])
+    flat = of_members.reshape(len(of_members), math.prod(of_members.shape[1:]))
+    columns = [np.bincount(group, column, count) for column in flat.T]
+    # Of no members NumPy makes whole numbers.
+    return np.stack(columns, axis=1).reshape(-1, *of_members.shape[1:]).astype(np.float64)
 
 
 def centres(group: np.ndarray, body_mass: np.ndarray, position: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 import taichi as ti
 
 from taichi_dem.kit.products import cross, dot, matvec, norm, transposed_matvec
-from taichi_dem.kit.types import real, vec3
+from taichi_dem.kit.types import mat3, real, vec3
 from taichi_dem.physics.rotation import place_in
 from taichi_dem.physics.sphere_pair import active_bits, add_within
 from taichi_dem.stability.body_limits import HIT
@@ -72,8 +72,9 @@ class PairForces:
     force: on the second [N]. moment_i, moment_j: about the centre of each [N m]. dragged, rubbed:
     power that dashpots and friction take [W]. slipped: energy of springs that slipped or parted
     [J]. rub, bound: sums of the sizes of friction and of its limits [N]. stored: elastic energy of
-    overlaps and of springs between spheres; not found in a step [J]. deepest: largest overlap over
-    the sum of the radii. near_count: spheres within a margin. active: CONTACT and RUBBED, where
+    overlaps and of springs between spheres [J]. leverage: sum of the forces on the second times
+    their arms from the first [N m]. Neither is found in a step. deepest: largest overlap over the
+    sum of the radii. near_count: spheres within a margin. active: CONTACT and RUBBED, where
     spheres push and rub.
     """
 
@@ -86,6 +87,7 @@ class PairForces:
     rub: real
     bound: real
     stored: real
+    leverage: mat3
     deepest: real
     near_count: ti.i32
     active: ti.i64
@@ -174,6 +176,7 @@ class ContactForce:
                 found.deepest = ti.max(found.deepest, self._depth(near, overlap))
                 if ti.static(not stepping):
                     found.stored += self.contacts.overlap_energy(m, met)
+                    found.leverage += self.contacts.leverage(met, pushed, push)
             elif ti.static(stepping):
                 found.slipped += self.springs.part(m, k)
             if ti.static(not stepping):

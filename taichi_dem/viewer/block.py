@@ -20,8 +20,8 @@ from taichi_dem.state.model import Model
 
 _HERE = Path(__file__).resolve().parent
 _SCRIPTS = (_HERE / "block.js", _HERE / "controls.js")
-#: Bytes of a body in a frame: displacement, turn, speed, damage, level; and at all times, at most.
-_FRAME_BYTES, _BODY_BYTES = 17, 300
+#: Bytes of a body in a frame: displacement, turn, speed, stress, damage, level; and in all.
+_FRAME_BYTES, _BODY_BYTES = 19, 300
 #: Time of a face that never breaks, and of one that was always free.
 _NEVER, _ALWAYS = 3e38, -1.0
 #: Colours of bodies on which an effect does not act and of outer faces; and of cracks.
@@ -85,7 +85,7 @@ def visible_faces(model: Model, broken_time: np.ndarray) -> Any:
 
 
 def _is_finite(frame: Frame) -> bool:
-    values = frame.displacement, frame.rotation, frame.speed, frame.damage
+    values = frame.displacement, frame.rotation, frame.speed, frame.damage, frame.stress
     return all(bool(np.isfinite(value).all()) for value in values)
 
 
@@ -155,7 +155,8 @@ def _colour_modes(frames, bodies, dt0, acting_since, time):
         for name, since in acting_since.items()
     ]
     own = [_speed_mode(frames, bodies), _level_mode(frames, bodies, dt0)]
-    return [*own, _damage_mode(frames, bodies), _break_mode(frames, bodies, time), *effects]
+    own += [_stress_mode(frames, bodies), _damage_mode(frames, bodies)]
+    return [*own, _break_mode(frames, bodies, time), *effects]
 
 
 def _speed_mode(frames, bodies):
@@ -186,6 +187,18 @@ def _damage_mode(frames, bodies):
         **{"scaled": True, "low": 0.0, "high": 1.0},
         "values": quantise([frame.damage[bodies] for frame in frames]),
         "table": pack(colour_table("Blues", 0.08, 1.0), "uint8"),
+        "keys": [_CRACK],
+    }
+
+
+def _stress_mode(frames, bodies):
+    stresses = [1e-6 * frame.largest_stress[bodies] for frame in frames]
+    top = float(np.percentile(np.abs(stresses), 98)) or 1.0
+    return {
+        **{"name": "stress", "label": "largest principal stress [MPa]", "kind": "frames"},
+        **{"scaled": True, "low": -top, "high": top},
+        "values": quantise(stresses),
+        "table": pack(colour_table("RdBu_r", 0.02, 0.98), "uint8"),
         "keys": [_CRACK],
     }
 

@@ -56,7 +56,12 @@ class Run:
             "needs": missing.findings(missing.volume),
             "frames": len(self.recorder.frames),
         }
-        arrays = {**self.saved.memory.read(), **columns, "damage": frame.damage}
+        arrays = {
+            **self.saved.memory.read(),
+            **columns,
+            "damage": frame.damage,
+            "stress": frame.stress,
+        }
         return {**arrays, **{name: np.array(repr(value)) for name, value in told.items()}}
 
 

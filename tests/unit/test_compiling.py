@@ -27,7 +27,7 @@ BUDGET = {
     "Coupling.advance": 16068,
     "Coupling.start": 1765,
 }
-OTHERS = 1700
+OTHERS = 2575
 
 
 @pytest.fixture(scope="module")

@@ -98,6 +98,10 @@ def test_vtkhdf_holds_what_the_pvd_series_holds(result, tmp_path):
             assert np.array_equal(root["Points"][start : start + number], vtu.points)
             assert np.array_equal(cells, vtu.cells[0].data)
             assert set(vtu.cell_data) == set(root["CellData"])
+            frame, (stress,) = result.frames[k], vtu.cell_data["stress_Pa"]
+            assert np.array_equal(stress.reshape(-1, 3, 3), frame.stress)
+            (largest,) = vtu.cell_data["largest_stress_Pa"]
+            assert largest == pytest.approx(np.linalg.eigvalsh(frame.stress)[:, 2], rel=1e-12)
             for name, (values,) in vtu.cell_data.items():
                 start = steps["CellDataOffsets"][name][k]
                 found = root["CellData"][name][start : start + count]

@@ -53,6 +53,7 @@ def block_frame(centre, time_s, draw):
         displacement=displacement,
         velocity=30.0 * share * draw.normal(size=(count, 3)),
         angular_momentum=np.zeros((count, 3)),
+        stress=share * 1e6 * np.eye(3) * draw.normal(size=(count, 1, 1)),
         level=draw.integers(0, 4, count),
         damage=draw.random(count),
         bound=np.zeros(count, dtype=int),
@@ -110,6 +111,16 @@ def test_motion_on_a_page_is_that_of_the_frames(shown):
     # Rest positions have 24 bits.
     bound = half[:, :, None] * (1.0 + 1e-9) + 2.0**-24 * np.abs(centre).max()
     assert (np.abs(place - [frame.position for frame in frames]) <= bound).all()
+
+
+def test_stresses_on_a_page_are_the_largest_principal_ones(shown):
+    """In MPa, on a scale that has zero in its middle."""
+    result, made = shown
+    (mode,) = [one for one in data_of(made)["modes"] if one["name"] == "stress"]
+    found, half = of_frames(mode["values"])
+    largest = [1e-6 * np.linalg.eigvalsh(frame.stress)[:, 2] for frame in result.frames]
+    assert (np.abs(found - largest) <= half * (1.0 + 1e-9)).all()
+    assert mode["low"] == -mode["high"]
 
 
 def test_faces_show_from_when_their_bond_breaks(shown):

@@ -398,6 +398,7 @@ class PairDashpots:
                 found.rub += norm(rub)
                 found.bound += self.tables.friction.limit(m, pressed)
                 found.stored += self.contacts.overlap_energy(m, met)
+                found.leverage += self.contacts.leverage(met, pushed, pressed)
             found.stored += self.springs.stored(m, k)
         return found
 
