@@ -38,7 +38,7 @@ export HOME := $(CURDIR)/.venv/home
 endif
 
 .PHONY: help venv demo test test-physics test-rest test-experiments test-slow test-quadrants test-gpu attack fuzz lint bench coverage \
-  gallery lessons docs mesh wheel release-check clean
+  gallery lessons lessons-static docs mesh wheel release-check clean
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-16s %s\n", $$1, $$2}' Makefile
@@ -107,6 +107,9 @@ gallery: $(STAMP) ## run all experiments and show them on one page (GALLERY_OPTI
 
 lessons: $(LESSONS_STAMP) ## serve four interactive lessons to this machine's browser (installs marimo)
 	$(BIN)/python -m marimo run $(LESSONS) --host 127.0.0.1 $(LESSONS_OPTIONS)
+
+lessons-static: $(STAMP) ## write the lessons as four HTML files that need no server, in results/lessons
+	$(BIN)/python experiments/lessons/_static.py $(LESSONS_OPTIONS)
 
 docs: $(DOCS_STAMP) ## build these pages with API, gallery and search as a site, in results/docs
 	$(BIN)/python -m sphinx -q -W --keep-going -c docs/site . results/docs

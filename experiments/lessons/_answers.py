@@ -6,10 +6,9 @@ All runs on the thread of the session.
 import math
 from typing import Any, NamedTuple
 
+import _page  # noqa: F401
 import taichi_dem as dem
-from _meshes import with_moved_nodes
-from _page import png_like_the_first
-from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, styled
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED
 from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
 
@@ -20,6 +19,7 @@ UNTIL = 1.2e-4
 TOLERANCES, FIRST = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03, 0.01), 3.0
 PAGE, WAIT = "what_an_answer_costs", "Asking."
 ALT = "Answers with their bars, sources of error, bars and true errors, and CPU time"
+SIZE, TALL = (8.8, 5.4), (4.4, 10.6)
 CONTROLS = {"tolerance": (TOLERANCES, FIRST, "largest error that you allow [%]")}
 #: Step of the truth [s], a tenth or less of those of answers to 0.03 %.
 FINEST = 1e-8
@@ -70,6 +70,8 @@ def solved(tolerance):
 @session.remember
 def mesh_source():
     """The mesh as a source of error: the spread over meshes of this size."""
+    from _meshes import with_moved_nodes  # of the folder above, which ``_page`` makes known
+
     meshes = [with_moved_nodes(scene().mesh, MOVED, seed) for seed in range(MESHES)]
     asked = {"tolerance": 0.01 * TOLERANCES[0], "sources": ["mesh"], "meshes": meshes}
     found = dem.solve(scene(), until=UNTIL, goal=GOAL, **asked, progress=None)
@@ -94,11 +96,6 @@ def answer(tolerance):
     return Asked(answers[nearest], known, true, mesh_source())
 
 
-def compile_all():
-    """Compile the bar, so that no later answer has to wait for it."""
-    truth()
-
-
 def words(asked):
     """The answer in a sentence, beside the truth."""
     found = asked.chosen
@@ -114,17 +111,15 @@ def words(asked):
     )
 
 
-def picture(asked):
-    """Values with their bars, bars and errors over what was asked, seconds over it; PNG bytes."""
-    with styled(0, size=(10.0, 6.0)) as (figure, _):
-        panels = figure.subplot_mosaic(
-            [["values", "budget"], ["errors", "price"]], height_ratios=(0.75, 1.0)
-        )
-        _values(panels["values"], asked)
-        _budget(panels["budget"], asked)
-        _errors(panels["errors"], asked)
-        _price(panels["price"], asked)
-        return png_like_the_first(figure, "answer")
+def draw(figure, asked, tall):
+    """Values with their bars, bars and errors over what was asked, seconds over it."""
+    drawn = {"values": _values, "budget": _budget, "errors": _errors, "price": _price}
+    places, heights = [["values", "budget"], ["errors", "price"]], (0.75, 1.0)
+    if tall:
+        places, heights = [[name] for name in drawn], (0.8, 0.6, 1.0, 1.0)
+    panels = figure.subplot_mosaic(places, height_ratios=heights)
+    for name, draw_panel in drawn.items():
+        draw_panel(panels[name], asked)
 
 
 def _values(axes, asked):

@@ -5,17 +5,18 @@ The grains are those of the automaton by rules of place. All runs on the thread 
 
 import numpy as np
 
-from _page import percent, png_like_the_first
+from _page import percent
 from ca_damper import Automaton, Batch, Oscillator, SceneTable
 from ca_damper.plot.boxes import Box, DrawnBox, frame_panel
 from ca_damper.report.record import frames_of
-from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, STYLES, styled
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, STYLES
 from taichi_dem.kit.session_thread import session
 
 #: Frequencies by the natural one of the empty box, and the cycles before and while measuring.
 RATIOS = (0.88, 0.9, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.99, 1.0, 1.02, 1.05)
 TRANSIENT, MEASURED = 60, 15
 PAGE, WAIT, ALT = "why_a_box_of_grains_damps", "Shaking.", "Response, energy a cycle, box"
+SIZE, TALL = (8.8, 5.6), (4.4, 11.0)
 CONTROLS = {
     "base": ((0.05, 0.1, 0.2, 0.4, 0.6, 1.0, 1.5, 2.0), 0.6, "base moves by [mm]"),
     "ratio": (RATIOS, 0.97, "frequency / own frequency"),
@@ -56,7 +57,7 @@ class Answer:
 
 def answer(base, ratio, grains, share):
     """The Answer to a choice of the CONTROLS."""
-    return Answer(grains, 0.01 * share, 1e-3 * base, ratio)
+    return session.remember(Answer)(grains, 0.01 * share, 1e-3 * base, ratio)
 
 
 def words(answer):
@@ -80,7 +81,7 @@ def structure(grains, share, base):
 
 
 @session.remember
-def compile_all():
+def compiled():
     """The batch, a scene a ratio."""
     frequency = np.array(RATIOS) * PAPER.natural_frequency
     table = SceneTable(CONTROLS["grains"][1], 1, FILLING.default_dt, frequency)
@@ -90,7 +91,7 @@ def compile_all():
 @session.remember
 def shaken(grains, o):
     """Shake until all is as it will stay; returns Cycles at all RATIOS, and Frames of each."""
-    batch = compile_all()
+    batch = compiled()
     numbers = {"mass": o.mass, "stiffness": o.stiffness, "damping": o.damping}
     batch.change(particles=grains, base_amplitude=o.base_amplitude, **numbers)
     batch.start("rigid")
@@ -102,15 +103,15 @@ def shaken(grains, o):
     return batch.run(0, MEASURED), tuple(zip(*shots))
 
 
-def picture(answer):
-    """Response, energy a cycle, and the box through one cycle; PNG bytes."""
-    with styled(0, size=(10.0, 6.2)) as (figure, _):
-        above, below = figure.add_gridspec(2, 1, height_ratios=(1.0, 1.15))
-        response, energy = above.subgridspec(1, 2, width_ratios=(1.7, 1.0)).subplots()
-        _response(response, answer)
-        _energy(energy, answer)
-        _boxes(figure, below.subgridspec(1, PICTURES).subplots(), answer)
-        return png_like_the_first(figure, "grains")
+def draw(figure, answer, tall):
+    """Response, energy a cycle, and the box through one cycle."""
+    above, below = figure.add_gridspec(2, 1, height_ratios=(1.0, 1.15))
+    grid = (2, 1) if tall else (1, 2)
+    response, energy = above.subgridspec(*grid, width_ratios=(1.7, 1.0)[: grid[1]]).subplots()
+    _response(response, answer)
+    _energy(energy, answer)
+    rows = 2 if tall else 1
+    _boxes(figure, below.subgridspec(rows, PICTURES // rows).subplots().ravel(), answer)
 
 
 def _response(axes, answer):
@@ -123,9 +124,11 @@ def _response(axes, answer):
     rms, look = 1e3 * answer.cycles.rms, {"color": STYLES[FILLING.label].colour, "ms": 4}
     axes.plot(RATIOS, rms, "o-", label=f"{answer.grains} grains", **look)
     axes.plot(answer.ratio, answer.at_ratio(rms), "o", ms=12, mfc="none", mec=BLACK, mew=1.5)
-    axes.set(xlabel="frequency of the base / own frequency of the empty box [1]", ylim=(0.0, None))
+    axes.set(xlabel="frequency / own frequency of the empty box [1]", ylim=(0.0, None))
     axes.set(ylabel="RMS displacement [mm]", title="how far the box swings")
-    axes.legend()
+    # Room for the legend above the curves.
+    axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
+    axes.legend(loc="upper left")
 
 
 def _energy(axes, answer):

@@ -7,11 +7,13 @@ The cost of a choice is measured with its own program, on demand. Dashpots are s
 step may be twenty times as long as they would allow. All runs on the thread of the session.
 """
 
+from functools import partial
+
 import numpy as np
 
 import taichi_dem as dem
-from _page import percent, png_like_the_first
-from taichi_dem.kit.plot_style import BLUE, GREY, RED, styled
+from _page import percent
+from taichi_dem.kit.plot_style import BLUE, GREY, RED
 from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.plot.view import draw_bodies
@@ -39,6 +41,7 @@ EFFECTS = {
 ALL = tuple(EFFECTS)
 PAGE, WAIT = "which_effects_a_scene_needs", "Pulling."
 ALT = "Bar with all effects and with those chosen, cost of a step"
+SIZE, TALL = (8.8, 4.2), (4.4, 11.0)
 CONTROLS = {name: (bool, True, words) for name, (_, words) in EFFECTS.items()}
 CONTROLS["speed"] = (SPEEDS, 2.0, "the right end starts with [m/s]")
 #: The programs that answer, each with all that can be silent.
@@ -111,12 +114,10 @@ def price(names, speed):
     return Answer(speed, *both[0], advice(names, speed), np.min(spent, axis=0))
 
 
-def compile_all():
-    """Compile all programs and pull with all effects, so that no later answer waits for it."""
-    for program in PROGRAMS[:-1]:
-        dem.Simulation(scene(program, program, SPEEDS[0]), METHOD).start()
-    for speed in SPEEDS:
-        outcome(ALL, speed)
+def preparation():
+    """Runs of all programs, and with all effects at every speed: no later answer waits for them."""
+    programs = [partial(outcome, program, SPEEDS[0]) for program in PROGRAMS]
+    return [*programs, *(partial(outcome, ALL, speed) for speed in SPEEDS)]
 
 
 def verdicts(answer):
@@ -146,23 +147,26 @@ def words(answer):
     return "\n".join([sentences, "", *rows])
 
 
-def picture(answer):
-    """The bar with all effects and with those chosen, and the cost of a step; PNG bytes."""
+def draw(figure, answer, tall):
+    """The bar with all effects and with those chosen, and the cost of a step."""
     rows = {"all effects": answer.complete, "your choice": answer.chosen}
     # The stroke looks like a twelfth of the bar, to one digit.
     magnify = float(f"{LENGTH / 12.0 / answer.stroke:.1g}")
-    with styled(0, size=(10.0, 4.4)) as (figure, _):
-        places = [[f"{name}, {instant}" for instant in SHOWN] + [name] for name in rows]
-        panels = figure.subplot_mosaic(places, width_ratios=(1.0, 1.0, 0.75))
-        bars = [panels[title] for row in places for title in row[:2]]
-        for (name, result), row in zip(rows.items(), places):
-            for title, number in zip(row, SHOWN.values()):
-                drawn = _pulled(panels[title], answer, result, number, magnify)
-                panels[title].set_title(title if row is places[0] else name, loc="center")
-        words = f"moved to the right [mm], drawn × {magnify:.0f}"
-        figure.colorbar(drawn, ax=bars, label=words, location="bottom", aspect=50, pad=0.02)
-        _prices(*(panels[name] for name in rows), answer)
-        return png_like_the_first(figure, "effects")
+    titles = [[f"{name}, {instant}" for instant in SHOWN] for name in rows]
+    places = [[*pair, name] for pair, name in zip(titles, rows)]
+    shape = {"width_ratios": (1.0, 1.0, 0.75)}
+    if tall:
+        places = [[one] for one in (*sum(zip(*titles), ()), *rows)]
+        shape = {"height_ratios": (1.0, 1.0, 1.0, 1.0, 0.7, 0.7)}
+    panels = figure.subplot_mosaic(places, **shape)
+    bars = [panels[title] for pair in titles for title in pair]
+    for result, pair in zip(rows.values(), titles):
+        for title, number in zip(pair, SHOWN.values()):
+            drawn = _pulled(panels[title], answer, result, number, magnify)
+            panels[title].set_title(title, loc="center")
+    words = f"moved to the right [mm], drawn × {magnify:.0f}"
+    figure.colorbar(drawn, ax=bars, label=words, location="bottom", aspect=50, pad=0.02)
+    _prices(*(panels[name] for name in rows), answer)
 
 
 def _pulled(axes, answer, result, number, magnify):
@@ -192,7 +196,7 @@ def _prices(above, below, answer):
     for axes, values, form in ((above, costs, "%.3g"), (below, broken, "%d")):
         if values is None:
             axes.set(xticks=[], yticks=[])
-            axes.text(0.5, 0.5, "not measured yet: press the button", ha="center", va="center")
+            axes.text(0.5, 0.5, "not measured", ha="center", va="center")
             continue
         bars = axes.barh(["your choice", "all effects"], values, color=[BLUE, GREY], height=0.5)
         axes.bar_label(bars, fmt=form, padding=3)

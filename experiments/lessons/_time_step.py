@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 import taichi_dem as dem
-from _page import percent, png_like_the_first
-from taichi_dem.kit.plot_style import BLACK, GREY, RED, seconds, styled, styles_of
+from _page import percent
+from taichi_dem.kit.plot_style import BLACK, GREY, RED, seconds, styles_of
 from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.observers import macro_steps
@@ -31,6 +31,7 @@ TIME_MS = 1e3 * np.linspace(0.0, UNTIL, SAMPLES + 1)
 RISES, PEAK = (1e-5, 2e-5, 5e-5), 1e6
 PAGE, WAIT = "what_a_time_step_costs", "Striking."
 ALT = "Bar, far end, error over cost"
+SIZE, TALL = (8.8, 5.4), (4.4, 9.4)
 METHODS = {
     "explicit": dem.Uniform,
     "limited": partial(dem.Uniform, dashpot="limited"),
@@ -71,7 +72,7 @@ class Strike:
 
 
 class Answer(NamedTuple):
-    """Strikes for one choice; ladders: those at all STEPS, by the methods tried with this blow."""
+    """Strikes for one choice; ladders: those at all STEPS, by the methods tried so far."""
 
     method: str
     chosen: Strike
@@ -85,7 +86,7 @@ def scene(rise=RISES[0]):
     return dem.Scene(bar(LENGTH, WIDTH, CELLS), dem.CONCRETE, [blow, dem.effects.BondDamping()])
 
 
-def limits():
+def facts():
     """Longest stable explicit step of the worst body, in words."""
     own = dem.step_report(scene()).limits
     names = {"dashpots": "bond_dashpot", "springs": "bond_stiffness"}
@@ -142,10 +143,10 @@ def truth(rise):
 def answer(method, step, rise):
     """The Answer to a choice: method by name, step [ns] and rise [us] nearest to these."""
     step, rise = nearest(STEPS, 1e-9 * step), nearest(RISES, 1e-6 * rise)
-    tried = session.kept(("ladders", rise), dict)
-    own = tried[method] = [timed(method, one, rise) for one in STEPS]
-    ladders = {name: tried[name] for name in METHODS if name in tried}
-    return Answer(method, own[STEPS.index(step)], truth(rise), ladders)
+    tried = session.kept("methods tried", set)
+    tried.add(method)
+    ladders = {name: [timed(name, one, rise) for one in STEPS] for name in METHODS if name in tried}
+    return Answer(method, ladders[method][STEPS.index(step)], truth(rise), ladders)
 
 
 def nearest(values, value):
@@ -165,26 +166,24 @@ def words(answer):
     )
 
 
-def compile_all():
-    """Compile the bar of every method and strike it with all blows: later answers look it up."""
-    for rise in RISES:
-        truth(rise)
-        for method, step in itertools.product(METHODS, STEPS):
-            timed(method, step, rise)
+def preparation():
+    """Strikes of the bar by every method with all blows: later answers look them up."""
+    every = itertools.product(METHODS, STEPS, RISES)
+    return [partial(truth, rise) for rise in RISES] + [partial(timed, *one) for one in every]
 
 
-def picture(answer):
-    """The bar on its way, its far end over time, and error over cost of every step; PNG bytes."""
-    with styled(0, size=(10.0, 6.0)) as (figure, _):
-        places = [["bar", "bar"], ["end", "price"]]
-        panels = figure.subplot_mosaic(places, height_ratios=(0.5, 1.0))
-        _struck(figure, panels["bar"], answer)
-        _far_end(panels["end"], answer)
-        _price(panels["price"], answer)
-        return png_like_the_first(figure, "time step")
+def draw(figure, answer, tall):
+    """The bar on its way, its far end over time, and error over cost of every step."""
+    places, heights = [["bar", "bar"], ["end", "price"]], (0.5, 1.0)
+    if tall:
+        places, heights = [["bar"], ["end"], ["price"]], (0.4, 1.0, 1.2)
+    panels = figure.subplot_mosaic(places, height_ratios=heights)
+    _struck(figure, panels["bar"], answer, tall)
+    _far_end(panels["end"], answer)
+    _price(panels["price"], answer)
 
 
-def _struck(figure, axes, answer):
+def _struck(figure, axes, answer, tall):
     """The bar coloured by velocity when the wave is on its way, or the sentence of its end."""
     chosen, model = answer.chosen, answer.truth.result.model
     frame, high = chosen.motion or answer.truth.motion, model.mesh.points.max(axis=0)
@@ -194,12 +193,14 @@ def _struck(figure, axes, answer):
     axes.set(xlim=(-0.02, high[0] + 0.03), ylim=(-0.02, high[1] + 0.02), xlabel="x [m]", yticks=[])
     axes.set_title(f"t = {TIME_MS[SHOWN]:.2f} ms, displacement × {MAGNIFY:g}")
     axes.spines["left"].set_visible(False)
-    figure.colorbar(drawn, ax=axes, label="velocity\n[mm/s]", aspect=8, pad=0.01)
+    beside = {"label": "velocity\n[mm/s]", "aspect": 8, "pad": 0.01}
+    below = {"label": "velocity [mm/s]", "aspect": 30, "location": "bottom"}
+    figure.colorbar(drawn, ax=axes, **(below if tall else beside))
     if not chosen.motion:
         drawn.set_alpha(0.15)
         axes.set_title("the run did not get there")
         look = {"ha": "center", "va": "center", "color": RED, "weight": "bold"}
-        words = textwrap.fill(chosen.sentence.split(";")[0], 60)
+        words = textwrap.fill(chosen.sentence.split(";")[0], 30 if tall else 60)
         axes.text(0.5 * high[0], 0.5 * high[1], words, **look)
 
 
@@ -215,7 +216,7 @@ def _far_end(axes, answer):
 
 def _price(axes, answer):
     """Error over seconds at every step of the methods tried so far, the chosen one ringed."""
-    axes.set(xscale="log", yscale="log", xlim=(7e-4, 1.0), ylim=(3e-8, 3.0))
+    axes.set(xscale="log", yscale="log", xlim=(7e-4, 1.0), ylim=(1e-14, 3.0))
     axes.axhspan(1.0, 3.0, color="0.94", lw=0, label="× diverged: its cost, but no error")
     axes.axhline(1e-2, color=GREY, ls=":", lw=1.0, label="error of 1 %")
     for row, (method, strikes) in enumerate(answer.ladders.items()):
@@ -231,9 +232,11 @@ def _price(axes, answer):
         place = chosen.seconds, chosen.error(answer.truth)
         axes.plot(*place, "o", ms=14, mfc="none", mec=BLACK, mew=1.5)
         look = {"textcoords": "offset points", "weight": "bold"}
-        axes.annotate(seconds(chosen.step), place, (10, 8), **look)
+        # Below a point that lies high, clear of the title.
+        axes.annotate(seconds(chosen.step), place, (10, 8 if place[1] < 0.1 else -22), **look)
     axes.set(xlabel="CPU time of one core [s]", ylabel="largest error of the far end [1]")
     axes.set_title("lower left is better")
+    axes.set_yticks([1e-8, 1e-6, 1e-4, 1e-2, 1.0])
     # Minor ticks would take a third of the time of the picture.
     axes.minorticks_off()
     axes.legend(loc="lower left")

@@ -18,7 +18,7 @@ def _():
     import _time_step as lesson
 
     chosen, guessed = page.controls(mo, lesson), page.guesses(mo, lesson)
-    page.opening(mo, lesson, chosen, **lesson.limits())
+    page.opening(mo, lesson, chosen)
     return chosen, guessed, lesson, mo, page
 
 

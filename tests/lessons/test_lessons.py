@@ -1,22 +1,62 @@
-"""What the lessons compute and tell: bits of runs made for the choice, accounts that close."""
+"""What the lessons compute and tell: bits of runs made for the choice, accounts that close.
 
+And their static pages: all frames are there, and a click in a browser shows another one.
+"""
+
+import base64
 import importlib.util
+import json
+import re
+import zlib
 from pathlib import Path
 
 import pytest
 
 import _answers
 import _grains
+import _needs
+import _page
+import _static
 import _time_step
 from taichi_dem import Simulation, Uniform, effects, runtime
 from taichi_dem.kit.session_thread import session
 from taichi_dem.materials import CONCRETE
 from taichi_dem.scene import Scene
+from tests.browser import run_in_page
 from tests.scenes import ROOT
 
 pytestmark = pytest.mark.experiment
 
 NOTEBOOKS = sorted(Path(ROOT, "experiments", "lessons").glob("wh*.py"))
+LESSONS = pytest.mark.parametrize(
+    "lesson", [_time_step, _answers, _grains, _needs], ids=lambda lesson: lesson.PAGE
+)
+MOST_BYTES = 3e6
+#: What a reader sees: returns it once the picture is there.
+SEEN = """
+  const picture = document.getElementById("picture");
+  const seen = async () => {
+    await new Promise((go) => setTimeout(go, 500));
+    await picture.decode();
+    const inputs = [...document.querySelectorAll("input:checked")];
+    const checked = inputs.map((one) => one.name + one.value);
+    const told = document.getElementById("answer").innerText, state = location.hash;
+    const fits = document.documentElement.scrollWidth <= innerWidth;
+    return { state, checked, told, fits, picture: picture.dataset.wanted };
+  };
+"""
+#: Chooses a control's other value, and the first guess, where the mouse would: in reach of it.
+CLICK = """
+  const before = await seen();
+  for (const name of ["values", "guesses"]) {
+    const chip = document.querySelector(`input[name=${name}]:not(:checked)`);
+    chip.scrollIntoView({ block: "center" });
+    const place = chip.getBoundingClientRect();
+    document.elementFromPoint(place.x + place.width / 2, place.y + place.height / 2).click();
+    await new Promise((go) => setTimeout(go, 500));
+  }
+  return [before, await seen()];
+"""
 
 
 @pytest.fixture(scope="module")
@@ -85,3 +125,62 @@ def test_a_notebook_runs_without_a_browser(path, engine, capfd):
     spec.loader.exec_module(module)
     module.app.run()
     assert capfd.readouterr().err == ""
+
+
+@pytest.fixture(scope="module")
+def pages(engine, tmp_path_factory):
+    """Path of the quick static page of a lesson, built when it is asked for."""
+    folder, made = tmp_path_factory.mktemp("lessons"), {}
+
+    def page_of(lesson):
+        if lesson not in made:
+            made[lesson] = _static.build(lesson.__name__, folder, quick=True)
+        return made[lesson]
+
+    return page_of
+
+
+def data_of(path):
+    """What a static page holds."""
+    found = re.search(r'id="data">(.*?)</script>', path.read_text(encoding="utf-8"))
+    return json.loads(found[1])
+
+
+@LESSONS
+def test_a_static_page_has_a_frame_for_each_value_and_asks_for_nothing(lesson, pages):
+    text, data = pages(lesson).read_text(encoding="utf-8"), data_of(pages(lesson))
+    assert not re.search(
+        r"https?://|@import|url\(|<(link|script|img)[^>]*(src|href)=\"(?!data:)", text
+    )
+    pictures = [zlib.decompress(base64.b64decode(one)) for one in data["pictures"]]
+    assert all(b"<svg" in one for one in pictures)
+    shown = [(frame["wide"], frame["tall"]) for one in data["questions"] for frame in one["frames"]]
+    assert {*sum(shown, ())} == {*range(len(pictures))}
+    for question in data["questions"]:
+        assert len(question["values"]) == len(question["frames"]) == _static.QUICK
+        assert len(question["replies"]) == len(question["guesses"])
+        told = [reply.startswith("<p><strong>Right.") for reply in question["replies"]]
+        assert told.index(True) == question["right"] and sum(told) == 1
+
+
+@LESSONS
+def test_a_full_page_is_small(lesson, pages):
+    """No larger than the quick one would be with two such pictures for each value."""
+    asked = _page.questions(_page.parts_of(lesson)[1])
+    values = [_static.options_of(lesson.CONTROLS[one.control][0]) for one in asked]
+    pictures = data_of(pages(lesson))["pictures"]
+    mean = sum(map(len, pictures)) / len(pictures)
+    assert pages(lesson).stat().st_size + 2 * mean * sum(map(len, values)) < MOST_BYTES
+
+
+@LESSONS
+@pytest.mark.parametrize("size", [(1280, 800), (500, 900)], ids=["lecture", "telephone"])
+def test_a_click_changes_address_and_picture_and_a_reload_shows_the_same(lesson, size, pages):
+    before, after = run_in_page(pages(lesson), "#at=1", SEEN + CLICK, size)
+    assert before["state"] == "#at=1" and before["told"] == ""
+    assert after["state"].startswith("#at=1&values=") and after["picture"] != before["picture"]
+    assert after["told"].startswith(("Right.", "Not so, but:"))
+    assert {"guesses0"} < {*after["checked"]} and before["fits"] and after["fits"]
+    again = run_in_page(pages(lesson), after["state"], SEEN + "return seen();", size)
+    assert again == after
+    assert pages(lesson).with_suffix(".png").stat().st_size > 10_000
