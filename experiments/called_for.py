@@ -6,16 +6,14 @@
 The paper's block is blasted to 0.5 ms with all effects, and without some of them. Each frame shows
 the surroundings of the hole, displacements five times as large; below stand the CPU seconds of the
 run and the error of the hole's displacement against the run with all effects. What chance does to
-that displacement is the difference of a run whose gas has another last bit: errors below it say
-nothing. Friction goes with contact, as nothing rubs that does not touch.
+that displacement is the difference of a run whose gas has another last bit.
 
 With effects="auto" an effect begins to act on a body when it is called for there. The map colours
 each body by the last effect that began to act on it: where only bonds are strained nothing else is
-computed. Friction begins with contact. Expect contact to matter most: without it the walls of
-cracks pass through each other.
+computed. Friction begins with contact.
 
-Seconds are CPU seconds of one thread of stepping, without compiling, the least of the runs. Writes
-called_for.png, acting.png, called_for.csv and summary.json to results/called_for/.
+Seconds are those of stepping on one core, the least of the runs. Writes called_for.png, acting.png,
+called_for.csv and summary.json to results/called_for/.
 """
 
 import sys
