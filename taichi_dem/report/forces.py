@@ -74,7 +74,7 @@ class Forces:
 
     def _found(self):
         bodies = int(values(self.tables.body_count))
-        table = np.zeros((bodies, 3 * self.count))
+        table = np.empty((bodies, 3 * self.count))
         if self.count:
             # Loads alone ask for no other forces.
             contacts = self.readings.contact_wrenches() if self.answers else np.zeros((1, 6))
@@ -86,6 +86,9 @@ class Forces:
         """Fill in the forces on every body, three columns each; contacts: wrenches of these."""
         ti.loop_config(serialize=ti.static(self.small))
         for i in range(self.tables.body_count[None]):
+            # Of an array that a kernel only writes, a card has no copy of what was in it.
+            for k in range(ti.static(3 * self.count)):
+                table[i, k] = 0.0
             now, step = self.schedule.seconds(self.state.tick[None]), self.schedule.own_step(i)
             force, moment = vec3(0.0), vec3(0.0)
             if ti.static(self.answers):
