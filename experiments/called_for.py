@@ -79,7 +79,7 @@ def runs_of(options):
 def draw_frames(path, results, rows):
     """The surroundings of the hole at the end, by how far bodies have moved; numbers below."""
     lines = len(rows) // 2
-    with picture(path, lines, 2, size=(4.8, 1.2 + 2.1 * lines), dpi=300) as (figure, panels):
+    with picture(path, lines, 2, size=(4.8, 2.4 + 1.5 * lines), dpi=300) as (figure, panels):
         for axes, result, (title, seconds, _, error) in zip(panels.flat, results, rows):
             frame, model = result.frame(), result.model
             moved = 1e3 * np.linalg.norm(frame.displacement, axis=1)
