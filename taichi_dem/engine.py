@@ -47,8 +47,8 @@ class Structure:
 class BlastEngine(Engine):
     """Tables, state, contact search, schedule, step and drivers of one structure.
 
-    model in its methods is a ``Model``, the scene's arrays. records: whether the kernels that
-    recording needs are compiled.
+    model in its methods is a ``Model``, the scene's arrays. recording_compiled: whether all
+    kernels are that a recording needs.
     """
 
     advice = (
@@ -80,7 +80,7 @@ class BlastEngine(Engine):
         self.drivers = {name: driver(self.step) for name, driver in DRIVERS.items()}
         self.readings = Readings(self.tables, self.state, self.advance)
         self.forces = Forces(self.readings)
-        self.records = False
+        self.recording_compiled = False
 
     def load(self, model: Model, method: Method, max_speed: float, sleep: float = 0.0) -> None:
         """Take over a scene, at rest and at time zero; max_speed [m/s], sleep: see ``Scene``."""

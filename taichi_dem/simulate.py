@@ -160,8 +160,7 @@ def run_simulation(
     scene, method = simulation.scene, simulation.method
     plan = _Plan(scene, method, until, samples, frames, observers, progress)
     with reporting(progress, title) as tell:
-        simulation, recorder = _started(simulation)
-        recorder.brief = brief
+        simulation, recorder = _started(simulation, brief)
         more = {"brief": brief, "start": simulation.first_motion}
         result, error = _result(simulation, recorder, CheckpointWriter(), plan, tell, **more)
     if error is not None:
@@ -270,9 +269,9 @@ def _receivers_among(observers):
     return found
 
 
-def _started(simulation):
+def _started(simulation, brief=False):
     """A simulation ready to step and its recorder, with all kernels compiled."""
-    recorder = Recorder(simulation, *watched_groups(simulation.scene))
+    recorder = Recorder(simulation, *watched_groups(simulation.scene), brief=brief)
     simulation.start()
     compiling("recording", PARTS, PARTS)
     recorder.compile()

@@ -9,15 +9,14 @@ a reader has seen who takes the questions in their order.
 
 import argparse
 import base64
-import html
 import importlib
 import io
-import re
 import time
 import zlib
 from pathlib import Path
 
 import matplotlib
+from markdown_it import MarkdownIt
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 
 import _page as page
@@ -28,6 +27,8 @@ from taichi_dem.kit.session_thread import session
 LESSONS = "_time_step", "_answers", "_grains", "_needs"
 #: Questions, and values of a control, of a quick page.
 QUICK = 2
+#: Paragraphs and tables to HTML; HTML among the words is shown as it is typed.
+MARKDOWN = MarkdownIt("commonmark", {"html": False}).enable("table")
 HERE = Path(__file__).resolve().parent
 VIEWER = Path(taichi_dem.kit.viewer.__file__).parent
 
@@ -55,7 +56,7 @@ def content_of(lesson, quick=False):
     frames = Frames(lesson)
     return {
         "title": heading.removeprefix("# "),
-        "opening": html_of(words),
+        "opening": MARKDOWN.render(words),
         "alt": lesson.ALT,
         "hint": page.HEADING.removeprefix("## "),
         "questions": [_question(lesson, one, frames, quick) for one in asked],
@@ -75,10 +76,10 @@ def _question(lesson, question, frames, quick):
         options, first = dict([*options.items()][begin : begin + QUICK]), first - begin
     shown = [frames.of({**values, control: one}) for one in options.values()]
     return {
-        "words": _inline(question.words),
-        "guesses": list(map(_inline, question.guesses)),
+        "words": MARKDOWN.renderInline(question.words),
+        "guesses": list(map(MARKDOWN.renderInline, question.guesses)),
         "right": question.guesses.index(question.right),
-        "replies": [html_of(page.reply(question, guess)) for guess in question.guesses],
+        "replies": [MARKDOWN.render(page.reply(question, guess)) for guess in question.guesses],
         "label": lesson.CONTROLS[control][2],
         "values": list(options),
         "first": first,
@@ -97,7 +98,7 @@ class Frames:
         answer, key = self.lesson.answer(**values), tuple(values.items())
         known, frame = self._known.get(key, (None, None))
         if known != answer:
-            frame = {"words": html_of(self.lesson.words(answer))}
+            frame = {"words": MARKDOWN.render(self.lesson.words(answer))}
             frame |= {"wide": self._picture(answer, False), "tall": self._picture(answer, True)}
             self._known[key] = answer, frame
         return frame
@@ -137,29 +138,6 @@ def svg_of(figure):
 def packed(content):
     """Bytes as the page unpacks them: deflated, in base64."""
     return base64.b64encode(zlib.compress(content, 9)).decode("ascii")
-
-
-def html_of(markdown):
-    """HTML of paragraphs and tables with bold and italic words."""
-    return "".join(map(_block, markdown.strip().split("\n\n")))
-
-
-def _block(text):
-    """A paragraph, or a table whose lines begin with a bar."""
-    if not text.startswith("|"):
-        return f"<p>{_inline(text)}</p>"
-    head, _, *rows = ([cell.strip() for cell in row.split("|")[1:-1]] for row in text.splitlines())
-    return f"<table>{_row(head, 'th')}{''.join(_row(row, 'td') for row in rows)}</table>"
-
-
-def _row(cells, tag):
-    return f"<tr>{''.join(f'<{tag}>{_inline(cell)}</{tag}>' for cell in cells)}</tr>"
-
-
-def _inline(text):
-    """HTML of words, some bold or italic."""
-    bold = re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", html.escape(text), flags=re.DOTALL)
-    return re.sub(r"\*(.+?)\*", r"<em>\1</em>", bold, flags=re.DOTALL)
 
 
 def build(name, folder, quick=False):

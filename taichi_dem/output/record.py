@@ -103,9 +103,8 @@ class Recorder:
     so far [m/s], (body_count,). brief: whether frames are without stress, which nobody reads.
     """
 
-    def __init__(self, simulation: Simulation, *groups: str):
-        self.simulation, self.model = simulation, simulation.model
-        self.brief = False
+    def __init__(self, simulation: Simulation, *groups: str, brief: bool = False):
+        self.simulation, self.model, self.brief = simulation, simulation.model, brief
         self.holes = {group: hole_of(self.model, group) for group in groups}
         loads = enumerate(self.model.loads)
         self.gas = [place for place, load in loads if isinstance(load, GasPressure)]
@@ -117,9 +116,9 @@ class Recorder:
     def compile(self) -> None:
         """Compile all that recording needs, so that nothing later keeps Ctrl-C waiting."""
         engine = self.simulation.engine
-        if engine.records:
+        if engine.recording_compiled:
             return
-        engine.records = True
+        engine.recording_compiled = True
         self.sample()
         self.snapshot()
         self.rows, self.frames = [], []

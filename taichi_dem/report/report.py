@@ -261,7 +261,7 @@ class Report:
             "error": self.known_error,
             "time": rows["time"],
             "method": f"{self.method}, smallest step {rows['smallest step']}",
-            "effects": self._acted(),
+            "effects": self._acted() or "none",
             "work put in": rows["work put in"],
             "injected": rows["injected"],
             "certificate": self.certificate.verdict if self.certificate else "",
@@ -269,11 +269,12 @@ class Report:
         return in_lines(brief, self.needs, BRIEF)
 
     def _acted(self):
-        """Which effects acted, and which never did."""
-        never = [use.effect for use in self.effect_activity if use.idle]
-        acted = [use.effect for use in self.effect_activity if not use.idle]
-        parts = f"{', '.join(acted)} acted" if acted else "", f"{', '.join(never)} never did"
-        return "; ".join(part for part in (parts if never else parts[:1]) if part) or "none"
+        """Which effects acted, which never did, and of which no event was counted or could be."""
+        said: dict[str, list[str]] = {"acted": [], "not counted": [], "never acted": []}
+        for use in self.effect_activity:
+            words = "acted" if use.is_active else "never acted" if use.idle else "not counted"
+            said[words].append(use.effect)
+        return "; ".join(f"{', '.join(names)} {words}" for words, names in said.items() if names)
 
 
 def known_error(report: Report, scene: Scene, method: Any) -> str:

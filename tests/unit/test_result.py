@@ -11,6 +11,7 @@ import pytest
 
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, Uniform, read_mesh, simulate, write_paraview
 from taichi_dem.kit.display import BRIEF
+from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.mesh.shapes import bar
 from tests.made_result import made_result
 
@@ -118,6 +119,22 @@ def test_a_report_is_brief_and_loses_nothing(flown):
     assert len(lines) == BRIEF and all(f"warning: {k}\n" in f"{details}\n" for k in range(30))
     left = re.fullmatch(r"and (\d+) more lines: report.details\(\)", lines[-1])
     assert f"warning: {30 - int(left[1]) - 1}" == lines[-2]
+
+
+def test_a_report_says_that_an_effect_acted_only_where_an_event_was_counted(flown):
+    given = {"softening": (3, False), "bond_damping": (0, True), "friction": (0, False)}
+    uses = [
+        EffectUse(name, "events", n, energy_J=0.0, rounding=round_)
+        for name, (n, round_) in given.items()
+    ]
+    (line,) = [
+        line
+        for line in str(dataclasses.replace(flown.report, effect_activity=tuple(uses))).splitlines()
+        if line.startswith("effects")
+    ]
+    assert line.split(None, 1)[1] == (
+        "softening acted; bond_damping not counted; friction never acted"
+    )
 
 
 def read_xyz(path):
