@@ -62,7 +62,7 @@ class Batch(LoadedScenes):
         scene [s], which is shortened so that a whole number of steps makes a cycle of the base.
     mount : str, default "spring"
         ``"spring"``: on spring and dashpot. ``"base"``: moves like the base whatever the filling
-        does. ``"floor"``: lies on the base by its weight, on a stiffness and damping that never
+        does. ``"floor"``: rests on the base by its weight, on a stiffness and damping that never
         pull.
     measured_cycles : int, default 1
         Largest number of cycles that one run may measure.
@@ -82,13 +82,13 @@ class Batch(LoadedScenes):
         Places of structures given by their modes, see ``shake_structure``; None for a container of
         its own in each scene.
     if_diverged : str, default "nan"
-        ``"nan"``: the other scenes go on where one diverges, its results are nan, and a warning
-        tells which. ``"raise"``: it ends all.
+        ``"nan"``: if a scene diverges, its results are nan, a warning names it, and the others
+        continue. ``"raise"``: it ends all.
 
     Attributes
     ----------
     diverged : ndarray
-        Scenes that have diverged, with those on one structure with them, bool, shape (scenes,);
+        Scenes that diverged, with all on the same structure, bool, shape (scenes,);
         ``divergences()`` tells when and why.
     run_seconds : float
         Wall time spent on stepping [s].
@@ -239,7 +239,7 @@ class Batch(LoadedScenes):
         self._load_pace()
 
     def drive(self, frequency: Any) -> None:
-        """Go on at another frequency, at the end of a cycle.
+        """Continue at another frequency, at the end of a cycle.
 
         The base keeps its position and changes its speed.
 
@@ -292,8 +292,7 @@ class Batch(LoadedScenes):
         InputError
             A number is out of range, a cycle is not complete, or the excitation ends earlier.
         SimulationDiverged
-            All scenes left the range in which their numbers mean anything, or one with
-            ``if_diverged="raise"``.
+            All scenes diverged, or one with ``if_diverged="raise"``.
         """
         transient = whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
         measured = whole("measured_cycles", measured_cycles, 0, self.measured_cycles)
@@ -310,7 +309,7 @@ class Batch(LoadedScenes):
         return cycles
 
     def measure_each(self, cycles: Any, progress: Listener | None = None) -> tuple[np.ndarray, ...]:
-        """Go on by a number of cycles for each scene, and measure all of them.
+        """Continue by a number of cycles for each scene, and measure all of them.
 
         Parameters
         ----------
@@ -329,8 +328,7 @@ class Batch(LoadedScenes):
         InputError
             A number is out of range, or a cycle is not complete.
         SimulationDiverged
-            All scenes left the range in which their numbers mean anything, or one with
-            ``if_diverged="raise"``.
+            All scenes diverged, or one with ``if_diverged="raise"``.
         """
         counts = for_all("cycles", cycles, self.count, self.measured_cycles).astype(np.int64)
         self._check_cycle_is_full()
@@ -354,8 +352,7 @@ class Batch(LoadedScenes):
         InputError
             A number is negative or not whole.
         SimulationDiverged
-            All scenes left the range in which their numbers mean anything, or one with
-            ``if_diverged="raise"``.
+            All scenes diverged, or one with ``if_diverged="raise"``.
         """
         self._check_started()
         self._recording = None
@@ -410,9 +407,9 @@ class Batch(LoadedScenes):
         checkpoint : Checkpoint, optional
             Where and when to save; None for no checkpoint.
         resume : path, optional
-            Checkpoint to go on from; the saved run must be called again and is continued.
+            Checkpoint to continue from; the saved run must be called again.
         identity : dict of str
-            Words by name that a file must share with this run.
+            Words by name that the file and this run must share.
         owners : dict or sequence of (str, object), default ()
             Further objects whose data belong in the file, as in ``restart.RunSnapshot``.
 
@@ -460,7 +457,7 @@ class Batch(LoadedScenes):
         self.going_on = True
 
     def aside(self) -> tuple[dict[str, np.ndarray], ...]:
-        """Read the whole state, to keep it while another batch has the engine.
+        """Read the whole state, to keep it while another batch uses the engine.
 
         Returns
         -------
@@ -470,7 +467,7 @@ class Batch(LoadedScenes):
         return self.memory.read(), self.saved()
 
     def take_up(self, aside: tuple[dict[str, np.ndarray], ...]) -> None:
-        """Go on from a state instead of a start, with the same bits.
+        """Continue from a state instead of a start, with the same bits.
 
         Parameters
         ----------
@@ -517,7 +514,7 @@ class Batch(LoadedScenes):
 
     @property
     def certificate(self) -> Certificate:
-        """Effects that acted and from when, what was left out with its size, what was audited."""
+        """Effects that acted and since when, size of those left out, audits."""
         return certificate_of(self)
 
     def _go(

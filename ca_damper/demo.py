@@ -1,10 +1,10 @@
-"""Let a box of grains go beside a rigid mass of the same weight, and count the cycles.
+"""Release a box of grains beside a rigid mass of the same weight, and count the cycles.
 
-A container hangs on a spring and is let go 30 mm above its rest. The particles in it fly, fall and
-hit its walls. Beside it hangs one in which as many particles are fixed. Nothing shakes them, so no
-resonance can be missed: a faster decay is damping. The particles damp as long as the container's
-peak acceleration is above about 1 g; below it they lie on the floor, and the structure's own
-damping is left. Try other numbers of particles and places to let go from.
+A container hangs on a spring and is released 30 mm above its rest. The particles in it fly, fall
+and hit its walls. Beside it hangs one with as many fixed particles. Nothing shakes them, so a
+shifted resonance plays no part: a faster decay is damping. The particles damp as long as the
+container's peak acceleration is above about 1 g; below it they lie on the floor, and the
+structure's own damping is left. Try other numbers of particles and other amplitudes.
 
     python -m ca_damper demo                                   # 6 seconds
     python -m ca_damper demo --particles 50 --amplitude 40
@@ -16,8 +16,8 @@ Figures are medians over nine starts, five in a quick run. An amplitude is sqrt(
 displacement of a cycle of the empty container.
 
 Writes damper.gif, decay.png, decay.csv, caption.txt, report.json and summary.json to
-results/damper_demo/; with --all-pictures view.html, the film to play, with --no-pictures neither
-picture nor film.
+results/damper_demo/; with --all-pictures also view.html, which plays the film; with --no-pictures
+neither picture nor film.
 """
 
 from argparse import Namespace
@@ -56,12 +56,12 @@ FILLINGS = {"automaton": Automaton, "spheres": Spheres}
 #: Numbers of particles of which the figures tell, and most starts of each.
 COUNTS, STARTS = (10, 30, 50), 9
 SETTINGS = {
-    "particles": (30, 30, study.whole(0, 160), "0 to 160, 30"),
-    "amplitude": (30.0, 30.0, study.number(2.0 * LEVEL, 100), "let go at [mm], 20 to 100, 30"),
-    "filling": ("automaton", "automaton", study.one_of(FILLINGS), "of the film, automaton"),
-    "effects": ("listed", "listed", study.one_of(EFFECTS), "listed; or auto"),
-    "dt": (None, None, study.number(0, 1), "step of that filling [s], 1e-4 or 2e-5 of spheres"),
-    "seed": (1, 1, study.whole(0, 2**31 - STARTS), "of the first start, 1"),
+    "particles": (30, 30, study.whole(0, 160), "number of particles, from 0 to 160, default 30"),
+    "amplitude": (30.0, 30.0, study.number(2.0 * LEVEL, 100), "displacement [mm], default 30"),
+    "filling": ("automaton", "automaton", study.one_of(FILLINGS), "default automaton"),
+    "effects": ("listed", "listed", study.one_of(EFFECTS), "effects: listed (default) or auto"),
+    "dt": (None, None, study.number(0, 1), "step [s], default 1e-4, of spheres 2e-5"),
+    "seed": (1, 1, study.whole(0, 2**31 - STARTS), "seed of the first start, default 1"),
     "starts": (STARTS, 5),
     # Those of the animation.
     "shown": (5, 2),
@@ -90,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def add_options(made: study.Parser) -> None:
     """Add the options of this job that are no settings to its parser."""
-    made.add_argument("--compare", action="store_true", help="figures of the other filling too")
+    made.add_argument("--compare", action="store_true", help="print figures of both fillings")
     study.add_pictures(made)
 
 

@@ -1,4 +1,4 @@
-"""Pictures and words of the demonstration: a container with free particles beside a rigid mass."""
+"""Pictures and text of the demonstration: a container with free particles beside a rigid mass."""
 
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
@@ -163,8 +163,8 @@ def sentences(decays: Mapping[str, Decay], filling: Any, options: Namespace) -> 
     share = f"{load:g} g, {100.0 * load / mass:.0f} % of its mass"
     decay, rigid = decays[filling.label], decays["rigid"]
     return (
-        f"The container weighs {mass:g} g, swings by itself at {oscillator.natural_frequency:.2f} "
-        f"Hz and is let go at {options.amplitude:g} mm.",
+        f"The container weighs {mass:g} g, has a natural frequency of "
+        f"{oscillator.natural_frequency:.2f} Hz and is released at {options.amplitude:g} mm.",
         f"With {counted(count, 'particle')} ({share}) fixed in it, "
         f"{_until(rigid.cycles(count))}; with free ones, {_until(decay.cycles(count))}.",
         *_lost(decay.decrements(count), rigid.decrements(count)),

@@ -1,4 +1,4 @@
-"""Exceptions that a user of the package may meet; scripts end with 2 and 3 on them."""
+"""Exceptions for users of the package; scripts end with exit codes 2 and 3 on them."""
 
 from collections.abc import Mapping
 
@@ -7,7 +7,7 @@ from taichi_dem.kit.errors import SimulationDiverged as _SimulationDiverged
 
 
 class SimulationDiverged(_SimulationDiverged):
-    """A scene left the range in which its numbers mean anything.
+    """A scene left the range of meaningful numbers.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class SimulationDiverged(_SimulationDiverged):
     dt : float
         Step that was used [s].
     dt_allowed : float
-        Step that would do [s], also in ``advice``.
+        Step that suffices [s], also in ``advice``.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Contract of a filling of the container: its input is the motion, its output the load.
+"""Interface of a filling of the container: its input is the motion, its output the load.
 
 A filling is a frozen dataclass of a user's options, checked when it is made (``Filling``). It binds
 itself to the scenes of an engine (``DeviceFilling``), which is compiled once and then runs every
@@ -48,7 +48,7 @@ class Action:
 
 @ti.dataclass
 class Blows:
-    """Blows of a filling on the container in a step, before any of them is carried out.
+    """Impacts of a filling on the container in a step, before any is carried out.
 
     impulse: of those on floor and ceiling, on a container that they would not move, along x [N s].
     struck: mass of what meets floor and ceiling [kg], which resists as if it were carried. rubbed:
@@ -63,7 +63,7 @@ class Blows:
 
 @ti.dataclass
 class Recoil:
-    """How a container takes the blows of a step, with those on all that moves with it.
+    """Response of a container to the impacts of a step, with all that moves with it.
 
     velocity: along x at the end of the step, after all blows on floors and ceilings [m/s]. share:
     sum of the rubbed masses, each times the speed that a unit impulse on it gives the container.
@@ -96,7 +96,7 @@ class Structure:
 
 @runtime_checkable
 class Filling(Protocol):
-    """Contract of a filling of the container.
+    """Interface of a filling of the container.
 
     Options of a user, checked when they are made. A filling may also have ``order``, that of the
     error in the step, for the report; choose its effects by itself, as ``activation.py`` describes;
@@ -131,14 +131,14 @@ class Filling(Protocol):
 
     @property
     def step_bound(self) -> tuple[float, str] | None:
-        """Longest step that it allows or advises [s], and why; None where any will do."""
+        """Longest step that it allows or advises [s], and why; None for no limit."""
 
     @property
     def structure(self) -> Structure:
         """What is compiled; fillings of a class and an equal structure share it."""
 
     def check(self, particles: int, dt: float) -> None:
-        """Refuse a number of particles or a step that the filling cannot do.
+        """Refuse a number of particles or a step that the filling cannot run.
 
         Parameters
         ----------
@@ -193,9 +193,9 @@ class DeviceFilling(Protocol):
     may change between two steps, when a sweep goes on to its next frequency. It may have two
     further members for a certificate, in Python: see ``activation.py``.
 
-    One whose blows see how the container gives way takes ``advance`` apart, so that boxes on one
-    structure resolve theirs together: ``find_blows(s, step, motion)`` returns Blows, and
-    ``carry_out(s, step, motion, recoil)`` with a Recoil returns the Action.
+    A filling whose impacts depend on the recoil of the container splits ``advance``, so that boxes
+    on one structure resolve their impacts together: ``find_blows(s, step, motion)`` returns Blows,
+    and ``carry_out(s, step, motion, recoil)`` with a Recoil returns the Action.
     """
 
     def load(self, filling: Filling) -> None:

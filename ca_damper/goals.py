@@ -1,7 +1,7 @@
-"""Goals: outputs of a damper that can be asked for with a tolerance, see ``solve_response``.
+"""Goals: outputs of a damper for ``solve_response``, which finds them to a tolerance.
 
-A goal of one's own takes a few lines; its function gets a Response of one particle number and
-returns one value for each seed, or a row of them:
+A user-defined goal takes a few lines; its function gets a Response of one particle number and
+returns one value for each seed, or a row of values:
 
     largest_swing = Goal("largest swing", "m", lambda found: found.amplitude[0].max(0), "extreme")
 """
@@ -34,8 +34,8 @@ class Goal(BaseGoal):
         Function of a Response of one particle number, with as many seeds as there are runs; returns
         an array (seeds,) or (seeds, places).
     kind : str, default "value"
-        ``"value"``: at given frequencies. ``"extreme"``: of the curve, which is followed to its
-        peak. ``"curve"``: a value for each of the given frequencies.
+        ``"value"``: at given frequencies. ``"extreme"``: at the peak of the curve. ``"curve"``: a
+        value for each of the given frequencies.
     ratios : tuple of float, default ()
         Frequency ratios f/f0 [-] that the goal needs; none for an ``"extreme"``, whose Response has
         at least three around the highest RMS.

@@ -106,7 +106,7 @@ class Oscillator:
         Raises
         ------
         InputError
-            At the natural frequency without damping, where there is no steady state.
+            There is no steady state: at the natural frequency without damping.
         """
         ratio = self._ratio(frequency, added_mass)
         check_steady("an oscillator", ratio, frequency)

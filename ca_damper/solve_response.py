@@ -1,8 +1,8 @@
-"""Ask for an output of the damper with a tolerance, get it with an error bar.
+"""Outputs of the damper to a tolerance, with an error bar.
 
-A pilot at a coarse step finds the frequencies that the goal needs; scenes at two steps and of a few
-seeds then go on, each until its transient has ended and the mean over its cycles, the seeds and
-the step leave a bar that is narrow enough. Nothing begins again that can go on.
+A pilot at a coarse step finds the frequencies that the goal needs. Scenes at two steps and with a
+few seeds then continue until their transients have ended and the bar, by cycles, seeds and step, is
+narrow enough. No scene is repeated that can continue.
 """
 
 import math
@@ -79,36 +79,35 @@ def solve_response(
     tolerance : float, default 0.01
         Half-width of the bar as a share of the value, or of a curve's largest.
     confidence : float, default 0.95
-        Probability [-] with which the bar holds the value of endless runs at a vanishing step.
+        Probability [-] with which the bar holds the value of infinite runs at a vanishing step.
     budget_s : float, optional
-        CPU time after which the best answer is returned and says what is missing [s]; None for no
-        limit.
+        CPU time after which the best answer is returned, with what it lacks [s]; None for no limit.
     oscillator : Oscillator, optional
         Primary structure; that of the paper if None.
     ratios : tuple of (float, float), optional
         Range (lowest, highest) of f/f0 [-] in which to look for a peak. None: one around the
-        natural frequency, which is left where the peak is outside.
+        natural frequency, which grows if the peak is outside.
     seeds : int or sequence of int, optional
         Number of seeds or the seeds themselves; as many as it takes if None.
     plan : Plan, optional
-        Plan of an earlier answer for this filling and as many particles: begin at its step, seeds
+        Plan of an earlier answer for this filling and number of particles: start at its step, seeds
         and cycles.
     sources : iterable of str, default ("step",)
-        Sources of error that are measured, and so in the bar: ``"step"``, always; ``"filling"``,
-        by the same question to grains of the other kind, ``Spheres`` or ``Automaton``.
+        Sources of error to measure and include in the bar: ``"step"``, always; ``"filling"``, by
+        the same question to the other model of the grains, ``Spheres`` or ``Automaton``.
     progress : callable or str or None, default "auto"
         As in ``frequency_response``.
 
     Returns
     -------
     Answer or tuple of Answer
-        A tuple for several goals. It has branches where seeds come to several steady motions.
+        A tuple for several goals. It has branches if seeds reach several steady motions.
 
     Raises
     ------
     InputError
-        The question cannot be asked, the peak is outside ratios, or the budget ends before there is
-        anything to tell.
+        The question is invalid, the peak is outside ratios, or the budget ends before there is an
+        answer.
     SimulationDiverged
         No step that was tried is stable.
 
@@ -259,7 +258,7 @@ def _answer(done: Search, found: Estimate) -> Answer:
         error = math.sqrt(float(found.fine.variance[0]))
         branches = branches_of(found.fine.values[:, 0], clusters, seeds, error, t)
         step = _step_of(branches, done.steps, found, job.confidence)
-        return branched(made, branches, step, "seed", "took {} steady motions")
+        return branched(made, branches, step, "seed", "reached {} steady motions")
     if job.is_drawn and len(seeds) == 1:
         made = doubted(made, _ONE_SEED)
     return replace(made, cost_curve=_cost_curve(done, made))

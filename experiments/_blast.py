@@ -42,7 +42,7 @@ def blast_parser(
     saves: whether its run is written whole, and saves itself on the way.
     """
     made = parser(name, description, drivers, **given)
-    made.add_argument("--mesh", default=mesh, help="tetrahedra with a face group hole")
+    made.add_argument("--mesh", default=mesh, help="mesh file with a face group named hole")
     if saves:
         add_checkpoints(made)
     return made

@@ -19,7 +19,7 @@ _SMALL = {
     "lines.linewidth": 1.2,
 }
 #: Displacements that methods may be compared by, and how they are called.
-_COMPARED = {"hole_radial_displacement_mm": "hole", "monitor_displacement_mm": "body watched"}
+_COMPARED = {"hole_radial_displacement_mm": "hole", "monitor_displacement_mm": "monitored body"}
 
 
 @contextlib.contextmanager

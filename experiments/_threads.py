@@ -79,7 +79,7 @@ def thread_gains(mesh, cells, methods, steps, rounds, repeats):
 def gain_of(single, double):
     """Figures of ``thread_gains``; single, double: results of runs on one and on two threads."""
     if len({one["digest"] for one in (*single, *double)}) > 1:
-        raise InputError("one thread and two threads must give the same bits, and do not")
+        raise InputError("one thread and two threads must give the same bits, but do not")
 
     def gain(name):
         least = [min(value for one in runs for value in one[name]) for runs in (single, double)]

@@ -3,16 +3,15 @@
     python experiments/accuracy_on_request.py          # about 15 minutes on one core
     python experiments/accuracy_on_request.py --quick
 
-Questions about bars under gas pressure are drawn at random. Price: CPU time of ``solve`` over that
-of the cheapest single run, with any of our methods and steps, that is as near to the truth as was
-asked; found by scanning, with the truth known. The longest stable step is near enough for most
-questions, so that nothing is spared by a coarser one: two runs, of which the second makes a tenth
-more steps, cost 2.1 times as much as the first alone, and that is what we expect. Where bonds
-break, twins tell what chance does: five runs more.
+Questions about bars under gas pressure are drawn at random. The price of an answer is the CPU time
+of ``solve`` over that of the cheapest single run whose error is within the tolerance. That run is
+found by a scan of all methods and steps, with the truth known. For most questions the longest
+stable step is accurate enough. We then expect a price of 2.1: two runs, the second with a tenth
+more steps. Where bonds break, five more runs measure the spread by chance.
 
-Besides, what 10, 3, 1 and 0.3 % cost for the paper's block and for the paper's damper, over runs
-with steps tuned by hand; and bodies dropped on a slab, of which no single run can tell. Whether the
-bars hold: bar_coverage.py.
+It also compares answers to 10, 3, 1 and 0.3 % for the paper's block and damper with runs whose
+steps are tuned by hand, and drops bodies on a slab, where no single run can answer. bar_coverage.py
+tests whether the bars hold.
 """
 
 import sys
@@ -30,7 +29,7 @@ from taichi_dem.kit.plot_style import BLUE, GREY, ORANGE, RED, picture
 
 NAME = "accuracy_on_request"
 SETTINGS = {
-    "prices": (30, 1, study.whole(1, 1000), "questions whose price is compared"),
+    "prices": (30, 1, study.whole(1, 1000), "questions whose cost is compared, default 30"),
     # A short bar in a quick run.
     "first": (0, 3),
     # Whether single runs are made by other methods than that of the answers, too.
@@ -128,14 +127,14 @@ def draw_parting(path, time_ms, ways, apart, answer):
     """
     with picture(path, 1, 2, size=(9.0, 4.2)) as (_, (left, right)):
         left.plot(time_ms, ways.T, color=BLUE, linewidth=0.8)
-        left.set(xlabel="time [ms]", ylabel="mean way of the bodies [mm]")
+        left.set(xlabel="time [ms]", ylabel="mean path of the bodies [mm]")
         left.set_title(f"{len(ways)} runs whose starts differ by one rounding")
         right.semilogy(time_ms[1:], np.maximum(apart[:, 1:].T, 1e-16), color=BLUE, linewidth=0.8)
         words = f"tolerance, {100 * answer.tolerance:g} %"
         right.axhline(answer.tolerance, color=ORANGE, label=words)
-        look = {"color": RED, "linestyle": "--", "label": "from here on solve sees them part"}
+        look = {"color": RED, "linestyle": "--", "label": "from here on solve sees them separate"}
         right.axvline(1e3 * answer.plan.parting_s, **look)
-        right.set(xlabel="time [ms]", ylabel="distance from the first run / way [1]")
+        right.set(xlabel="time [ms]", ylabel="distance from the first run / path [1]")
         right.set_title("how far they are apart")
         right.legend(loc="lower right")
 

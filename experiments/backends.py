@@ -1,14 +1,14 @@
 """How many steps a second does each back end make, and what bounds them?
 
-Bars of tetrahedra under gas are stepped by one thread of the CPU, by all of them, and by each back
-end of a GPU that answers here, by three methods. Two lines bound what is measured: the bytes that a
-step has to move at the rate of a copy in memory, and the steps of the smallest scene, in which the
-device waits for launches and for numbers that the host reads.
+Bars of tetrahedra under gas pressure are stepped by three methods: on one CPU thread, on all CPU
+threads, and on each GPU back end found here. Two lines bound the measured rates: the bytes of a
+step at the bandwidth of memory, and the rate of the smallest scene, in which the device waits for
+launches and for reads by the host.
 
     python experiments/backends.py           # minutes on a CPU and on a graphics card
     python experiments/backends.py --quick
 
-A Vulkan driver that runs on the CPU, Mesa's lavapipe, is slow, and refuses large scenes.
+Mesa's lavapipe, a Vulkan driver that runs on the CPU, is slow and refuses large scenes.
 
 Writes backends.png, backends.csv and summary.json to results/backends/.
 """
@@ -39,10 +39,10 @@ LOOK = {
 SETTINGS = {
     # Bars of 2k x k x k boxes of six tetrahedra.
     "sizes": ((4, 8, 13, 20), (2, 3), study.several(study.whole(1, 60)), "boxes along a width"),
-    "places": (None, ["cpu 1", "cpu"], study.several(study.one_of(LOOK)), "by comma; all there"),
+    "places": (None, ["cpu 1", "cpu"], study.several(study.one_of(LOOK)), "devices; default all"),
     "methods": ([*METHODS], ["explicit_limited"], study.several(study.one_of(METHODS)), "by comma"),
-    "steps": (20, 5, study.whole(1, 10_000), "timed together, 20"),
-    "repeats": (3, 1, study.whole(1, 100), "of them; the fastest counts, 3"),
+    "steps": (20, 5, study.whole(1, 10_000), "steps in one timing, default 20"),
+    "repeats": (3, 1, study.whole(1, 100), "timings, of which the fastest counts, default 3"),
 }
 TABLE = study.Table(
     place=("place", "place"),

@@ -1,15 +1,14 @@
-"""Does a bar hold as often as it says? Questions drawn by a number, and far finer runs.
+"""Does a bar hold as often as it says? Random questions, judged by far finer runs.
 
     make coverage                                   # 120 questions, 15 minutes on one core
     python experiments/bar_coverage.py --battery 7  # others of the same kind, 40 minutes
     python experiments/bar_coverage.py --quick
 
-A battery asks about bars, the paper's block, parts under blows, and dampers. It draws meshes and
-their numbering, materials, loads, times, goals and tolerances by its number. Each answer is judged
-by a run whose step is 16 times finer, or for a damper by other seeds at a quarter of the step:
-95 % of the bars should hold it, no fewer, and no more, which would be bars that are too wide. Those
-of batteries 0 to 2 are kept in bar_references.csv, and made anew where an answer needs finer
-ones.
+A battery asks about bars, the paper's block, parts under impact, and dampers. Its number is the
+seed of meshes and their numbering, materials, loads, times, goals and tolerances. The reference of
+an answer is a run with a step 16 times finer, or for a damper other seeds at a quarter of the step.
+It should lie in 95 % of the bars: fewer mean bars too narrow, more mean bars too wide. References
+of batteries 0 to 2 are kept in bar_references.csv; finer ones are made where an answer needs them.
 
 Writes bars.csv, references.csv, bar_coverage.md, bar_coverage.png and summary.json to
 results/bar_coverage/.
@@ -34,8 +33,8 @@ from taichi_dem.kit.progress_bar import ProgressBar
 NAME = "bar_coverage"
 REFERENCES = Path(__file__).with_name("bar_references.csv")
 SETTINGS = {
-    "battery": (0, 0, study.whole(0, 2**31), "number by which questions are drawn, 0"),
-    "questions": (120, 4, study.whole(1, 10_000), "number of questions, 120"),
+    "battery": (0, 0, study.whole(0, 2**31), "seed of the questions, default 0"),
+    "questions": (120, 4, study.whole(1, 10_000), "number of questions, default 120"),
     # Cheap ones in a quick run.
     "first": (0, 108),
 }
@@ -126,7 +125,7 @@ def run(options):
     references = judge.References(REFERENCES)
     found = judged(options, references)
     if not any(one.single for one in found):
-        raise InputError(f"questions must be more: {options.questions} had no single number")
+        raise InputError(f"questions must be more: none of {options.questions} had a single number")
     answers = pd.DataFrame([vars(one) for one in found])
     answers.to_csv(folder / "bars.csv", index=False, columns=COLUMNS.split())
     references.write(folder / "references.csv")

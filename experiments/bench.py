@@ -3,15 +3,15 @@
     make bench                          # about 8 minutes on two quiet cores
     python experiments/bench.py --quick # a minute
 
-Figures are CPU time of one core unless they say otherwise, with --arch cuda time of the wall;
-compile time apart. Median of repeats, and their spread; candidates of one part take turns.
+Figures are CPU time of one core unless they say otherwise, and wall time with --arch cuda, without
+compiling. They are medians of repeats, with their spread; candidates of one part take turns.
 
-The floors of the machine are measured between the parts: a copy in memory and in the cache, and
-multiplications and additions, by one core. A figure that states its least work stands as a share of
-its floor: the time of that work at these rates over the time it took.
+Between the parts, the floors of the machine are measured on one core: copies in memory and in
+cache, multiplications and additions. A figure with a known least work is given as a share of its
+floor: the time of that work at these rates over the measured time.
 
 Writes bench.json to results/, adds a line to bench_history.jsonl there, and draws bench.png: all
-figures over the commits that have been measured on such a processor.
+figures over the commits measured on such a processor.
 """
 
 import json

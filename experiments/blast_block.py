@@ -1,19 +1,19 @@
-"""How does the full block break, 3 m deep as in the experiment, which the paper could not afford?
+"""How does the full block of the experiment break, 3 m deep, which was too costly for the paper?
 
-The paper's scene on a block of 2 m by 2 m by 3 m with a hole through its depth, dashpots solved
-together. The paper expects more than a month of its rule for such a block; here a step of 20,000
-tetrahedra takes about 20 ms of one core and 1 ms of the blast 2500 steps, a minute or two. Expect
-cracks as in the flat block at mid depth, more of them towards the ends, which are free; and peak
-velocities that fall with a power of the distance from the hole, between the 1/2 of a cylindrical
-wave without losses and the 1.5 to 2 of measured blasts, as the dashpots take most of the work. The
-power is fitted to bodies nearer to the hole than to any free side: elsewhere the wave comes back.
+The scene is the paper's, on a block of 2 m by 2 m by 3 m with a hole through its depth; dashpots
+are solved together. The paper estimates more than a month for such a block by its rule. Here a step
+of 20,000 tetrahedra takes about 20 ms of one core, and 1 ms of the blast takes 2500 steps, a minute
+or two. Expect cracks as in the flat block at mid depth, and more cracks towards the free ends.
+Expect peak velocities that fall with a power of the distance between 1/2 (a cylindrical wave
+without losses) and 1.5 to 2 (measured blasts), as the dashpots take most of the work. The power is
+fitted to bodies nearer to the hole than to any free side: elsewhere the wave is reflected.
 
     python experiments/blast_block.py                          # 20,000 tetrahedra
     python experiments/blast_block.py --tetrahedra 100000      # a quarter of an hour or more
-    python experiments/blast_block.py --resume --until 2e-3    # go on from where it ended
+    python experiments/blast_block.py --resume --until 2e-3    # continue that run
 
-Gmsh makes the mesh, once a folder. Without it 15 mirrored copies of the paper's flat block stand in
-(14,490 tetrahedra); ``make mesh`` installs it.
+Gmsh makes the mesh, once a folder; ``make mesh`` installs Gmsh. Without it, 15 mirrored copies of
+the paper's flat block are used (14,490 tetrahedra).
 
 Writes cracks.png, peaks.png, energy.png, history.csv, peaks.csv, mesh, ParaView series and
 summary.json to results/blast_block/; a run saves itself as blast_fracture.py does.
@@ -54,10 +54,10 @@ from taichi_dem.plot.view import draw_lines, shades
 
 NAME = "blast_block"
 SETTINGS = {
-    "tetrahedra": (None, None, study.whole(2000, 2000000), "about how many, 20000"),
-    "until": (1e-3, 1e-4, study.number(0, 1), "simulated time [s], 1e-3"),
-    "samples": (200, 20, study.whole(1, 1000000), "rows of the time series, 200"),
-    "frames": (10, 1, study.whole(1, 10000), "snapshots, 10"),
+    "tetrahedra": (None, None, study.whole(2000, 2000000), "about this many, default 20000"),
+    "until": (1e-3, 1e-4, study.number(0, 1), "simulated time [s], default 1e-3"),
+    "samples": (200, 20, study.whole(1, 1000000), "rows of the time series, default 200"),
+    "frames": (10, 1, study.whole(1, 10000), "number of snapshots, default 10"),
     # Copies of the flat block that stand in for a mesh by Gmsh.
     "copies": (15, 3),
 }

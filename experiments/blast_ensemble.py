@@ -1,18 +1,18 @@
 """How sure is a crack? The probability of each face to break over 100 perturbed blasts.
 
-One blast gives one pattern of cracks, and nobody knows a block well enough to say that it is the
-one. Each blast here has another mesh, whose points are moved by 0.1 % of the shortest edge there
-(the cut into elements is arbitrary, and cracks should not hang on it), and another strength: that
-of concrete scatters by 5 % from cast to cast, and fracture energy with it. The block, its hole and
-the gas stay. Expect the crushed zone and the main cracks in all blasts, about one broken face in
-three in some of them only, and a displacement of the hole that is known to 4 %.
+One blast gives one crack pattern, but no block is known exactly. Here each blast has another mesh
+and another strength. Mesh points are moved by 0.1 % of the shortest edge, as cracks should not
+depend on the arbitrary mesh. Strength and fracture energy scatter by 5 %, as those of concrete do
+from cast to cast. The block, its hole and the gas pressure stay the same. Expect the crushed zone
+and the main cracks in all blasts, about one broken face in three in some blasts only, and a
+displacement of the hole that is known to 4 %.
 
     python experiments/blast_ensemble.py                      # 100 blasts on all cores
-    python experiments/blast_ensemble.py --scatter 0          # the mesh alone: what chance makes
-    python experiments/blast_ensemble.py --members 1000       # goes on from those that are there
+    python experiments/blast_ensemble.py --scatter 0          # other meshes alone
+    python experiments/blast_ensemble.py --members 1000       # adds to finished blasts
 
-Blasts run side by side by ``sweep``, a process a core; those that are finished are kept, and the
-same command runs what is missing. Writes probability.png, displacement.png, probability.csv (each
+``sweep`` runs the blasts in parallel, one process per core. Finished blasts are kept, and the same
+command runs the missing ones. Writes probability.png, displacement.png, probability.csv (each
 face), displacement.csv, members.csv (each blast) and summary.json to results/blast_ensemble/.
 """
 
@@ -46,12 +46,12 @@ from taichi_dem.state.model import Model
 
 NAME = "blast_ensemble"
 SETTINGS = {
-    "members": (100, 4, study.whole(2, 100000), "blasts, 100"),
-    "until": (5e-4, 8e-5, study.number(0, 1), "simulated time [s], 5e-4"),
-    "samples": (20, 8, study.whole(1, 99), "times at which the hole is looked at, 20"),
-    "jitter": (1e-3, 1e-3, study.number(0, 0.05, open_low=False), "of points by edge, 0.001"),
-    "scatter": (0.05, 0.05, study.number(0, 0.2, open_low=False), "of the strength, 0.05"),
-    "seed": (0, 0, study.whole(0, 2**31), "of all blasts, 0"),
+    "members": (100, 4, study.whole(2, 100000), "number of blasts, default 100"),
+    "until": (5e-4, 8e-5, study.number(0, 1), "simulated time [s], default 5e-4"),
+    "samples": (20, 8, study.whole(1, 99), "samples of the hole's displacement, default 20"),
+    "jitter": (1e-3, 1e-3, study.number(0, 0.05, open_low=False), "share of edges, default 0.001"),
+    "scatter": (0.05, 0.05, study.number(0, 0.2, open_low=False), "of the strength, default 0.05"),
+    "seed": (0, 0, study.whole(0, 2**31), "seed of the ensemble, default 0"),
 }
 options_parser = partial(blast_parser, NAME, __doc__, (), settings=SETTINGS)
 #: Name of a result: displacement of the hole at a sample [mm].

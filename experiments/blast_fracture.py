@@ -18,23 +18,22 @@ spheres behind broken faces, and sliding friction. With --compare the blast is r
 with these; pictures are of the first run. An effect of --with takes the place of the usual one of
 its kind: surface_contact has spheres on all free faces.
 
-Softening, slip and contact are evaluated only where and when they act, and bodies that no wave has
-reached sleep; the certificate in the report says what acted, since when, and what was left out.
+Softening, slip and contact are evaluated only where and when they act; bodies that no wave has
+reached sleep. The certificate in the report says what acted, since when, and what was left out.
 
-A run saves itself in checkpoint.npz at its end, on Ctrl-C, and as often as --checkpoint-every says;
-the same command with --resume goes on from there, also with a larger --until.
+A run saves itself in checkpoint.npz at its end, on Ctrl-C, and as often as --checkpoint-every says.
+The same command with --resume continues it, also with a larger --until.
 
-With --accuracy, the displacement of the hole is found to that share of its value, or the kinetic
-energy of a mesh without a hole: the program chooses the method and its step, whatever --method,
---samples and --frames say, and prints the answer with its error bar, what it cost, and what other
-accuracies cost. Each source of error is named, measured or not; with --budget contact, the contact
-law is measured against a finer one. The cracks are those of its finest run; nothing else is run or
-drawn then.
+With --accuracy, the program finds the displacement of the hole to this share of its value; for a
+mesh without a hole, the kinetic energy. It chooses method and step, whatever --method, --samples
+and --frames say. It prints the answer with its error bar and cost, and the cost of other
+accuracies. It names each source of error, measured or not; --budget contact also measures the
+contact law against a finer one. The cracks are those of its finest run; nothing else is run or
+drawn.
 
 Dashpots are solved together unless another method is asked for; blast_methods.py compares them.
 
-``python -m taichi_dem demo`` is the same job without these choices, where only the package is
-installed.
+``python -m taichi_dem demo`` is the same job without these choices, for an installed package.
 
 Writes cracks.png, blast.gif, view.html (a page in which the block turns and plays), history.csv,
 bonds.csv (when each bond broke), bodies.csv, the mesh used, summary.json and a ParaView series
@@ -72,9 +71,9 @@ PAPER_DT0, PAPER_L = 1e-8, 1e-7
 #: Contact of the paper, as of --with.
 SPHERES = "sphere_contact,friction"
 SETTINGS = {
-    "dt0": (None, None, study.number(0, 1), "largest step [s], by method"),
-    "l": (None, None, study.number(0, 1), "the paper's way of a body in a step [m], 1e-7"),
-    "without": ("", "", str, "effects to leave out, by comma"),
+    "dt0": (None, None, study.number(0, 1), "largest step [s]; default: that of the method"),
+    "l": (None, None, study.number(0, 1), "limit of a displacement in a step [m], default 1e-7"),
+    "without": ("", "", str, "effects to leave out, with commas"),
     **DEMO_SETTINGS,
 }
 
@@ -83,10 +82,10 @@ def options_parser():
     """Options of this experiment."""
     made = blast_parser(NAME, __doc__, settings=SETTINGS, saves=True)
     made.add_argument("--method", choices=(*METHODS, *PAPER_METHODS), default="implicit")
-    made.add_argument("--with", dest="added", default="", help="effects to add, by comma")
-    words = "auto: only where they act; all: everywhere; by default auto"
+    made.add_argument("--with", dest="added", default="", help="effects to add, with commas")
+    words = "auto (default): evaluate laws only where they act; all: everywhere"
     made.add_argument("--effects", choices=WORDS, default=WORDS[0], help=words)
-    made.add_argument("--compare", action="store_true", help="run it with the paper's contact too")
+    made.add_argument("--compare", action="store_true", help="also run it with the paper's contact")
     study.add_accuracy(made, "the displacement of the hole", "contact")
     study.add_pictures(made)
     return made

@@ -1,19 +1,18 @@
 """Which method solves the paper's blast, how fast, and how well?
 
-Every method on the same scene: the paper's rule with one step for all and with a step for each,
-steps controlled by what limits them, dashpots limited to what the step bears, and dashpots solved
+All methods run the same scene: the paper's rule with one step for all and with a step for each
+body, controlled steps, dashpots limited to what is stable at the step, and dashpots solved
 together. Expect the paper's rule to take a hundred times as long as the solved dashpots for the
-same answer: its displacement limit l is no accuracy need but an indirect rule of stability.
+same answer: its displacement limit l is an indirect stability rule, not a measure of accuracy.
 
     python experiments/blast_methods.py                    # about eight minutes, most of it the
     python experiments/blast_methods.py --methods implicit,explicit_limited      # paper's uniform
 
-The reference is the implicit method at a sixteenth of its step. Displacement: mean of the hole's
-wall. The largest stable step is found by doubling, in runs to --stable-until that must end within
-10 % of the reference. A bond on the edge of
-breaking near 2e-4 s makes some runs go another way from there on, one per cent apart at the end.
-Times are CPU seconds of stepping alone. Writes methods.png, for every method with a step for each
-body levels_NAME.png, who needs which step, the table as CSV, the history of every method and
+The reference is the implicit method at a sixteenth of its step. The displacement is the mean of the
+hole's wall. The largest stable step is found by doubling, in runs to --stable-until that must end
+within 10 % of the reference. One bond nearly breaks at 2e-4 s; it breaks in some runs, which end
+one per cent away. Times are CPU seconds of stepping alone. Writes methods.png, levels_NAME.png for
+every method with a step for each body, the table as CSV, the history of every method and
 summary.json to results/blast_methods/.
 """
 
@@ -36,11 +35,11 @@ REFERENCE = "reference", partial(ImplicitDashpots, sweeps=(6, 40)), 2.5e-8
 #: Those of the quick job, long enough for faces to break: the paper's rule would take minutes.
 QUICK_METHODS = ["explicit_limited", "implicit"]
 SETTINGS = {
-    "methods": ([*METHODS], QUICK_METHODS, study.several(study.one_of(METHODS)), "by comma; all"),
-    "until": (5e-4, 6e-5, study.number(0, 1), "simulated time [s], 5e-4"),
-    "stable_until": (1e-4, 6e-5, study.number(0, 1), "for the stable step [s], 1e-4"),
+    "methods": ([*METHODS], QUICK_METHODS, study.several(study.one_of(METHODS)), "default all"),
+    "until": (5e-4, 6e-5, study.number(0, 1), "simulated time [s], default 5e-4"),
+    "stable_until": (1e-4, 6e-5, study.number(0, 1), "end of trial runs [s], default 1e-4"),
     "samples": (100, 10),
-    "doublings": (8, 0, study.whole(0, 20), "tried for the largest stable step, 8"),
+    "doublings": (8, 0, study.whole(0, 20), "tried for the largest stable step, default 8"),
 }
 #: Error of the displacement beyond which a run counts as unstable though no body ran away.
 USABLE = 0.1

@@ -7,10 +7,10 @@ at 5e-5 s, when few bodies move, and a large one at 5e-4 s; and a displacement t
     python experiments/blast_multirate.py             # l = 1e-7 m, ten times the paper's
     python experiments/blast_multirate.py --l 1e-8    # the paper's l: most of an hour (estimated)
 
-The larger l scales all steps and thereby the cost of all three runs alike, and hardly their ratio.
-At l = 2e-7 m the run on the paper's block ends as diverged, at 3.4e-4 s.
-Times are CPU seconds of stepping alone, without compiling. Writes pictures, CSV of all that is
-plotted and summary.json to results/blast_multirate/.
+The larger l scales all steps, and so the cost of all three runs alike; their ratio hardly changes.
+At l = 2e-7 m the run on the paper's block diverges at 3.4e-4 s.
+Times are CPU seconds of stepping alone, without compiling. Writes pictures, CSV of all plotted data
+and summary.json to results/blast_multirate/.
 """
 
 import sys
@@ -33,10 +33,10 @@ METHODS = {
 }
 SETTINGS = {
     "methods": (tuple(METHODS), ("uniform", "multirate_held")),
-    "l": (1e-7, 1e-7, study.number(0, 1), "largest way of a body in a step [m], 1e-7"),
-    "dt0": (1e-8, 1e-8, study.number(0, 1), "largest step [s], 1e-8"),
-    "early": (5e-5, 2e-5, study.number(0, 1), "first instant compared [s], 5e-5"),
-    "until": (5e-4, 6e-5, study.number(0, 1), "second instant compared [s], 5e-4"),
+    "l": (1e-7, 1e-7, study.number(0, 1), "limit of a displacement in a step [m], default 1e-7"),
+    "dt0": (1e-8, 1e-8, study.number(0, 1), "largest step [s], default 1e-8"),
+    "early": (5e-5, 2e-5, study.number(0, 1), "first time compared [s], default 5e-5"),
+    "until": (5e-4, 6e-5, study.number(0, 1), "second time compared [s], default 5e-4"),
     "samples": (100, 12),
 }
 #: The paper's figures by method and instant [s]: its minutes, its displacement, what follows.
@@ -115,7 +115,7 @@ def run(options):
     study.write_rows(at("comparison.csv"), rows)
     series = {name: made for name, (_, made) in runs.items()}
     plot_methods(at("methods.png"), series, "monitor_displacement_mm")
-    print(f"One step for all against a step for each, all at l = {options.l:g} m\n")
+    print(f"One step for all and a step for each, at l = {options.l:g} m\n")
     TABLE.show(rows)
     for row in rows:
         paper = PAPER.get((row["method"], f"{row['time_s']:.9g}"), {})

@@ -1,21 +1,22 @@
 """What does it take to keep many workers busy while the work moves over the block?
 
-The paper's blast by the paper's rule is run once and what it evaluates is counted, body by body, in
-intervals of 50 largest steps. Then workers are simulated that share this work in four ways: fixed
-runs of bodies; runs cut anew after each interval by the workers' times (the paper, Figs 8 and 9) or
-by the bodies' own costs; and equal parts of what is due at each tick, which the lists of this
-program give for nothing. All wait at the end of a tick for the slowest; messages are free.
+The paper's blast is run once by the paper's rule; evaluations are counted for each body in
+intervals of 50 largest steps. Then simulated workers share this work in four ways: fixed ranges of
+bodies; ranges that change after each interval by the workers' times (the paper, Figs 8 and 9) or by
+the bodies' costs; and equal parts of what is due at each tick, which the lists of this program
+provide at no cost. At the end of a tick all wait for the slowest; messages cost nothing.
 
-Expect: fixed shares 5 to 15 times apart, as the work is where the block breaks; rebalanced ones
-within 1.2. In the paper 5.8 and 1.1, and 8 min less of 541. Balance over the run is not all: many
-ticks bring few bodies, and those sit side by side, so workers with runs of bodies often rest.
+Expect fixed shares to differ by factors of 5 to 15, as the work is where the block breaks, and
+rebalanced ones by 1.2. The paper has 5.8 and 1.1, which saves 8 min of 541. Balance over the run is
+not enough: at many ticks few bodies are active, all in one region, so workers with ranges of bodies
+often wait.
 
     python experiments/blast_scaling.py             # most of ten minutes
     python experiments/blast_scaling.py --l 1e-7    # a minute for the run
 
 Two threads are measured, not simulated: whole steps of the parallel driver on a large bar and on
-the paper's block, each in a process of its own, fastest of repeats. Where other programs keep the
-cores busy, look at what the busiest thread took of the cores instead (..._busy).
+the paper's block, each in its own process, fastest of repeats. If other programs use the cores,
+read the CPU time of the busiest thread instead (..._busy).
 
 Writes scaling.png, scaling.csv, shares.csv and summary.json to results/blast_scaling/.
 """
@@ -35,10 +36,10 @@ from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, PURPLE, RED, pic
 
 NAME = "blast_scaling"
 SETTINGS = {
-    "until": (5e-4, 5e-5, study.number(0, 1), "simulated time [s], 5e-4"),
-    "l": (1e-8, 1e-7, study.number(0, 1), "the paper's way of a body in a step [m]"),
-    "every": (50, 50, study.whole(1, 100000), "steps an interval, 50"),
-    "repeats": (5, 1, study.whole(1, 100), "of the threads' times"),
+    "until": (5e-4, 5e-5, study.number(0, 1), "simulated time [s], default 5e-4"),
+    "l": (1e-8, 1e-7, study.number(0, 1), "limit of a displacement in a step [m], default 1e-8"),
+    "every": (50, 50, study.whole(1, 100000), "largest steps in an interval, default 50"),
+    "repeats": (5, 1, study.whole(1, 100), "timings of the threads, default 5"),
     "counts": ((*range(1, 25), 32, 48, 64, 96, 128, 192, 256), (1, 2, 4, 8, 16, 24, 64, 256)),
     # Boxes of the bar for the threads, six tetrahedra each, and turns of one and two threads.
     "cells": ((40, 20, 20), (10, 5, 5)),
@@ -58,7 +59,7 @@ WAYS = {
     "static": "fixed shares, by N - i",
     "polyline": "rebalanced by workers' times (the paper)",
     "rebalanced": "rebalanced by bodies' costs",
-    "due": "equal parts of what is due",
+    "due": "equal parts of active bodies",
 }
 #: Colour and line by way of sharing.
 LOOK = dict(zip(WAYS, ((RED, "-."), (PURPLE, "--"), (BLUE, "-"), (GREEN, (0, (8, 2))))))
@@ -83,7 +84,7 @@ def draw_acceleration(axes, shared, most=np.inf, serial=0.0):
         colour, line = LOOK[way]
         axes.plot(counts, gains, ls=line, color=colour, label=WAYS[way])
     bound = counts / (1.0 + serial * (counts - 1.0))
-    axes.plot(counts, bound, ":", color=GREY, label="bound: nobody ever waits")
+    axes.plot(counts, bound, ":", color=GREY, label="bound: no worker waits")
     axes.set(xlabel="workers [1]", ylabel="acceleration [1]")
 
 

@@ -1,17 +1,17 @@
 """Which way of sweeping solves the dashpots of all bonds in the fewest sweeps?
 
-At several times of the paper's blast the velocities of all bodies are disturbed by 5 % of the
-largest, as springs and loads do in a step, and the dashpots are solved from what the step before
-has left: bond by bond in the order of their colours (Gauss-Seidel, what ``ImplicitDashpots`` does),
-or all at once with the masses split (Jacobi), without and with momentum. Expect Gauss-Seidel to
-need a half of the sweeps or fewer: a bond sees at once what its neighbours have done. As bonds of
-one colour share no body, they may be visited side by side, and no bit depends on the threads; so
-nothing is left for Jacobi but fewer launches on a GPU, one a sweep where colours take five.
+At several times of the paper's blast, all velocities are disturbed by 5 % of the largest, as
+springs and loads do in a step. The dashpots are then solved from the impulses of the last step:
+bond by bond in the order of their colours (Gauss-Seidel, as in ``ImplicitDashpots``), or all at
+once with split masses (Jacobi), without and with momentum. Expect Gauss-Seidel to need at most half
+of the sweeps, as a bond uses the new velocities of its neighbours. Bonds of one colour share no
+body, so they can run in parallel with the same bits. Jacobi's only advantage is fewer launches on a
+GPU: one a sweep instead of five.
 
     python experiments/blast_sweeps.py
 
-Error: largest of a body's velocity against a solution to round-off, over the largest speed. Writes
-sweeps.png, sweeps.csv and summary.json to results/blast_sweeps/.
+The error is the largest of a body's velocity against the exact solution, over the largest speed.
+Writes sweeps.png, sweeps.csv and summary.json to results/blast_sweeps/.
 """
 
 import itertools

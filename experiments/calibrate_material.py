@@ -1,18 +1,18 @@
 """Which constants of bonds make a mesh, and specimens of its elements, show what was measured?
 
-Young's modulus and Poisson's ratio are met by static solves of the mesh, which change the moduli of
-bonds. Strengths are met by runs of specimens of elements of the mesh's median size: tension, or
-else brazilian, by the tensile strength of bonds, compression by their cohesion. Where tension and
-brazilian are both asked for, tension is met and brazilian compared. Expect each misfit to fall
-below the tolerance within a few rounds, or a sentence that says why it does not.
+Static solves of the mesh fit the moduli of bonds to Young's modulus and Poisson's ratio. Runs of
+specimens, with elements of the mesh's median size, fit the tensile strength of bonds to tension, or
+else to brazilian, and their cohesion to compression. If both tension and brazilian are given,
+tension is fitted and brazilian compared. Expect each misfit to fall below the tolerance within a
+few rounds, or a sentence that says why it does not.
 
     python experiments/calibrate_material.py              # a minute
     python experiments/calibrate_material.py --mesh block.msh --young 30e9 --tension 3e6
     python experiments/calibrate_material.py --quick      # static solves alone
 
-Compression needs slip-energy, and scenes that then list SlipWeakening: bonds that keep their
-cohesion harden without a peak. Writes calibration.png, targets.csv and summary.json
-to results/calibrate_material/.
+Compression needs slip-energy, and scenes that list SlipWeakening: without it, bonds keep their
+cohesion and harden without a peak. Writes calibration.png, targets.csv and summary.json to
+results/calibrate_material/.
 """
 
 import contextlib
@@ -35,21 +35,21 @@ from taichi_dem.stability.step_report import element_sizes
 NAME = "calibrate_material"
 STRESS, ENERGY = study.number(0, 1e12), study.number(0, 1e9)
 SETTINGS = {
-    "mesh": (None, None, str, "file of the mesh, a bar of 192 bodies"),
-    "young": (None, None, STRESS, "Young's modulus that the mesh is to show [Pa]"),
-    "poisson": (None, None, study.number(*POISSON, open_low=False), "its Poisson's ratio"),
+    "mesh": (None, None, str, "mesh file; default: a bar of 192 bodies"),
+    "young": (None, None, STRESS, "Young's modulus of the mesh [Pa]"),
+    "poisson": (None, None, study.number(*POISSON, open_low=False), "Poisson's ratio of the mesh"),
     "tension": (None, None, STRESS, "strength of a prism in direct tension [Pa]"),
     "brazilian": (None, None, STRESS, "2 P / (pi D t) of a disc between two arcs [Pa]"),
     "compression": (None, None, STRESS, "strength of a prism between held ends [Pa]"),
     "slip_energy": (None, None, ENERGY, "G_II of SlipWeakening [J/m2]; else bonds slip"),
-    "tolerance": (0.02, 0.02, study.tolerance, "misfit that is allowed, 2%"),
-    "seed": (0, 0, study.whole(0, 2**31 - 1), "of the specimens, 0"),
-    "density": (2450.0, 2450.0, study.number(0, 1e6), "[kg/m3], 2450"),
-    "fracture_energy": (60.0, 60.0, ENERGY, "of a bond [J/m2], 60"),
-    "friction_angle": (40.0, 40.0, study.number(0, 90, open_low=False), "[degrees], 40"),
-    "damping_ratio": (0.05, 0.05, study.number(0, 10, open_low=False), "0.05"),
-    "tensile_strength": (4e6, 4e6, STRESS, "of a bond to begin with [Pa], 4e6"),
-    "cohesion": (15e6, 15e6, STRESS, "of a bond to begin with [Pa], 15e6"),
+    "tolerance": (0.02, 0.02, study.tolerance, "largest misfit allowed, default 2%"),
+    "seed": (0, 0, study.whole(0, 2**31 - 1), "seed of the specimens, default 0"),
+    "density": (2450.0, 2450.0, study.number(0, 1e6), "density [kg/m3], default 2450"),
+    "fracture_energy": (60.0, 60.0, ENERGY, "fracture energy of a bond [J/m2], default 60"),
+    "friction_angle": (40.0, 40.0, study.number(0, 90, open_low=False), "[degrees], default 40"),
+    "damping_ratio": (0.05, 0.05, study.number(0, 10, open_low=False), "of bonds, default 0.05"),
+    "tensile_strength": (4e6, 4e6, STRESS, "first guess for bonds [Pa], default 4e6"),
+    "cohesion": (15e6, 15e6, STRESS, "first guess for bonds [Pa], default 15e6"),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 #: Constant of ``Material.from_elastic`` that meets each target.

@@ -4,15 +4,15 @@
     python experiments/called_for.py --quick
 
 The paper's block is blasted to 0.5 ms with all effects, and without some of them. Each frame shows
-the surroundings of the hole, displacements five times as large; below stand the CPU seconds of the
-run and the error of the hole's displacement against the run with all effects. What chance does to
-that displacement is the difference of a run whose gas has another last bit.
+the surroundings of the hole, displacements magnified five times. Below it are the CPU seconds of
+the run and the error of the hole's displacement against the run with all effects. The effect of
+chance is the difference of a run whose gas pressure differs in the last bit.
 
-With effects="auto" an effect begins to act on a body when it is called for there. The map colours
-each body by the last effect that began to act on it: where only bonds are strained nothing else is
-computed. Friction begins with contact.
+With effects="auto", an effect begins to act on a body when it is needed there. The map colours each
+body by the last effect that began to act on it. Where bonds only strain, nothing else is computed.
+Friction begins with contact.
 
-Seconds are those of stepping on one core, the least of the runs. Writes called_for.png, acting.png,
+Seconds are those of stepping on one core, in the fastest run. Writes called_for.png, acting.png,
 called_for.csv and summary.json to results/called_for/.
 """
 
@@ -40,9 +40,9 @@ LEFT_OUT = {
 SETTINGS = {
     # Each is compiled; a quick run does without the last two.
     "scenes": (tuple(LEFT_OUT), ("all effects", "no contact")),
-    "until": (5e-4, 2e-4, study.number(0, 1), "simulated time [s], 5e-4"),
-    "repeats": (3, 1, study.whole(1, 100), "runs, the least seconds of which count, 3"),
-    "step": (4e-7, 4e-7, study.number(0, 1e-5), "step of the method [s], 4e-7"),
+    "until": (5e-4, 2e-4, study.number(0, 1), "simulated time [s], default 5e-4"),
+    "repeats": (3, 1, study.whole(1, 100), "runs, of which the fastest counts, default 3"),
+    "step": (4e-7, 4e-7, study.number(0, 1e-5), "step of the method [s], default 4e-7"),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
 #: Effects that can begin to act, the later one of two that do so at once; and what is drawn.

@@ -3,15 +3,14 @@
     python experiments/cost_of_accuracy_blast.py          # about four minutes on one core
     python experiments/cost_of_accuracy_blast.py --quick
 
-Every method runs the paper's block over a sweep of its step, up to an instant at which all methods
-still converge to one result: 126 faces are broken by then. (One bond is on the edge of breaking at
-2e-4 s; a millionth more or less decides which way the hole then goes, 1 % apart, so that later
-results compare decisions, not errors.) The error is that of the displacements of all bodies; faces
-and energy are judged beside it. The reference is the implicit method at a very short step, kept in
-OUT/references, and checked by the finest run of the paper's multirate rule. Runs that are cheap
-and not a method's coarsest are made a second time with all positions disturbed by 1e-12 m: their
-distance is the chaos floor, their time the spread. Times are CPU seconds of one thread of stepping
-alone, without compiling.
+Every method runs the paper's block over a sweep of its step, up to a time at which all methods
+still converge to one result: 126 faces are broken by then. (At 2e-4 s a change of a millionth
+decides whether one bond breaks, which moves the hole by 1 %.) The error is that of the
+displacements of all bodies; broken faces and energy are also compared. The reference is the
+implicit method at a very short step, kept in OUT/references, and checked by the finest run of the
+paper's multirate rule. Cheap runs, except a method's coarsest, are repeated with all positions
+disturbed by 1e-12 m: the difference is the chaos floor, the times give the spread. Times are CPU
+seconds of one thread of stepping alone, without compiling.
 """
 
 import sys

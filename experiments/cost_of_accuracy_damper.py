@@ -4,11 +4,10 @@
     python experiments/cost_of_accuracy_damper.py --quick
 
 Automaton and spheres are different models, so each is compared with its own limit: the same method
-at a step far below those of the sweep, with other seeds (kept in OUT/references). That reference is
+at a step far below those of the sweep, with other seeds (kept in OUT/references). The reference is
 checked twice: by the finest run of the sweep, and by the force measured on the container, from
-which the transfer function gives the motion anew. How far the limits lie from the spheres' is a
-figure of its own, and a second picture takes the spheres' curve for the truth. RK45 is compared
-with the transfer function of the empty container.
+which the transfer function gives the motion. A second picture takes the spheres' curve as the
+truth. RK45 is compared with the transfer function of the empty container.
 """
 
 import sys
@@ -135,7 +134,7 @@ def draw(folder, options, made, own, toward, empty, floors):
         error_name="error of the response curve / its peak [1]",
         **{"residual_names": ("step [µs]", force), "step_unit": 1e-6},
         caption=f"{scenes}Reference of each method: itself with other seeds, at {shorter:.2g} of "
-        "its finest step or less. Dotted: what seeds alone make of it.",
+        "its finest step or less. Dotted: spread from seed to seed alone.",
         **shared,
     )
     finest = seconds(made[SPHERES].reference["step"])

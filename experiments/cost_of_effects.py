@@ -3,22 +3,22 @@
     python experiments/cost_of_effects.py          # about four minutes on two cores
     python experiments/cost_of_effects.py --quick
 
-The paper's block is blasted with its effects left out one by one; so is a response curve of the
-damper computed, by spheres and by the automaton.
+Effects are left out one by one of the blast of the paper's block, and of a response curve of the
+damper by spheres and by the automaton.
 
-- What an effect costs: CPU seconds of a step with and without it from the same states. States of
-  the run with all effects are put into every other scene; all scenes take turns in one process, in
-  random order, until the 95 % interval of the ratio is small or the most rounds are made. It tells
-  how well these states are timed; they stand for equal parts of the run. Contacts of another kind
-  begin from states of their own run, as their lists have to be as old.
+- What an effect costs: CPU seconds of a step with and without it, from the same states. States of
+  the run with all effects are loaded into every other scene. All scenes take turns in one process,
+  in random order, until the 95 % interval of the ratio is small or the rounds are used up. The
+  interval is that of the timing; the states represent equal parts of the run. Contacts of another
+  kind start from states of their own run, as their lists must be equally old.
 - What else it takes: every scene also runs in a process of its own with an empty cache of kernels:
   memory of all fields, CPU seconds before the first step, size of the compiled kernels.
 - What it is good for: the displacement of the hole and the broken faces, or the response, of those
   runs.
 
 An effect that is left out of a scene must cost nothing: an elastic block is timed against a step
-stripped by hand. And of some scenes the shortest list of effects that serves is known: what all
-effects cost there is listed too.
+stripped by hand. For some scenes the shortest sufficient list of effects is known: the cost of all
+effects there is listed too.
 
 Writes effects.png, blast.csv, spheres.csv, automaton.csv, lists.csv and summary.json to
 results/cost_of_effects/.
@@ -65,9 +65,9 @@ SCENES["blast"][LAST_BIT] = {"names": ORDER, "ulps": 1}
 #: In the quick job every scene compiles in a process of its own.
 QUICK = {"blast": (ALL, [*LESS][3]), "spheres": ("spheres as they are", "friction of spheres")}
 SETTINGS = {
-    "until": (2.5e-4, 1e-4, study.number(0, 1), "simulated time of the blast [s], 2.5e-4"),
-    "rounds": (60, 10, study.whole(1, 10_000), "most rounds of turns from the same states, 60"),
-    "half_width": (0.01, 0.02, study.number(0, 1), "of the 95 % interval of a cost, 0.01"),
+    "until": (2.5e-4, 1e-4, study.number(0, 1), "simulated time of the blast [s], default 2.5e-4"),
+    "rounds": (60, 10, study.whole(1, 10_000), "most rounds from the same states, default 60"),
+    "half_width": (0.01, 0.02, study.number(0, 1), "of the 95 % interval of a cost, default 0.01"),
     "states": (8, 4),
     "substeps": (16, 8),
     "lists": ((*KNOWN_LISTS,), ("blast",)),
@@ -189,7 +189,7 @@ def draw(path, tables):
             area_key("change by chance alone (round-off, seeds)", fc=GREY, alpha=0.3),
         ]
         figure.legend(handles=marks, loc="outside lower right", ncols=3)
-        figure.suptitle("What does an effect cost, and what is it good for?")
+        figure.suptitle("What does an effect cost, and what does it change?")
 
 
 def draw_costs(axes, rows):
@@ -250,7 +250,7 @@ def run(options):
             figures["blast_chance_percent"] = row.change_percent, "%"
     for group, table in tables.items():
         table.to_csv(folder / f"{group}.csv", index=False)
-        print(f"\n{TITLES[group]}: cost of a step, what leaving an effect out spares and changes")
+        print(f"\n{TITLES[group]}: cost of a step, what a run without an effect saves and changes")
         hidden = ["group", "failed", "key", "sign", "effect"]
         print(table.drop(columns=hidden).to_string(float_format="{:.4g}".format))
         print(*(f"{one.scene}: {one.failed}" for one in table.itertuples() if one.failed), sep="\n")

@@ -1,9 +1,9 @@
 """Do cracks run along the rows of a mesh?
 
 A square plate with a notch in the middle of its left side is pulled along y, so that its crack runs
-straight on, along x. A structured plate whose rows are turned by 15 degrees against that breaks
-along a row. The same points scattered, by the seed that ``shapes.plate(scatter=...)`` takes too,
-have no rows: their cracks keep the direction, each a little rough.
+straight along x. A structured plate whose rows are turned by 15 degrees breaks along a row. The
+same points scattered, as by ``shapes.plate(scatter=...)``, have no rows: their cracks are a little
+rough but keep the direction.
 
     python experiments/crack_direction.py             # two minutes
     python experiments/crack_direction.py --seeds 20
@@ -29,8 +29,8 @@ from taichi_dem.simulate import run_simulation
 
 NAME = "crack_direction"
 SETTINGS = {
-    "element": (4e-3, 5e-3, study.number(2e-3, 8e-3), "edge of an element [m], 0.004"),
-    "seeds": (5, 1, study.whole(1, 100), "scattered plates, 5"),
+    "element": (4e-3, 5e-3, study.number(2e-3, 8e-3), "edge of an element [m], default 0.004"),
+    "seeds": (5, 1, study.whole(1, 100), "number of scattered plates, default 5"),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 #: Side of the plate and depth of the notch [m], turn of the rows, and error allowed [degrees].
@@ -120,7 +120,7 @@ def picture_cracks(path, made):
         names, angles = [one.name for one in made], [one.angle for one in made]
         last.axhspan(-ALLOWED, ALLOWED, color=GREEN, alpha=0.2, lw=0.0, label=f"± {ALLOWED:g}°")
         last.axhline(0.0, color=GREY, lw=0.8, label="exact")
-        last.axhline(-TURN, color=GREY, ls=":", label="a row")
+        last.axhline(-TURN, color=GREY, ls=":", label="a row of the mesh")
         last.scatter(range(len(made)), angles, c=[RED] + [BLUE] * (len(made) - 1), zorder=3)
         last.set_xticks(range(len(made)), names, rotation=90)
         last.set(ylabel="direction of the crack [°]", ylim=(-18.0, 12.0))

@@ -1,14 +1,14 @@
-"""Cost of a cycle against the number of particles, and the steps that fillings bear (Fig. 12).
+"""Cost of a cycle over the number of particles, and the stable steps of fillings (Fig. 12).
 
     python experiments/damper_cost.py          # about a minute
     python experiments/damper_cost.py --quick
 
-Spheres by comparing all pairs, as in the paper, and by cells, at 2e-5 s, and combined with flights
-in steps of 1e-4 s; the automaton by a scan of all cells, as in the paper, and by a list of
-particles, at the paper's 1e-4 s and at the spheres' 2e-5 s. CPU seconds of one core for one cycle
-of 6 Hz on the spring, median of repeats, compile time apart. Then every filling is run at longer
-and longer steps until it refuses or diverges. A quick run leaves out variants that need further
-programs, such as all pairs and the combination.
+Spheres run with all pairs, as in the paper, and with cells, at 2e-5 s, and combined with flights in
+steps of 1e-4 s. The automaton runs with a scan of all cells, as in the paper, and with a list of
+particles, at the paper's 1e-4 s and at the spheres' 2e-5 s. Times are CPU seconds of one core for a
+cycle of 6 Hz on the spring, median of repeats, without compiling. Then every filling is run at
+longer and longer steps until it refuses or diverges. A quick run leaves out variants that need
+further programs, such as all pairs and the combination.
 """
 
 import sys
@@ -45,8 +45,8 @@ VARIANTS = {
     "ca_list_2e-5": (PAPER, 2e-5, "list, 20 µs", "s", "-"),
 }
 SETTINGS = {
-    "particles": (NUMBERS, [1, 10, 50, 160], several(whole(1, 160)), "numbers, 1 to 160"),
-    "repeats": (5, 3, whole(1, 1000), "of every timing, 5"),
+    "particles": (NUMBERS, [1, 10, 50, 160], several(whole(1, 160)), "default from 1 to 160"),
+    "repeats": (5, 3, whole(1, 1000), "repeats of every timing, default 5"),
     "seconds": (0.05, 0.01),
     "cycles": (20, 3),
     # Those of a quick run need the fewest programs.

@@ -1,11 +1,11 @@
 """How much do grains damp, over amplitude and frequency, and what does theory say?
 
-The container is driven as A sin(w t), whatever the grains do. First without gravity over the
-amplitude, beside the theory of collect and collide: grains fly as one block between floor and lid
-and lose all of their relative motion at each wall. Expect the loss to jump at A = gap / pi to 4 in
-units of N m A^2 w^2 and to fall slowly after it. Then with gravity over amplitude and frequency:
-below A w^2 = g grains lie still and are mere mass; the loss is largest where they are thrown
-once a cycle, from about twice that on. A quick run leaves the rules of the paper out.
+The container is driven as A sin(w t), whatever the grains do. The first map has no gravity, and is
+compared with the theory of collect and collide: grains fly as one block between floor and lid and
+lose all relative motion at each wall. Expect the loss to jump at A = gap / pi to 4 in units of N m
+A^2 w^2, and to fall slowly beyond. The second map has gravity: below A w^2 = g grains lie still and
+only add mass; the loss is largest where they are thrown once a cycle, from about 2 g on. A quick
+run leaves out the rules of the paper.
 
     python experiments/damper_maps.py            # two minutes
     python experiments/damper_maps.py --particles 20
@@ -26,9 +26,9 @@ from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_maps"
 SETTINGS = {
-    "particles": (30, 30, study.whole(1, 120), "grains of the maps with gravity, 30"),
-    "block": (40, 40, study.whole(10, 120), "grains without gravity, 40"),
-    "seeds": (3, 1, study.whole(1, 100), "of each scene, 3"),
+    "particles": (30, 30, study.whole(1, 120), "grains with gravity, default 30"),
+    "block": (40, 40, study.whole(10, 120), "grains without gravity, default 40"),
+    "seeds": (3, 1, study.whole(1, 100), "seeds of each scene, default 3"),
     # Amplitudes by gap / pi; amplitudes by those of g; frequencies [Hz].
     "ratios": (17, 7),
     "levels": (12, 5),

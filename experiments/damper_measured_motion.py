@@ -1,12 +1,12 @@
 """What do grains take from a structure that a measured motion shakes?
 
-The container on its spring is shaken by the record of a CSV file, empty and with more and more
-grains, by the automaton and by spheres; what is told is its motion on the base. The file in the
-repository is synthetic, an earthquake at a small scale by the formula in its header; give your own
-with --record, with columns such as time_s and acceleration_m_s2. The damping ratio is that of the
-structure with a dashpot that takes the work which the grains took. Expect 30 grains to double it
-and to take a quarter of the RMS; after the strong part the filled container may swing more than the
-empty one, whose resonance lies elsewhere.
+The record of a CSV file shakes the container on its spring, empty and with more and more grains, by
+the automaton and by spheres. The result is its motion relative to the base. The file in the
+repository is synthetic, a small-scale earthquake by the formula in its header; give your own with
+--record, with columns such as time_s and acceleration_m_s2. The damping ratio is that of a dashpot
+that takes the same work as the grains, plus the structure's own. Expect 30 grains to double it and
+to reduce the RMS by a quarter; after the strong part the filled container may swing more than the
+empty one, as the resonance has shifted.
 
     python experiments/damper_measured_motion.py                # 15 seconds
     python experiments/damper_measured_motion.py --record my_road.csv --scale 0.5
@@ -32,12 +32,12 @@ NAME = "damper_measured_motion"
 RECORD = Path(__file__).with_name("base_motion.csv")
 SETTINGS = {
     "record": (str(RECORD), str(RECORD), str, "CSV file of the base's motion"),
-    "scale": (1.0, 1.0, study.number(0, 1e6), "factor of the motion, 1"),
+    "scale": (1.0, 1.0, study.number(0, 1e6), "factor of the motion, default 1"),
     "particles": (
         *([5, 10, 20, 30, 40, 50], [10, 30]),
-        *(study.several(study.whole(1, 160)), "numbers of grains, 1 to 160"),
+        *(study.several(study.whole(1, 160)), "numbers of grains, from 1 to 160"),
     ),
-    "seeds": (6, 2, study.whole(1, 1000), "of each, 6"),
+    "seeds": (6, 2, study.whole(1, 1000), "seeds of each number, default 6"),
 }
 #: Number of grains that the figures speak of, or the next one there is.
 SHOWN = 30

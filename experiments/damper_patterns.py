@@ -1,10 +1,9 @@
 """How do the particles move in a shaken container, by automaton and by spheres?
 
-20 and 40 particles over one cycle of a container that moves by +-4 cells (24 mm) at 6 Hz, whatever
-the particles do (Komatsuzaki et al., Figs. 9 and 10). Expect particles that the floor throws up,
-that come apart in the air and are caught again. The automaton's swing further than the spheres, as
-its ceiling takes down a whole cluster when one particle of it touches, and up to a tenth of a
-cycle earlier.
+The pictures show 20 and 40 particles over one cycle of a container that is driven by +-4 cells (24
+mm) at 6 Hz (Komatsuzaki et al., Figs. 9 and 10). Expect the floor to throw the particles up, and to
+catch them again. Those of the automaton move further than the spheres, as its ceiling takes down a
+whole cluster when one particle touches it, and up to a tenth of a cycle earlier.
 
     python experiments/damper_patterns.py                  # about half a minute
     python experiments/damper_patterns.py --amplitude 10 --accounting landing
@@ -29,10 +28,10 @@ from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_patterns"
 SETTINGS = {
-    "amplitude": (24.0, 24.0, study.number(0, 100), "[mm], 24"),
-    "frequency": (6.0, 6.0, study.number(0.5, 100), "[Hz], 6"),
-    "dt": (2e-5, 2e-5, study.number(0, 1), "spheres' step [s], 2e-5"),
-    "seeds": (5, 2, study.whole(1, 100), "starts that are averaged, 5"),
+    "amplitude": (24.0, 24.0, study.number(0, 100), "amplitude of the container [mm], default 24"),
+    "frequency": (6.0, 6.0, study.number(0.5, 100), "frequency [Hz], default 6"),
+    "dt": (2e-5, 2e-5, study.number(0, 1), "step of the spheres [s], default 2e-5"),
+    "seeds": (5, 2, study.whole(1, 100), "number of starts averaged, default 5"),
     "transient": (30, 5),
     "cycles": (4, 1),
 }
@@ -55,7 +54,7 @@ TABLE = study.Table(
 def options_parser():
     """Options of this experiment."""
     made = study.parser(NAME, __doc__, settings=SETTINGS)
-    made.add_argument("--accounting", choices=ACCOUNTINGS, default="all", help="all")
+    made.add_argument("--accounting", choices=ACCOUNTINGS, default="all", help="default all")
     return made
 
 

@@ -1,12 +1,12 @@
 """Does a particle fall and rebound as Fig. 8 of Komatsuzaki et al. says it should?
 
-One particle falls from the top of a container at rest. Four ways in which the automaton treats the
-way travelled when a particle turns are compared, and the spheres, each with the closed form for its
-own gravity (10 m/s^2 on the lattice, 9.8 m/s^2 for the spheres). Expect "signed" and
-"signed_through_walls" within a millisecond, the other two off by tens of them. A blow costs the
-default about two steps: it falls in the step after the particle reached its last cell. Where the
-particle no longer rises by a cell, the automaton's static contact holds it: there its bounces end.
-A quick run leaves "signed_through_walls" out.
+One particle falls from the top of a container at rest. Four readings of the automaton's rule for
+the distance travelled when a particle turns, and the spheres, are compared with the closed form for
+their gravity (10 m/s^2 on the lattice, 9.8 m/s^2 for the spheres). Expect "signed" and
+"signed_through_walls" to agree within a millisecond, and the other two to be off by tens of
+milliseconds. An impact delays the default by about two steps: it acts in the step after the
+particle reached its last cell. Bounces end where the particle no longer rises by a cell: the
+automaton's static contact then holds it. A quick run leaves out "signed_through_walls".
 
     python experiments/damper_rebound.py                    # about half a minute
     python experiments/damper_rebound.py --restitution 0.5
@@ -31,9 +31,9 @@ from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_rebound"
 SETTINGS = {
-    "restitution": (0.75, 0.75, study.number(0.3, 1), "0.75"),
-    "ca_dt": (1e-4, 1e-4, study.number(0, 1), "automaton's step [s], 1e-4"),
-    "dt": (2e-5, 2e-5, study.number(0, 1), "spheres' step [s], 2e-5"),
+    "restitution": (0.75, 0.75, study.number(0.3, 1), "coefficient of restitution, default 0.75"),
+    "ca_dt": (1e-4, 1e-4, study.number(0, 1), "step of the automaton [s], default 1e-4"),
+    "dt": (2e-5, 2e-5, study.number(0, 1), "step of the spheres [s], default 2e-5"),
     "impacts": (6, 4),
     # Between two samples [s].
     "every": (4e-4, 4e-3),
@@ -154,7 +154,7 @@ def plot_errors(axes, errors):
     """Bars by impact; errors: of the times of impact [ms], by filling."""
     rows = [pd.Series(own, [f"impact {k + 1}" for k in range(len(own))]) for own in errors.values()]
     table = pd.DataFrame(rows, [TITLES[title] for title in errors]).clip(lower=SHORTEST)
-    words = f"most that passes, {ALLOWED_MS:g} ms"
+    words = f"limit, {ALLOWED_MS:g} ms"
     axes.axvline(ALLOWED_MS, color=VIOLET, linewidth=1.0, linestyle="--", label=words)
     table.plot.barh(ax=axes, width=0.76, color=SHADES, logx=True)
     axes.set(xlabel="error of the time of impact [ms]", xlim=(SHORTEST, None))

@@ -7,18 +7,18 @@
     python experiments/damper_response.py --accuracy 5% --budget filling --fillings dem
 
 Every particle number, frequency and seed is a scene; all scenes of a filling run as one batch.
-Bands are the lowest and highest of the seeds, lines their median. A rigid mass of the particles'
-weight is drawn for scale: what the particles take off its peak is damping, what they shift beside
-it is apparent mass. A sweep up and down, the state carried on, shows where two motions are
-possible. A quick run takes spheres and the automaton with static contact.
+Bands show the range of the seeds, lines their median. A rigid mass of the particles' weight is
+drawn for comparison: a lower peak is damping, a shifted one apparent mass. A sweep up and down,
+which carries the state on, shows where two motions are possible. A quick run takes spheres and the
+automaton with static contact.
 
-With --accuracy, place and height of the peaks are found to that share of their value: the program
-chooses frequencies, steps, seeds and cycles, whatever the other options say of them, and prints
-each answer with its error bar and what it cost. With --budget filling the same is asked of grains
-of the other kind, too. Nothing else is run then.
+With --accuracy, the program finds place and height of the peaks to this share of their value. It
+chooses frequencies, steps, seeds and cycles, whatever the other options say, and prints each answer
+with its error bar and cost. With --budget filling it also runs grains of the other kind. Nothing
+else is run then.
 
 Responses and sweeps save themselves at their end, on Ctrl-C, and as often as --checkpoint-every
-says; the same command with --resume goes on from there and repeats nothing.
+says; the same command with --resume continues and repeats nothing.
 """
 
 import sys
@@ -47,15 +47,15 @@ FILLINGS = {filling.label: filling for filling in (ca.Spheres(), *AUTOMATA)}
 NUMBERS = several(whole(0, 160))
 SETTINGS = {
     "fillings": (list(FILLINGS), ["dem", "ca_static"], several(str), ", ".join(FILLINGS)),
-    "particles": ([10, 20, 30, 40, 50], [10, 30], NUMBERS, "numbers, 10,20,30,40,50"),
-    "seeds": (5, 2, whole(1, 1000), "of the automata, 5"),
-    "dem_seeds": (1, 1, whole(1, 1000), "of the spheres, 1"),
-    "transient": (150, 20, whole(0, 100000), "cycles left out, 150"),
-    "measured": (20, 5, whole(1, 1000), "cycles measured, 20"),
-    "dem_dt": (None, None, number(0, 1), "step of the spheres [s], 2e-5"),
-    "ca_dt": (None, None, number(0, 1), "step of the automata [s], 1e-4"),
-    "sweep_particles": ([10, 50], [10], NUMBERS, "swept, 10,50"),
-    "sweep_seeds": (2, 1, whole(1, 1000), "swept, 2"),
+    "particles": ([10, 20, 30, 40, 50], [10, 30], NUMBERS, "default 10,20,30,40,50"),
+    "seeds": (5, 2, whole(1, 1000), "seeds of the automata, default 5"),
+    "dem_seeds": (1, 1, whole(1, 1000), "seeds of the spheres, default 1"),
+    "transient": (150, 20, whole(0, 100000), "cycles before those measured, default 150"),
+    "measured": (20, 5, whole(1, 1000), "cycles measured, default 20"),
+    "dem_dt": (None, None, number(0, 1), "step of the spheres [s], default 2e-5"),
+    "ca_dt": (None, None, number(0, 1), "step of the automata [s], default 1e-4"),
+    "sweep_particles": ([10, 50], [10], NUMBERS, "numbers of particles swept, default 10,50"),
+    "sweep_seeds": (2, 1, whole(1, 1000), "seeds of the sweep, default 2"),
     "ratios": (RATIOS, RATIOS[::4]),
 }
 

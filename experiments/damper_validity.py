@@ -1,12 +1,12 @@
 """Where does the automaton agree with spheres and with exact solutions, and where not?
 
-Cases with a value that is known, exact or by the spheres: the swing of grains in a container that
-is thrown up and down, the impact damper, loss and apparent mass at small amplitudes, the plug that
-grains form without gravity, the peaks of the damped structure, and whether a motion lasts. Each is
-run with the rules of the paper and with those of place. Expect the rules of place within the range
-that is wanted in every row. The picture says where to trust either, over acceleration, frequency
-and filling: how far the impedance that the container feels is from that of the spheres. A quick
-run leaves out the peaks of the structure and the swing of few grains.
+Each case has a reference, exact or by the spheres: the motion of grains in a container that throws
+them, the impact damper, loss and apparent mass at small amplitudes, the plug that grains form
+without gravity, the peaks of the damped structure, and whether a motion lasts. Each is run with the
+rules of the paper and with those of place. Expect the rules of place to lie within the wanted range
+in every row. The picture shows where to trust either, over acceleration, frequency and filling, by
+the difference of the impedance from that of the spheres. A quick run leaves out the peaks of the
+structure and the motion of few grains.
 
     python experiments/damper_validity.py                 # about five minutes on two cores
     python experiments/damper_validity.py --quick
@@ -29,7 +29,7 @@ from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_validity"
 SETTINGS = {
-    "seeds": (16, 4, study.whole(1, 1000), "starts that are averaged, 16"),
+    "seeds": (16, 4, study.whole(1, 1000), "number of starts averaged, default 16"),
     "transient": (150, 25),
     "cycles": (20, 6),
     "long": (2000, 200),

@@ -1,18 +1,18 @@
 """How far does the hole open, and what does contact cost?
 
-The paper's block is blasted with two laws of contact, each with ever more points a face: spheres
-behind broken faces, as in the paper, and whole bodies, which repel each other by the energy of the
-volume that they share, summed along rays to points of their faces. Expect the hole to depend on the
-number of spheres, but hardly on that of rays. Spheres appear within each other as a face breaks,
-and so put in energy that no load gave; bodies put in none.
+The paper's block is blasted with two contact laws, each with more and more points a face. Spheres
+lie behind broken faces, as in the paper. Whole bodies repel each other by the energy of their
+shared volume, summed along rays to points of their faces. Expect the hole to depend on the number
+of spheres, but hardly on that of rays. Spheres overlap when a face breaks, which adds energy that
+no load gave; bodies add none.
 
     python experiments/demo_contact.py                       # three minutes
     python experiments/demo_contact.py --divisions 5,10 --parts 3
 
-Each run is made with three peaks of the gas pressure, 0.1 % apart, so that one sees what is chance:
-with --parts 8 --step 1e-7 one of the runs goes another way from 0.2 ms on, by 0.9 mm at the end.
-A sphere keeps its stiffness whatever their number, so more of them are stiffer together. Seconds
-are of CPU, without compiling, the least of the three.
+Each run is made with three peaks of the gas pressure, 0.1 % apart, to show the effect of chance:
+with --parts 8 --step 1e-7 one run separates at 0.2 ms, by 0.9 mm at the end. The stiffness of a
+sphere does not depend on their number, so more spheres are stiffer. Times are CPU seconds of the
+fastest of the three, without compiling.
 
 Writes contact.png, contact.csv and summary.json to results/demo_contact/.
 """
@@ -31,10 +31,10 @@ from taichi_dem.kit.plot_style import BLUE, RED, picture
 NAME = "demo_contact"
 DIVISIONS, PARTS = study.several(study.whole(3, 20)), study.several(study.whole(1, 8))
 SETTINGS = {
-    "divisions": ((4, 5, 6, 8, 9, 12), (4, 5), DIVISIONS, "of an edge, for spheres"),
-    "parts": ((2, 3, 4, 6, 8), (2, 3), PARTS, "of an edge, for rays"),
-    "until": (5e-4, 2e-4, study.number(0, 1), "simulated time [s], 5e-4"),
-    "step": (2e-7, 2e-7, study.number(0, 1), "of all runs [s], 2e-7"),
+    "divisions": ((4, 5, 6, 8, 9, 12), (4, 5), DIVISIONS, "parts of an edge, for spheres"),
+    "parts": ((2, 3, 4, 6, 8), (2, 3), PARTS, "parts of an edge, for rays"),
+    "until": (5e-4, 2e-4, study.number(0, 1), "simulated time [s], default 5e-4"),
+    "step": (2e-7, 2e-7, study.number(0, 1), "step of all runs [s], default 2e-7"),
     # As shares of the paper's peak, which is the first.
     "peaks": ((1.0, 0.999, 1.001), (1.0,)),
     "samples": (50, 10),
@@ -51,7 +51,7 @@ TABLE = study.Table(
     hole_mm=(lambda one: one.holes[0], "hole [mm]", ".2f", "mm"),
     lowest_mm=(lambda one: min(one.holes), "lowest", ".2f"),
     highest_mm=(lambda one: max(one.holes), "highest", ".2f"),
-    injected_kJ=(lambda one: 1e-3 * one.energy["injected"], "out of nothing [kJ]", ".1f", "kJ"),
+    injected_kJ=(lambda one: 1e-3 * one.energy["injected"], "injected [kJ]", ".1f", "kJ"),
     gas_work_kJ=(lambda one: 1e-3 * one.energy["load_work"], "gas [kJ]", ".0f", "kJ"),
     most_shared=("first.interpenetration.share", "body shared", ".0f%", "1"),
     residual=("first.energy_residual_fraction", "residual", ".2g%", "1"),
@@ -60,7 +60,7 @@ TABLE = study.Table(
 #: Panels: a column, the label of its axis, and the title.
 PANELS = {
     "hole_mm": ("displacement of the hole's wall [mm]", "how far the hole opens"),
-    "injected_kJ": ("energy put in as faces break [kJ]", "energy out of nothing"),
+    "injected_kJ": ("energy put in as faces break [kJ]", "energy that no load gave"),
     "cpu_s": ("CPU time of a run [s]", "what it costs"),
 }
 

@@ -1,10 +1,10 @@
 """What does a handful of particles in a box do to its vibration?
 
-A container hangs on a spring and is let go 30 mm above its rest. The particles in it fly, fall and
-hit its walls. Beside it hangs one in which as many particles are fixed. Nothing shakes them, so no
-resonance can be missed: a faster decay is damping. The particles damp as long as the container's
-peak acceleration is above about 1 g; below it they lie on the floor, and the structure's own
-damping is left. Try other numbers of particles and places to let go from.
+A container hangs on a spring and is released 30 mm above its rest. The particles in it fly, fall
+and hit its walls. Beside it hangs one with as many fixed particles. Nothing shakes them, so a
+shifted resonance plays no part: a faster decay is damping. The particles damp as long as the
+container's peak acceleration is above about 1 g; below it they lie on the floor, and the
+structure's own damping is left. Try other numbers of particles and other amplitudes.
 
     python experiments/demo_damper.py                                  # 6 seconds
     python experiments/demo_damper.py --particles 50 --amplitude 40
@@ -15,15 +15,15 @@ damping is left. Try other numbers of particles and places to let go from.
 Figures are medians over nine starts, five in a quick run. An amplitude is sqrt(2) times the RMS
 displacement of a cycle of the empty container.
 
-With --effects auto the program computes the effects that the scene calls for (the spheres turn
-where friction makes them); "listed", the default, takes the fillings as they are.
+With --effects auto the program computes the effects that the scene needs (such as rotation of the
+spheres with friction); "listed", the default, takes the fillings as they are.
 
-``python -m ca_damper demo`` is the same job where only the package is installed: the scene and what
-is measured of it stand in ca_damper/demo.py.
+``python -m ca_damper demo`` is the same job for an installed package; ca_damper/demo.py has the
+scene and the measures.
 
 Writes damper.gif, decay.png, decay.csv, caption.txt, report.json and summary.json to
-results/demo_damper/; with --all-pictures view.html, the film to play, with --no-pictures neither
-picture nor film.
+results/demo_damper/; with --all-pictures also view.html, which plays the film; with --no-pictures
+neither picture nor film.
 """
 
 import sys

@@ -1,15 +1,15 @@
 """Does a bond do what its law says, when it is pulled, unloaded, reloaded and sheared?
 
-A bench with five specimens, each of two tetrahedra bonded by one face. One is pulled, pressed and
-pulled on until it breaks; four are pressed together, slid, slid back and slid on. The left body
-of each is clamped and serves as load cell, the right one is driven. Expect measured points on the
-drawn law (Konno et al., Fig. 2 to 4): a peak of 6.66 MPa, failure at 29.93 um, 99.67 J/m^2 in
-between, and in shear a plateau of cohesion + friction x pressure.
+Five specimens are tested, each of two tetrahedra bonded by one face. One is pulled, pressed, and
+pulled until it breaks; four are pressed together, slid, slid back and slid on. The left body of
+each is fixed and measures the force; the right body is driven. Expect measured points on the drawn
+law (Konno et al., Fig. 2 to 4): a peak of 6.66 MPa, failure at 29.93 um, 99.67 J/m^2 in between,
+and in shear a plateau of cohesion + friction x pressure.
 
     python experiments/demo_fracture_law.py             # ten seconds
     python experiments/demo_fracture_law.py --steps 20000
 
-Dashpots are left out: they would add a traction that depends on how fast one pulls. Writes
+Dashpots are left out: they would add a traction that depends on the speed. Writes
 law.gif, law.png, tension.csv, shear.csv and summary.json to results/demo_fracture_law/.
 """
 
@@ -29,7 +29,7 @@ from taichi_dem.mesh.shapes import pair, placed_together, single
 from taichi_dem.simulate import run_simulation
 
 NAME = "demo_fracture_law"
-SETTINGS = {"steps": (5000, 1000, study.whole(200, 100000), "samples along the way, 5000")}
+SETTINGS = {"steps": (5000, 1000, study.whole(200, 100000), "steps along the path, default 5000")}
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 #: Bodies are driven, so the step decides only how finely the law is sampled.
 EDGE, APART, STEP = 0.05, 0.2, 1e-8

@@ -1,8 +1,8 @@
-"""Do steps of their own for every body change what one sees of a blow?
+"""Do steps that differ by body change the response to an impact?
 
-A fragment hits the free end of a bonded bar. Once with one step for all bodies, as short as the
-fastest one needs; once with a step for every body, dt0 / 2^k, by the same rule: none moves further
-than l in a step. Short steps spread into the bar with the wave, and the displacement of both
+A fragment hits the free end of a bonded bar. One run has one step for all bodies, as short as the
+fastest needs; the other has a step for each body, dt0 / 2^k, by the same rule: no body moves
+further than l in a step. Short steps spread into the bar with the wave. The displacement of both
 ends is the same; only the number of evaluations differs.
 
     python experiments/demo_multirate.py             # most of a minute
@@ -42,7 +42,7 @@ METHODS = {
     "drifted": partial(dem.Multirate, neighbour="drifted"),
 }
 SETTINGS = {
-    "speed": (20.0, 20.0, study.number(0, 50), "of the fragment [m/s], 20"),
+    "speed": (20.0, 20.0, study.number(0, 50), "speed of the fragment [m/s], default 20"),
     "methods": (tuple(METHODS), ("uniform", "held")),
     "until": (2e-4, 4e-5),
     "pictures": (40, 10),
@@ -106,9 +106,9 @@ def picture_blow(path, impacts, time):
             way.plot(time, 1e6 * impact.struck, **look)
             way.plot(time, 1e6 * impact.far, lw=0.8, **look)
             work.plot(time, 1e-6 * impact.evaluations, label=impact.style.label, **look)
-        way.set(xlabel="time [µs]", ylabel="displacement [µm]", title="the answer")
+        way.set(xlabel="time [µs]", ylabel="displacement [µm]", title="result")
         work.set(xlabel="time [µs]", ylabel="evaluations of bonds and pairs [10⁶]")
-        work.set(title="the price", xlim=(0.0, time[-1]))
+        work.set(title="cost", xlim=(0.0, time[-1]))
         words.set_axis_off()
         # There are no numbers below the right one, as words has no axes.
         for axes in (way, work):

@@ -1,12 +1,12 @@
-"""How far does a blow reach, and need the rest be computed?
+"""How far does an impact reach, and must the rest be computed?
 
-A pile of 100,000 tetrahedra is struck on its head. With effects="auto" a body sleeps until a
-neighbour moves by more than a share of the mean speed or of a bond's limit, and the bonds beyond
-are not evaluated. Expect the zone that is awake to grow a little faster than the wave runs, as
-dashpots spread momentum ahead of it; steps many times cheaper, the more so the longer the pile; the
-same displacement to some 1e-8. In the paper's block of 2 m nothing sleeps for long.
+A pile of 100,000 tetrahedra is struck on its head. With effects="auto", a body sleeps until a
+neighbour moves by more than a share of the mean speed or of a bond's limit. Bonds beyond are not
+evaluated. Expect the awake zone to grow a little faster than the wave, as dashpots spread momentum
+ahead of it. Steps are many times cheaper, the more so the longer the pile; the displacement is the
+same to about 1e-8. In the paper's block of 2 m nothing sleeps for long.
 
-    python experiments/demo_sleeping.py                  # a quarter of an hour, most of it without
+    python experiments/demo_sleeping.py                  # a quarter of an hour
     python experiments/demo_sleeping.py --cells 60       # a pile of 23,000: three minutes
     python experiments/demo_sleeping.py --sleep 1e-3     # a looser bound
 
@@ -27,9 +27,9 @@ from taichi_dem.mesh.shapes import bar
 
 NAME = "demo_sleeping"
 SETTINGS = {
-    "cells": (260, 40, study.whole(10, 2000), "boxes along the pile, 0.1 m each, 260"),
-    "until": (5e-4, 1e-4, study.number(0, 1), "simulated time [s], 5e-4"),
-    "sleep": (1e-6, 1e-6, study.number(0, 0.01), "share of speed and opening that wakes, 1e-6"),
+    "cells": (260, 40, study.whole(10, 2000), "boxes along the pile, 0.1 m each, default 260"),
+    "until": (5e-4, 1e-4, study.number(0, 1), "simulated time [s], default 5e-4"),
+    "sleep": (1e-6, 1e-6, study.number(0, 0.01), "share of speed and opening that wakes: 1e-6"),
     "across": (8, 2),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)

@@ -1,17 +1,17 @@
 """Where does a bar break when a pulse comes back from its free end?
 
-First a weak push on the end of a bar: how fast does the wave run, and does the free end move twice
-as fast as the wave behind it? Then bars in which a compressive pulse, steep in front and fading
-linearly behind, runs to the right. The free end sends it back as tension, which first reaches the
+A weak push on the end of a bar shows how fast the wave runs, and whether the free end moves twice
+as fast as the wave behind it. Then, in other bars, a compressive pulse runs to the right, with a
+steep front and a linear decay. The free end reflects it as tension, which first reaches the
 strength at depth lambda sigma_t / (2 s0): the stronger the pulse s0, the thinner the spall.
 
     python experiments/demo_wave_and_spall.py             # a quarter of a minute
     python experiments/demo_wave_and_spall.py --cells 40
 
-The front rises over four cells of the test bar and the dashpots have a twentieth of their
-strength, so that neither the grid rings nor the pulse smears. The formula wants a steep front: at
-three times the strength a bar breaks a cell too near its end (measured). Writes spall.gif,
-wave.png, spall.png, wave.csv, spall.csv and summary.json to results/demo_wave_and_spall/.
+The front rises over four cells of the test bar, and dashpots have a twentieth of their strength:
+the mesh does not ring, and the pulse stays sharp. The formula assumes a steep front: at three times
+the strength a bar breaks one cell too near its end. Writes spall.gif, wave.png, spall.png,
+wave.csv, spall.csv and summary.json to results/demo_wave_and_spall/.
 """
 
 import sys
@@ -32,7 +32,7 @@ from taichi_dem.simulate import run_simulation
 
 NAME, LAW = "demo_wave_and_spall", dem.CONCRETE
 SETTINGS = {
-    "cells": (40, 40, study.whole(20, 160), "boxes along a bar, 40"),
+    "cells": (40, 40, study.whole(20, 160), "boxes along a bar, default 40"),
     "ratios": ((1.25, 1.5, 1.75, 2.0), (1.5, 2.0)),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
@@ -130,11 +130,11 @@ def picture_wave(path, wave, place, cells):
         for (words, cell), colour, line in zip(cells.items(), (BLUE, GREEN, RED), LINES):
             over.plot(1e3 * time, velocity[:, cell], color=colour, ls=line, label=words)
             along.axvline(place[cell], lw=1.2, color=colour, ls=line, label=words)
-        along.set_title("it runs, comes back, runs again")
+        along.set_title("the wave runs, returns and runs again")
         along.legend(loc="lower left", bbox_to_anchor=(0.0, 1.08), ncols=4, columnspacing=1.0)
         top = velocity[:, [*cells.values()][1]].max()
         over.axhline(2.0 * top, color=GREY, ls=":", label="twice the wave's peak")
-        over.set(xlabel="time [ms]", ylabel=label, title="the free end doubles it")
+        over.set(xlabel="time [ms]", ylabel=label, title="the free end doubles the velocity")
         over.legend(loc="upper left")
 
 
@@ -157,7 +157,7 @@ def picture_spall(path, made, stress, rows, joint, cell):
         last.plot(line, formula, color=GREY, label="pulse length × strength / (2 s$_0$)")
         last.errorbar(arrived, depth, cell, fmt="o", color=RED, ms=5, label="broke, ± one cell")
         last.set(xlabel="pulse s$_0$ that arrived [MPa]", ylabel="depth of the first break [m]")
-        last.set(ylim=(0.0, None), title="the stronger, the thinner")
+        last.set(ylim=(0.0, None), title="a stronger pulse, a thinner piece")
         last.legend(loc="lower right", bbox_to_anchor=(1.0, 1.08))
 
 

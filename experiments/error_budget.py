@@ -1,11 +1,11 @@
-"""Which source makes the error of an answer, and what does it cost to know each?
+"""Which source makes the error of an answer, and what does each cost to know?
 
-The bar of an answer is as good as what it leaves out. Three questions are asked with all sources
-measured: how far a blast pushes the wall of its hole, how far a blow bends a notched beam, and how
-far a damped mass swings at resonance. Step and chance are measured by runs at half the step, the
-contact law by one run with four times the rays, the mesh by others of the same size whose inner
-nodes are moved, and grains that are places of a lattice by spheres. Expect the step, on which the
-runs are spent, to be the least of all, and the mesh or the contact to make most of a bar.
+An error bar holds only the sources that were measured. Three questions are asked with all sources
+measured: how far a blast pushes the wall of its hole, how far an impact bends a notched beam, and
+how far a damped mass swings at resonance. Runs at half the step measure step and chance; a run with
+four times the rays measures the contact law; other meshes of the same size, with moved inner nodes,
+measure the mesh; spheres measure the automaton. Expect the step, on which the runs are spent, to be
+the smallest source, and the mesh or the contact the largest.
 
     python experiments/error_budget.py          # a minute
     python experiments/error_budget.py --quick
@@ -30,8 +30,8 @@ from taichi_dem.mesh.shapes import bar
 
 NAME = "error_budget"
 SETTINGS = {
-    "until": (5e-4, 5e-5, study.number(0, 1), "simulated time of the blast [s], 5e-4"),
-    "meshes": (5, 2, study.whole(2, 50), "other meshes of each solid, 5"),
+    "until": (5e-4, 5e-5, study.number(0, 1), "simulated time of the blast [s], default 5e-4"),
+    "meshes": (5, 2, study.whole(2, 50), "other meshes of each solid, default 5"),
     "beam": ((20, 4, 4), (10, 2, 2)),
     "beam_until": (2e-3, 5e-4),
     "particles": (20, 10),

@@ -2,12 +2,12 @@
 
     make gallery                                       # about 40 minutes on two cores
     make gallery GALLERY_OPTIONS=--quick               # about six
-    python experiments/gallery.py --reuse              # the page alone, from what is there
-    python experiments/gallery.py --only demo_damper   # one anew, the others from what is there
+    python experiments/gallery.py --reuse              # the page from present results
+    python experiments/gallery.py --only demo_damper   # one again, others as they are
 
-Open results/index.html: it needs no server. Ends with exit code 1 and a list when an experiment
+Open results/index.html: it needs no server. The exit code is 1, with a list, if an experiment
 failed or is missing from the page. A new experiment gets an entry in _gallery_pages.txt; --readme
-then renews the table of docs/experiments.md. --pictures takes small pictures and figures of full
+then updates the table of docs/experiments.md. --pictures copies small pictures and figures of full
 runs into docs; --readme writes these figures into the pages.
 """
 
@@ -47,9 +47,9 @@ _MARK = re.compile(r"(<!-- figure: ([^>]+?), (\d) digits -->)(.*?)(<!-- end -->)
 _TABLE = re.compile(r"(<!-- table: (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 FLAGS = {
     "quick": "run smaller jobs of under a minute",
-    "reuse": "run only what has no result yet",
-    "readme": "renew the table of experiments and figures in all pages, run nothing",
-    "pictures": f"renew {SMALL_PICTURES} and the figures kept for the pages, run nothing",
+    "reuse": "run only experiments without a result",
+    "readme": "update the table of experiments and the figures in all pages, run nothing",
+    "pictures": f"update {SMALL_PICTURES} and the figures for the pages, run nothing",
 }
 
 
@@ -58,7 +58,7 @@ def main(arguments=None):
     made = bare_parser("gallery", __doc__)
     out = {"type": os.path.expanduser, "default": "results"}
     made.add_argument("--out", help="folder for page and results", **out)
-    made.add_argument("--only", type=several(str), default=None, help="names, by comma")
+    made.add_argument("--only", type=several(str), default=None, help="names with commas")
     for name, words in FLAGS.items():
         made.add_argument(f"--{name}", action="store_true", help=words)
     return main_of_tool(_work, made, arguments)

@@ -1,16 +1,16 @@
-"""Which hard cases each method bears, which it refuses in words, and by what margin.
+"""Which hard cases each method can compute, which it refuses in words, and by what margin.
 
     python experiments/hard_cases.py                      # about ten minutes on one core
     python experiments/hard_cases.py --only full_box,still_heap
     python experiments/hard_cases.py --quick
 
-A case is a scene at the edge of what can be computed, with figures that physics bounds: the formula
-stands in the table. A method that claims the case passes with all figures within their bounds; the
-margin is bound over figure, of the worst of them. A method that cannot handle it has to refuse in
-words: numbers in their place count as a failure. The cases are tests, in tests/hard_cases.
+A case is a scene at the edge of what can be computed, with figures that physics bounds by a formula
+in the table. A method that claims the case passes if all figures are within their bounds; the
+margin is the bound over the figure, of the worst figure. A method that cannot handle the case must
+refuse it in words: returning numbers counts as a failure. The cases are tests, in tests/hard_cases.
 
-On the wall each case is a square; those that no method bears, and all refuse, are grey. Opened in a
-browser, a square of hard_cases.svg opens the picture of its case.
+In the overview each case is a square; cases that all methods refuse are grey. In a browser, a
+square of hard_cases.svg opens the picture of its case.
 
 Writes hard_cases.png and .svg, hard_cases.csv, a picture of each case, hard_cases_blast.png,
 hard_cases_damper.png and summary.json to results/hard_cases/.
@@ -48,8 +48,8 @@ NAME = "hard_cases"
 #: Of a quick run, which compile little; the tests ask all, at quick size.
 OF_QUICK = ("single_cell", "step_above_limit", "flat_element", "step_that_is_no_number")
 SETTINGS = {
-    "only": (None, OF_QUICK, study.several(str), "cases by name, all by default"),
-    "columns": (3, 3, study.whole(1, 8), "of the sheet, 3"),
+    "only": (None, OF_QUICK, study.several(str), "names of cases; default: all"),
+    "columns": (3, 3, study.whole(1, 8), "columns of the sheet, default 3"),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 #: Least margins of the squares of the wall, their colours, and how many are side by side.
@@ -200,7 +200,7 @@ def picture_wall(path, trials):
         axes.set_axis_off()
         keys = [area_key(f"{name}: {counts[name]}", fc=colour) for name, colour in WALL.items()]
         look = {"loc": "outside lower center", "ncols": 3, "fontsize": 9.5, "title_fontsize": 9.5}
-        figure.legend(handles=keys, title=f"{len(names)} hard cases by margin", **look)
+        figure.legend(handles=keys, title=f"{len(names)} hard cases, by margin", **look)
         write_whole(path.with_suffix(".svg"), partial(figure.savefig, format="svg"))
 
 

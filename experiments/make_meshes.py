@@ -1,11 +1,10 @@
-"""Make the meshes that the package carries; needed only to change them.
+"""Make the meshes that come with the package; needed only to change them.
 
 Writes paper_block.msh into taichi_dem/meshes: the block of Konno et al., section 4.1 and Fig 10,
 2.0 m x 2.0 m, 0.2 m deep, a hole of 5 cm diameter 40 cm from the right face. The paper's mesh has
 277 nodes and 962 tetrahedra; this one has 966 tetrahedra and 302 nodes: the circle is cut into 8
 chords of 2 cm, elements measure 5.5 cm along the hole and grow linearly to 50 cm at 1.1 m from it.
-Far size, growth and diagonals were chosen, among 1500 meshes tried, for the largest stable time
-step.
+Far size, growth and diagonals give the largest stable time step among 1500 meshes tried.
 
 Needs gmsh: ``make mesh`` installs it and runs this script. Takes two seconds.
 """

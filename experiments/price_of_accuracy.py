@@ -3,19 +3,18 @@
     python experiments/price_of_accuracy.py          # two minutes on one core
     python experiments/price_of_accuracy.py --quick
 
-How far the hole opens until 0.1 ms is computed by the paper's rule with its own step and its own
-displacement limit l, by one short step with limited dashpots, by one long step with solved
-dashpots, and asked of ``solve`` to 10, 1 and 0.1 %. Of the two methods of a fixed step, the
-cheapest run is shown whose error is within 1 % and stays so at all shorter steps; the reference is
-the method of solved dashpots at a much shorter step. The error of an answer of ``solve`` is that of
-its own bar. Expect the cheapest run to cost a thousandth of the paper's rule, and an answer some
-tens of such runs: these find the step, the error, and what chance does to it, which with the
-paper's contact is more than 0.1 %.
+The opening of the hole at 0.1 ms is computed in four ways: by the paper's rule with its step and
+displacement limit l; with limited dashpots and one short step; with solved dashpots and one long
+step; and by ``solve`` to 10, 1 and 0.1 %. Of both fixed steps, the cheapest run is shown whose
+error is within 1 %, also at all shorter steps. The reference has solved dashpots and a much shorter
+step; the error of an answer is its own bar. Expect the cheapest run to cost a thousandth of the
+paper's rule, and an answer some tens of such runs: these find the step, the error, and the effect
+of chance, which with the paper's contact exceeds 0.1 %.
 
-The paper's own times are those of another, unnamed machine, with one process: 16 min to 0.05 ms and
-3897 min to 0.5 ms (Konno et al., section 4.3). No time to 0.1 ms is given: it lies between. Of the
-rule on this machine the summary has both, to half of the simulated time and to all of it. A quick
-run ends at 0.06 ms and has ten times the paper's l.
+The paper's times are those of another, unnamed machine with one process: 16 min to 0.05 ms and 3897
+min to 0.5 ms (Konno et al., section 4.3). The time to 0.1 ms lies between. For this machine the
+summary has times of the rule to half and to all of the simulated time. A quick run ends at 0.06 ms
+and has ten times the paper's l.
 
 Seconds are CPU seconds of one thread of stepping, without compiling. Writes price_of_accuracy.png,
 price_of_accuracy.csv and summary.json to results/price_of_accuracy/.
@@ -34,8 +33,8 @@ from taichi_dem.kit.study.work_precision import Point, answers
 
 NAME = "price_of_accuracy"
 SETTINGS = {
-    "until": (1e-4, 6e-5, study.number(0, 1), "simulated time [s], 1e-4"),
-    "l": (PAPER_L, 1e-7, study.number(0, 1), "displacement limit of the paper's rule [m], 1e-8"),
+    "until": (1e-4, 6e-5, study.number(0, 1), "simulated time [s], default 1e-4"),
+    "l": (PAPER_L, 1e-7, study.number(0, 1), "limit of a displacement in a step [m], default 1e-8"),
     "reference": (1.25e-8, 5e-8),
     "tolerances": ((0.1, 0.01, 0.001), (0.01,)),
     # Steps of the methods of a fixed step [s], from the longest down.

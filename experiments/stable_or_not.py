@@ -1,9 +1,9 @@
 """What happens below and above the stable step, and what does the account of energy say?
 
-A bonded bar is struck on its left end with 0.9 and with 1.3 times the step that its bonds bear.
-With dashpots the limit is theirs, without them that of the springs, some thirty times longer. Below
-the limit the account closes. Above it neighbours spin against each other, by the same factor more
-every step, out of nothing, until the program ends the run and says where and why.
+A bonded bar is struck on its left end; its step is 0.9 and 1.3 times the stable one. With dashpots
+they set the limit; without them the springs do, at a step about thirty times longer. Below the
+limit the energy balance closes. Above it neighbours spin against each other; the spin grows by the
+same factor every step, until the program ends the run and says where and why.
 
     python experiments/stable_or_not.py             # half a minute
     python experiments/stable_or_not.py --quick     # dashpots only
@@ -31,7 +31,7 @@ from taichi_dem.simulate import result_of
 
 NAME = "stable_or_not"
 SETTINGS = {
-    "peak": (1e6, 1e6, study.number(0, 1e8), "of the blow [Pa], 1e6"),
+    "peak": (1e6, 1e6, study.number(0, 1e8), "peak pressure of the blow [Pa], default 1e6"),
     "limits": (("bond_dashpot", "bond_stiffness"), ("bond_dashpot",)),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
@@ -93,7 +93,7 @@ def film(folder, runs):
         *panels, account = figure.subplot_mosaic("01;22", height_ratios=(1, 1.3)).values()
         drawn = [draw_first(axes, account, made, most) for axes, made in zip(panels, runs)]
         account.set_title("colour: spin", loc="center")
-        account.set(xlabel="time [µs]", ylabel="energy from nowhere\n/ energy put in [1]")
+        account.set(xlabel="time [µs]", ylabel="unexplained energy\n/ energy put in [1]")
         account.set(xlim=(0.0, 1.05e6 * end), yscale="log", ylim=(1e-5, 1e5))
         # Closer together towards the end, where all happens at once.
         for now in end * (1.0 - np.linspace(1.0, 0.0, MOVING) ** 1.5):

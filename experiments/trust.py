@@ -1,8 +1,8 @@
-"""Why should a stranger believe it? Cases that others have published, beside our own numbers.
+"""Can the results be trusted? Cases that others have published, beside our numbers.
 
 Each case has a number from a formula, another program or a test of real material. Ours is the mean
-over random meshes with half of their range; a miss is printed as a miss, with its reason. The cases
-are tests, in tests/trust.
+over random meshes, with half of their range. A miss is reported with its reason. The cases are
+tests, in tests/trust.
 
     python experiments/trust.py                           # about an hour on one core
     python experiments/trust.py --only slope,rotation
@@ -25,10 +25,10 @@ from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, pic
 NAME = "trust"
 QUICK = ("bar_wave", "joint", "rotation")
 SETTINGS = {
-    "only": (None, QUICK, study.several(str), "cases by name, all by default"),
-    "meshes": (5, 2, study.whole(1, 100), "random meshes of each size, 5"),
-    "sizes": (3, 1, study.whole(1, 3), "sizes of element in the plates, 3"),
-    "seed": (0, 0, study.whole(0, 10**6), "of the first mesh, 0"),
+    "only": (None, QUICK, study.several(str), "names of cases; default: all"),
+    "meshes": (5, 2, study.whole(1, 100), "random meshes of each size, default 5"),
+    "sizes": (3, 1, study.whole(1, 3), "element sizes of the plates, default 3"),
+    "seed": (0, 0, study.whole(0, 10**6), "seed of the first mesh, default 0"),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 HEADER = ("case", "source", "published", "ours", "wanted", "verdict")

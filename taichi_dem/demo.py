@@ -35,9 +35,9 @@ from taichi_dem.simulate import simulate
 
 NAME = "blast_demo"
 SETTINGS = {
-    "until": (5e-4, 8e-5, study.number(0, 1), "simulated time [s], 5e-4"),
-    "frames": (40, 6, study.whole(1, 10000), "snapshots, 40"),
-    "samples": (200, 20, study.whole(1, 1000000), "rows of the time series, 200"),
+    "until": (5e-4, 8e-5, study.number(0, 1), "simulated time [s], default 5e-4"),
+    "frames": (40, 6, study.whole(1, 10000), "number of snapshots, default 40"),
+    "samples": (200, 20, study.whole(1, 1000000), "rows of the time series, default 200"),
 }
 _ENTRY = Entry(
     name=NAME,

@@ -52,7 +52,7 @@ class BlastEngine(Engine):
     """
 
     advice = (
-        "take a smaller mesh, or shorter lists of contact (pairs_per_body, spheres_per_body, "
+        "take a smaller mesh, or shorter contact lists (pairs_per_body, spheres_per_body, "
         "neighbours_per_body)"
     )
     counted = "bodies"

@@ -1,6 +1,6 @@
 """Goals: outputs of a run that can be asked for with a tolerance, see ``solve``.
 
-A goal of one's own takes a line; its function gets a ``Result`` with a frame at its end:
+A user-defined goal takes one line; its function gets a ``Result`` with a frame at its end:
 
     fastest = Goal("fastest body", "m/s", lambda result: result.peak_speed.max())
 """
@@ -35,12 +35,12 @@ class Goal(BaseGoal):
     function : callable, optional
         Function of a Result with a frame at its end; returns a number.
     kind : str, default "value"
-        ``"value"``: at the end. ``"extreme"``: over the run, of which its Results then have a time
-        series. ``"count"``: a value that changes in steps, as a whole number does.
+        ``"value"``: at the end. ``"extreme"``: over the run; Results then have a time series.
+        ``"count"``: a value that changes in steps, such as a whole number.
     averaged : bool, default False
-        Whether the mean over runs is asked for that differ by chance, see ``mean``.
+        Whether the goal is the mean over runs that differ by chance, see ``mean``.
     check : callable or None, optional
-        Function of a Scene that raises InputError where the scene lacks what is asked for.
+        Function of a Scene that raises InputError where the goal needs what the scene lacks.
 
     Raises
     ------
@@ -78,7 +78,7 @@ class Goal(BaseGoal):
         return replace(self, name=f"mean {self.name}", averaged=True)
 
     def check_scene(self, scene: Scene) -> None:
-        """Refuse, before any run, a scene that lacks what is asked for.
+        """Refuse, before any run, a scene without what the goal needs.
 
         Parameters
         ----------
@@ -205,7 +205,7 @@ def kinetic_energy() -> Goal:
 
 
 def peak_speed(body: int) -> Goal:
-    """Largest speed of a body in the run; shorter steps look at it at more times.
+    """Largest speed of a body in the run; shorter steps sample it more often.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def peak_speed(body: int) -> Goal:
 
 
 def energy_share(term: str) -> Goal:
-    """Share of the work put in that a term of the energy balance has.
+    """Term of the energy balance as a share of the work put in.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ def energy_share(term: str) -> Goal:
         work = account["load_work"] + account["support_work"]
         if work <= 0.0:
             raise InputError(
-                f"an energy share must be of work put in above 0 J, got {work:.3g} J by "
+                f"an energy share must refer to work put in above 0 J, got {work:.3g} J by "
                 f"{result.report.until_s:.3g} s"
             )
         return account[term] / work
@@ -255,7 +255,7 @@ def energy_share(term: str) -> Goal:
 
 
 def largest_fragment() -> Goal:
-    """Mass of the largest part that bonds still join, as a share of the whole.
+    """Mass of the largest fragment, as a share of the whole.
 
     Returns
     -------

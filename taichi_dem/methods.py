@@ -1,4 +1,4 @@
-"""Time integration methods a user chooses from; each says how the schedule steps."""
+"""Time integration methods for the user; each sets how the schedule steps."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass
@@ -10,12 +10,11 @@ from taichi_dem.step_control import Displacement, FixedStep, StepControl
 
 
 class Method:
-    """How bodies step; the base of the methods here and of one's own.
+    """How bodies step; base of these methods and of user-defined ones.
 
-    A class of one's own gives at least ``dt0`` and ``name`` (docs/add_a_time_integrator.md). It may
-    also have ``advance``, a class derived from ``step.advance.Advance``, ``structure``, what its
-    kernels depend on beside its class (``structure_of``), and ``order``, that of its error
-    (``order_of``).
+    A user-defined class has at least ``dt0`` and ``name`` (docs/add_a_time_integrator.md). It may
+    also have ``advance``, a class derived from ``step.advance.Advance``; ``structure``, on which
+    its kernels depend (``structure_of``); and ``order``, that of its error (``order_of``).
 
     Attributes
     ----------
@@ -64,7 +63,7 @@ def structure_of(method: Any) -> Hashable:
     """Parts of a method on which its kernels depend: all but its numbers.
 
     A user-defined method may have a member ``structure``; else any change of its numbers compiles
-    anew, as kernels may have read them.
+    anew, as kernels may contain them.
 
     Parameters
     ----------
@@ -87,8 +86,7 @@ def structure_of(method: Any) -> Hashable:
 def order_of(method: Any, damped: bool, varying: bool) -> int | None:
     """Order of the error in the step between events.
 
-    A class that is derived from a method declares an order of its own, or none: its ``advance`` may
-    have another one.
+    A class derived from a method declares its own order, or none: its ``advance`` may have another.
 
     Parameters
     ----------
@@ -97,7 +95,7 @@ def order_of(method: Any, damped: bool, varying: bool) -> int | None:
     damped : bool
         Whether a dashpot acts.
     varying : bool
-        Whether bodies or times had steps of their own.
+        Whether steps differ between bodies or times.
 
     Returns
     -------
@@ -150,7 +148,7 @@ class _Explicit(Method):
         damped : bool
             Whether a dashpot acts.
         varying : bool
-            Whether bodies or times had steps of their own.
+            Whether steps differ between bodies or times.
 
         Returns
         -------
@@ -171,8 +169,8 @@ class Uniform(_Explicit):
     dt0 : float, default 1e-08
         Largest step [s].
     distance : float, optional
-        Displacement limit l [m]: no body may move further in a step, so the step of all falls to
-        that of the fastest body. None: the step is dt0 throughout.
+        Displacement limit l [m]: no body may move further in a step, so the fastest body sets the
+        step of all. None: the step is always dt0.
     control : StepControl, optional
         Further limits of the step.
     dashpot : str, default "full"
@@ -213,8 +211,8 @@ class Multirate(_Explicit):
         no more.
     neighbour : str, default "held"
         ``"held"``: a body between its own times stays at its last position (the paper).
-        ``"drifted"``: it is drifted along to every time at which one of its bonds or contacts is
-        evaluated, and then takes the impulse at once.
+        ``"drifted"``: it drifts to every time at which one of its bonds or contacts is evaluated,
+        and takes the impulse at once.
     control : StepControl, optional
         As in ``Uniform``.
     dashpot : str, default "full"
@@ -262,7 +260,7 @@ class ImplicitDashpots(Method):
     theta : float, default 0.5
         Time in the step, as a share of it, at which bond dashpots take their velocity: from 0.5
         (mean of both ends, second order) to 1 (the end, first order, for steps so long that the
-        mean would ring).
+        mean would oscillate).
     refresh : float, default 3e-05
         Interval between updates of the solved blocks of bonds [s].
 
@@ -318,7 +316,7 @@ class ImplicitDashpots(Method):
         damped : bool
             Whether a dashpot acts.
         varying : bool
-            Whether bodies or times had steps of their own.
+            Whether steps differ between bodies or times.
 
         Returns
         -------

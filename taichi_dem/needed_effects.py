@@ -1,6 +1,6 @@
-"""Effects that a run needed: those to keep, to drop, and to add.
+"""Effects that a run needed: which to keep, drop and add.
 
-An effect is said to be droppable only where a run without it has been made and is equal.
+An effect is called droppable only if a run without it was made and is equal.
 """
 
 from dataclasses import replace
@@ -21,19 +21,19 @@ ROUNDING = 1e-9
 
 
 def needed_effects(result: Result, tolerance: float = ROUNDING) -> Advice:
-    """Advice on the effects of a run: those to keep, to drop, and to add.
+    """Advice on the effects of a run: which to keep, drop and add.
 
-    The run is repeated without the effects that seem to have had no part; ``Report.advice`` is what
-    can be said without. Loads and supports define the problem and are always kept.
+    The run is repeated without the effects that seem to have done nothing; ``Report.advice`` makes
+    no run. Loads and supports define the problem and are always kept.
 
     Parameters
     ----------
     result : Result
         Result of ``simulate``.
     tolerance : float, default ROUNDING
-        Largest difference of all that was recorded that counts as equal, as a share of its largest
-        value, from 0 to 1; by default what rounding explains. With a larger one, effects that took
-        less than this share of the energy are tried too.
+        Largest difference of recorded values that counts as equal, as a share of the largest value,
+        from 0 to 1; by default that of rounding. With a larger one, effects that took less than
+        this share of the energy are tried too.
 
     Returns
     -------
@@ -113,9 +113,9 @@ def _without(effects, names, may_be_silent):
 def recorded_difference(first: Result, second: Result) -> float:
     """Largest difference of all columns, speeds and times of fracture of two runs.
 
-    A share of the largest value of each; of energies, of the largest of all of them; of speeds, of
-    the largest in the connected part to which a body belongs; zero where rounding explains it.
-    Infinite where columns have other lengths, or other bonds broke.
+    As a share of the largest value of each column, of all energies, or of the speeds in a connected
+    part; zero where rounding explains it. Infinite if columns have other lengths, or other bonds
+    broke.
     """
     history, broken, part = first.series, first.broken_time, parts_of(first.model.mesh)
     joules = [name for name in history if name.endswith("_J") and name != "residual_J"]

@@ -47,7 +47,7 @@ def macro_steps(until: float, dt0: float) -> int:
 
 @dataclass(frozen=True)
 class Every:
-    """Calls of an observer at even distances, besides at the start and at the end of the run.
+    """Calls of an observer at even intervals, and at the start and the end of the run.
 
     One of the four is given.
 
@@ -60,8 +60,8 @@ class Every:
     samples : int, optional
         Number of rows of the time series between calls.
     wall_s : float, optional
-        Wall time between calls [s]; these calls come between two steps of any length, when bodies
-        may stand at different times.
+        Wall time between calls [s]; these calls come between any two steps, when bodies may be at
+        different times.
 
     Raises
     ------
@@ -235,12 +235,12 @@ class Collector:
     rows : dict of list
         Values by name; ``collector[name]`` is an array of them.
     view : RunView or None
-        View of the last call, for one more look at a run that diverged.
+        View of the last call, also of a run that diverged.
 
     Raises
     ------
     InputError
-        The times are no Every or At, or what is to be read is no function.
+        The times are not an Every or At, or a value to read is not a function.
 
     Examples
     --------
@@ -409,12 +409,12 @@ class Receivers:
     Raises
     ------
     InputError
-        A name or place is none.
+        A name or place is invalid.
 
     Notes
     -----
-    ``result.receivers[name]`` holds what a run gave, a ``Received``, and ``result.write`` leaves
-    receivers.csv. A resumed run gives what followed.
+    ``result.receivers[name]`` is a ``Received``, and ``result.write`` writes receivers.csv. A
+    resumed run has only what followed.
 
     Examples
     --------

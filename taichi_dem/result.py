@@ -35,8 +35,7 @@ from taichi_dem.state.model import Model
 class Result:
     """Result of a run.
 
-    As the last line of a notebook's cell it shows its history, the block in the last frame, and the
-    report.
+    A notebook shows its history, the block in the last frame, and the report.
 
     Parameters
     ----------
@@ -57,10 +56,10 @@ class Result:
     report : Report
         Figures and cost of the run.
     diverged : str, default ""
-        Error sentence of a run that left its bounds, whose data end before that; else ``""``.
+        Error message of a run that diverged, whose data end before that; else ``""``.
     start : dict, optional
-        Motion that was set before the run, arguments of ``State.set_motion``; None for a run that
-        began as its scene says.
+        Motion that was set before the run, arguments of ``State.set_motion``; None for that of the
+        scene.
     acting_since : dict, optional
         With effects="auto": time from which each effect acted on each body [s], by name; NaN for
         never.
@@ -107,7 +106,7 @@ class Result:
 
     @cached_property
     def effects(self) -> Any:
-        """A DataFrame, a row an effect: what it did, since when, what was left out, advice."""
+        """A DataFrame, a row per effect: what it did, since when, what was left out, advice."""
         return self.report.advice().table()
 
     @property
@@ -403,8 +402,8 @@ class Result:
         path : file name, optional
             Of the page; by default ``view.html`` in a new folder for temporary files.
         open_browser : bool, optional
-            By default it opens where a person sits at a terminal of a desktop: not in a pipe, a
-            test, a notebook or on a build server.
+            By default only from a terminal of a desktop: not in a pipe, a test, a notebook or on a
+            build server.
 
         Returns
         -------
@@ -414,14 +413,13 @@ class Result:
         Raises
         ------
         InputError
-            Without frames, for a scene of which two exceed 30 MB, and when the file cannot be
-            written.
+            There are no frames, two frames exceed 30 MB, or the file cannot be written.
 
         Notes
         -----
-        Displacement and turn of a body have 16 bits: an error of at most 1/65534 of the largest of
-        their frame. A page of the paper's block with 50 frames has 1.2 MB. Beyond 30 MB frames
-        are left out evenly, and the page says so.
+        Displacements and rotations have 16 bits: an error of at most 1/65534 of the largest in
+        their frame. A page of the paper's block with 50 frames has 1.2 MB. Beyond 30 MB frames are
+        left out evenly, and the page says so.
 
         Examples
         --------

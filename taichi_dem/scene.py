@@ -37,7 +37,7 @@ SLEEP = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Scene(Pictured):
-    """A block of bonded bodies and the effects that act in it; checked once, here.
+    """A block of bonded bodies and the effects that act in it; its input is checked here.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ class Scene(Pictured):
     max_speed : float, default 10000.0
         Speed beyond which a run counts as diverged [m/s].
     loads : iterable of Effect, default ()
-        Loads and supports, and laws instead of the usual ones, beside a word.
+        With ``"auto"`` or ``"all"``: loads, supports, and laws in place of the usual ones.
     sleep : float, optional
-        With ``"auto"``: share up to which the neighbours of a body count as not reached by a wave,
-        of the opening at which a law of the bond between them begins, and of the mean speed of the
-        connected part to which they belong. None: 1e-6; at most 0.01, 0 for no sleep.
+        With ``"auto"``: share below which a body's neighbours sleep, of the opening at which a law
+        of the bond between them begins, and of the mean speed of their connected part. None: 1e-6;
+        at most 0.01, 0 for no sleep.
     unbonded : iterable of str, default ()
         Names of groups of inner faces without bonds from the start, as a notch or an open joint.
         Both sides are free, and touch as broken faces do.
@@ -67,7 +67,8 @@ class Scene(Pictured):
         change.
     materials : mapping, optional
         Material of the bodies of a group by the name of a body group; all other bodies have
-        ``material``. ``body_materials.joined`` says what a bond or contact between two of them has.
+        ``material``. ``body_materials.joined`` has the rule for bonds and contacts between two of
+        them.
     velocity : array_like or mapping or function, optional
         Velocities of the bodies at the start [m/s]: a vector for all, a vector by body group
         (``Mesh.body_groups``; other bodies are at rest), a row for each body, (body_count, 3), or a
@@ -80,7 +81,7 @@ class Scene(Pictured):
     Attributes
     ----------
     initial_motion : mapping
-        Arrays "velocity" and "spin" that follow, (body_count, 3); empty for a scene at rest.
+        Arrays "velocity" and "spin" at the start, (body_count, 3); empty for a scene at rest.
 
     Raises
     ------
@@ -203,7 +204,7 @@ def _effects_of(scene):
     effects = _listed("effects", scene.effects)
     if given and word in (None, LISTED):
         raise InputError(
-            "loads must be left out where effects is a list, which holds them, "
+            "loads must be left out where effects is a list: put them into this list, "
             f"got {shown(scene.loads)}"
         )
     # A scene that was made from a word hands both on, as dataclasses.replace does.
@@ -291,7 +292,7 @@ def _check_roles(effects):
 
 
 def scene_warnings(scene: Any) -> tuple[str, ...]:
-    """Sentences about what a scene lists or leaves out in vain; before a run.
+    """Warnings before a run: effects that a scene lists or leaves out in vain.
 
     scene: a Scene.
     """
@@ -324,9 +325,9 @@ def remedy(contact: Any) -> str:
 
 
 def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
-    """Sentences about parts of a scene that may meet and would not touch there; before a run.
+    """Warnings before a run: parts of a scene that may meet and would not touch.
 
-    A solid in one piece meets nothing until it breaks, which is detected in the run. Scenes with
+    A solid in one piece cannot meet itself until it breaks, which the run detects. Scenes with
     contact are expected to have meeting bodies: any with several parts is reported. Scenes without
     contact may hold independent solids: they are not reported where they stay at rest, fall alike,
     or are too far from each other (``may_meet``). Faces that lie on each other without a bond

@@ -1,4 +1,4 @@
-"""The loop of a run: step, sample, keep frames, return all as one result; what is saved of it."""
+"""The loop of a run: step, sample, keep frames, save, return the result."""
 
 import warnings
 from collections.abc import Callable, Sequence
@@ -77,16 +77,16 @@ def simulate(
     title : str, default "simulating"
         Title of the progress bar.
     output : path, optional
-        Folder for the result, which is written at the end, or up to the last good sample when the
-        run diverges.
+        Folder for the result; it is written at the end, up to the last good sample if the run
+        diverges.
     checkpoint : Checkpoint, optional
-        Where and when the run saves itself, besides at its end and on Ctrl-C, SIGTERM, SIGHUP,
-        SIGXCPU and SIGUSR1.
+        Where and when the run saves itself; it also does so at its end and on Ctrl-C, SIGTERM,
+        SIGHUP, SIGXCPU and SIGUSR1.
     resume : path, optional
-        Checkpoint to go on from, of the same scene and method; the bits are those of a run that was
-        never stopped.
+        Checkpoint to continue from, of the same scene and method; the bits are those of an
+        uninterrupted run.
     observers : sequence of Observer, default ()
-        Observers, called on the way with a ``RunView``; after a resume, at the times that are left.
+        Observers, called during the run with a ``RunView``; after a resume, at the remaining times.
 
     Returns
     -------
@@ -98,14 +98,14 @@ def simulate(
     InputError
         An argument is out of its range.
     SimulationDiverged
-        The run left its bounds; ``result`` of the exception has the data up to there.
+        The run diverged; ``result`` of the exception has the data before that.
     Interrupted
         A signal ended the run, which has been saved.
 
     Notes
     -----
-    A UserWarning before the first step says what the scene cannot do (``scene_warnings``), which of
-    its histories change within less than a step, and which bodies begin within each other.
+    A UserWarning before the first step names what the scene cannot do (``scene_warnings``),
+    histories that change within less than a step, and bodies that overlap at the start.
 
     Examples
     --------

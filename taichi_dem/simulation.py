@@ -1,4 +1,4 @@
-"""A scene on the device, ready to step: builds every part once and ties them together."""
+"""A scene on the device, ready to step: builds all parts once and connects them."""
 
 import contextlib
 import copy
@@ -55,7 +55,7 @@ def _part(name) -> Any:
 class Simulation:
     """One scene, one method, one driver, on an engine of the session.
 
-    ``simulate`` makes one; it is the level below for those who step by themselves. ``tables``,
+    ``simulate`` makes one; use it directly to control the steps. ``tables``,
     ``state``, ``schedule``, ``contacts``, ``broad_phase``, ``advance``, ``step``, ``readings`` and
     ``forces`` are the parts of its engine, which is its own as long as it lives; contacts and
     broad_phase are None without contact. ``values`` reads their fields, which may have room for
@@ -76,8 +76,8 @@ class Simulation:
     model : Model
         Arrays of the scene.
     cut_short : str
-        What an exception or Ctrl-C interrupted, in words, so that its bits would not be those of an
-        undisturbed run; ``""`` otherwise.
+        What an exception or Ctrl-C interrupted, in words; its bits would then differ from an
+        undisturbed run. ``""`` otherwise.
     run_seconds, run_cpu_seconds : float
         Wall and CPU time spent in steps so far [s], without compiling and without readings.
 
@@ -127,14 +127,14 @@ class Simulation:
 
     @property
     def engine(self) -> BlastEngine:
-        """Fields and kernels; InputError once it is closed, its session has ended, or elsewhere."""
+        """Fields and kernels; InputError if closed, after its session, or on another thread."""
         self._engine.check(self)
         return self._engine
 
     def close(self) -> None:
-        """Give the engine back, for which others else wait until nobody refers to the simulation.
+        """Give the engine back; else others get it once nothing refers to the simulation.
 
-        Of a closed one, only what was read before is left.
+        A closed simulation only has what was read before.
         """
         self.engine.owner = None
 
@@ -237,8 +237,8 @@ class Simulation:
         opened = self.energy_balance is not None
         if self.cut_short:
             raise InputError(
-                f"this simulation was interrupted while {self.cut_short}, and cannot be gone on "
-                "with: reset it, or make a new one"
+                f"this simulation was interrupted while {self.cut_short}, and cannot "
+                "continue: reset it, or make a new one"
             )
         if opened:
             return
@@ -395,7 +395,7 @@ class Simulation:
         Parameters
         ----------
         brief : bool, default False
-            Whether to leave out a last comparison of all bodies, and the effects that it misses.
+            Whether to leave out the last comparison of all bodies, and so missing effects.
 
         Returns
         -------
@@ -409,7 +409,7 @@ class Simulation:
         """
         flag("brief", brief)
         if self.energy_balance is None:
-            raise InputError("report must be asked for once the simulation was started, got none")
+            raise InputError("report must follow start(), but the simulation was not started")
         here = slice(self.model.body_count)
         # A look of its own: to report changes nothing of what later samples find.
         shared_volume = copy.copy(self.shared_volume)

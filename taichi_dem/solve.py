@@ -1,4 +1,4 @@
-"""An output of a scene to a tolerance: the program chooses method and step, and gives a bar."""
+"""Output of a scene to a tolerance: the program chooses method and step, and gives a bar."""
 
 import math
 from collections.abc import Iterable
@@ -38,7 +38,7 @@ def solve(
     meshes: Iterable[Mesh] | None = None,
     progress: Listener | str | None = AUTO,
 ) -> Answer:
-    """Output of a scene at a time, with an error bar as narrow as asked.
+    """Output of a scene at a time, with an error bar of the given width.
 
     Parameters
     ----------
@@ -55,10 +55,9 @@ def solve(
     budget_s : float, optional
         CPU time after which no run is begun [s]; None for no limit.
     plan : Plan, optional
-        Plan of the answer to a question of a similar scene: begin at the steps that were enough
-        there.
+        Plan of an answer for a similar scene: start at the steps that sufficed there.
     sources : iterable of str, default ("step",)
-        Sources of error that are measured, and so in the bar: ``"step"``, always; ``"contact"``,
+        Sources of error to measure and include in the bar: ``"step"``, always; ``"contact"``,
         against a contact law of finer resolution; ``"mesh"``, over other meshes. Others are named
         as not measured.
     meshes : iterable of Mesh, optional
@@ -69,8 +68,8 @@ def solve(
     Returns
     -------
     Answer
-        Value, error bar, its sources and cost; ``shortfall`` says why a bar is wider than asked,
-        and what would help.
+        Value, error bar, its sources and cost; ``shortfall`` tells why a bar is too wide, and what
+        would help.
 
     Raises
     ------

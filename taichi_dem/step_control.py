@@ -27,7 +27,7 @@ LARGEST, DISPLACEMENT, ROTATION, BOND_K, BOND_C, CONTACT_K, CONTACT_C, LOAD, NEI
 
 @dataclass(frozen=True)
 class StepControl:
-    """Limits of a body's step beside its displacement in it.
+    """Limits of a body's step beside the displacement limit.
 
     Parameters
     ----------

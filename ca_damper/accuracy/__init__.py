@@ -1,1 +1,1 @@
-"""How ``solve_response`` finds an answer: scenes that go on, estimates, and what narrows a bar."""
+"""How ``solve_response`` finds an answer: scenes that continue, estimates, narrowing of bars."""

@@ -1,4 +1,4 @@
-"""What is known of a goal from runs: its value, and where the error comes from."""
+"""Estimate of a goal from runs: its value and the sources of its error."""
 
 import math
 from collections.abc import Sequence
@@ -23,8 +23,8 @@ STEP_ORDER = 1.0
 SOURCES = {
     "step": ("of the time step", "a larger budget_s shortens it"),
     "no order": (
-        "of the time step, by which the value changes in no order",
-        "no step of this model has it to more",
+        "of the time step, with which the value changes in no order",
+        "no step of this model narrows it",
     ),
     "chance": ("from seed to seed", "more seeds narrow it"),
     "cycles": ("of the mean over cycles", "a larger budget_s lengthens the runs"),
@@ -108,7 +108,7 @@ class Estimate:
         return self.levels[0]
 
     def allowed(self, tolerance: float) -> float:
-        """Largest half-width that is good enough: nothing is known better than to rounding."""
+        """Largest half-width that is narrow enough, at least that of rounding."""
         return float(np.maximum(tolerance * size_of(self.value), 2.0 * self.rounding))
 
     def clusters(self, tolerance: float) -> list[np.ndarray]:

@@ -1,4 +1,4 @@
-"""A checked question to ``solve_response``, and where its runs begin."""
+"""A checked question to ``solve_response``, and the start of its runs."""
 
 import math
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Frequencies where a response peaks, found on a lattice that is halved as often as it must be."""
+"""Frequency of the peak of a response, found on a lattice that is halved as often as needed."""
 
 import math
 from collections.abc import Callable
@@ -120,7 +120,7 @@ class PeakSearch:
         if not self.may_extend or not LEAST_RATIO < further < MOST_RATIO or not rms.any():
             side = "below" if below else "above"
             raise InputError(
-                f"ratios must hold the peak, which lies outside, {side} {end:.6g}: the response "
+                f"ratios must contain the peak, which lies outside, {side} {end:.6g}: the response "
                 f"still rises there, got ({self.lowest:g}, {self.highest:g})"
             )
         k = round(self.lattice.position(further, 0))

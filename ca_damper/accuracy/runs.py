@@ -1,7 +1,7 @@
-"""Scenes of one filling that go on from where they are, until they are steady.
+"""Scenes of one filling that continue from their state until they are steady.
 
-The seeds of one frequency and step go on together, each for as many cycles: one that stopped where
-it looks steady would stop in the quieter of several motions more often than it takes it.
+All seeds of one frequency and step continue for the same number of cycles: if each stopped once it
+looks steady, the quieter of several motions would be counted too often.
 """
 
 import math
@@ -29,7 +29,7 @@ _MOST_CYCLES = 20_000
 
 
 class BudgetSpent(Exception):
-    """The next runs would take more than is left. needed: what they would take in all [s]."""
+    """The next runs would exceed the budget. needed: time of all runs with them [s]."""
 
     def __init__(self, needed: float):
         super().__init__(needed)

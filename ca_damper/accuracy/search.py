@@ -1,4 +1,4 @@
-"""Reduction of the error of goals: which scenes go on, until the bars are narrow enough."""
+"""Reduction of the error of goals: which scenes continue, until the bars are narrow enough."""
 
 import math
 from dataclasses import replace
@@ -62,7 +62,7 @@ class Search:
         return tuple(k for k in some if k <= 2.0 or k * self.at.dt <= self.job.longest_step())
 
     def run(self) -> list[Estimate]:
-        """Estimates of all goals, good enough or the best that could be had."""
+        """Estimates of all goals, narrow enough or the best possible."""
         found: list[Estimate] = []
         best = self.at
         try:
@@ -201,8 +201,8 @@ class Search:
             level, margin = level - 1, 1
         if goal.ratios or margin > _MOST_MARGIN:
             raise InputError(
-                f"goal {goal.name!r} must be a finite number in this scene, got NaN: seeds peak "
-                "far apart, or the frequencies do not define it; ask for a goals.response_curve"
+                f"goal {goal.name!r} must be a finite number in this scene, got NaN: seeds have "
+                "distant peaks, or the frequencies do not define it; ask for a goals.response_curve"
             )
         return self._go_to(level=level, margin=margin)
 

@@ -1,4 +1,4 @@
-"""The kind of the grains as a source of error, which no seed or step can tell."""
+"""The model of the grains as a source of error, which seeds and steps do not show."""
 
 import math
 from typing import Any
@@ -57,11 +57,11 @@ def filling_source(answer: Answer, filling: Any, other: Answer | str | None) -> 
         return None
     kind = other_filling(filling)
     if kind is None:
-        return Source("filling", math.nan, "not measured: there is no other kind of such grains")
+        return Source("filling", math.nan, "not measured: there is no other model of these grains")
     name = type(kind).__name__
     if isinstance(other, Answer):
         apart: Any = np.hypot(np.abs(answer.value - other.value), other.error)
-        words = f"the same asked of {name}(), with its bar"
+        words = f"the same question to {name}(), with its bar"
         return Source("filling", apart, words, other.plan.seconds)
-    words = other or f"ask {name}()"
+    words = other or f"run {name}()"
     return Source("filling", math.nan, f"not measured: {words}", answer.plan.seconds)

@@ -1,4 +1,4 @@
-"""How the response of a filling depends on its step: error, cost, and how much of it is chance."""
+"""Response of a filling over its step: error, cost, and the share of chance."""
 
 from dataclasses import replace
 from operator import attrgetter

@@ -1,4 +1,4 @@
-"""What automata of all rules have in common on the device, and the order in which rules act."""
+"""Base of all automata on the device, and the order in which rules act."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ PAIRS, WALLS, PUSHES, HOLDS = range(4)
 #: Counted events by the effect that they belong to.
 _COUNTED = {
     "pairs": (PAIRS, "pairs met"),
-    "landing": (WALLS, "blows to walls"),
+    "landing": (WALLS, "impacts on walls"),
     "ejection": (PUSHES, "particles pushed along"),
     "static contact": (HOLDS, "particles came to rest"),
 }

@@ -1,4 +1,4 @@
-"""Ranges in which the rules of the automaton were checked, and what lies outside them."""
+"""Ranges in which the rules of the automaton were checked, and scenes outside them."""
 
 from typing import Any
 

@@ -43,7 +43,7 @@ class Automaton:
     Parameters
     ----------
     accounting : str, default "all"
-        Impulses that act on the container: ``"landing"`` (of particles that meet a wall after a
+        Impulses that act on the container: ``"landing"`` (of particles that hit a wall after a
         change of cell), ``"landing+ejection"`` (also of those that a wall pushes along), ``"all"``,
         or another key of ``accounting.ACCOUNTINGS``.
     static_contact : bool, optional
@@ -78,10 +78,10 @@ class Automaton:
     traversal : str, default "list"
         ``"list"`` of particles or ``"scan"`` of all cells; both give the same bits.
     rules : str, default "place"
-        ``"place"``: particles fly in any direction, collide where their positions meet, and all
-        impacts of a step are given to the container together; accounting, pair_rule and
-        accumulator have no other value than their default. ``"paper"``: rules of the paper, for
-        reproducing it; a UserWarning before a run says where they are known to fail.
+        ``"place"``: particles fly in any direction, collide where their positions meet, and the
+        container takes all impacts of a step together; accounting, pair_rule and accumulator must
+        have their defaults. ``"paper"``: rules of the paper, to reproduce it; a UserWarning before
+        a run says where they are known to fail.
     friction : float, optional
         Friction coefficient between particles, for rules ``"place"`` only. None: 0.5 there, no
         friction by the rules of the paper.
@@ -153,7 +153,7 @@ class Automaton:
                 positive(name, value, zero_allowed=True)
                 if self.rules != "place":
                     raise InputError(
-                        f"{name} must be None with rules {self.rules!r}, whose blows have no "
+                        f"{name} must be None with rules {self.rules!r}, whose impacts have no "
                         f"friction, got {value:g}"
                     )
         for name, value in _OF_THE_PAPER.items():

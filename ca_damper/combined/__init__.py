@@ -1,4 +1,4 @@
-"""Spheres where contacts last, whole steps of the automaton where all grains fly."""
+"""Spheres during contacts, and whole steps of the automaton while all grains fly."""
 
 from ca_damper.combined.device import Combined
 

@@ -128,12 +128,11 @@ class DeviceCombined(DeviceSpheres):
 
 @dataclass(frozen=True)
 class Combined(Spheres):
-    """Spheres that take short steps where contacts last, and long ones while all of them fly.
+    """Spheres with short steps during contacts, and long steps while all of them fly.
 
-    A step is as long as one of the automaton. Where no contact is possible in it, by bounds of all
-    speeds, the grains fly through it at once; else they take ``substeps`` steps of spheres. The
-    impulse of a step on the container is the sum of both. All other parameters are those of
-    ``Spheres``.
+    A step is as long as one of the automaton. If bounds of all speeds exclude a contact, the grains
+    fly through it at once; else they take ``substeps`` steps of spheres. The impulse on the
+    container is the sum of both. All other parameters are those of ``Spheres``.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Effects that a batch computes: those listed, or those that its scenes call for; its certificate.
+"""Effects that a batch computes: those listed, or those that its scenes need; its certificate.
 
 A filling takes part by two methods, both optional: ``activated(particles)`` returns the filling
 with the effects that at most so many particles call for, and an Estimate for each effect that it

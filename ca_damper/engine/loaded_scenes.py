@@ -26,7 +26,7 @@ from taichi_dem.kit.validation import whole
 
 #: Parts in which the kernels of a batch are compiled.
 _PARTS = 3
-_LOST_IN_WORDS = "lost its container, whose motion is no finite number"
+_LOST_IN_WORDS = "has a container whose motion is not a finite number"
 
 
 class LoadedScenes:
@@ -221,7 +221,7 @@ class LoadedScenes:
         if position.any():
             late = int(position.argmax())
             raise InputError(
-                f"a cycle must be full here, scene {late} stands at step {position[late]} of "
+                f"a cycle must be complete here, scene {late} stands at step {position[late]} of "
                 f"{self.steps_per_cycle[late]}: advance it first"
             )
 

@@ -1,4 +1,4 @@
-"""What kernels note of a run: samples at even intervals, and events by kind."""
+"""Records of a run by kernels: samples at even intervals, and events by kind."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""What shakes the structure: motions of its base and forces on it, as functions of time.
+"""Excitation of the structure: motions of its base and forces on it, over time.
 
 ``sines``, ``sweep``, ``random_vibration``, ``from_samples`` and ``from_csv`` make a Signal, which
 is a base displacement [m] or a force [N]; a SineForce is a force in closed form. ``Batch`` and

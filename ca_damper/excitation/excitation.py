@@ -115,7 +115,7 @@ class Excitation:
         return identity_of({"base": self.base, "force": self.force, **signals})
 
     def in_words(self) -> tuple[str, ...]:
-        """What acts on base and container, and what was done to samples of it.
+        """Motion of the base and force, and the treatment of samples.
 
         Returns
         -------

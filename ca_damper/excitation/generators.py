@@ -1,7 +1,7 @@
 """Signals from formulas: several sines, sweeps, random vibration of a given spectral density.
 
-They are sampled so finely that their spline cannot be told from the formula: with 40 nodes in a
-cycle it is off by 2e-6 of the amplitude, and its second derivative by (2 pi / 40)^2 / 12 or 0.2 %.
+They are sampled so finely that their spline follows the formula: with 40 nodes in a cycle its error
+is 2e-6 of the amplitude, that of its second derivative (2 pi / 40)^2 / 12 or 0.2 %.
 """
 
 import math
@@ -100,7 +100,7 @@ def sweep(
     of: str = "value",
     step: float | None = None,
 ) -> Signal:
-    """Sine whose frequency goes from ``low`` to ``high``, or down.
+    """Sine whose frequency goes from ``low`` to ``high``, up or down.
 
     Parameters
     ----------
@@ -113,8 +113,7 @@ def sweep(
     duration : float
         Duration [s].
     way : str, default "linear"
-        ``"linear"``: as many Hz in every second; ``"logarithmic"``: as many octaves in every
-        second.
+        ``"linear"``: equal Hz in every second; ``"logarithmic"``: equal octaves in every second.
     of : str, default "value"
         ``"value"`` or ``"acceleration"``: what keeps its amplitude, the latter but for the slow
         change of the frequency.

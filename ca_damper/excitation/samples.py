@@ -1,4 +1,4 @@
-"""A Signal from samples that were measured, after checks that a spline through them means anything.
+"""A Signal from measured samples, after checks that a spline can represent them.
 
 A spline through samples follows a component that is sampled at least four times a cycle: its gain
 sinc^4(f) 3 / (2 + cos(2 pi f)), f by the sampling rate, is then within 1.5 % of 1, and the image at
@@ -47,9 +47,9 @@ def from_samples(
         ``"value"``: of the signal itself, such as a displacement [m] or a force [N].
         ``"acceleration"``: of its second derivative [m/s^2], which is integrated twice from rest.
     correct_baseline : bool, default False
-        Subtract from an acceleration the straight line that lets the motion end at rest where it
-        began: of a record with an offset, which integrates to a large drift. A shock changes the
-        speed for good, and this line would take that away. A report says what was done.
+        Subtract from an acceleration the straight line that makes the motion end at rest where it
+        began: for a record with an offset, which integrates to a large drift. Do not use it for a
+        shock, which changes the speed for good. A report says what was done.
 
     Returns
     -------
@@ -81,7 +81,7 @@ def from_samples(
         made, treated = _at_rest_again(step, samples)
     else:
         made = integral(step, samples, "samples")
-        treated = "integrated twice from rest, no base line taken off"
+        treated = "integrated twice from rest, without a base line correction"
     return replace(made, treated="; ".join(filter(None, (evened, treated))))
 
 
@@ -169,7 +169,7 @@ def from_csv(
     path : path
         CSV file.
     column : str, optional
-        Column to take; needed where there are several of them.
+        Column to take; needed if there are several.
     correct_baseline : bool, default False
         For an acceleration: subtract a straight line so that the motion ends at rest where it
         began, as in ``from_samples``; right for a record with an offset, wrong for a shock.

@@ -1,4 +1,4 @@
-"""A function of time on a uniform grid, with a smooth interpolant: the one form of any excitation.
+"""A function of time on a uniform grid, with a smooth interpolant: the form of every excitation.
 
 The interpolant is a cubic spline with two continuous derivatives, so that displacement, velocity
 and acceleration of a base belong to one motion. In the interval of length h from node 0 to node 1,
@@ -51,7 +51,7 @@ class Signal:
     label : str, default "signal"
         Description in words.
     treated : str, default ""
-        What was done to samples before the signal was made of them, in words.
+        Treatment of samples before the signal was made, in words.
 
     Raises
     ------
@@ -116,7 +116,7 @@ class Signal:
         Parameters
         ----------
         factor : float
-            Factor; ``treated`` stays that of the samples before.
+            Factor; ``treated`` stays the same.
 
         Returns
         -------
@@ -133,7 +133,7 @@ class Signal:
         return Signal(self.step, times * self.value, times * self.bend, label, self.treated)
 
     def in_words(self, unit: str) -> str:
-        """What acts on a structure: origin, length, what was done to samples, and both ends.
+        """Origin, length, treatment of samples, and both ends of the signal.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""The container as it is drawn: in rows of frames, side by side, and on its spring."""
+"""Drawings of the container: in rows of frames, side by side, and on its spring."""
 
 import contextlib
 from collections.abc import Iterator, Mapping, Sequence

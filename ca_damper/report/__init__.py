@@ -1,1 +1,1 @@
-"""What comes out of a run: measures, reports, certificates, progress."""
+"""Output of a run: measures, reports, certificates, progress."""

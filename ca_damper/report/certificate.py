@@ -41,7 +41,7 @@ class Periods:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Certificate(BaseCertificate):
-    """What was computed, what was left out, and how that is known.
+    """Effects computed and left out in a run, with estimates and audits.
 
     Parameters
     ----------

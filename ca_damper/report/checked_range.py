@@ -1,4 +1,4 @@
-"""Range in which a filling was checked, and what of the scenes of a batch lies outside it."""
+"""Range in which a filling was checked, and scenes of a batch outside it."""
 
 import warnings
 from dataclasses import dataclass, replace
@@ -9,12 +9,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class CheckedRange:
-    """Where the numbers of a filling were compared with others, and whether a run is inside.
+    """Range in which the numbers of a filling were compared, and whether a run is inside.
 
     Parameters
     ----------
     words : str
-        The range, and how well the numbers agree in it.
+        The range, and the agreement in it.
     outside : tuple of str, default ()
         What of the scenes lies outside.
     warning : str, default ""
@@ -32,7 +32,7 @@ class CheckedRange:
     def finding(self) -> str:
         """What of the scenes lies outside, in words."""
         found = f"outside: {'; '.join(self.outside)}" if self.outside else "inside"
-        open_part = "" if self.knows_motion else ", but for the motion, which was not looked at"
+        open_part = "" if self.knows_motion else ", except the motion, which was not checked"
         return f"{found}{open_part}"
 
 

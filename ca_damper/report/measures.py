@@ -1,4 +1,4 @@
-"""From the sums that a run gathers over whole cycles to response, loss and apparent mass.
+"""Response, loss and apparent mass from sums over whole cycles of a run.
 
 Harmonics are complex amplitudes: x(t) = mean + Re(X exp(i w t)) + higher ones, and the base motion
 y = y0 sin(w t) has Y = -i y0. X comes from n samples at the beginnings of steps, F from n means

@@ -1,4 +1,4 @@
-"""One scene at one time, as it is kept for pictures."""
+"""State of one scene at one time, for pictures."""
 
 from dataclasses import dataclass
 from typing import Any

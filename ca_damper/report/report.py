@@ -55,15 +55,14 @@ class Report:
     order : int, optional
         Order of the error in the step; None where the filling declares none.
     sampling : tuple of (int, float), optional
-        Number of cycles that means were taken over, and half-width of the mean of the highest RMS
-        as a share of it, with a confidence of 95 %; None where it is not known, as it is not of a
-        mean that still changes.
+        Number of measured cycles, and half-width of the mean of the highest RMS as a share of it,
+        with a confidence of 95 %; None where unknown, as for a mean that still changes.
     certificate : Certificate, optional
         When effects first acted, what was left out, what was audited.
     diverged : tuple of str
         A sentence for each scene that diverged, the first in time first; its results are nan.
     excitation : tuple of str, default ()
-        What acts beside the sine of the base, and what was done to samples of it, in words.
+        Excitation beside the sine of the base, and treatment of samples, in words.
     transient : str, default ""
         Why the mean of the highest RMS is not known, in words.
     checked : CheckedRange, optional
@@ -193,7 +192,7 @@ class Report:
         Returns
         -------
         str
-            A table of some twelve lines, and one for each effect and signal.
+            A table of about twelve lines, and one for each effect and signal.
         """
         return in_lines(self._rows())
 
@@ -246,8 +245,7 @@ def needed_effects(result: object, tolerance: float = 1e-3) -> Advice:
 
     Notes
     -----
-    Spheres are checked every few steps: an effect that may have acted unseen between two checks is
-    kept.
+    Spheres are checked every few steps: an effect that may have acted between two checks is kept.
 
     Examples
     --------

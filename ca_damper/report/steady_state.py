@@ -1,4 +1,4 @@
-"""From values cycle by cycle: has the transient ended, and how well is the mean known.
+"""End of the transient, and error of the mean, from values cycle by cycle.
 
 The beginning is cut off where the standard error of the mean of the rest is least (the rule MSER of
 simulation practice). The halves of the rest are then compared by a t test; the spread of their

@@ -1,1 +1,1 @@
-"""Questions to many scenes: responses, sweeps, maps, time histories, films."""
+"""Runs of many scenes: responses, sweeps, maps, time histories, films."""

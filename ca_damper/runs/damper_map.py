@@ -203,8 +203,7 @@ def damper_map(
     InputError
         An argument is out of its range, or the filling has no box to change.
     SimulationDiverged
-        All scenes left the range in which their numbers mean anything. Where some did, a warning
-        tells which, and their results are nan.
+        All scenes diverged. If only some do, a warning names them, and their results are nan.
 
     Examples
     --------

@@ -181,7 +181,7 @@ def film(
     InputError
         The batch was not started, or a number is out of range.
     SimulationDiverged
-        All scenes have left the range in which their numbers mean anything.
+        All scenes diverged.
 
     Examples
     --------

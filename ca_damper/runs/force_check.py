@@ -1,4 +1,4 @@
-"""Whether the container moves as the force measured on it demands: a check of a whole run.
+"""Check of a whole run: the container must move as the force measured on it demands.
 
 By M x'' + C x' + K x = K y + C y' + f for the first harmonics, with Y = -i y0. Over whole cycles of
 length T the harmonic of x' is i w X + 2 (x_end - x_begin) / T, and so on: the motion need not be

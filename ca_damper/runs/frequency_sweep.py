@@ -1,4 +1,4 @@
-"""Sweeps up through the frequencies and down again with continued state, to show hysteresis.
+"""Sweeps up and down through the frequencies with continued state, to show hysteresis.
 
 The frequency changes at the end of a cycle, when the base passes its middle: it keeps its place and
 takes up its new speed at once.
@@ -128,7 +128,7 @@ def sweep_up_and_down(
     checkpoint: Checkpoint | None = None,
     resume: FileName | None = None,
 ) -> Sweep:
-    """Go up through the ratios and down again without a new start.
+    """Sweep up through the ratios and down again without a new start.
 
     Parameters
     ----------
@@ -167,8 +167,7 @@ def sweep_up_and_down(
     InputError
         An argument is out of its range.
     SimulationDiverged
-        All scenes left the range in which their numbers mean anything. Where some did, a warning
-        tells which, and their results are nan.
+        All scenes diverged. If only some do, a warning names them, and their results are nan.
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
     check_run(transient_cycles, measured_cycles, start, progress)

@@ -17,7 +17,7 @@ from taichi_dem.kit.display import counted, in_brief, listed
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class History(Result):
-    """What all time histories have; of a scene are its place and its seed.
+    """Base of time histories; a scene has a place and a seed.
 
     Parameters
     ----------

@@ -45,8 +45,8 @@ _PEAK_COLUMNS = (
 class Response(Result):
     """Response curves of a filling; every measure is an array (particles, ratios, seeds).
 
-    As the last line of a notebook's cell it shows its curves and a table of the peaks; a peak at an
-    end of the ratios is said to be outside.
+    A notebook shows its curves and a table of the peaks; a peak at an end of the ratios is marked
+    as outside.
 
     Parameters
     ----------
@@ -329,15 +329,15 @@ def frequency_response(
         Motion of the container at the beginning: ``"rest"``, ``"empty"`` or ``"rigid"``, see
         ``Batch.start``.
     effects : str, default "listed"
-        ``"listed"`` or ``"auto"``, see ``Batch``; ``report.certificate`` tells what acted and what
-        was left out.
+        ``"listed"`` or ``"auto"``, see ``Batch``; ``report.certificate`` tells which effects acted
+        and which were left out.
     progress : callable or str or None, default "auto"
         ``"auto"``: a bar on a terminal and in Jupyter. None: silence. A function is called with a
         Progress while kernels are compiled, and then six times a second.
     checkpoint : Checkpoint, optional
-        Where and when the run saves itself, besides at its end and on Ctrl-C.
+        Where and when the run saves itself; it also does so at its end and on Ctrl-C.
     resume : path, optional
-        Checkpoint to go on from; the bits are those of a run that was never stopped.
+        Checkpoint to continue from; the bits are those of an uninterrupted run.
 
     Returns
     -------
@@ -349,8 +349,7 @@ def frequency_response(
     InputError
         An argument is out of its range, or the filling refuses a scene.
     SimulationDiverged
-        All scenes left the range in which their numbers mean anything. Where some did, a warning
-        tells which, and their results are nan.
+        All scenes diverged. If only some do, a warning names them, and their results are nan.
 
     Examples
     --------

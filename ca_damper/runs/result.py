@@ -1,4 +1,4 @@
-"""What the results of all runs have in common: values over named axes, as tables and grids."""
+"""Base of the results of all runs: values over named axes, as tables and grids."""
 
 import math
 from typing import Any

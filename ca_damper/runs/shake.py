@@ -1,4 +1,4 @@
-"""Shake a structure, or one of several modes with boxes, by a motion or a force that is no sine."""
+"""Shake an oscillator, or a structure of several modes with boxes, by any motion or force."""
 
 import math
 from collections.abc import Sequence
@@ -104,8 +104,7 @@ def shake(
     InputError
         An argument is out of its range.
     SimulationDiverged
-        All scenes left the range in which their numbers mean anything. Where some did, a warning
-        tells which, and their results are nan.
+        All scenes diverged. If only some do, a warning names them, and their results are nan.
 
     Examples
     --------
@@ -198,8 +197,7 @@ def shake_structure(
     InputError
         An argument is out of its range, or the step is too long for the highest mode.
     SimulationDiverged
-        All scenes left the range in which their numbers mean anything. Where some did, a warning
-        tells which, and their results are nan.
+        All scenes diverged. If only some do, a warning names them, and their results are nan.
     """
     progress_option("progress", progress)
     check_filling(filling)

@@ -1,4 +1,4 @@
-"""Gravity on the particles: one number downwards, or two for a box that is tilted or lies."""
+"""Gravity on the particles: one number downwards, or two for a tilted or horizontal box."""
 
 from typing import Any
 

@@ -36,7 +36,7 @@ DIVERGENCES = {
     NOT_FINITE: "has a sphere whose velocity is not a finite number",
     RUNAWAY: "has a sphere that moves by more than its radius in a step",
     OVERLAP: "has spheres that overlap, or lie outside the container, by more than a radius",
-    ENERGY_GAINED: "has contacts that give back more energy than they took",
+    ENERGY_GAINED: "has contacts that return more energy than they took",
 }
 
 # Share of their energy, as the container sees it, that spheres may gain from contacts: all of them

@@ -1,7 +1,7 @@
-"""Effects of the spheres: what they did in a run, and what they would do, from numbers before it.
+"""Effects of the spheres: their activity in a run, and estimates before it.
 
-How much they did is sampled when a scene is checked for divergence: to ask in every step would
-cost a fifth of it. When each acted for the first time is noted in the step itself.
+Activity is sampled when a scene is checked for divergence: in every step it would cost a fifth
+more. The first action of each effect is noted in the step itself.
 
 Rotation: a blow at 45 degrees with friction f and restitution e changes the tangential speed v by
 f (1 + e) v as long as it slides, and by 2/7 v at most, when it sticks. A tangential impulse J gives
@@ -38,7 +38,7 @@ _BY = {
 }
 
 #: Reason why an unseen effect may have acted: an impact is shorter than the time between checks.
-_UNSEEN = "touches between two looks leave no trace"
+_UNSEEN = "contacts between two samples are not counted"
 
 # Blows that may all turn a sphere the same way.
 _BLOWS = 1000
@@ -88,7 +88,7 @@ class EffectActivity(EventCounts):
         touches = int(self.table.in_use(self.touches).sum())
         # Spheres keep their spin: where none turns at any check, none has been turned.
         turn, unseen = motion[1] > 0.0, "" if touches else _UNSEEN
-        contact = EffectUse("normal contact", "touches seen", touches, whole="what contacts took")
+        contact = EffectUse("normal contact", "contacts seen", touches, whole="what contacts took")
         turning = replace(contact, effect="rotation", events=touches if turn else 0)
         found = (
             replace(contact, share=_share(power, 0), steers=True, kept=unseen),

@@ -91,7 +91,7 @@ class Spheres:
     gravity : float or tuple of (float, float), default 9.8
         Gravity [m/s^2]: downwards, or (to the right, downwards), as for a box that is tilted.
     rotation : bool, default False
-        Whether spheres turn; the paper leaves it out.
+        Whether spheres rotate; the paper leaves it out.
     search : str, default "cells"
         ``"cells"``, or ``"all_pairs"`` as in the paper: the same bits, but slower above 10 spheres.
     start : array_like, optional
@@ -99,7 +99,7 @@ class Spheres:
         scenes. None: random ones from the seed of each scene.
     friction_law : str, default "viscous"
         ``"viscous"``: grows with small slip, so that heaps creep. ``"history"``: a tangential
-        spring for each contact, which holds.
+        spring for each contact, which holds heaps at rest.
     sizes : sequence of (int, float), optional
         (number, diameter [m]) of each size; the box holds as many as there would be of the largest.
     start_velocity : array_like, optional

@@ -1,4 +1,4 @@
-"""Checks of what users give of the spheres one by one: places and velocities at the start."""
+"""Checks of places and velocities of single spheres at the start."""
 
 from typing import Any
 

@@ -14,12 +14,12 @@ ceiling at -u and the floor at u, so J = 2 m u. It meets the ceiling at x0 = x(0
 X sin(w t + phase) it follows that X sin(phase) = x0 - J q(0) and w X cos(phase) = v - J q'(0-);
 squares add up to X^2: a quadratic equation for u.
 
-Small changes of a motion follow the Jacobian of its map from blow to blow. Changed are the place x
-and speed v of the container, the velocity p of the grain, all after a blow, and the time t of the
-blow. At T/2 those of x and v have grown to free(T/2) (dx - x' dt, dv - v' dt), that of the grain's
-place to dx + dp T/2 + u dt. The next blow is later by the gap between both over the speed at which
-they meet. It changes velocities by (1 + e) times that speed, shared by the masses; then all but the
-time turns over.
+Small changes of a motion follow the Jacobian of its map from impact to impact. Changed are the
+place x and speed v of the container, the velocity p of the grain, all after a blow, and the time t
+of the blow. At T/2 those of x and v have grown to free(T/2) (dx - x' dt, dv - v' dt), that of the
+grain's place to dx + dp T/2 + u dt. The next blow is later by the gap between both over the speed
+at which they meet. It changes velocities by (1 + e) times that speed, shared by the masses; then
+all but the time turns over.
 """
 
 import math
@@ -107,7 +107,7 @@ class ImpactDamper:
 
     @cached_property
     def speeds(self) -> tuple[float, ...]:
-        """Speeds between the blows [m/s] of all such motions; none where there is no motion."""
+        """Speeds between the impacts [m/s] of all such motions; none if there is no motion."""
         (a, b), (c, d) = self._forced
         size = self.oscillator.base_amplitude * abs(self.oscillator.transfer(self.frequency))
         square = [a * a + c * c, 2.0 * (a * b + c * d), b * b + d * d - size * size]
@@ -220,7 +220,7 @@ class ImpactDamper:
         return sign * np.array([self.motion(u, t), [self.position(u, t), -u]])
 
     def multipliers(self, u: float) -> np.ndarray:
-        """Factors by which small changes of the motion grow from blow to blow.
+        """Factors by which small changes of the motion grow from impact to impact.
 
         Parameters
         ----------
@@ -230,8 +230,8 @@ class ImpactDamper:
         Returns
         -------
         ndarray
-            Four complex eigenvalues of the Jacobian of the map from blow to blow, that of the
-            largest magnitude first.
+            Four complex eigenvalues of the Jacobian of the map from impact to impact, the largest
+            magnitude first.
         """
         found = np.linalg.eigvals(self._jacobian(u))
         return found[np.argsort(-np.abs(found), kind="stable")]

@@ -107,7 +107,7 @@ def words(asked):
         f"**{value:.{digits}f} ± {error:.{digits}f} nm**, after **{found.plan.runs} runs** and "
         f"**{found.plan.seconds:.2g} s** of one core ({found.plan.method}).{outcome} "
         f"The truth is **{true:.{digits}f} nm**, of this mesh: others of its size move it by "
-        f"± {asked.shares()['mesh']:.1f} %, which no step mends ({asked.mesh.seconds:.2g} s)."
+        f"± {asked.shares()['mesh']:.1f} %, which no step reduces ({asked.mesh.seconds:.2g} s)."
     )
 
 
@@ -141,7 +141,7 @@ def _budget(axes, asked):
     """Half-widths by source of the chosen answer, beside the error allowed."""
     shares = asked.shares()
     axes.barh([*shares], [*shares.values()], color=[RED, BLUE])
-    axes.axvline(100.0 * asked.chosen.tolerance, color=GREY, ls=":", label="what you allow")
+    axes.axvline(100.0 * asked.chosen.tolerance, color=GREY, ls=":", label="allowed error")
     axes.set(xscale="log", xlim=(1e-3, 1e2), xlabel="half-width [%]")
     axes.set_title("sources of error of the chosen answer")
     axes.invert_yaxis()
@@ -152,7 +152,7 @@ def _budget(axes, asked):
 def _errors(axes, asked):
     """Half-widths of bars and true errors over the error allowed."""
     asked_for = list(asked.answers)
-    axes.plot(TOLERANCES, TOLERANCES, color=GREY, ls=":", label="what you allow")
+    axes.plot(TOLERANCES, TOLERANCES, color=GREY, ls=":", label="allowed error")
     bars = [100.0 * asked.bar(one) for one in asked_for]
     axes.plot(asked_for, bars, "o-", color=BLUE, ms=5, label="bar")
     errors = [100.0 * asked.error(one) for one in asked_for]
@@ -170,7 +170,7 @@ def _price(axes, asked):
     axes.plot(*zip(*spent), "o-", color=BLUE, ms=5, label="paid")
     place = 100.0 * chosen.tolerance, chosen.plan.seconds
     axes.plot(*place, "o", ms=12, mfc="none", color=RED, label="the chosen answer")
-    axes.set(ylabel="CPU time of one core [s]", title="price of an answer", ylim=(5e-3, 5.0))
+    axes.set(ylabel="CPU time of one core [s]", title="cost of an answer", ylim=(5e-3, 5.0))
     _over_what_is_allowed(axes)
 
 

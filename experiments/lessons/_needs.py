@@ -143,7 +143,7 @@ def words(answer):
     rows = ["| effect | listed | what it did | the program says |", "|---|---|---|---|"]
     for words, on, did, says in verdicts(answer):
         rows.append(f"| {words} | {'yes' if on else 'no'} | {did} | **{says}** |")
-    sentences = " ".join([f"{first}bodies end elsewhere by **{change}**.", *said])
+    sentences = " ".join([f"{first}bodies end **{change}** away.", *said])
     return "\n".join([sentences, "", *rows])
 
 
@@ -187,8 +187,8 @@ def _pulled(axes, answer, result, number, magnify):
 
 def _prices(above, below, answer):
     """Time of a step of both, where it has been measured, and their broken bonds."""
-    far, words = answer.change, "one of both did not end"
-    words = words if far is None else f"bodies end {percent(far)} elsewhere"
+    far, words = answer.change, "one of the runs did not end"
+    words = words if far is None else f"bodies end {percent(far)} away"
     above.set(xlabel="time of a step [µs]", title="what it costs")
     below.set(xlabel="broken bonds [1]", title=words)
     broken = [one.report.broken_faces for one in (answer.chosen, answer.complete)]

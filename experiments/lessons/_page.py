@@ -63,7 +63,7 @@ def answered(mo, lesson, values):
     Where the program ends the run, its sentence stands in the place of both.
     """
     served = mo.app_meta().mode in ("run", "edit")
-    wait = f"{lesson.WAIT} When a lesson is first opened it compiles, some seconds."
+    wait = f"{lesson.WAIT} A lesson compiles for some seconds when it is first opened."
     with mo.status.spinner(wait):
         try:
             answer = session.ask(lambda: lesson.answer(**values))
@@ -171,7 +171,7 @@ def replies(mo, lesson, chosen):
 
 def reply(question, guess):
     """The answer to a guess: whether it is right, and why."""
-    verdict = "Right." if guess == question.right else f"Not so, but: *{question.right}*."
+    verdict = "Right." if guess == question.right else f"No: *{question.right}*."
     return f"**{verdict}** {question.answer}"
 
 

@@ -198,7 +198,7 @@ def _struck(figure, axes, answer, tall):
     figure.colorbar(drawn, ax=axes, **(below if tall else beside))
     if not chosen.motion:
         drawn.set_alpha(0.15)
-        axes.set_title("the run did not get there")
+        axes.set_title("the run ended before")
         look = {"ha": "center", "va": "center", "color": RED, "weight": "bold"}
         words = textwrap.fill(chosen.sentence.split(";")[0], 30 if tall else 60)
         axes.text(0.5 * high[0], 0.5 * high[1], words, **look)
@@ -217,7 +217,7 @@ def _far_end(axes, answer):
 def _price(axes, answer):
     """Error over seconds at every step of the methods tried so far, the chosen one ringed."""
     axes.set(xscale="log", yscale="log", xlim=(7e-4, 1.0), ylim=(1e-14, 3.0))
-    axes.axhspan(1.0, 3.0, color="0.94", lw=0, label="× diverged: its cost, but no error")
+    axes.axhspan(1.0, 3.0, color="0.94", lw=0, label="× diverged: cost without an error")
     axes.axhline(1e-2, color=GREY, ls=":", lw=1.0, label="error of 1 %")
     for row, (method, strikes) in enumerate(answer.ladders.items()):
         style = STYLES[method]

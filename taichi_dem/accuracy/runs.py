@@ -172,7 +172,7 @@ class Runs:
     def parting(self, level: float) -> float:
         """Time at which one rounding has come to the tolerance, at a level [s]; infinite if never.
 
-        By the way of a usual body, to a fraction of the run. Makes two runs.
+        Measured by the path of a typical body, to a fraction of the run. Makes two runs.
         """
         one, two = (self.frames(level, twin) for twin in (0, 1))
         for frame, other in zip(one[1:], two[1:]):
@@ -189,7 +189,7 @@ class Runs:
         return _apart(self.results[coarse].frames[-1], self.results[fine].frames[-1])
 
     def peak_change(self, coarse: float, fine: float) -> float:
-        """Difference of a usual body's largest speed at two levels, as a share of the finer."""
+        """Difference of a typical body's largest speed at two levels, as a share of the finer."""
         slower, faster = (self.results[level].peak_speed for level in (coarse, fine))
         return _share(np.abs(slower - faster), faster, _EPSILON * faster.max())
 

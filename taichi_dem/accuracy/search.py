@@ -1,4 +1,4 @@
-"""The way to an answer: which run is made next, and when the bar is narrow enough."""
+"""Search for an answer: which run comes next, and when the bar is narrow enough."""
 
 import math
 from collections.abc import Callable
@@ -36,7 +36,7 @@ _HOPELESS = 1e6
 
 
 class Search:
-    """Makes runs until the bar is as narrow as asked, or cannot be, or the budget is spent.
+    """Makes runs until the bar is narrow enough or cannot get narrower, or the budget is spent.
 
     budget: CPU seconds after which no run is begun. first: level to begin with.
     """
@@ -91,7 +91,7 @@ class Search:
         """Sources of error that runs of this question show, with the CPU time of all of them."""
         runs = self.runs
         falling = f"{counted(runs.count, 'run')} at falling steps"
-        twins = counted(self.twins.count, "twin") if self.twins.count else "nothing lets twins part"
+        twins = counted(self.twins.count, "twin") if self.twins.count else "nothing can split twins"
         step = Source("step", math.hypot(parts.step, parts.solver), falling, runs.seconds)
         return step, Source("chance", parts.chance, twins, 0.0)
 
@@ -112,7 +112,7 @@ class Search:
         needed = self.runs.seconds + 2.0 ** (second - first) * self.runs.cost[first]
         if needed > self.budget:
             got, least = told_apart(self.budget, needed, 2)
-            raise InputError(f"budget_s must leave time for two runs, {least} s here, got {got}")
+            raise InputError(f"budget_s must be at least {least} s here, for two runs, got {got}")
         if self.runs.value(second) is None:
             raise SimulationDiverged(self.runs.failure)
         self.levels.append(second)
@@ -203,8 +203,8 @@ class Search:
         needed = max(2, math.ceil(2.0 * (width / self._allowed) ** 2))
         seconds = needed * sum(self.runs.cost[level] for level in self.levels[:2])
         return (
-            f"{words}. The mean of some {needed} of them may have it, in {seconds:.2g} s: ask for "
-            "goal.mean()"
+            f"{words}. The mean of about {needed} runs may reach it, in {seconds:.2g} s: ask "
+            "for goal.mean()"
         )
 
     def _add_twins(self, parts):
@@ -218,10 +218,10 @@ class Search:
         """Go on to half the step, or to the one that the order of a smooth run calls for."""
         last, more = self.levels[-1], 1
         if self._counts_breaks and self._allowed < 1.0:
-            self.why = "what breaks is known to one face at best"
+            self.why = "the number of broken faces is known to one at best"
             return
         if last - self.levels[0] >= _MOST_FINE:
-            self.why = f"half of a step of {self.job.method(last).dt0:.2g} s changes as much"
+            self.why = f"halving the step of {self.job.method(last).dt0:.2g} s changes as much"
             return
         if not self._eventful:
             wanted = _halvings(parts.total, self._allowed, self.job.declared)

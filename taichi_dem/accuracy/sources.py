@@ -1,4 +1,4 @@
-"""Sources of error beside the step: resolution of the contact law, mesh, what was left out."""
+"""Sources of error beside the step: resolution of the contact law, mesh, effects left out."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -25,9 +25,9 @@ _RAYS = 4.0
 
 @dataclass(frozen=True)
 class Beside:
-    """Measures what no shorter step mends, by runs at the level of the coarsest one.
+    """Measures errors that no shorter step reduces, by runs at the coarsest level.
 
-    There it is as large, and costs least. runs: those of the question. report: of the finest one.
+    They are as large there, and cost least. runs: those of the question. report: of the finest one.
     affords: whether the budget lets so many runs be made.
     """
 
@@ -38,7 +38,7 @@ class Beside:
     affords: Callable[[float], bool]
 
     def sources(self) -> Iterator[Source]:
-        """Those that the scene has: measured where the question asks for it."""
+        """Sources that the scene has, measured where the question asks for them."""
         law = self.job.scene.effect("contact")
         if law is not None:
             yield self._contact(law)
@@ -68,7 +68,7 @@ class Beside:
             [replace(self.job.scene, mesh=mesh) for mesh in self.job.meshes]
         )
         if len(values) < len(self.job.meshes):
-            return Source("mesh", math.inf, f"{count}, a run of which diverged", seconds)
+            return Source("mesh", math.inf, f"{count}, of which one diverged", seconds)
         spread = mean_and_deviation([self.runs.value(self.level), *values])[1]
         error = spread * t_quantile(self.job.confidence, len(values))
         return Source("mesh", error, f"spread over {count}", seconds)

@@ -1,4 +1,4 @@
-"""Twins of a run, which differ from it by chance alone: how far they spread, and to which ends."""
+"""Twins of a run, which differ from it by chance alone: their spread and their outcomes."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -40,9 +40,8 @@ class Twins:
     def spread(self, levels: Sequence[float], allowed: float, is_last: bool) -> float:
         """Half-width by which runs that differ by chance spread, of one or of their mean.
 
-        Where half the step breaks the same faces and moves bodies by little, and no twins have
-        parted so far, nothing is there that could let them part. is_last: whether no finer level
-        is looked at.
+        If half the step breaks the same faces and hardly moves bodies, and no twins have separated
+        so far, twins cannot separate. is_last: whether this is the finest level.
         """
         averaged = self.job.goal.averaged
         if self.count == 0:
@@ -75,7 +74,7 @@ class Twins:
         return mean_and_deviation(found)[1] if len(found) > self.count else math.inf
 
     def branched(self, made: Answer, allowed: float, step: float) -> Answer:
-        """The answer with its branches, where twins come to a few ends; else as it is.
+        """The answer with its branches, where twins have a few outcomes; else unchanged.
 
         step: error of a value by the step.
         """
@@ -85,5 +84,5 @@ class Twins:
         if self.job.goal.averaged or not few:
             return made
         branches = branches_of(values, clusters, range(len(values)), step, 1.0)
-        ends = "that differ by chance came to {} ends"
+        ends = "that differ by chance had {} outcomes"
         return branched(made, branches, made.parts.step, "run", ends)

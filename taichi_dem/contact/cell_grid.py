@@ -1,6 +1,6 @@
 """Cell grid over the centres of bodies.
 
-And the positions at which bodies were listed, with the distances that they may go from there.
+And the positions at which bodies were listed, with the distances that they may move from there.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Pairs of bodies in contact: the impulses they exchange, and how far bodies may go unsearched."""
+"""Pairs of bodies in contact: their impulses, and how far bodies may move before a search."""
 
 import numpy as np
 import taichi as ti

@@ -1,4 +1,4 @@
-"""Search for pairs of bodies that may touch soon, and for what the contact law wants of each.
+"""Search for pairs of bodies that may touch soon, and for their contacts by the contact law.
 
 Invariants, at any tick between two searches:
 
@@ -104,8 +104,8 @@ class BroadPhase:
             if self.contacts.law.meets_bodies and option == "spheres_per_body":
                 option = "pairs_per_body"
             raise InputError(
-                f"contact lists are full: give {law} a larger {option}, or move solids apart that "
-                "lie in each other"
+                f"contact lists are full: give {law} a larger {option}, or move "
+                "overlapping solids apart"
             )
 
     def _phases(self, n) -> Phases:

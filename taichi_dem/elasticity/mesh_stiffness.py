@@ -227,7 +227,7 @@ def motions_under(
         rest -= step * held
     raise InputError(
         f"the springs of a mesh must be solved within {_MOST_ITERATIONS} iterations, and are "
-        f"not: is it made of bodies that hang on single bonds, or of very uneven size?"
+        f"not: bodies may hang on single bonds, or differ too much in size"
     )
 
 

@@ -36,16 +36,15 @@ _FIELDS = ("global_vars", "grad_vars", "dual_vars", "matrix_fields")
 
 
 class CapacityError(InputError):
-    """The machine's memory, or Taichi's room for field trees, is used up."""
+    """The machine has no memory left, or Taichi no further field tree."""
 
 
 class FieldTree:
     """Fields declared in its ``with`` block; memory is taken at the end of the block, all at once.
 
-    advice: what to do where the machine lacks the memory, as the end of a sentence. counted: for
-    how many of what the fields have room. bytes: size of all fields. Raises InputError,
-    before anything is allocated, where the machine lacks the memory or the session has no room for
-    another tree.
+    advice: what to do where memory is short, as the end of a sentence. counted: how many of what
+    fit into the fields. bytes: size of all fields. Raises InputError, before anything is allocated,
+    where the machine lacks the memory or the session has no room for another tree.
     """
 
     scratch_fields = ("_anchor",)
@@ -99,7 +98,7 @@ class FieldTree:
         except RuntimeError as error:
             # Taichi does not tell how much memory of a card is free.
             raise CapacityError(
-                f"this needs {self.bytes / 1e9:.3g} GB, which the device refuses "
+                f"this needs {self.bytes / 1e9:.3g} GB, which the device does not give "
                 f"({' '.join(str(error).split())}): {self.advice}"
             ) from None
         if backend.is_cpu():
@@ -344,7 +343,7 @@ def check_capacity() -> None:
     if trees > MOST_TREES:
         raise CapacityError(
             f"groups of fields in a Taichi session must stay below {MOST_TREES}, got {trees}: "
-            "call runtime.clear() after some hundred kinds of scenes"
+            "call runtime.clear() after a few hundred kinds of scenes"
         )
 
 

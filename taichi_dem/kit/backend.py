@@ -1,7 +1,7 @@
-"""What the running device is and can do: the only module that knows one back end from another.
+"""Properties of the running device: the only module that distinguishes back ends.
 
-Kernels, drivers and loaders ask here. Doubles are required: Metal and most Vulkan drivers of
-telephones have none.
+Kernels, drivers and loaders ask here. Double precision is required: Metal and most Vulkan drivers
+of telephones lack it.
 """
 
 import math
@@ -60,9 +60,9 @@ def in_host_memory() -> bool:
 
 
 def probe() -> None:
-    """Find out what the device that Taichi has just started on does wrong.
+    """Find the faults of the device on which Taichi has just started.
 
-    Raises InputError where it computes no doubles, or not even small blocks of threads serve.
+    Raises InputError where it has no double precision, or fails even with small blocks of threads.
 
     Mesa's lavapipe, a Vulkan driver that runs on the CPU, ends all loops of a thread after 65,535
     rounds, and threads of a block of more than 8 leave a loop with an atomic together.
@@ -74,7 +74,7 @@ def probe() -> None:
         blocks = [block for block in (0, _SMALL_BLOCK) if _loops_end_alone(block)]
     except RuntimeError as error:
         words = str(error).strip().splitlines()[-1]
-        raise InputError(f"the device computes no doubles: use arch 'cpu' ({words})") from None
+        raise InputError(f"the device has no double precision: use arch 'cpu' ({words})") from None
     if not blocks:
         raise InputError("the driver of the device ends loops too early: use arch 'cpu'")
     _faults.update(block=blocks[0], rounds=_rounds())

@@ -1,7 +1,7 @@
-"""What a certificate of a run is made of: estimates of what was left out, and audits.
+"""Parts of a certificate of a run: estimates of what was left out, and audits.
 
-A few of all evaluations that were skipped, chosen by a counter and not by their result, are made
-and compared. What was found among them bounds the share of misses among all of them.
+A few of the skipped evaluations, chosen by a counter and not by their result, are made and
+compared. The misses among them bound the share of misses among all.
 """
 
 import math
@@ -31,7 +31,7 @@ class Estimate:
     words : str
         The group in words.
     limits : tuple of (float, float), default LIMITS
-        Groups below which it is negligible, and from which on it is needed.
+        Group below which the effect is negligible, and group from which it is needed.
     """
 
     effect: str
@@ -69,7 +69,7 @@ class Audit:
     Parameters
     ----------
     skipped : int
-        Evaluations that were not needed, those made for the audit among them.
+        Evaluations that were not needed, including those of the audit.
     audited : int
         Skipped evaluations that were made and compared.
     misses : int
@@ -140,12 +140,12 @@ class BaseCertificate:
 
     @property
     def holds(self) -> bool:
-        """Whether no audit found a miss, and nothing else speaks against it."""
+        """Whether no audit found a miss, and there is no other fault."""
         return not self.failure
 
     @property
     def failure(self) -> str:
-        """Why the certificate does not hold, and what settles it; ``""`` where it holds."""
+        """Why the certificate does not hold, and a remedy; ``""`` where it holds."""
         faults = self._faults()
         return f"{', and '.join(faults)}: {self.remedy}" if faults else ""
 
@@ -156,7 +156,7 @@ class BaseCertificate:
 
     @property
     def remedy(self) -> str:
-        """What would settle it."""
+        """Remedy of a fault."""
         raise NotImplementedError
 
     def as_dict(self) -> dict[str, Any]:

@@ -40,7 +40,7 @@ _MOST_MARKS = 1_000_000
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """Where a run saves itself, and when besides at its end.
+    """File to which a run saves itself, and when.
 
     A run also saves itself at its end and on Ctrl-C or another stop signal.
 
@@ -132,7 +132,7 @@ class Interrupted(Portable, KeyboardInterrupt):
 
 
 class StopRequests:
-    """Notes the first stop signal in its block, in ``asked``; the second one interrupts.
+    """Notes the first stop signal in its block, in ``asked``; a second one interrupts.
 
     asked: number of the signal, 0 for none. One that is ignored, as SIGHUP under nohup, stays so,
     except for Ctrl-C. Python delivers signals to the main thread only: in others nothing changes.
@@ -173,7 +173,7 @@ def digest(*arrays: ArrayLike) -> str:
 
 
 def identity_of(value: Any) -> str:
-    """Words for a value that are the same for equal ones: 1, 1.0 and ``np.float64(1)`` are one.
+    """Words for a value, the same for equal values such as 1, 1.0 and ``np.float64(1)``.
 
     Dataclasses and containers are looked into, an array is given by its ``digest``; of anything
     else its ``repr`` counts.
@@ -233,7 +233,7 @@ def read_checkpoint(path: FileName, identity: Mapping[str, str]) -> dict[str, np
         raise InputError(f"cannot read checkpoint {path}: {error.strerror or error}") from None
     except (ValueError, KeyError):
         raise InputError(
-            f"{path} must be a whole checkpoint: it is damaged, none, or of an earlier version"
+            f"{path} must be a complete checkpoint: it is damaged, none, or of an earlier version"
         ) from None
     for name, mine in identity.items():
         theirs = about.get(name, "nothing")
@@ -250,6 +250,6 @@ def _sealed_arrays(path):
             end <= 0
             or content[end:] != hashlib.sha256(memoryview(content)[:end]).hexdigest().encode()
         ):
-            raise ValueError("its digest does not fit")
+            raise ValueError("its digest does not match")
         with np.load(file, allow_pickle=False) as archive:
             return dict(archive)

@@ -1,4 +1,4 @@
-"""Processes that a program starts and waits for, which end with it."""
+"""Processes that a program starts, waits for, and ends with itself."""
 
 import contextlib
 import signal
@@ -17,7 +17,7 @@ _told = threading.Event()
 
 
 class Terminated(BaseException):
-    """The program was told to end, by a signal of a number."""
+    """A signal has told the program to end."""
 
     @property
     def number(self) -> int:

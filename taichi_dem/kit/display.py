@@ -1,4 +1,4 @@
-"""How objects show themselves: a line or two at a prompt, HTML in a notebook.
+"""Display of objects: a line or two at a prompt, HTML in a notebook.
 
 Nothing here reads a field: an object may be shown after its Taichi session has ended.
 """

@@ -36,8 +36,8 @@ class EffectUse:
     whole : str, default "the energy put in"
         What the share is of, in words.
     steers : bool, default False
-        Whether it directs the rest even where it takes little, as a crack does; such an effect can
-        be left out only if it never acted.
+        Whether it directs the motion even if it takes little energy, as a crack does; such an
+        effect can be left out only if it never acted.
     kept : str, default ""
         Reason to keep it in any case, in words, or ``""``.
     rounding : bool, default False
@@ -74,11 +74,11 @@ class EffectUse:
 
     @property
     def idle(self) -> bool:
-        """Whether it is known to have had no part in the run, not even in its rounding."""
+        """Whether it is known that it did not change the run, not even its rounding."""
         return not (self.is_active or self.kept or self.rounding)
 
     def negligible(self, tolerance: float) -> bool:
-        """Whether it acted, and booked less than a share of the energy, or round-off alone.
+        """Whether it acted, but with less than a share of the energy, or only round-off.
 
         Parameters
         ----------
@@ -126,9 +126,8 @@ class Advice:
     tolerance : float
         Share of the energy below which an effect counts as negligible.
     shown : mapping, optional
-        Difference that a run without an effect made, by name, as a share of what was recorded. Then
-        only effects whose difference is within the tolerance are droppable. None where counts
-        decide.
+        Difference that a run without an effect made, by name, as a share of the record. Only
+        effects whose difference is within the tolerance are then droppable. None if counts decide.
     left_out : tuple, default ()
         Estimates of effects that nothing serves; like the findings, each with a ``row``.
     """
@@ -141,12 +140,12 @@ class Advice:
 
     @property
     def inactive(self) -> tuple[str, ...]:
-        """Names of the effects that had no part; without them not a bit would differ."""
+        """Names of the effects that never acted; without them no bit would differ."""
         return tuple(use.effect for use in self.uses if use.idle)
 
     @property
     def negligible(self) -> tuple[str, ...]:
-        """Names of the effects that booked less than the tolerance, or no more than round-off."""
+        """Names of the effects with less energy than the tolerance, or only round-off."""
         return tuple(use.effect for use in self.uses if use.negligible(self.tolerance))
 
     @property
@@ -164,7 +163,7 @@ class Advice:
         if use.effect not in self.shown:
             return "; no run without it was made"
         if self.shown[use.effect] == 0.0:
-            same = "the same but for rounding" if use.rounding else "the same"
+            same = "the same up to rounding" if use.rounding else "the same"
             return f"; a run without it is {same}"
         return f"; a run without it differs by {100.0 * self.shown[use.effect]:.2g} %"
 

@@ -18,17 +18,17 @@ class InputError(Portable, ValueError):
 
 
 class SimulationDiverged(Portable, RuntimeError):
-    """The run left the range in which its numbers mean anything.
+    """The run left the range of meaningful numbers.
 
     Attributes
     ----------
     result : Result or None
         Result of the run up to its last good sample; None where there is none.
     advice : mapping of float
-        What the sentence advises, numbers by name: step [s], the largest one of the method;
+        Numbers that the sentence advises, by name: step [s], the largest one of the method;
         max_speed [m/s] of the scene; contact_stiffness [N/m] or, of whole bodies, normal_stiffness
         [Pa/m] of the material; of the damper dt [s].
-        A run that follows it may have to be advised again.
+        A run that follows it may need further advice.
     """
 
     result: Any = None

@@ -1,4 +1,4 @@
-"""All fields of an object, found by walking through it, and their bits, read and written fast."""
+"""All fields of an object and its parts, and fast access to their bits."""
 
 import types
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""What Taichi finds out again at every node of a kernel, found once: it reads kernels in less time.
+"""Cache of what Taichi looks up at every node of a kernel, so that it reads kernels faster.
 
 For a possible error message it notes the source line of every name and operator, broken at 80
 characters, and the stack in which each field is declared; wherever a function is called it looks

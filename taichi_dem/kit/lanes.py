@@ -1,4 +1,4 @@
-"""Several members worked on side by side, one a lane of a vector.
+"""Several members computed side by side, one per lane of a vector.
 
 The compiler turns arithmetic on vectors into vector instructions where each vector lies in one
 piece of memory, as an entry of a vector or matrix field does. Four numbers of 64 bits are what one

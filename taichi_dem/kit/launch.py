@@ -70,6 +70,6 @@ def _failed(error):
         return handle_exception_from_cpp(error)
     words = " ".join(str(error).split())
     return InputError(
-        f"the device does not answer any more ({words}): go on from the last checkpoint, or start "
+        f"the device no longer answers ({words}): resume from the last checkpoint, or start "
         "again with arch 'cpu'"
     )

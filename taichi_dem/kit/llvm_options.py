@@ -1,4 +1,4 @@
-"""Passes of LLVM switched off that cost time at each start and gain none in a step.
+"""Switch off passes of LLVM that cost time at each start and save none in a step.
 
 LLVM repeats the body of each small loop eight times, and most of ours turn but a few times: without
 that kernels compile in three quarters of the time. The others work on machine code, which is made

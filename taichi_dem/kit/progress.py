@@ -17,7 +17,7 @@ _UNTIMED = ("compiling", "drawing")
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a job is; every job of both packages and of the experiments reports one of these.
+    """Progress of a job; every job of both packages and of the experiments reports it.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Progress:
 
     @property
     def seconds_left(self) -> float:
-        """Time expected until the end [s]; infinite while too little is known of it."""
+        """Expected time until the end [s]; infinite while unknown."""
         if self.phase in _UNTIMED or self.share < LEAST_SHARE:
             return math.inf
         return max(0.0, self.seconds * (1.0 / self.share - 1.0))
@@ -52,7 +52,7 @@ class Progress:
 
 
 def time_left(seconds: float) -> str:
-    """A time that is left [s] in words, no finer than it is known; "" when it is unknown."""
+    """Remaining time [s] in words, no finer than it is known; "" if unknown."""
     if not math.isfinite(seconds):
         return ""
     if seconds < 90.0:

@@ -34,7 +34,7 @@ class ProgressBar:
     Parameters
     ----------
     title : str
-        What is being done.
+        Name of the job.
 
     Examples
     --------
@@ -66,7 +66,7 @@ class ProgressBar:
         self._show(progress)
 
     def at(self, share: float) -> None:
-        """Show the progress of a job that knows no more than its share.
+        """Show the progress of a job that knows only its share.
 
         Parameters
         ----------
@@ -77,7 +77,7 @@ class ProgressBar:
         self(Progress(share, time.perf_counter() - self._started))
 
     def count(self, done: int, total: int) -> None:
-        """Show how many runs are done of a job that consists of several.
+        """Show how many runs of a job are done.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Where a number was computed: processor, machine, memory, and commit of the sources."""
+"""Origin of a computed number: processor, machine, memory, and commit of the sources."""
 
 import functools
 import os

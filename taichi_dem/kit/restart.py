@@ -1,4 +1,4 @@
-"""Saving and resuming runs: the parts of a run, the times of saving, and how a run is resumed."""
+"""Saving and resuming of runs: data of a run, times of saving, restoring."""
 
 import os
 import time
@@ -51,7 +51,7 @@ class RunSnapshot:
                 owner.resume(_under(part, arrays))
             except (KeyError, IndexError, ValueError, TypeError):
                 raise InputError(
-                    f"checkpoint {path} is of another version: what it holds of the {part} differs"
+                    f"checkpoint {path} is of another version: its data of the {part} differ"
                 ) from None
 
 

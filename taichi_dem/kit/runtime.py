@@ -197,8 +197,8 @@ def _check_process():
     """Raise InputError in a fork of the process that started Taichi."""
     if _session is not None and _session.process != os.getpid():
         raise InputError(
-            "Taichi was started before this process was forked, and would hang in it: begin "
-            'processes by multiprocessing.get_context("spawn"), or start Taichi in them only'
+            "Taichi was started before this process was forked, and would hang in it: start "
+            'processes by multiprocessing.get_context("spawn"), or start Taichi only in them'
         )
 
 
@@ -319,7 +319,7 @@ def _initialise(wanted):
     got = impl.current_cfg().arch
     if got != backend.GPUS.get(wanted.arch, got) or backend.is_cpu() != (wanted.arch == "cpu"):
         _reset()
-        raise InputError(f"arch {wanted.arch!r} was asked for, Taichi started {got}")
+        raise InputError(f"arch {wanted.arch!r} was asked for, but Taichi started {got}")
     try:
         backend.probe()
     except InputError:

@@ -1,8 +1,8 @@
 """One thread that owns Taichi, for programs that serve several users: pages, notebooks, sliders.
 
-Each browser that opens a page is served by a thread of its own, in one process. Taichi makes fields
-only on the thread that started it, and two starts would take each other's fields away. So all work
-is handed to this thread, which keeps its results for the next user.
+In one process, each browser that opens a page has a thread of its own. Taichi makes fields only on
+the thread that started it, and a second start would remove them. So this thread does all work, and
+keeps its results for the next user.
 """
 
 import functools

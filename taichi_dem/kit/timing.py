@@ -1,4 +1,4 @@
-"""Timings that can be compared: warm, repeated, with their spread, by turns."""
+"""Comparable timings: warm, repeated, in turns, with their spread."""
 
 import glob
 import math

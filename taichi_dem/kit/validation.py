@@ -1,4 +1,4 @@
-"""Checks of user input: the value is returned, or InputError names it and the allowed range."""
+"""Checks of user input: they return the value, or raise InputError with the allowed range."""
 
 import dataclasses
 import decimal
@@ -41,7 +41,7 @@ def shown(value: Any) -> str:
 
 
 def told_apart(value: float, bound: float, digits: int = 3) -> tuple[str, str]:
-    """A refused value and the bound that it misses, in the fewest digits that tell them apart.
+    """A refused value and the bound that it misses, in the fewest digits that differ.
 
     digits: of the bound at least; the value has six. The bound is rounded away from the value, so
     that it is allowed as it reads.
@@ -159,7 +159,7 @@ def word(name: str, value: Any) -> str:
     """The value; InputError unless it is text that a mesh file can hold as a name."""
     if not isinstance(value, str) or not value or not value.isprintable() or '"' in value:
         raise InputError(
-            f'{name} must be text on one line, without ", of one letter at least, '
+            f'{name} must be one line of text, of one letter at least and without ", '
             f"got {shown(value)}"
         )
     return value

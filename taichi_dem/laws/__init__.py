@@ -1,1 +1,1 @@
-"""What acts between bodies: laws of bonds, of contact and of friction."""
+"""Laws between bodies: of bonds, contact and friction."""

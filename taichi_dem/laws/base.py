@@ -83,8 +83,8 @@ class Effect:
     def silent(self) -> "Effect":
         """Return a copy that is compiled like this effect and never acts.
 
-        All bits, reports and findings are those of a scene that does not list it, which would be
-        compiled anew.
+        All bits, reports and findings are those of a scene without it, but nothing is compiled
+        anew.
 
         Returns
         -------
@@ -103,7 +103,7 @@ class Effect:
         return made
 
     def check_material(self, material: Material) -> None:
-        """Refuse a material that the effect cannot act with; a scene asks.
+        """Refuse a material with which the effect cannot act; a scene calls this.
 
         Parameters
         ----------
@@ -117,7 +117,7 @@ class Effect:
         """
 
     def numbers(self, material: Material) -> tuple:
-        """Numbers that kernels read; to change them compiles nothing.
+        """Numbers that kernels read; changing them compiles nothing.
 
         Loads, supports and ground read them as ``self.law[0]`` and on, laws of bonds and contacts
         as ``self.law[m, 0]`` and on, m a pair of materials.
@@ -125,7 +125,7 @@ class Effect:
         Parameters
         ----------
         material : Material
-            Material of the scene; for a law what joins the two bodies (``body_materials.joined``).
+            Material of the scene; for a law the one between two bodies (``body_materials.joined``).
 
         Returns
         -------
@@ -239,8 +239,8 @@ class Effect:
     def accepts(self, given: "Effect") -> bool:
         """Whether kernels compiled for this effect are valid for an effect of a scene.
 
-        They are, unless they contain an attribute of it, read in a kernel, that has another value,
-        or it has another count of numbers.
+        They are valid unless an attribute that kernels read has another value, or the effect has
+        another count of numbers.
 
         Parameters
         ----------
@@ -294,13 +294,13 @@ def _numbers_of(effect, materials):
 
 
 def check_one_material(effect: Effect, materials: BodyMaterials) -> None:
-    """Raise InputError where a load, support or ground takes numbers that materials differ in."""
+    """Raise InputError where materials give a load, support or ground different numbers."""
     if effect.role in MANY and not materials.is_one:
         own = [tuple(effect.numbers(row[k])) for k, row in enumerate(materials.pairs)]
         if any(numbers != own[0] for numbers in own):
             raise InputError(
-                f"effect {effect.name} takes one row of numbers for all bodies, and must get the "
-                f"same of every material of a scene, got {shown(own[0])} and others"
+                f"effect {effect.name} has one row of numbers for all bodies, and must get "
+                f"the same row from every material of a scene, got {shown(own[0])} and others"
             )
 
 

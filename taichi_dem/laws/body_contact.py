@@ -1,4 +1,4 @@
-"""Contact of whole bodies, whose energy is that of the volume in which they overlap."""
+"""Contact of whole bodies, by the energy of their shared volume."""
 
 from dataclasses import replace
 from typing import Any
@@ -37,13 +37,12 @@ MOST_PARTS, _NONE, _FAR = 8, 1e-28, 0.02
 
 @ti.data_oriented
 class BodyContact(SphereContact):
-    """Bodies repel each other by the gradient of an energy of their overlap; outer faces too.
+    """Bodies repel each other by the gradient of an energy of their overlap, also at outer faces.
 
-    The contact of ``effects="auto"`` and ``"all"``. The energy of a pair is k (q - q0)^2 / 2, k the
-    normal stiffness of a bond per area and q the size of the overlap, the area of contact's root
-    times the depth where flat sides meet; q0 is the smallest q since the two could first touch. So
-    a break injects nothing, whatever overlaps then. A dashpot acts on the rate of q, never as
-    attraction.
+    The contact of ``effects="auto"`` and ``"all"``. The energy of a pair is k (q - q0)^2 / 2 with k
+    the normal stiffness of a bond per area and q the size of the overlap (where flat sides meet:
+    the root of the contact area times the depth); q0 is the smallest q since the two could first
+    touch. So a break injects no energy. A dashpot acts on the rate of q, never as attraction.
 
     Parameters
     ----------

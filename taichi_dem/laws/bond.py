@@ -213,7 +213,7 @@ class BondDamping(Effect):
 
 @ti.data_oriented
 class Separable:
-    """A normal and a tangential law, each for itself but for the pressure: the paper's.
+    """A normal and a tangential law that share only the pressure, as in the paper.
 
     tension, shear: bound effects of these roles. The rest is as of the role bond.
     Source: Konno et al., section 2.1.
@@ -288,7 +288,7 @@ class Separable:
 class SlipWeakening(ShearSlip):
     """Coulomb slip of bonds whose cohesion falls linearly with the accumulated slip, to zero.
 
-    Takes the place of ``ShearSlip``, by which cohesion does not degrade.
+    Replaces ``ShearSlip``, whose cohesion does not degrade.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ _MOST, _QUARTER = 8.0, 0.25
 class MixedMode(Effect):
     """Bonds soften along a straight line, by opening and sliding together, and fail.
 
-    Takes the place of ``Softening`` and ``ShearSlip``.
+    Replaces ``Softening`` and ``ShearSlip``.
 
     Parameters
     ----------

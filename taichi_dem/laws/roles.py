@@ -5,7 +5,7 @@ arguments, and functions of the model. b is a bond, u one of its three contact u
 3 b + 2), i a body, k a sphere pair, m a pair of materials, whose numbers a law reads as
 ``self.law[m, 0]`` and on.
 
-And the laws that a scene takes from its material where it names none: effects="auto" and "all".
+Also the laws that effects="auto" and "all" take from the material of a scene.
 """
 
 from collections.abc import Iterable
@@ -172,8 +172,8 @@ def check_activation(effect: Any) -> None:
     """Raise InputError for a law that has no rule for effects="auto"; loads and supports act."""
     if effect.role in _OF_BONDS and effect.is_silent:
         raise InputError(
-            "effects 'auto' must have laws of bonds that act, as it looks for no limit beside "
-            f"theirs, got a silent {type(effect).name}: list the effects, or take 'all'"
+            "effects 'auto' must have laws of bonds that act, as it checks the limits of these "
+            f"laws only, got a silent {type(effect).name}: list the effects, or take 'all'"
         )
     rules = ("activation", "begins") if effect.role in _OF_BONDS else ("activation",)
     for rule in rules if effect.role in _DOES else ():
@@ -194,7 +194,7 @@ def _first(kind, member):
 
 
 def check_effect(effect: Any) -> None:
-    """Raise InputError unless an effect has a known role and every member that it asks for."""
+    """Raise InputError unless an effect has a known role and every member of that role."""
     if effect.role not in ROLES:
         raise InputError(
             f"role of effect {type(effect).__name__} must be one of {', '.join(ROLES)}, got "

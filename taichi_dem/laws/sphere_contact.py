@@ -109,7 +109,7 @@ class SphereContact(Effect):
         return spheres_of_faces(model.mesh, model.centre, self.divisions)
 
     def areas(self, mesh: Mesh) -> Any:
-        """By what the constants are multiplied at most in a contact of each body, (n,) or one."""
+        """Largest factor of the constants in a contact of each body, (n,) or one."""
         return 1.0
 
     def declare_columns(self, store: PairStore) -> None:
@@ -188,7 +188,7 @@ class SphereContact(Effect):
 
     @ti.func
     def settle(self, near, k):
-        """Take note of how entry k is now, before its forces are asked."""
+        """Prepare entry k before its forces are evaluated."""
 
     @ti.func
     def normal(self, m, overlap, opening_rate):

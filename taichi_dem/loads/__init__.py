@@ -1,1 +1,1 @@
-"""What acts on a body: loads, supports, ground."""
+"""Effects on single bodies: loads, supports, ground."""

@@ -45,7 +45,7 @@ def unresolved_histories(effects: Any, step: float) -> tuple[str, ...]:
     return tuple(
         f"{effect.name} ({getattr(effect, 'group', 'all bodies')}) changes within {time:.3g} s, "
         f"less than the largest step, {step:.3g} s: its shape over time may be lost, though loads "
-        "keep their whole impulse and ramps their whole way; steps of at most "
+        "keep their whole impulse and ramps their whole displacement; steps of at most "
         f"{time:.3g} s resolve it"
         for effect, time in times
         if time < step

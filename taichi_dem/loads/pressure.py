@@ -1,4 +1,4 @@
-"""Weight, pressure on a group of outer faces, that of the blast gas (Konno et al., eq. 4)."""
+"""Weight, pressure on a group of outer faces, blast gas pressure (Konno et al., eq. 4)."""
 
 import math
 from collections.abc import Sequence
@@ -121,8 +121,7 @@ class Pressure(FacePressure):
     Parameters
     ----------
     group : str
-        Group of outer faces, or of inner faces without bonds, whose both sides the pressure pushes
-        apart.
+        Group of outer faces, or of inner faces without bonds, whose sides are pushed apart.
     values : float or sequence of float
         Pressures [Pa] at the times: linear between them, constant before the first and after the
         last. Negative values pull. A single number is a constant pressure from time zero.
@@ -258,8 +257,7 @@ class GasPressure(FacePressure):
     decay_ratio : float, default 2.75
         Ratio of the time from the peak to zero to the rise.
     start : float, default 0.0
-        Time at which the pressure begins [s]: holes with a ``GasPressure`` each fire one after the
-        other.
+        Time at which the pressure begins [s], such as for holes that fire one after the other.
 
     Raises
     ------
@@ -300,7 +298,7 @@ class GasPressure(FacePressure):
 
     @property
     def duration(self) -> float:
-        """Time from its start until there is no pressure any more [s]."""
+        """Time from its start until the pressure is zero [s]."""
         return (self.decay_ratio + 1.0) * self.rise
 
     def numbers(self, material: Material) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""A boundary beyond which the solid goes on: waves leave through it.
+"""Quiet boundary: waves leave the mesh, as if the solid continued.
 
 Source: J. Lysmer and R. L. Kuhlemeyer, Finite dynamic model for infinite media, J. Eng. Mech. Div.
 ASCE 95(EM4), 1969, 859-877, eq. 1 and 2.

@@ -86,7 +86,7 @@ class Fixed(_Support):
 class Roller(_Support):
     """Bodies with a face in the group slide on its plane and turn about its normal only.
 
-    A body on several planes slides along what they have in common, and turns only where all are
+    A body on several planes slides along their common directions, and turns only if all are
     parallel.
 
     Parameters
@@ -174,7 +174,7 @@ class PrescribedMotion(_Support):
     frequency : float, default 0.0
         Frequency [Hz]; zero for a constant velocity.
     ramp : float, default 0.0
-        Time in which the velocity rises from zero, in a straight line [s].
+        Time in which the velocity rises linearly from zero [s].
     history : tuple of (sequence, sequence), optional
         (times [s], shares), in place of a ramp: the velocity is multiplied by the shares, linear
         between the times and constant before the first and after the last.
@@ -226,7 +226,7 @@ class PrescribedMotion(_Support):
             if both:
                 raise InputError(
                     f"group {self.group} of prescribed_motion must not share bodies with group "
-                    f"{effect.group} of {effect.name}, which holds them otherwise, got body "
+                    f"{effect.group} of {effect.name}, which holds them differently, got body "
                     f"{min(both)} in both"
                 )
 

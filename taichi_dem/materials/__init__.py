@@ -1,4 +1,4 @@
-"""Materials of bodies, and the constants of what joins two of them."""
+"""Materials of bodies, and constants of bonds and contacts between them."""
 
 from taichi_dem.materials.material import CONCRETE, Material
 

@@ -1,4 +1,4 @@
-"""Materials of the bodies of a scene, and what joins two of them: THE rule for mixed bonds.
+"""Materials of the bodies of a scene, and THE rule for bonds between two of them.
 
 A bond or contact between two materials has springs and dashpots in series, and the lesser of both
 strengths, cohesions, frictions and fracture energies, each for itself (``joined``).
@@ -38,7 +38,7 @@ _LEAST = ("tensile_strength", "cohesion", "friction", "fracture_energy")
 
 
 def joined(first: Material, second: Material) -> Material:
-    """What a bond between two materials has, and a contact of two bodies.
+    """Constants of a bond, and of a contact, between two materials.
 
     Stiffnesses and dashpots are in series (``bond_rules.InSeries``; of contacts 2 k1 k2 / (k1 +
     k2), numbers by now), strengths the lesser ones. A constant that both share stays, to the bit.
@@ -87,7 +87,7 @@ class BodyMaterials:
 
     @cached_property
     def pairs(self) -> tuple[tuple[Material, ...], ...]:
-        """What joins material a and b, entry a, b; contacts have numbers."""
+        """Constants between materials a and b, entry a, b; contacts have numbers."""
         own = [self._on_mesh(k) for k in range(len(self.materials))]
         return tuple(
             tuple(one if one is other else joined(one, other) for other in own) for one in own
@@ -138,7 +138,7 @@ class BodyMaterials:
         return np.array(most)[self.of_body]
 
     def checked_pairs(self) -> tuple[Material, ...]:
-        """Every material, and what joins two in a bond, with the numbers of its softest bond.
+        """Every material and every pair in a bond, with the numbers of its softest bond.
 
         Raises InputError where the fracture energy is too small for a bond: the larger the
         elements, the softer their bonds, and the more energy they have stored when they reach their
@@ -170,7 +170,7 @@ class BodyMaterials:
         distance = bond_geometry(self.mesh, topology, self.density).distance[bond]
         where = f" at bond {bond}, whose bodies are {distance:.4g} m apart"
         if mixed:
-            where += " and of two materials, of which it has the lesser strength and energy"
+            where += " and of two materials, with the lesser strength and energy of both"
         check_energy(made, where)
         return made
 

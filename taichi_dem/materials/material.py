@@ -200,7 +200,7 @@ class Material:
         cohesion: float,
         damping_ratio: float = 0.05,
     ) -> Material:
-        """Make a material from measured values; bonds are stiffer where bodies are closer.
+        """Make a material from measured values; shorter bonds are stiffer.
 
         Young's modulus and Poisson's ratio of a block then do not depend on the size of its
         elements: a bond has the stiffness modulus / distance per area (``materials.moduli``).

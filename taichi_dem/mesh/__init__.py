@@ -1,1 +1,1 @@
-"""Meshes of tetrahedra and all that follows from their geometry; NumPy only."""
+"""Meshes of tetrahedra and their geometry; NumPy only."""

@@ -1,4 +1,4 @@
-"""Arrays of a mesh checked: small defects are repaired and told, others refused (NumPy only)."""
+"""Checks of mesh arrays: small defects are repaired and reported, others refused (NumPy only)."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -238,8 +238,8 @@ def _checked_faces(tetrahedra, groups, notes):
             inner.append(name)
         elif wrong:
             raise InputError(
-                f"group {name!r}: {wrong} of its {len(mine)} faces are not outer faces of the "
-                "mesh, as those of a group must be unless two bodies share each of them"
+                f"group {name!r}: {wrong} of its {len(mine)} faces are not outer faces; all "
+                "faces of a group must be outer faces, or all must be shared by two bodies"
             )
         once = np.unique(row_of[mine])
         if len(once) < len(mine):

@@ -1,4 +1,4 @@
-"""Mesh files: read all that meshio can, write Gmsh, VTU and PVD."""
+"""Mesh files: read all formats of meshio, write Gmsh, VTU and PVD."""
 
 import contextlib
 import io
@@ -24,8 +24,8 @@ from taichi_dem.mesh.tetrahedra import edge_lengths
 
 _SPLIT = "split them into tetrahedra, for example by ParaView's filter Tetrahedralize"
 _REMEDY = (
-    "mesh in three dimensions (gmsh -3) with a physical group of the volume too, without which "
-    "Gmsh does not save it, or fill a closed surface by taichi_dem.shapes.from_surface"
+    "mesh in three dimensions (gmsh -3) with a physical group of the volume, or Gmsh does not "
+    "save it; or fill a closed surface by taichi_dem.shapes.from_surface"
 )
 
 _ENDS = re.compile(rb"^\$((?:End)?(?:Nodes|Elements))[ \t\r]*$", re.MULTILINE)
@@ -59,7 +59,7 @@ def read_mesh(
     path : path
         File that meshio reads.
     scale : float, default 1.0
-        Length of one unit of the file [m], such as 0.001 for a drawing in mm.
+        Length of one unit of the file [m], such as 0.001 for mm.
     weld_tolerance : float, default 0.0
         Points not farther apart than this become one [m]; 0 welds nothing.
     keep_coincident : bool, default False
@@ -69,7 +69,7 @@ def read_mesh(
     Returns
     -------
     Mesh
-        The checked mesh; ``notes`` tells what was mended or not read.
+        The checked mesh; ``notes`` lists repairs and unread data.
 
     Raises
     ------
@@ -83,9 +83,9 @@ def read_mesh(
     formats from integer data on triangles, as "data name_value". Groups of bodies come from Gmsh's
     physical volumes; in other formats from sets of solid cells and integer data on them. Elements
     of higher order are read as linear ones. Hexahedra, prisms and pyramids are cut into tetrahedra
-    after welding. Groups of points and lines are not read. A UserWarning tells of what may change
-    results: sets of some points, which are not read, cells of types that meshio does not know, and
-    cells that meet but share no face.
+    after welding. Groups of points and lines are not read. A UserWarning names what may change
+    results: unread sets of points, cells of types that meshio does not know, and cells that meet
+    but share no face.
 
     Examples
     --------
@@ -173,7 +173,7 @@ def _read_raw(path):
     Whatever goes wrong inside becomes one InputError.
     """
     if not os.path.isfile(path):
-        raise InputError(f"mesh file {path} does not exist, or is no file")
+        raise InputError(f"mesh file {path} does not exist, or is not a file")
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):

@@ -109,7 +109,7 @@ def refuse_too_many(element: float, volume: float) -> None:
     if element < least:
         got, bound = told_apart(element, least)
         raise InputError(
-            f"element must be at least {bound} m, for {_MOST_BODIES} tetrahedra at most in "
+            f"element must be at least {bound} m, to make at most {_MOST_BODIES} tetrahedra in "
             f"{volume:.3g} m3, got {got}"
         )
 

@@ -34,8 +34,8 @@ _DIGITS = 15
 class Mesh(Pictured):
     """Tetrahedra and named groups of faces; immutable.
 
-    Made from arrays it is checked and mended as ``checked_mesh`` says; ``dataclasses.replace``
-    gives another mesh.
+    Its arrays are checked and repaired as in ``checked_mesh``; ``dataclasses.replace`` makes
+    another mesh.
 
     Parameters
     ----------
@@ -47,12 +47,11 @@ class Mesh(Pictured):
         Point indices (n, 3) by name: of outer faces with normals outward, or of inner faces that
         two bodies share.
     notes : tuple of str, default ()
-        Sentences about what the checks repaired or found remarkable.
+        Sentences about repairs and findings of the checks.
     source : str, default ""
         Name of the file; ``""`` for a mesh built in memory.
     keep_coincident : bool, default False
-        Whether points that coincide stay apart, and with them the faces on them, as at a joint or a
-        crack.
+        Whether coincident points, and the faces on them, stay apart, as at a joint or a crack.
     body_groups : mapping, optional
         Numbers of bodies (n,) by name, in rising order, as for ``Scene(materials=...)``.
     weld_tolerance : float, default 0.0
@@ -69,7 +68,7 @@ class Mesh(Pictured):
     Raises
     ------
     InputError
-        The arrays are such as ``checked_mesh`` refuses.
+        ``checked_mesh`` refuses the arrays.
 
     Examples
     --------
@@ -171,13 +170,13 @@ class Mesh(Pictured):
         raise InputError(f"mesh has no {kind} group {shown(name)}; its {kind} groups are: {known}")
 
     def bonded_by(self, shares: Mapping[str, float]) -> "Mesh":
-        """Return the mesh with only a share of the area of some inner faces bonded.
+        """Return the mesh with only a share of some inner faces bonded.
 
         Parameters
         ----------
         shares : mapping
-            Share by the name of an inner group, from 0 (no bond) to 1; the smallest counts where a
-            face is in several groups.
+            Share by the name of an inner group, from 0 (no bond) to 1; a face in several groups has
+            the smallest.
 
         Returns
         -------
@@ -187,7 +186,7 @@ class Mesh(Pictured):
         Raises
         ------
         InputError
-            A group is not there, or is of outer faces, or a share lies outside [0, 1].
+            A group does not exist or has outer faces, or a share lies outside [0, 1].
         """
         if not instance("shares", shares, Mapping) and not self.bonded_shares:
             return self
@@ -196,8 +195,8 @@ class Mesh(Pictured):
             fraction(f"share of group {name}", share)
             if name not in self.inner_groups:
                 raise InputError(
-                    f"group {name} must be of inner faces, which two bodies share, to be unbonded "
-                    "or bonded weaker, got one of outer faces"
+                    f"group {name} must have inner faces, which two bodies share, to be unbonded "
+                    "or weaker, got outer faces"
                 )
         made = copy.copy(self)
         made.__dict__["bonded_shares"] = tuple(sorted(shares.items()))
@@ -205,7 +204,7 @@ class Mesh(Pictured):
 
     @property
     def has_open_faces(self) -> bool:
-        """Whether faces may lie on each other that no bond joins."""
+        """Whether coincident faces without a bond may exist."""
         return self.keep_coincident or any(share == 0.0 for _, share in self.bonded_shares)
 
     def group(self, name: str, chosen: Choice) -> "Mesh":
@@ -274,8 +273,8 @@ class Mesh(Pictured):
         by : sequence of float, default (0.0, 0.0, 0.0)
             Shift [m].
         turned : sequence of float, default (0.0, 0.0, 0.0)
-            Vector along the axis of the turn, right-handed, and as long as its angle [degrees]:
-            (0, 0, 90) turns x into y.
+            Rotation vector, right-handed, of the length of the angle [degrees]: (0, 0, 90) turns x
+            into y.
         about : sequence of float, optional
             Point on the axis [m]; the middle of the mesh's box by default.
 
@@ -327,8 +326,8 @@ def checked_mesh(
         Points not farther apart than this become one [m]; 0 welds nothing.
     keep_coincident : bool, default False
         Accept distinct points at one place. Faces on them are free surfaces, as of two blocks that
-        touch, a joint or a crack, and meet by the contact of outer faces. Without it such points
-        are refused, as bodies that seem joined there would not be bonded.
+        touch, a joint or a crack; they need a contact of outer faces. Without it such points are
+        refused, as bodies that seem joined would have no bond.
     body_groups : mapping, optional
         Numbers of tetrahedra (k,) by name.
 
@@ -340,7 +339,7 @@ def checked_mesh(
     Raises
     ------
     InputError
-        A defect cannot be repaired; the sentence has the numbers, counted from 0.
+        A defect cannot be repaired; the message names the numbers, counted from 0.
 
     Notes
     -----
@@ -428,7 +427,7 @@ def _with_group(mesh: Mesh, kind: str, name: str, members: np.ndarray) -> Mesh:
     """The mesh with one more of its "groups" of faces or "body_groups"."""
     groups = getattr(mesh, kind)
     if word("name", name) in groups:
-        raise InputError(f"name must be that of a new group, got {shown(name)}, which is there")
+        raise InputError(f"name must be that of a new group, got {shown(name)}, which exists")
     if not len(members):
         raise InputError(f"group {name} must have at least one member, but none was chosen")
     more: Any = {kind: {**groups, name: members}}

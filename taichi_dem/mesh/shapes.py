@@ -270,8 +270,7 @@ def _inner_triangles(points, starts, ends, element, draw):
         if abs(float(_areas(points, found).sum()) - wanted) <= _AREA * wanted:
             return found
     raise InputError(
-        "element must be smaller for this shape, whose narrowest place it has to fit into, got "
-        f"{element:g} m"
+        f"element must be smaller, to fit into the narrowest place of this shape, got {element:g} m"
     )
 
 
@@ -368,21 +367,21 @@ def join(*meshes: Mesh, names: Sequence[str] | None = None, bonded: bool = False
     names : sequence of str, optional
         Names of the meshes: first, second, ... by default.
     bonded : bool, default False
-        Whether bonds join the meshes where faces of theirs match, corner by corner. Without it they
-        are apart, also where they touch.
+        Whether bonds join the meshes where faces match, corner by corner. Without it they stay
+        apart, even where they touch.
 
     Returns
     -------
     Mesh
-        Each mesh is a body group of its name. Its groups are there as NAME_GROUP, and, under their
-        own name, together with those of that name of the others. Of groups of outer faces those
-        that have become inner ones are left out, unless all of a group have.
+        Each mesh is a body group of its name. Its groups are named NAME_GROUP; groups of equal
+        names are also joined under that name. Outer faces that have become inner ones leave their
+        groups, unless all faces of a group have.
 
     Raises
     ------
     InputError
-        There are fewer than two meshes, or other than as many different names, or two groups would
-        have one name, or meshes that are to be bonded share no face.
+        There are fewer than two meshes, the names are not as many or not different, two groups
+        would have one name, or bonded meshes share no face.
 
     Examples
     --------
@@ -441,8 +440,8 @@ def _bonded(mesh):
     before, after = (len(np.unique(joined_bodies(one.tetrahedra))) for one in (mesh, made))
     if after == before:
         raise InputError(
-            "bonded must be False for meshes that share no face: their points must lie on each "
-            "other, corner by corner, got none that do"
+            "bonded must be False for meshes that share no face: corners of their faces "
+            "must coincide, got none that do"
         )
     return made
 

@@ -56,7 +56,7 @@ def write_gltf(path: FileName, result: Any, colour: str, seconds: float) -> None
     colour : str
         One of ``body_values.COLOURS``: of the outer faces of each body, from violet to yellow.
     seconds : float
-        How long the animation lasts [s]; the run is stretched to it.
+        Duration of the animation [s], to which the run is stretched.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def write_gltf(path: FileName, result: Any, colour: str, seconds: float) -> None
     Notes
     -----
     A node is a fragment of the last frame, with its outer faces and its broken ones (grey), at rest
-    about its centre of mass. It moves as ``rigid_motion`` says; what a fragment bends is not shown.
+    about its centre of mass. It moves by ``rigid_motion``; bending of fragments is not shown.
     Format: Khronos glTF 2.0. Lengths in m, axes as in the run: y is up in most viewers.
     """
     model, frames = result.model, result.frames

@@ -1,6 +1,6 @@
 """Fragments: bodies that unbroken bonds still join, as one rigid piece each.
 
-And values by which bodies are coloured, by name.
+Also values by which bodies are coloured, by name.
 """
 
 from typing import Any

@@ -67,8 +67,8 @@ class Frame:
     The stress is the symmetric part of the sum of forces times arms from the centre, over the
     volume at rest. Forces are those of bonds (springs, and dashpots where they act) and contacts,
     and of loads, ground and supports on the faces of their groups, at the faces' middles. Weight,
-    loads without a group and inertia act at the centre and add nothing; what the turning of a
-    body itself asks for is left out. Dashpots have velocities of half a step before.
+    loads without a group and inertia act at the centre and add nothing; centrifugal terms of a
+    rotating body are left out. Dashpots have velocities of half a step before.
     """
 
     time_s: float
@@ -328,7 +328,7 @@ def write_paraview(
     Raises
     ------
     InputError
-        The folder cannot be written to, the name is none for files in it, or there is no frame.
+        The folder cannot be written to, the name is invalid, or there is no frame.
 
     Notes
     -----

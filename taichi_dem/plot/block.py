@@ -54,7 +54,7 @@ def plot_cracks(
     axis: Sequence[float] = ALONG_Z,
     path: FileName | None = None,
 ) -> Figure:
-    """Draw broken faces by time of breaking, at rest and as the block is in a frame (Fig 12).
+    """Draw broken faces by time of breaking, at rest and as deformed in a frame (Fig 12).
 
     The last panel shows the most broken part, true to scale.
 

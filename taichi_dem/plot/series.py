@@ -64,7 +64,7 @@ def _stack(axes, time, history, terms):
     axes.plot(time, 1e-3 * given, color="black", linestyle="--", linewidth=1.2, label=words)
     # Room for the legend above a work that rises early.
     top = 1.1 * axes.get_ylim()[1]
-    axes.set(ylabel="energy [kJ]", title="Held and lost, stacked", ylim=(None, top))
+    axes.set(ylabel="energy [kJ]", title="Stored and dissipated, stacked", ylim=(None, top))
     axes.legend(handles=axes.lines, loc="upper left")
 
 

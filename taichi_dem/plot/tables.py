@@ -1,4 +1,4 @@
-"""Pictures of what a result has calculated: columns, shares, fragments, cracks, the block."""
+"""Pictures of a result: columns, shares, fragments, cracks, the block."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -87,7 +87,7 @@ def _draw(axes, time, table, names, unit):
 def plot_energy_shares(result: Any, *, path: FileName | None = None) -> Figure:
     """Draw every term of the energy balance as a share of the energy given, over time.
 
-    What is missing to 100 % is unexplained.
+    The rest to 100 % is unexplained.
     """
     shares = arrays_of(result.energy_shares())
     factor, unit = scale(float(shares["time_s"].max(initial=0.0)), "s")
@@ -111,7 +111,7 @@ def plot_energy_shares(result: Any, *, path: FileName | None = None) -> Figure:
 def plot_fragments(result: Any, frame: int = -1, *, path: FileName | None = None) -> Figure:
     """Draw the share of the mass that passes a sieve over its opening, in a frame.
 
-    Shaded: the sizes of single bodies, below which the mesh and not the material decides.
+    The sizes of single bodies are shaded: there the mesh decides, not the material.
     """
     fragments = arrays_of(result.fragments(frame))
     order = np.argsort(fragments["sieve_m"], kind="stable")
@@ -178,8 +178,8 @@ def plot_attenuation(
 ) -> Figure:
     """Draw peak velocities over the distance from a hole, with a power law.
 
-    Where too few bodies are nearer to the hole than to a side, as in a thin plate, all are fitted;
-    where too few are far enough, no law is drawn.
+    If too few bodies are nearer to the hole than to a side, as in a thin plate, all are fitted; if
+    too few are far enough away, no law is drawn.
 
     Parameters
     ----------

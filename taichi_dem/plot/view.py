@@ -1,4 +1,4 @@
-"""What all pictures of a block are made of: a view along an axis, its faces from back to front.
+"""Parts of all pictures of a block: a view along an axis, its faces from back to front.
 
 Bodies are coloured by a value, lines by another, a mesh before a run by its groups. Corners are
 world positions (body_count, 4, 3) [m], as ``record.body_corners`` gives.

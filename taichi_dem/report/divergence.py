@@ -1,4 +1,4 @@
-"""Detect diverged runs: describe where and why, and advise a shorter step or other constants."""
+"""Detect diverged runs: tell where and why, and advise a shorter step or other constants."""
 
 import math
 import time
@@ -73,13 +73,13 @@ class DivergenceCheck:
         what = f"moves at {speed:.3g} m/s"
         # A speed that is no number is beyond every bound.
         if run.contacts is None or not speed < values(run.state.max_speed2) ** 0.5:
-            why = "the energy that it has was given to it"
+            why = "loads or the start gave it this energy"
             faster = _to_try(why, "max_speed", RAISED * speed, "m/s")
             raise self._error(body, what, self._shorter_step(body) or faster)
         extent = float(run.model.spheres.extent[body])
         allowed = FARTHEST * extent / (speed + math.hypot(*motion["spin"][body]) * extent)
         shorter = _to_try(f"contacts allow {allowed:.3g} s", "step", 0.5 * allowed, "s")
-        what += ", too far in a step for its contacts to be followed"
+        what += ", too far in a step to follow its contacts"
         raise self._error(body, what, shorter)
 
     def _check_overlap(self):
@@ -128,7 +128,7 @@ class DivergenceCheck:
         if -account["residual"] > bound and present > given:
             velocity = self.run.state.motion()["velocity"]
             body = int(np.linalg.norm(velocity, axis=1).argmax())
-            what = f"is the fastest while {-account['residual']:.3g} J came from nowhere"
+            what = f"is the fastest while {-account['residual']:.3g} J of energy are unexplained"
             shorter = self._shorter_step(body, to_blame=True)
             raise self._error(body, what, shorter or ("which nothing limits", {}))
 
@@ -152,7 +152,7 @@ class DivergenceCheck:
     def _too_deep(self, body, what):
         """SimulationDiverged of a body that has sunk too deep into another."""
         if not values(self.run.state.tick):
-            words = "and the scene begins like this: move the bodies apart"
+            words = "and the scene starts so: move the bodies apart"
             return self._error(body, what, (words, {}))
         law = self.run.model.contact
         stiffness = self.run.model.materials.of_contacts(law.constants[0])
@@ -185,7 +185,7 @@ class DivergenceCheck:
         if bounded and taken > 0.5 * limit:
             return _to_try(words, "step", 0.5 * limit, "s")
         if to_blame or unexplained_share(self.energy_balance.account()) > CLOSED:
-            words += ", but the account does not close"
+            words += ", but the energy balance does not close"
             return _to_try(words, "step", 0.5 * min(taken, limit), "s")
         return None
 

@@ -1,4 +1,4 @@
-"""Effects of a run: what acted, since when, and with what share of the energy.
+"""Effects of a run: which acted, since when, and with what share of the energy.
 
 And the certificate of a run with effects="auto": what was left out.
 """
@@ -36,7 +36,7 @@ _LAWS = {
     "friction": ("bodies rubbed", ("friction",), "friction"),
 }
 _WITHOUT_WORK = ", and holds without doing work"
-_OWN = "the account need not show what an effect of your own does"
+_OWN = "the energy balance may not show what an effect of your own does"
 _SHARE = "share of the energy put in, at most"
 
 
@@ -140,7 +140,7 @@ class _Uses:
     def _drive(self, effect):
         """The same of a load, support or ground, kept whatever work it did."""
         model, article = self.run.model, "the" if effect.role == "ground" else "a"
-        kept = f"{article} {effect.role} is part of the question"
+        kept = f"{article} {effect.role} defines the problem"
         drives = *model.loads, *model.supports, *model.ground
         place = drives.index(effect)
         marks, loads = self.bits & np.int64(1 << place), len(model.loads)
@@ -184,8 +184,8 @@ class Certificate(BaseCertificate):
     asleep : float
         Share of bodies times time that were asleep.
     impulse : float
-        Bound of the impulse that sleeping bonds of a connected part left out, as a share of the
-        momentum of that part; of the part where this is largest.
+        Bound of the impulse that sleeping bonds of a connected part left out, as a share of its
+        momentum; largest over the parts.
     energy : float
         Bound of the energy that they left out, as a share of the energy of that part, likewise.
     missing : tuple of MissingEffect, default ()
@@ -218,13 +218,13 @@ class Certificate(BaseCertificate):
         faults = super()._faults()
         if not self.impulse <= self.sleep:
             faults.append(
-                f"sleep left out {self.impulse:.2g} of a part's impulse, {self.sleep:g} asked"
+                f"sleep left out {self.impulse:.2g} of a part's impulse, {self.sleep:g} allowed"
             )
         return [*faults, *(one.what for one in self.missing)]
 
     @property
     def remedy(self) -> str:
-        """What would settle it."""
+        """Remedy of a fault."""
         if self.missing:
             return f"list {', '.join(one.effect for one in self.missing)}"
         return "run the scene with effects='all'"

@@ -66,9 +66,9 @@ def open_account(account: Mapping[str, float], round_off: float) -> tuple[str, .
     if share <= OPEN:
         return ()
     return (
-        f"the account of energy leaves {account['residual']:.3g} J unexplained, {share:.2g} of all "
-        "that went through it: take a shorter step, or begin with velocities of bonded bodies that "
-        "dashpots do not stop within one",
+        f"the energy balance leaves {account['residual']:.3g} J unexplained, {share:.2g} of all "
+        "energy in it: take a shorter step, or start with velocities that dashpots of bonds do not "
+        "stop within one step",
     )
 
 

@@ -1,10 +1,9 @@
 """Is an effect needed? Estimates from the numbers of a scene, before a run and after it.
 
-A dimensionless group compares the effect with what it acts beside. Far below one it is negligible,
-far above it is needed, and between it is unclear: stresses concentrate at holes and notches by a
-factor of a few, which no such estimate knows. Each connected part is judged by its own size,
-stiffness, strength, loads and speed: beside a large or fast part, a mean or a largest value of all
-would hide what moves or breaks a small or slow one.
+A dimensionless group compares the effect with the others. Far below one it is negligible, far above
+it is needed, and between it is unclear: holes and notches concentrate stresses by a factor of a
+few, which no such estimate includes. Each connected part is judged by its own size, stiffness,
+strength, loads and speed: values over all parts would hide a small or slow one.
 """
 
 import math
@@ -152,8 +151,8 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
     Returns
     -------
     tuple of Estimate
-        For each effect a dimensionless group that compares it with what it acts beside, and the
-        verdict negligible, needed or unclear. Print them.
+        For each effect a dimensionless group that compares it with others, and the verdict
+        negligible, needed or unclear. Print them.
 
     Raises
     ------

@@ -1,10 +1,10 @@
 """Effects that a scene left out and that would have acted in the run; bodies that creep.
 
-Friction without springs is a drag up to Coulomb's limit: below it, bodies slide as fast as the drag
-lets them, on a slope that is flatter than the friction angle too. Such a contact is told from a
-collision by its time, and by what the drag has given: what is pressed together parts within damping
-over stiffness, and two pieces stop once the drag gave the momentum that they slide with. Pieces
-that slide on as fast after many times as much are pushed by a load.
+Friction without springs is a drag up to Coulomb's limit: below it bodies creep, also on a slope
+flatter than the friction angle. Creep differs from a collision in its duration and in the impulse
+of the drag: pressed bodies separate within damping over stiffness, and sliding pieces stop once the
+drag has taken their momentum. Pieces that still slide as fast after many times that impulse are
+pushed by a load.
 """
 
 from dataclasses import dataclass, replace
@@ -106,7 +106,7 @@ class Creep(Kept):
         """The finding in words."""
         return (
             f"bodies in contact creep under a steady load, at up to {1e3 * self.speed:.2g} mm/s, "
-            f"though it takes {100.0 * self.share:.2g} % of the friction that would hold them"
+            f"though this takes {100.0 * self.share:.2g} % of the friction that could hold them"
         )
 
 
@@ -139,7 +139,7 @@ def bond_rounding(run: Run) -> np.ndarray:
 
 @dataclass(frozen=True)
 class MissingEffect:
-    """A need that no listed effect serves.
+    """An effect that the scene needs and does not list.
 
     effect: the effect to list. what: the finding in words. count: number of places. where: first
     such bond or body, as unit says; place_m: the middle of its face, or of the body, in the mesh
@@ -174,7 +174,7 @@ class MissingEffect:
 
 
 def unserved(model: Model) -> dict[str, MissingEffect]:
-    """By name, every need that no effect of a model serves, nothing found yet."""
+    """By name, all effects that a model leaves out, with nothing found yet."""
     roles = {effect.role for effect in model.effects if effect.name}
     material, touch = model.materials, "contact" in roles
     rubs, damps = material.friction > 0.0, material.has_bond_damping

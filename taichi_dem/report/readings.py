@@ -1,4 +1,4 @@
-"""What reports read of a run, by tables that kernels fill, and what they keep of it."""
+"""Data of a run that reports read, from tables that kernels fill, and keep."""
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping

@@ -74,7 +74,7 @@ class Report:
     round_off_J : float, default 0.0
         Energies below this may be round-off [J].
     unconverged_steps : int, default 0
-        Steps whose sweeps ended before impulses agreed.
+        Steps whose sweeps ended before convergence.
     worst_residual : float, default 0.0
         Their largest residual, as a share of the speed of the fastest body.
     interpenetration : Interpenetration, optional
@@ -132,7 +132,7 @@ class Report:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Sentences about effects that were missed, slip of bonds, and a step that was too long."""
+        """Sentences about missed effects, slip of bonds, and too long a step."""
         slipped = (slip for slip in self.bond_slip if slip.count)
         return (*map(str, (*self.missing_effects, *slipped)), *self.unresolved)
 
@@ -278,10 +278,10 @@ class Report:
 
 
 def known_error(report: Report, scene: Scene, method: Any) -> str:
-    """What is known of the error of a run that was not asked for an accuracy: for nothing extra.
+    """Known error of a run without a requested accuracy, at no extra cost.
 
-    Step and order of the method, how the energy balance closes, and what a plan says, in words. A
-    plan is at hand where the session has answered a question of a scene of this kind.
+    Step and order of the method, closure of the energy balance, and a plan, in words. There is a
+    plan if the session has answered a question on a scene of this kind.
     """
     if not report.substeps:
         return ""

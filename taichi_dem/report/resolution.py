@@ -1,4 +1,4 @@
-"""What mesh and step of a run do not resolve: slip of bonds that hold, dashpots, late failures."""
+"""Limits of mesh and step in a run: slip of unbroken bonds, dashpots, late failures."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from taichi_dem.state.timeline import MAX_LEVEL
 #: has slid by a share s of an edge along it, (1 - s)^2 still lies on the other: at 5 % a tenth of
 #: the area that the bond acts on is gone, more than an error that a user would accept.
 MOST_SLIP = 0.05
-_SLIPPED = f"bonds that hold have slipped by more than {100 * MOST_SLIP:g} % of an edge"
+_SLIPPED = f"unbroken bonds have slipped by more than {100 * MOST_SLIP:g} % of an edge"
 _FULL = "the cohesion is undiminished: SlipWeakening in place of ShearSlip degrades it with slip"
 _WEAKENED = "friction acts on the whole of it: compare with a coarser mesh"
 #: Least share of its coefficient at which a limited dashpot still represents the material.
@@ -29,13 +29,13 @@ MOST_TAKEN = 1.0
 _ALLOWED = -LEAST_SHARE, MOST_OPENING, -LEAST_SHARE, MOST_TAKEN
 _TOO_LONG = (
     "the dashpots of {count} bonds, and limits them to less than half, bond {worst} to "
-    "{percent:.2g} %: these bonds give way too fast",
+    "{percent:.2g} %: these bonds yield too fast",
     "{count} bonds that failed late, bond {worst} at {value:.2g} times its failure "
     "opening: their dashpots took energy for too long",
     "the contact dashpots of {count} bodies, and limits them to less than half, those "
-    "of body {worst} to {percent:.2g} %: what is pressed together parts too fast",
+    "of body {worst} to {percent:.2g} %: pressed bodies separate too fast",
     "the contact dashpots of {count} bodies: those of body {worst} take {value:.2g} of "
-    "a speed in one step, and throw bodies apart that they should stop",
+    "a speed in one step, and push bodies apart that they should stop",
 )
 
 
@@ -58,8 +58,8 @@ class BondSlip(MissingEffect):
     def __str__(self):
         return (
             f"up to {self.count} {self.what} of their face, bond {self.where} (at {self.place} m) "
-            f"by {100 * self.share:.3g} % at t = {self.first_s:.4g} s: less of the face lies on "
-            f"the other, but {_WEAKENED if self.weakens else _FULL}"
+            f"by {100 * self.share:.3g} % at t = {self.first_s:.4g} s: less of both faces "
+            f"overlaps, but {_WEAKENED if self.weakens else _FULL}"
         )
 
 
@@ -142,7 +142,7 @@ class StepResolution(Kept):
 
     @property
     def unconverged(self) -> tuple[int, float]:
-        """Steps whose sweeps ended before impulses agreed, and the worst residual.
+        """Steps whose sweeps ended before convergence, and the worst residual.
 
         The residual is a share of the fastest body's speed.
         """

@@ -1,7 +1,7 @@
 """Volume that bodies share: the measure of interpenetration, counted in 512 parts of a body.
 
-Bodies are rigid, so two of them that are not bonded may share volume only where nothing keeps them
-apart: no contact, faces that it leaves out, or contact that is too soft or too sparse.
+Bodies are rigid, so two bodies without a bond share volume only where nothing keeps them apart:
+without contact, at faces that it leaves out, or where it is too soft or too sparse.
 """
 
 from dataclasses import dataclass
@@ -135,7 +135,7 @@ class SharedVolume(Kept):
         contact, first = self.run.model.contact, _told(self.first)
         if contact is None or first.share == 0.0:
             return ()
-        rest = f", or {type(contact).__name__} counts their overlap as rest"
+        rest = f", or {type(contact).__name__} takes their overlap as unloaded"
         return (f"{_words(first, 'the start')}: move them apart{rest * contact.meets_bodies}",)
 
     def _compare(self, corners):

@@ -1,4 +1,4 @@
-"""What a scene's mesh makes of a material before a run: steps, elastic constants, cracks."""
+"""Stable steps, elastic constants and crack resolution of a scene, before a run."""
 
 from __future__ import annotations
 
@@ -117,8 +117,8 @@ class StepReport:
             criteria.append([name, f"{(binding == name).sum()}", *figures])
         lines = [line for table in (methods, criteria) for line in [*aligned(table), ""]]
         explained = (
-            "in contact: all of the worst face at once; Multirate: of the worst body, as "
-            "each has its own; a StepControl keeps to its safety's share of them"
+            "in contact: all contacts of the worst face at once; Multirate: of the worst body, as "
+            "each has its own; StepControl takes its safety's share of them"
         )
         return "\n".join([*lines, *self._worst(), explained, *warnings])
 
@@ -135,7 +135,7 @@ class StepReport:
             rows.append([f"{body}", f"{step[body]:.3g}", binding[body], *shape, f"{price:.3g}"])
         taken = 100.0 * float((1.0 / step[order[:WORST]]).sum() / (1.0 / step).sum())
         words = (
-            "price: how much larger the step of all would be without this body and those above; "
+            "price: factor on the step of all without this body and those above; "
             f"with steps of their own they take {taken:.3g} % of the updates"
         )
         return [*aligned(rows), "", words]
@@ -210,7 +210,7 @@ def bond_steps(mesh: Mesh, material: AnyMaterial) -> dict[str, np.ndarray]:
 
 @dataclass(frozen=True, eq=False)
 class ElasticReport:
-    """Elastic constants of a scene's mesh beside those asked for, and what follows from them.
+    """Elastic constants of a scene's mesh beside those asked for, and crack resolution.
 
     Parameters
     ----------
@@ -241,13 +241,13 @@ class ElasticReport:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence where elements are too large for cracks; those of ``steps`` are its own."""
+        """A sentence where elements are too large for cracks; ``steps`` has its own warnings."""
         coarse = int((self.elements < ELEMENTS).sum())
         words = (
             f"the characteristic length E G_f / tensile_strength^2 = {self._crack_words()} m is "
             f"less than {ELEMENTS:g} elements at {coarse} of {len(self.element_size)} bodies, with "
-            f"edges of up to {self.element_size.max():.3g} m: strength and paths of cracks there "
-            "are the mesh's"
+            f"edges of up to {self.element_size.max():.3g} m: there the mesh determines strength "
+            "and crack paths"
         )
         return (words,) if coarse else ()
 
@@ -274,7 +274,7 @@ class ElasticReport:
 
 
 def elastic_report(scene: Scene) -> ElasticReport:
-    """Elastic constants that the mesh of a scene shows with its material; print it before a run.
+    """Elastic constants of the mesh of a scene with its material; print it before a run.
 
     Parameters
     ----------

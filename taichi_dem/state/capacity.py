@@ -1,4 +1,4 @@
-"""How much finds room in an engine; counts of a scene are read at run time."""
+"""Capacity of an engine; counts of a scene are read at run time."""
 
 from typing import NamedTuple
 

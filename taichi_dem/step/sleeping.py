@@ -1,4 +1,4 @@
-"""Bodies that no wave has reached sleep: neither they nor their bonds are evaluated.
+"""Sleep: bodies that no wave has reached, and their bonds, are not evaluated.
 
 A body wakes its neighbours once what a sleeping bond leaves out is more than a share of what counts
 there: of the opening at which a law of that bond begins, or of the mean speed of the connected part

@@ -150,7 +150,7 @@ def test_a_bar_names_what_it_does_not_have():
     listed = Source("step", 0.3, "two runs"), Source("mesh", math.nan, "not measured: ask")
     plan = Plan("a method", 2, 1.0, 0.0)
     words = str(Answer("way", "mm", 3.0, ErrorParts(step=0.3), 0.1, 0.95, plan, sources=listed))
-    assert "(step 0.3; not in it: mesh)" in words and "not measured: ask" in words
+    assert "(step 0.3; not in the bar: mesh)" in words and "not measured: ask" in words
 
 
 def test_a_branch_keeps_what_was_measured_beside_the_step():

@@ -50,7 +50,7 @@ QUIET = Scene(single(), CONCRETE, [effects.QuietBoundary("base")])
 SCENES = {
     "laws of one role": (lambda: scene(effects.Softening(), effects.Softening()), "both take"),
     "friction alone": (lambda: scene(effects.Friction()), "list BodyContact too"),
-    "a notch outside": (lambda: scene(unbonded=["left"]), "must be of inner faces"),
+    "a notch outside": (lambda: scene(unbonded=["left"]), "must have inner faces"),
     "pressure inside": (
         lambda: scene(effects.Pressure("notch", 1.0), **NOTCHED),
         "must be of outer faces, or unbonded",

@@ -35,7 +35,7 @@ def test_the_filling_is_measured_by_the_same_question_to_the_other():
         apart = np.hypot(abs(answer.value - other.value), other.error)
         assert answer.parts == replace(alone.parts, filling=apart)
         assert answer.budget.error["filling"] == answer.parts.filling > 0.0
-        assert not alone.budget.in_bar["filling"] and "not in it: filling" in str(alone)
+        assert not alone.budget.in_bar["filling"] and "not in the bar: filling" in str(alone)
 
 
 @pytest.mark.parametrize("filling", [Empty(), RigidMass()], ids=lambda one: one.label)
@@ -51,7 +51,7 @@ def test_grains_that_the_other_kind_has_not_are_told_as_not_measured(filling):
     """Spheres of several sizes have no places, and spheres must bounce a little."""
     assert other_filling(filling) is None
     answer = solve_response(filling, **{**ASKED, "particles": 5}, progress=None)[0]
-    assert "no other kind of such grains" in answer.budget.how["filling"]
+    assert "no other model of these grains" in answer.budget.how["filling"]
     with pytest.raises(InputError, match="sources must not have 'filling'"):
         solve_response(filling, **ASKED, sources=["filling"])
 

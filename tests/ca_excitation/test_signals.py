@@ -44,7 +44,7 @@ def test_a_corrected_baseline_ends_at_rest_where_it_began_and_is_told():
     assert abs(value[0]) < 1e-12 and abs(slope[0]) < 1e-12
     # Taken away is a line.
     assert np.diff(raw.bend - made.bend, 2) == pytest.approx(0.0, abs=1e-12)
-    assert "no base line taken off" in raw.in_words("m")
+    assert "without a base line correction" in raw.in_words("m")
     assert "less a base line of acceleration" in made.in_words("m")
 
 

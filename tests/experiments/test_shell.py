@@ -92,7 +92,7 @@ def test_interrupted_blast_goes_on_to_the_same_files(monkeypatch, capsys, tmp_pa
         code, said = run("stopped")
     path = tmp_path / "stopped" / "checkpoint.npz"
     assert code == 130 and os.listdir(path.parent) == [path.name]
-    assert re.fullmatch(rf"interrupted at t = \S+ s, saved in {path}: go on with --resume", said)
+    assert re.fullmatch(rf"interrupted at t = \S+ s, saved in {path}: continue with --resume", said)
     assert run("stopped", "--resume") == (0, "")
     names = "history.csv bonds.csv bodies.csv mesh.msh paraview/{folder}_0006.vtu"
     for name in names.split():

@@ -105,7 +105,7 @@ def coordinates_at_1_km(trial):
     far.momentum_kept()
 
 
-@case([name for name in TOUCHING if name not in LIMITED], (LIMITED, "give way too fast"))
+@case([name for name in TOUCHING if name not in LIMITED], (LIMITED, "yield too fast"))
 def slivers(trial):
     """Two slivers of aspect 50 pulled by 1 µm ease as slowly as their dashpots make them."""
     # A unit of the sliver bears no more than this before it softens.
@@ -220,7 +220,7 @@ def step_ratio_resonance(trial):
     scan(trial, BEYOND if trial.method == "controlled" else BELOW)
 
 
-@case((), (MULTIRATE, "came from nowhere"))
+@case((), (MULTIRATE, "energy are unexplained"))
 def step_ratio_beyond_resonance(trial):
     """The same at largest steps up to 1.3 times half a period of the light body."""
     scan(trial, BEYOND)

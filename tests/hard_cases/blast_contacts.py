@@ -15,8 +15,8 @@ from tests.hard_cases.cases import Cases
 
 case = CASES = Cases("blast")
 BASIC = {"uniform": Uniform, "multirate_held": Multirate, "implicit": ImplicitDashpots}
-LIMITED = (("limited", "controlled"), "parts too fast")
-PAIR_TOO_FAST = ("uniform", "multirate_held", "multirate_drifted"), "throw bodies apart"
+LIMITED = (("limited", "controlled"), "separate too fast")
+PAIR_TOO_FAST = ("uniform", "multirate_held", "multirate_drifted"), "push bodies apart"
 JUMPING = {
     "controlled": Multirate(8e-8, 5e-9, control=StepControl(level_jump=None)),
     "multirate_held": Multirate(8e-8, 5e-9),

@@ -96,7 +96,7 @@ def stranger(path):
 @pytest.mark.parametrize("harm", [cut, flip, stranger])
 def test_damaged_and_foreign_files_are_refused(path, harm):
     harm(path)
-    with pytest.raises(InputError, match="must be a whole checkpoint"):
+    with pytest.raises(InputError, match="must be a complete checkpoint"):
         read_checkpoint(path, IDENTITY)
 
 

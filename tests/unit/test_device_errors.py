@@ -26,7 +26,7 @@ def test_a_lost_device_is_told_with_what_to_do(call, monkeypatch):
     launch = Launch(None)
     launch._ready = (Lost(), None, Lost, True)
     monkeypatch.setattr(backend, "is_cpu", lambda: False)
-    with pytest.raises(InputError, match=r"^the device does not answer any more .*checkpoint, or"):
+    with pytest.raises(InputError, match=r"^the device no longer answers .*checkpoint, or"):
         call(launch, 1)
 
 

@@ -108,7 +108,7 @@ def test_bodies_that_overlap_at_the_start_are_told_at_once_and_rest_as_they_are(
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         if share > 50.0:
-            with pytest.raises(SimulationDiverged, match=r"t = 0 s: .* the scene begins like this"):
+            with pytest.raises(SimulationDiverged, match=r"t = 0 s: .* the scene starts so"):
                 simulate(scene, **asked)
             return
         report = simulate(scene, **asked).report

@@ -56,7 +56,7 @@ def test_a_body_creeps_below_the_angle_of_friction_and_slides_or_rests_elsewhere
     assert found.certificate.holds == (not creeps)
     if creeps:
         share = 100.0 * math.tan(math.radians(case["degrees"])) / MU
-        assert f"it takes {share:.2g} % of the friction" in found.report.needs[0]
+        assert f"this takes {share:.2g} % of the friction" in found.report.needs[0]
 
 
 def test_an_answer_of_a_body_that_creeps_is_not_reached():

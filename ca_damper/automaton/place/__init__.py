@@ -1,1 +1,1 @@
-"""Rule set "place": grains meet where their places meet, not where their cells touch."""
+"""Rule set "place": grains collide where their positions meet, not where their cells touch."""

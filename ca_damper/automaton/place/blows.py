@@ -1,4 +1,4 @@
-"""Blows of a step carried out: grains with grains, then all blows on the container together.
+"""Impacts of a step: first of grains on grains, then all impacts on the container together.
 
 Sums over grains are whole numbers, so that they do not depend on their order.
 """

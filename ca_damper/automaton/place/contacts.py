@@ -1,4 +1,4 @@
-"""Contacts of the grains: which of them meet in a step, judged by their places; laws of blows.
+"""Contacts of the grains: which of them meet in a step, by their positions; laws of impacts.
 
 Places across a column are not kept: a grain is anywhere in its column with equal probability.
 Two discs of diameter d in neighbouring columns are then b apart across with the density b / d^2,

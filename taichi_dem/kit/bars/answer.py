@@ -1,4 +1,4 @@
-"""An answer to a question that was asked with a tolerance: value, error bar, and its cost."""
+"""Answer to a question with a tolerance: value, error bar and cost."""
 
 import math
 from collections.abc import Callable, Hashable, Iterator, Sequence
@@ -36,8 +36,8 @@ class ErrorParts:
     solver : float or ndarray, default 0.0
         Error of sweeps that end early, in the unit of the value.
     chance : float or ndarray, default 0.0
-        Spread of runs that differ by chance, in when their steps end or by their seeds, in the unit
-        of the value.
+        Spread of runs that differ by chance, by the ends of their steps or by seeds, in the unit of
+        the value.
     sampling : float or ndarray, default 0.0
         Error of the time over which a mean was taken, in the unit of the value.
     contact : float, default 0.0
@@ -81,7 +81,7 @@ class Expense:
     seconds : float
         CPU time [s].
     measured : bool
-        Whether it was spent, or is predicted from runs.
+        Whether it was spent; else it is predicted from runs.
     """
 
     tolerance: float
@@ -108,7 +108,7 @@ class Plan:
     final_s : float
         CPU time of the runs that gave the answer [s].
     begin : object, default 0
-        Where a similar question may begin: a level of the step, or a stage of the damper's runs.
+        Where a similar question may start: a level of the step, or a stage of the damper's runs.
     parting_s : float, default math.inf
         Simulated time from which runs that differ by one rounding differ by more than was allowed
         [s]; infinite if never.
@@ -132,13 +132,13 @@ class Plan:
 
     @property
     def parting(self) -> str:
-        """When runs that differ by one rounding part, in words."""
-        return f"runs that differ by one rounding part from {self.parting_s:.2g} s"
+        """When runs that differ by one rounding separate, in words."""
+        return f"runs that differ by one rounding separate from {self.parting_s:.2g} s on"
 
 
 @dataclass(frozen=True)
 class Branch:
-    """One of several ends of a question.
+    """One of several outcomes of a question.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ class Branch:
     error : float
         Half-width of the bar of the mean, in the unit of the goal.
     share : float
-        Share of all runs that came to it.
+        Share of all runs with this outcome.
     share_error : float
         Half-width of the bar of that share.
     seeds : tuple of int
@@ -192,12 +192,12 @@ class Answer:
     cost_curve : sequence of Expense, optional
         What other tolerances would cost.
     shortfall : str, default ""
-        Why the answer is not what was asked for, and what would help: the error is larger, or the
-        run itself is in doubt. ``""`` where it is neither.
+        Why the answer falls short, and what would help: the error is too large, or the run itself
+        is in doubt. ``""`` if neither.
     branches : tuple of Branch, default ()
-        Ends to which the runs of a question without a single answer came, the most frequent first.
+        Outcomes of the runs of a question without a single answer, the most frequent first.
     sources : tuple of Source, default ()
-        Sources of error by name, measured or not, with what each has cost or would.
+        Sources of error by name, measured or not, with the cost of each measure.
 
     Examples
     --------
@@ -257,7 +257,7 @@ class Answer:
     def _unmeasured(self):
         """What the bar does not have, in words."""
         names = [one.name for one in self.sources if not one.measured]
-        return f"; not in it: {', '.join(names)}" if names else ""
+        return f"; not in the bar: {', '.join(names)}" if names else ""
 
     def _bar(self):
         if isinstance(self.value, np.ndarray):
@@ -272,14 +272,14 @@ def _in_words(value, error, unit):
 
 
 def doubted(answer: Answer, *reasons: str) -> Answer:
-    """The answer, which is not reached where there are reasons to doubt its run."""
+    """The answer; it is not reached if there are reasons to doubt its run."""
     return replace(answer, shortfall="; ".join(filter(None, (answer.shortfall, *reasons))))
 
 
 def with_source(answer: Answer, source: Source) -> Answer:
-    """The answer with a source of error that no step mends.
+    """The answer with a source of error that no step reduces.
 
-    Its part of the bar is there where it was measured; wider than allowed, it is a doubt.
+    The bar includes it if it was measured; if wider than allowed, it is a reason to doubt.
     """
     made = replace(answer, sources=(*answer.sources, source))
     if not source.measured or not np.any(source.error):
@@ -290,7 +290,7 @@ def with_source(answer: Answer, source: Source) -> Answer:
     told = "" if made.shortfall else f"{100.0 * made.tolerance:g} % was not reached: "
     moves = f"the {source.name} moves it by {share_in_words(source.error, made.value, made.unit)}"
     if largest(source.error) > made.tolerance * largest(made.value):
-        return doubted(made, f"{told}{moves}, which no step mends")
+        return doubted(made, f"{told}{moves}, which no shorter step reduces")
     if largest(answer.error) > made.tolerance * largest(made.value):
         return made
     whole = share_in_words(made.error, made.value, made.unit)
@@ -306,7 +306,7 @@ def share_in_words(error: Values, value: Values, unit: str) -> str:
 def branched(
     answer: Answer, branches: tuple[Branch, ...], step: Values, run: str, ends: str
 ) -> Answer:
-    """The answer of a question with several ends: that of the most frequent.
+    """The answer of a question with several outcomes: that of the most frequent.
 
     step: error of it by the step. run: what a seed stands for, in the singular. ends: what they
     did, with a place for how many.
@@ -340,7 +340,7 @@ def _branch(values, part, seeds, error, t):
 
 
 def cost_curve(tolerance: float, cost: Callable[[float], tuple[float, bool]]) -> Iterator[Expense]:
-    """Costs of usual tolerances and the one that was asked; cost: CPU time [s], whether spent."""
+    """Costs of common tolerances and the one asked for; cost: CPU time [s], whether spent."""
     for one in sorted({*TOLERANCES, tolerance}, reverse=True):
         yield Expense(one, *cost(one))
 

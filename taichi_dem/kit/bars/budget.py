@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Source:
-    """One source of error of an answer; the bar has those that were measured.
+    """One source of error of an answer; the bar includes the measured ones.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Source:
     how : str
         How it was measured, or what would measure it.
     seconds : float, default nan
-        CPU time that its measure has taken, or would take [s]; nan where that is not known.
+        CPU time that its measurement took or would take [s]; nan if unknown.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Source:
 
 
 def named_sources(given: Any, known: Sequence[str]) -> tuple[str, ...]:
-    """Names of sources to measure, in the order of those that are known; the first one always is.
+    """Names of sources to measure, in the order of the known ones; the first is always measured.
 
     Raises InputError for another name.
     """

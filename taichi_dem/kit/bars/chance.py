@@ -1,4 +1,4 @@
-"""What chance does to values: Student's t, Fisher's F, and values that fall into clusters."""
+"""Statistics of values that differ by chance: Student's t, Fisher's F, clusters."""
 
 import math
 from collections.abc import Sequence

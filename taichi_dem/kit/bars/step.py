@@ -31,7 +31,7 @@ _BISECTIONS = 50
 
 @dataclass(frozen=True)
 class StepError:
-    """What runs at falling steps say of the finest one.
+    """Error of the finest of several runs at falling steps.
 
     error: half-width about its value. order: that was seen, NaN where differences do not shrink as
     those of an order would.

@@ -74,7 +74,7 @@ def _share(text):
 
 def interval(text: str) -> dict:
     """Type of an option that says how often: 600s on the wall, 5000steps, or 1e-5sim seconds."""
-    words = "like 600s (on the wall), 5000steps or 1e-5sim"
+    words = "like 600s (wall time), 5000steps or 1e-5sim"
     return _checked(_interval, words, lambda given: Checkpoint("any", **given))(text)
 
 
@@ -173,16 +173,16 @@ def output_paths(folder: str) -> Callable[[str], str]:
 def add_pictures(made: ArgumentParser) -> None:
     """Add the options that choose pictures: options.pictures is "key", "all" or "no"."""
     chosen = made.add_mutually_exclusive_group()
-    for name, words in {"all": "draw more than answers the question", "no": "draw none"}.items():
+    for name, words in {"all": "draw further pictures", "no": "draw no pictures"}.items():
         what: Any = {"dest": "pictures", "action": "store_const", "const": name, "default": "key"}
         chosen.add_argument(f"--{name}-pictures", help=words, **what)
 
 
 def add_checkpoints(made: ArgumentParser) -> None:
     """Add the options of a job that saves itself; see ``checkpoint_of``."""
-    words = "save the run every 600s on the wall, 5000steps or 1e-5sim simulated seconds"
+    words = "save the run every 600s of wall time, 5000steps or 1e-5sim of simulated seconds"
     made.add_argument("--checkpoint-every", type=interval, default={}, help=words)
-    words = "go on from what a run has saved in the same --out"
+    words = "resume the run that was saved in the same --out"
     made.add_argument("--resume", action="store_true", help=words)
 
 
@@ -206,7 +206,7 @@ def add_accuracy(made: ArgumentParser, what: str, source: str) -> None:
     what: is found to that share of its value, in words. source: of error, beside the step, that is
     measured when asked.
     """
-    words = f"find {what} to this share of their value, such as 1%%, and nothing else"
+    words = f"find {what} with an error of this share of the value, such as 1%%; do nothing else"
     made.add_argument("--accuracy", type=tolerance, default=None, help=words)
     words = f"with --accuracy, also measure the error of this source: {source}"
     made.add_argument("--budget", choices=(source,), help=words)
@@ -258,7 +258,7 @@ def main(
         run(options)
         older = older_files(options.out, options.began)
         if older:
-            print(f"Not of this run, in {options.out}: {', '.join(older)}")
+            print(f"Files of earlier runs in {options.out}: {', '.join(older)}")
         return 0
 
     return main_of_tool(work, made, arguments)
@@ -310,7 +310,7 @@ def _summary(options):
     """Text of summary.json, without the newline at its end."""
     path = Path(options.out, "summary.json")
     if not path.is_file() or path.name in older_files(options.out, options.began):
-        raise InputError(f"json needs a run that writes {path.name}, and this one wrote none")
+        raise InputError(f"json needs a run that writes {path.name}, but this run wrote none")
     return path.read_text(encoding="utf-8").rstrip()
 
 
@@ -328,7 +328,7 @@ def exit_code(work: Callable[[], int | None]) -> int:
         except (InputError, SimulationDiverged) as error:
             code, words = (2 if isinstance(error, InputError) else 3), str(error)
         except Interrupted as error:
-            code, words = 128 + error.number, f"{error}: go on with --resume"
+            code, words = 128 + error.number, f"{error}: continue with --resume"
         except KeyboardInterrupt:
             code, words = 130, "interrupted"
         except Terminated as error:

@@ -76,7 +76,7 @@ def run_entry(scripts: str | Path, entry: Entry, root: str, quick: bool = False)
     write_text(os.path.join(folder, RUN), json.dumps(note, indent=1))
     if done.returncode == 0:
         return ""
-    said = done.stderr.strip().splitlines() or ["it said nothing"]
+    said = done.stderr.strip().splitlines() or ["it printed nothing"]
     return f"exit code {done.returncode}: {said[-1]}"
 
 

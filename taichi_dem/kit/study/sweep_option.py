@@ -32,7 +32,7 @@ def add_sweep(made: ArgumentParser, count: Callable[[str], int]) -> None:
     """Add the options of a sweep; count: type of a number of processes."""
     words = "run the job for each row of a CSV file, whose columns are options"
     made.add_argument("--sweep", metavar="TABLE.csv", help=words)
-    made.add_argument("--workers", type=count, help="rows side by side with --sweep, one a core")
+    made.add_argument("--workers", type=count, help="rows run in parallel; default: one per core")
 
 
 def run_sweep(
@@ -89,7 +89,7 @@ def _argument(made, name, cell):
     known = {text[2:]: one for text, one in made._option_string_actions.items()}
     known = {text: one for text, one in known.items() if text not in ("", *_OWN, *_LOUDNESS)}
     if name not in known:
-        raise InputError(f"columns must be out of {', '.join(known)}, got {shown(name)}")
+        raise InputError(f"columns must be among {', '.join(known)}, got {shown(name)}")
     if known[name].nargs != 0:
         return f"--{name}={cell}"
     if cell.lower() not in _SWITCH:

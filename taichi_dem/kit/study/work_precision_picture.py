@@ -64,7 +64,7 @@ def picture_work_precision(
             axes["residual"].set_xlabel(residual_names[0])
             axes["residual"].set_ylabel(textwrap.fill(residual_names[1], 36))
         figure.legend(*_legend(axes["seconds"]), loc="outside upper left", ncols=2)
-        marks = "At the points: what is swept. Bars: to the slowest repeat."
+        marks = "Labels: what is swept. Bars: up to the slowest repeat."
         _write_below(figure, f"{caption} {marks}")
         # Where a label has room is known when everything else has its place.
         figure.draw_without_rendering()
@@ -170,7 +170,7 @@ class _Panel:
         end = min(right, x * (y / bottom) ** (1.0 / order))
         start = max(left, x * (y / top) ** (1.0 / order))
         line = [y * (x / place) ** order for place in (start, end)]
-        label = f"ideal gain, order {order}, from the best buy"
+        label = f"ideal gain, order {order}, from the cheapest point"
         self.axis.plot([start, end], line, color=GREY, ls="--", lw=0.9, label=label)
         self.axis.set(xlim=(left, right), ylim=(bottom, top))
 
@@ -180,7 +180,7 @@ class _Panel:
         bottom, top = axis.get_ylim()
         step = (top / bottom) ** 0.055
         edge = top * step ** (len(failed) + 0.3)
-        axis.axhspan(top, edge, color="0.94", lw=0, label="× no result: its cost, but no error")
+        axis.axhspan(top, edge, color="0.94", lw=0, label="× failed: cost without an error")
         costs, (left, right) = [at for own in failed.values() for at, _ in own], axis.get_xlim()
         left, right = min(left, 0.8 * min(costs)), max(right, 1.25 * max(costs))
         axis.set(xlim=(left, right), ylim=(bottom, edge))

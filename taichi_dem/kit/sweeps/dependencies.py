@@ -1,4 +1,4 @@
-"""What the result of a function depends on, as far as it can be seen without running it.
+"""Dependencies of the result of a function, as far as they show without running it.
 
 Its bytecode, and what that names in files of the user: functions, classes, constants, values that
 it closes over, defaults. Other packages count by their name and version. No digest depends on

@@ -218,7 +218,7 @@ class Journal:
                 there = json.load(file)["function"]
         if there != identity:
             raise InputError(
-                f"out must be a folder of this sweep, of {identity}, got {self.folder}, which "
+                f"out must be a folder of this sweep ({identity}), got {self.folder}, which "
                 f"holds one of {there}"
             )
         write_text(path, json.dumps({"function": identity}))
