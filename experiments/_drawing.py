@@ -5,8 +5,9 @@ import itertools
 from typing import NamedTuple
 
 import numpy as np
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-from taichi_dem.kit.plot_style import STYLE, filming, picture, styles_of, write_gif
+from taichi_dem.kit.plot_style import GREY, STYLE, filming, picture, styles_of, write_gif
 from taichi_dem.kit.progress import drawing
 from taichi_dem.plot.view import ALONG_Z, View, draw_bodies, frame_block, move_bodies
 
@@ -114,6 +115,24 @@ def crossings(triangles, normal, place):
         share = (place - first[:, normal]) / (end[:, normal] - first[:, normal])
         ends.append(first + share[:, None] * (end - first))
     return np.stack(ends, axis=1), which
+
+
+def in_space(axes, triangles, time_ms, box, look):
+    """Broken faces, thin, in the outline of the block; the hole's axis stands upright."""
+    box = box[:, [0, 2, 1]]
+    faces = Poly3DCollection(triangles[..., [0, 2, 1]], linewidth=0.0, alpha=0.45, **look)
+    faces.set_array(time_ms)
+    axes.add_collection3d(faces, autolim=False)
+    pairs = itertools.combinations(itertools.product(*box.T), 2)
+    edges = [pair for pair in pairs if sum(a != b for a, b in zip(*pair)) == 1]
+    axes.add_collection3d(Line3DCollection(edges, color=GREY, linewidth=0.8), autolim=False)
+    axes.set(xlim=box[:, 0], ylim=box[:, 1], zlim=box[:, 2])
+    axes.set_box_aspect(np.ptp(box, axis=0))
+    axes.set(xlabel="x [m]", ylabel="z [m]", zlabel="y [m]")
+    axes.view_init(elev=22.0, azim=-55.0)
+    axes.locator_params(nbins=4)
+    if np.ptp(box[:, 1]) < 0.5 * np.ptp(box, axis=0).max():
+        axes.locator_params(axis="y", nbins=2)
 
 
 def plot_methods(path, series, column):

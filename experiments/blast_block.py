@@ -19,7 +19,6 @@ Writes cracks.png, peaks.png, energy.png, history.csv, peaks.csv, mesh, ParaView
 summary.json to results/blast_block/; a run saves itself as blast_fracture.py does.
 """
 
-import itertools
 import os
 import sys
 import time
@@ -28,7 +27,6 @@ from importlib.util import find_spec
 
 import numpy as np
 from matplotlib.colors import Normalize
-from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from _blast import (
     BLOCK_STEP,
@@ -39,14 +37,14 @@ from _blast import (
     print_quality,
     run_options,
 )
-from _drawing import crossings
+from _drawing import crossings, in_space
 from _meshes import mirrored_copies
 from make_meshes import block_with_hole
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import GREY, picture
+from taichi_dem.kit.plot_style import picture
 from taichi_dem.kit.provenance import peak_memory_mb
 from taichi_dem.mesh.shapes import in_space_order
 from taichi_dem.output.hole_monitor import hole_of
@@ -119,24 +117,6 @@ def plot_deep_cracks(path, result, hole):
             axes.spines[["top", "right"]].set_visible(True)
             axes.grid(False)
         figure.colorbar(lines, ax=panels, label="time of breaking [ms]", shrink=0.8, aspect=25)
-
-
-def in_space(axes, triangles, time_ms, box, look):
-    """Broken faces, thin, in the outline of the block; the hole's axis stands upright."""
-    box = box[:, [0, 2, 1]]
-    faces = Poly3DCollection(triangles[..., [0, 2, 1]], linewidth=0.0, alpha=0.45, **look)
-    faces.set_array(time_ms)
-    axes.add_collection3d(faces, autolim=False)
-    pairs = itertools.combinations(itertools.product(*box.T), 2)
-    edges = [pair for pair in pairs if sum(a != b for a, b in zip(*pair)) == 1]
-    axes.add_collection3d(Line3DCollection(edges, color=GREY, linewidth=0.8), autolim=False)
-    axes.set(xlim=box[:, 0], ylim=box[:, 1], zlim=box[:, 2])
-    axes.set_box_aspect(np.ptp(box, axis=0))
-    axes.set(xlabel="x [m]", ylabel="z [m]", zlabel="y [m]")
-    axes.view_init(elev=22.0, azim=-55.0)
-    axes.locator_params(nbins=4)
-    if np.ptp(box[:, 1]) < 0.5 * np.ptp(box, axis=0).max():
-        axes.locator_params(axis="y", nbins=2)
 
 
 def run(options):

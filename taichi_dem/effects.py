@@ -5,6 +5,7 @@ from taichi_dem.laws.bond import BondDamping, ShearSlip, SlipWeakening, Softenin
 from taichi_dem.laws.friction import Friction, StickingFriction
 from taichi_dem.laws.mixed_mode import MixedMode
 from taichi_dem.laws.sphere_contact import SphereContact
+from taichi_dem.loads.expanding_gas import ExpandingGas
 from taichi_dem.loads.pressure import GasPressure, Gravity, Pressure
 from taichi_dem.loads.quiet_boundary import QuietBoundary
 from taichi_dem.loads.supports import Fixed, PrescribedMotion, Roller
@@ -12,6 +13,7 @@ from taichi_dem.loads.supports import Fixed, PrescribedMotion, Roller
 __all__ = [
     "BodyContact",
     "BondDamping",
+    "ExpandingGas",
     "Fixed",
     "Friction",
     "GasPressure",

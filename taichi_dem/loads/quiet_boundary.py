@@ -11,7 +11,7 @@ from taichi_dem.elasticity.rates import wave_moduli
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length, product, transposed
-from taichi_dem.kit.types import real
+from taichi_dem.kit.types import mat3, real
 from taichi_dem.kit.validation import positive, word
 from taichi_dem.laws.base import Effect
 from taichi_dem.mesh.tetrahedra import area_vectors
@@ -66,11 +66,12 @@ class QuietBoundary(Effect):
         self.s_speed = None if s_speed is None else positive("s_speed", s_speed)
 
     def declare(self, capacity: Capacity) -> None:
-        """Faces of every body in the group, and what resists it: the parts of a ``Block``."""
+        """Faces of every body in the group, and what resists it: the parts of a ``Block``.
+
+        Their 27 numbers are one field, as Taichi has room for about a thousand components.
+        """
         self.faces = ti.field(ti.i32, shape=capacity.bodies)
-        self.a, self.b, self.c = (
-            ti.Matrix.field(3, 3, real, shape=capacity.bodies) for _ in range(3)
-        )
+        self.parts = ti.field(real, shape=(capacity.bodies, 27))
 
     def load(self, model: Model) -> None:
         """Find the faces and their impedance; InputError when the mesh has no such group."""
@@ -93,10 +94,10 @@ class QuietBoundary(Effect):
         lever_arm = np.swapaxes(np.cross(arms[:, :, None], np.eye(3)), -1, -2)
         lever = product(law, lever_arm)
         blocks = law, -lever, product(transposed(lever_arm), lever)
-        for field, block in zip((self.a, self.b, self.c), blocks):
-            total = np.zeros((model.body_count, 3, 3))
-            np.add.at(total, np.repeat(body, 3), block.reshape(-1, 3, 3))
-            assign(field, total)
+        total = np.zeros((model.body_count, 3, 3, 3))
+        for k, block in enumerate(blocks):
+            np.add.at(total[:, k], np.repeat(body, 3), block.reshape(-1, 3, 3))
+        assign(self.parts, total.reshape(-1, 27))
 
     def _speeds(self, model, corners, density):
         """Speeds of both waves at each face [m/s]."""
@@ -120,4 +121,12 @@ class QuietBoundary(Effect):
     @ti.func
     def resistance(self, i):
         """Dashpots at the three points of each face of body i, as a ``Block``."""
-        return Block(a=self.a[i], b=self.b[i], c=self.c[i])
+        return Block(a=self._part(i, 0), b=self._part(i, 9), c=self._part(i, 18))
+
+    @ti.func
+    def _part(self, i, first):
+        """A matrix of body i, by rows from an entry on."""
+        found = mat3(0.0)
+        for r, c in ti.static(ti.ndrange(3, 3)):
+            found[r, c] = self.parts[i, first + 3 * r + c]
+        return found

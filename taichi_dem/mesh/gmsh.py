@@ -98,7 +98,7 @@ def _drawn_volume(gmsh, drawn):
     """Volume inside the surface, in units of the file."""
     if drawn:
         return sum(gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3))
-    points, triangles = _places_and_rows(gmsh, 2)
+    points, triangles = places_and_rows(gmsh, 2)
     corners = points[triangles]
     return abs(float(np.linalg.det(corners - corners[:1, :1]).sum())) / 6.0
 
@@ -128,7 +128,7 @@ def _draw_triangles(gmsh: Any, name: str) -> None:
 
 def _mesh_of(gmsh, scale, name, drawn):
     """The mesh that Gmsh has made; a group for each surface."""
-    points, tetrahedra = _places_and_rows(gmsh, 4)
+    points, tetrahedra = places_and_rows(gmsh, 4)
     if not len(tetrahedra):
         raise InputError(
             f"surface file {name} must be closed, each edge between two faces, but Gmsh found no "
@@ -139,7 +139,7 @@ def _mesh_of(gmsh, scale, name, drawn):
     return Mesh(points, tetrahedra, groups, source=name)
 
 
-def _places_and_rows(gmsh, kind, tag=-1):
+def places_and_rows(gmsh, kind, tag=-1):
     """Points (n, 3), and corners of triangles (kind 2) or tetrahedra (4) of an entity or all."""
     tags, places, _ = gmsh.model.mesh.getNodes()
     number = np.zeros(int(tags.max()) + 1, dtype=np.int64)
@@ -154,7 +154,7 @@ def _drawn_groups(gmsh):
     for _, tag in gmsh.model.getEntities(2):
         given = gmsh.model.getEntityName(2, tag).rsplit("/", 1)[-1].replace('"', "").strip()
         key = given if given.isprintable() and given else f"surface_{tag}"
-        _, faces = _places_and_rows(gmsh, 2, tag)
+        _, faces = places_and_rows(gmsh, 2, tag)
         groups[key] = np.vstack([groups.get(key, faces[:0]), faces])
     return {name: faces for name, faces in groups.items() if len(faces)}
 

@@ -142,6 +142,7 @@ class Recorder:
         row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})
         if self.model.ground:
             row["ground_dashpot_J"] = account["ground_dashpot"]
+            row.update(self._ground_work())
         row["smallest_step_s"] = sim.method.dt0 / 2.0 ** int(motion["level"].max())
         row["load_work_J"], row["support_work_J"] = account["load_work"], account["support_work"]
         speed = np.linalg.norm(motion["velocity"], axis=1)
@@ -150,6 +151,16 @@ class Recorder:
             row.update({f"{name}_{axis}_N": float(force[k]) for k, axis in enumerate("xyz")})
         self.peak_speed = np.maximum(self.peak_speed, speed)
         self.rows.append(row)
+
+    def _ground_work(self):
+        """Energy that each of several grounds has taken, columns of the time series."""
+        grounds = [name for name in self.forces if name.startswith("ground_")]
+        if len(self.model.ground) == 1:
+            return {}
+        taken = self.simulation.energy_balance.works()[:, -len(self.model.ground) :].sum(axis=0)
+        return {
+            f"{name.removesuffix('_force')}_J": float(-one) for name, one in zip(grounds, taken)
+        }
 
     def snapshot(self) -> None:
         """Keep the block as it is now."""

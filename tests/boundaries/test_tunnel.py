@@ -1,0 +1,175 @@
+"""Holes drilled into rock: their table, their walls, gas that expands, energy by side."""
+
+import importlib.util
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from _tunnel import QUICK, SIZE, designs, kept_mesh, scene_of
+from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, effects, simulate
+from taichi_dem.mesh.boreholes import Hole, check_holes, drilled_rock, read_holes, with_charges
+from taichi_dem.mesh.mesh import volumes
+from taichi_dem.mesh.shapes import bar, single
+from taichi_dem.mesh.tetrahedra import area_vectors
+
+NEEDS_GMSH = pytest.mark.skipif(
+    importlib.util.find_spec("gmsh") is None, reason="gmsh is not installed"
+)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_kept_meshes_lack_the_volume_of_the_holes(name):
+    """A prism of a hole has the volume of the round hole, whose axis ends inside the rock."""
+    holes = designs()[name].holes
+    cut = sum(0.25 * np.pi * hole.diameter_m**2 * hole.length_m for hole in holes)
+    assert volumes(kept_mesh(name)).sum() == pytest.approx(np.prod(SIZE) - cut, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_gas_acts_on_the_charged_walls(name):
+    """Wall and end of a prism of n sides: n chords times the length, and the round hole's area.
+
+    The boundary of a charge follows the mesh: within an edge, at most half of the charge here.
+    """
+    holes, sides = designs(delay=1e-4)[name].holes, 5
+    mesh, stages = with_charges(kept_mesh(name), SIZE[2], holes)
+    assert stages == {"stage_1": 0.0, "stage_2": 1e-4, "stage_3": 2e-4}
+    radius = 0.025 * np.sqrt(2.0 * np.pi / sides / np.sin(2.0 * np.pi / sides))
+    around = 2.0 * sides * radius * np.sin(np.pi / sides)
+    for name in stages:
+        area = np.linalg.norm(area_vectors(mesh.points, mesh.groups[name]), axis=1).sum()
+        exact = 2.0 * (around * holes[0].charged_m + np.pi * 0.025**2)
+        assert area == pytest.approx(exact, rel=0.12)
+        middle = mesh.points[mesh.groups[name]].mean(axis=1)
+        assert (SIZE[2] - middle[:, 2]).min() > 0.9 * holes[0].charge_from_m * 0.9
+
+
+def test_a_table_of_holes(tmp_path):
+    """Columns by name; what is not given is as of Hole."""
+    path = tmp_path / "holes.csv"
+    path.write_text("y_m,x_m,length_m,angle_deg,delay_s\n1,2,0.8,65,0.001\n3,2,1,90,0\n")
+    assert read_holes(path) == (Hole(2.0, 1.0, 0.8, 65.0, 0.0, 0.001), Hole(2.0, 3.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("x_m,y_m,length_m\n", "must have a header .* and rows"),
+        ("x_m,y_m\n1,1\n", "columns of a table of holes must be"),
+        ("x_m,y_m,length_m,colour\n1,1,1,red\n", "columns of a table of holes must be"),
+        ("x_m,y_m,length_m\n1,1,1\n1,1,-1\n", "hole 2: length_m must be"),
+        ("x_m,y_m,length_m\nleft,1,1\n", "hole 1: x_m must be"),
+        ("x_m,y_m,length_m,delay_s\n1,1,1,-1\n", "hole 1: delay_s must be .* got -1"),
+        ("x_m,y_m,length_m,angle_deg\n1,1,1,5\n", "hole 1: angle_deg must be"),
+        ("x_m,y_m,length_m,charge_from_m\n1,1,1,1.1\n", "hole 1: charge_from_m must be"),
+    ],
+)
+def test_a_bad_table_is_refused(tmp_path, text, words):
+    """One sentence with the number of the hole, the column and its value."""
+    path = tmp_path / "holes.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_holes(path)
+
+
+@pytest.mark.parametrize(
+    "holes, words",
+    [
+        ([Hole(4.1, 2, 1)], r"hole 1 must lie inside the rock of 4 x 4 x 3 m, got \(4.1, 2, 3\) m"),
+        ([Hole(2, 2, 3.2)], "hole 1 must lie inside the rock"),
+        ([Hole(3.8, 2, 1, angle_deg=60)], "hole 1 must lie inside the rock"),
+        ([Hole(1.9, 2, 1, angle_deg=80), Hole(2.1, 2, 1, angle_deg=100)], "1 and 2 must not cross"),
+    ],
+)
+def test_holes_outside_or_crossing_are_refused(holes, words):
+    """Before anything is meshed."""
+    with pytest.raises(InputError, match=words):
+        check_holes(SIZE, holes)
+    # As far apart as their walls allow.
+    check_holes(SIZE, [Hole(2, 2, 1), Hole(2.051, 2, 1)])
+
+
+def test_walls_that_a_mesh_does_not_show_are_refused():
+    """A mesh without the hole, and a table without a charge."""
+    mesh = bar(3.0, 4.0, (3, 4, 4))
+    with pytest.raises(InputError, match=r"hole 1 at .2, 2. m needs .* on 0 % of its wall"):
+        with_charges(mesh, 4.0, [Hole(2, 2, 1)])
+    with pytest.raises(InputError, match="must have one that is charged"):
+        with_charges(mesh, 4.0, [Hole(2, 2, 1, charge_from_m=1.0)])
+
+
+@NEEDS_GMSH
+def test_drilled_rock_has_its_volume_and_sides():
+    """A slot and an inclined hole are missing from the box; sides are whole but for the face."""
+    size, slot = (1.0, 1.0, 0.8), ((0.2, 0.3, 0.5), (0.1, 0.4, 0.3))
+    hole = Hole(0.6, 0.5, 0.4, angle_deg=70)
+    mesh = drilled_rock(size, [hole], 0.08, 0.3, slots=[slot], seed=3)
+    cut = np.prod(slot[1]) + np.pi * 0.025**2 * 0.4
+    assert volumes(mesh).sum() == pytest.approx(0.8 - cut, rel=1e-9)
+    for name, area in {"left": 0.8, "right": 0.8, "bottom": 0.8, "top": 0.8, "back": 1.0}.items():
+        vectors = area_vectors(mesh.points, mesh.groups[name])
+        assert np.linalg.norm(vectors, axis=1).sum() == pytest.approx(area, rel=1e-9)
+    with pytest.raises(InputError, match="near must be at most"):
+        drilled_rock(size, [hole], 0.25, 0.3)
+
+
+def test_gas_falls_with_the_volume():
+    """Force on a wall that has moved by u: p A (1 + u / a)^(-2 exponent), p of the pulse.
+
+    A load acts by its mean over a step, exact to (dt / rise)^2, 1e-4 here.
+    """
+    gas = {"peak": 1e6, "rise": 1e-4, "decay_ratio": 2.75}
+    load = effects.ExpandingGas("base", radius=1e-3, exponent=1.4, **gas)
+    scene = Scene(single(), CONCRETE, [load])
+    result = simulate(scene, method=Uniform(1e-6), until=3e-4, samples=30, frames=30)
+    area = 0.25 * np.sqrt(3.0) * 0.05**2
+    # The base faces along x, the body flies to lower x, away from the gas.
+    moved = np.array([-frame.displacement[0, 0] for frame in result.frames])
+    exact = load.pressure_at(result.series["time_s"]) * area * (1.0 + moved / 1e-3) ** -2.8
+    force = -result.series["load_force_x_N"]
+    assert moved[-1] > 0.3e-3
+    assert np.abs(force - exact).max() < 1e-3 * exact.max()
+
+
+def test_gas_in_a_wide_hole_is_gas_pressure():
+    """A hole that is wide beside all motion keeps its pressure: difference 2.8 u / a."""
+    gas = {"peak": 1e6, "rise": 1e-4}
+    found = []
+    for load in (effects.GasPressure("base", **gas), effects.ExpandingGas("base", 10.0, **gas)):
+        simulation = Simulation(Scene(single(), CONCRETE, [load]), Uniform(1e-6))
+        simulation.start()
+        simulation.advance_to(100)
+        found.append(simulation.motion()["velocity"][0, 0])
+    assert found[1] == pytest.approx(found[0], rel=1e-3) and found[0] != found[1]
+
+
+@pytest.mark.parametrize("exponent", [0.3, 5.2, -0.2, float("nan")])
+def test_an_exponent_that_is_no_multiple_of_a_fifth_is_refused(exponent):
+    """Powers of a fifth root have the same bits everywhere."""
+    with pytest.raises(InputError, match="exponent must be"):
+        effects.ExpandingGas(exponent=exponent)
+
+
+def test_energy_that_sides_take():
+    """Columns of several grounds add up to what all have taken, and a wave ends where it goes."""
+    still = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0)
+    push = effects.Pressure.triangle("left", peak=1e6, rise=5e-5, fall=5e-5)
+    quiet = [effects.QuietBoundary(side) for side in ("right", "left")]
+    scene = Scene(bar(1.0, 0.1, (20, 2, 2)), still, [push, *quiet])
+    history = simulate(scene, method=Uniform(2e-7), until=1.5e-3, samples=3).series
+    right, left = history["ground_right_J"], history["ground_left_J"]
+    assert right + left == pytest.approx(history["ground_dashpot_J"], rel=1e-12, abs=1e-12)
+    # The left end takes its part while it is pushed, the right one what the wave brings later.
+    work = history["load_work_J"][-1]
+    assert right[1] < 1e-3 * work < 0.4 * work < left[1]
+    assert right[-1] > 0.8 * (work - left[1])
+
+
+def test_five_quiet_sides_and_many_delays_fit_an_engine():
+    """Taichi has room for about a thousand components of fields."""
+    design = designs(delay=1e-4)["V cut"]
+    scene = scene_of(kept_mesh("V cut"), design, exponent=1.4)
+    assert len(scene.loads) == 8
+    simulation = Simulation(scene, Uniform(1e-7))
+    assert simulation.model.body_count == kept_mesh("V cut").body_count
