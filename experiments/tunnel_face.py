@@ -69,7 +69,7 @@ def fired(row):
     mesh = _tunnel.mesh_of(design, near, row["mesh"]) if near else _tunnel.kept_mesh(row["design"])
     looks = {"until": row["until_s"], "samples": 200, "frames": row["frames"]}
     looks["observers"] = [dem.Receivers(_tunnel.RECEIVERS)]
-    scene = _tunnel.scene_of(mesh, design, row["exponent"])
+    scene = _tunnel.scene_of(mesh, design, row["gas_exponent"])
     return design, dem.simulate(scene, method=METHOD, title=row["design"], **looks)
 
 
@@ -81,10 +81,10 @@ def shot(row):
 def rows_of(options):
     """Rows of all runs; the first mesh of each design, of the finer size, comes first."""
     names = ("parallel", _tunnel.YOURS) if options.holes else options.designs
-    # No mesh is kept of a user's holes.
     near = options.near or (_tunnel.QUICK_NEAR if options.holes else 0.0)
-    fixed = {"holes": options.holes or "", "delay_s": options.delay, "until_s": options.until}
-    fixed |= {"exponent": options.exponent, "frames": options.frames}
+    fixed = {"delay_s": options.delay, "until_s": options.until, "frames": options.frames}
+    own = {"holes": options.holes} if options.holes else {}
+    fixed |= {"gas_exponent": options.exponent, **own}
     sizes = [near, COARSER * near] if options.meshes > 1 else [near]
     numbers = itertools.product(range(options.meshes), sizes, names)
     return [{"design": d, "near_m": n, "mesh": k, **fixed} for k, n, d in numbers]
@@ -100,15 +100,15 @@ def runs_of(options):
         _tunnel.design_of(row)
     count = len({row["design"] for row in rows})
     drawn, others = rows[:count], rows[count:]
-    first = {row["design"]: fired(row) for row in drawn}
-    table = pd.DataFrame([{**row, **_tunnel.measured(*first[row["design"]])} for row in drawn])
+    found = []
     if others:
         folder = study.begin(options) / "runs"
-        more = dem.sweep(shot, others, out=folder, workers=options.threads)
-        for sentence in more["error"][more["error"] != ""]:
+        found.append(dem.sweep(shot, others, out=folder, workers=options.threads))
+        for sentence in found[0]["error"][found[0]["error"] != ""]:
             raise dem.InputError(sentence)
-        table = pd.concat([table, more])
-    return table, first
+    first = {row["design"]: fired(row) for row in drawn}
+    rows = [{**row, **_tunnel.measured(*first[row["design"]])} for row in drawn]
+    return pd.concat([pd.DataFrame(rows), *found]), first
 
 
 def write(options, rows, first, table):
