@@ -11,10 +11,10 @@ from taichi_dem.kit.errors import InputError
 
 
 class Launch:
-    """A kernel of an object, called with the same templates and other values each time.
+    """A kernel, called with the same templates and other values each time.
 
-    kernel: bound method with templates first, then whole numbers and contiguous arrays, that
-    returns a whole number or nothing. The first call is one of Taichi's own.
+    kernel: bound method or function with templates first, then whole numbers and contiguous arrays,
+    that returns a whole number or nothing. The first call of a session is one of Taichi's own.
     """
 
     def __init__(self, kernel: Any, *templates: Any):
@@ -23,15 +23,19 @@ class Launch:
 
     def __call__(self, *values: int | np.ndarray) -> Any:
         """Run it with these values; what it returns."""
-        if self._ready is None:
+        if not self._is_ready():
             found = self._kernel(*self._templates, *values)
             self._ready = self._prepared(values)
             return found
         return self._launched(values, waits=self._ready[-1])
 
+    def _is_ready(self):
+        """Whether it was called in this session of Taichi."""
+        return self._ready is not None and self._ready[0] is impl.get_runtime().prog
+
     def queue(self, *values: int | np.ndarray) -> None:
         """Run it some time soon, in order, without waiting for what it returns."""
-        if self._ready is None:
+        if not self._is_ready():
             self(*values)
         else:
             self._launched(values, waits=False)
@@ -57,8 +61,9 @@ class Launch:
 
     def _prepared(self, values):
         """Taichi's program, the compiled kernel, what makes a context, and whether it returns."""
-        kernel, owner = self._kernel._primal, self._kernel._kernel_owner
-        key = kernel.ensure_compiled(owner, *self._templates, *values)
+        kernel = self._kernel._primal
+        owner = [self._kernel._kernel_owner] if hasattr(self._kernel, "_kernel_owner") else []
+        key = kernel.ensure_compiled(*owner, *self._templates, *values)
         found, program = kernel.compiled_kernels[key], impl.get_runtime().prog
         compiled = program.compile_kernel(program.config(), program.get_device_caps(), found)
         return program, compiled, found.make_launch_context, kernel.return_type is not None

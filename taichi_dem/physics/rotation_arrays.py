@@ -6,6 +6,7 @@ The kernels read no field: they are compiled once a session, whatever engines it
 import numpy as np
 import taichi as ti
 
+from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.products import matvec, transposed_matvec
 from taichi_dem.kit.types import mat3, vec3, vec4
 from taichi_dem.physics.rotation import rotation_matrix, spin_of
@@ -21,14 +22,14 @@ def angular_momenta(orientation: np.ndarray, spin: np.ndarray, inertia: np.ndarr
     (n, 3, 3) [kg m^2].
     """
     found = np.empty((len(spin), 3))
-    _find_momenta(orientation, spin, inertia, found)
+    _launch_momenta(*_rows(orientation, spin, inertia), found)
     return found
 
 
 def rotations(orientation: np.ndarray) -> np.ndarray:
     """Rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
     found = np.empty((len(orientation), 3, 3))
-    _find_rotations(orientation, found)
+    _launch_rotations(*_rows(orientation), found)
     return found
 
 
@@ -38,9 +39,14 @@ def spins(orientation: np.ndarray, inertia_inverse: np.ndarray, momentum: np.nda
     orientation: unit quaternions (n, 4). inertia_inverse: in body axes (n, 3, 3) [1/(kg m^2)].
     momentum: angular, in world axes (n, 3) [kg m^2/s].
     """
-    found = np.empty_like(momentum)
-    _find_spins(orientation, inertia_inverse, momentum, found)
+    found = np.empty((len(momentum), 3))
+    _launch_spins(*_rows(orientation, inertia_inverse, momentum), found)
     return found
+
+
+def _rows(*arrays):
+    """Arrays as a kernel reads them."""
+    return [np.ascontiguousarray(array, dtype=np.float64) for array in arrays]
 
 
 @ti.func
@@ -86,3 +92,7 @@ def _find_spins(orientation: _ROWS, inertia_inverse: _MATRICES, momentum: _ROWS,
         spin = spin_of(_rotation(orientation, i), inverse, _vector(momentum, i))
         for r in ti.static(range(3)):
             found[i, r] = spin[r]
+
+
+_launch_momenta, _launch_rotations = Launch(_find_momenta), Launch(_find_rotations)
+_launch_spins = Launch(_find_spins)

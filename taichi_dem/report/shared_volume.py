@@ -110,6 +110,9 @@ class SharedVolume(Kept):
 
     def _now(self):
         """Positions [m] and rotations of the bodies."""
+        return self.run.readings.once("places", self._places)
+
+    def _places(self):
         state, here = self.run.state, slice(self.run.model.body_count)
         return values(state.position, here), rotations(values(state.orientation, here))
 
