@@ -17,7 +17,9 @@ SHADES = dict(zip(PARTS, (BLUE, WINE, ORANGE, "#c7b299", GREEN, "#dddddd")))
 #: Look of what the mesh may change.
 HATCHED = {"color": "none", "edgecolor": "black", "hatch": "////", "linewidth": 0.0, "height": 0.4}
 #: Half of the width of the section that a film shows [m], and the part of the rock.
-BAND, PART = 0.25, {"xlim": (0.6, 3.4), "ylim": (1.5, 3.7)}
+BAND, PART = 0.25, {"xlim": (0.6, 3.4), "ylim": (1.5, 3.9)}
+#: Of displacements in the film.
+MAGNIFY = 20.0
 
 
 def draw_cracks(path, runs):
@@ -94,11 +96,11 @@ def film_section(path, result):
         bar = figure.colorbar(drawn, ax=axes, label="speed [m/s]", aspect=25)
         bar.ax.set_yticks(edges, [f"{value:g}" for value in edges])
         for frame in result.frames:
-            faces = displaced(model, frame, 5.0)[chosen][:, LOCAL_FACES].reshape(-1, 3, 3)
+            faces = displaced(model, frame, MAGNIFY)[chosen][:, LOCAL_FACES].reshape(-1, 3, 3)
             seen = _from_below(faces)
             drawn.set_verts(faces[seen][..., [0, 2]])
             drawn.set_array(frame.speed[chosen[seen // 4]])
-            axes.set_title(f"t = {1e3 * frame.time_s:.2f} ms, displacement × 5")
+            axes.set_title(f"t = {1e3 * frame.time_s:.2f} ms, displacement × {MAGNIFY:g}")
             shoot()
 
 
