@@ -191,7 +191,7 @@ def drilled_rock(
     """
     check_holes(size, holes)
     near, far = positive("near", near), positive("far", far)
-    thinnest = min((one.length_m for one in holes), default=far)
+    thinnest = min((one.length_m for one in holes), default=2.0 * far)
     if not near <= min(far, 0.5 * thinnest):
         raise InputError(
             f"near must be at most far and half of the shortest hole, "
