@@ -149,11 +149,16 @@ def middle_of(design):
 
 
 def peaks(result, middle):
-    """Distance from the middle [m], peak speed [m/s] and whether a body is behind, or beside."""
-    away = result.model.centre - middle
+    """Distance from the middle [m], peak speed [m/s] and whether a body is behind, or beside.
+
+    Bodies of the largest piece alone, the rock that stays: what flies out shakes nothing.
+    """
+    piece = result.fragment_of_body()
+    stays = piece == np.bincount(piece, volumes(result.model.mesh)).argmax()
+    away = (result.model.centre - middle)[stays]
     across, behind = np.hypot(away[:, 0], away[:, 1]), -away[:, 2]
     distance = np.hypot(across, behind)
-    return distance, result.peak_speed, behind > across, np.abs(behind) < across
+    return distance, result.peak_speed[stays], behind > across, np.abs(behind) < across
 
 
 def power_law(distance, speed, chosen):

@@ -27,7 +27,7 @@ def draw_cracks(path, runs):
     columns = min(len(runs), 2)
     lines = -(-len(runs) // columns)
     box = np.array([np.zeros(3), SIZE])
-    with picture(path, 0, size=(4.6 * columns, 3.9 * lines)) as (figure, _):
+    with picture(path, 0, size=(4.6 * columns, 4.2 * lines)) as (figure, _):
         for number, (name, (_, result)) in enumerate(runs.items(), 1):
             axes = figure.add_subplot(lines, columns, number, projection="3d")
             broken = np.flatnonzero(np.isfinite(result.broken_time))
@@ -36,7 +36,7 @@ def draw_cracks(path, runs):
             look = {"cmap": shades("plasma", 0.0, 0.88), "norm": Normalize(0.0, until)}
             in_space(axes, triangles, 1e3 * result.broken_time[broken], box, look)
             axes.view_init(elev=24.0, azim=35.0)
-            axes.set_box_aspect(np.ptp(box[:, [0, 2, 1]], axis=0), zoom=1.1)
+            axes.set_box_aspect(np.ptp(box[:, [0, 2, 1]], axis=0), zoom=0.95)
             axes.set_title(f"{name}: {_area(result):.1f} m² of cracks")
         drawn = axes.collections[0]
         bar = {"location": "bottom", "shrink": 0.5, "aspect": 40}
@@ -54,7 +54,8 @@ def draw_peaks(path, runs, table):
             for (name, (design, result)), colour in zip(runs.items(), COLOURS):
                 distance, speed, behind, beside = peaks(result, middle_of(design))
                 chosen = (behind if place == "behind" else beside) & (distance > FITTED[0])
-                axes.plot(distance[chosen], speed[chosen], ".", ms=1.5, alpha=0.35, color=colour)
+                axes.plot(distance[chosen], speed[chosen], ".", ms=1.5, alpha=0.2, color=colour)
+                axes.plot(*_medians(distance[chosen], speed[chosen]), lw=2.5, color=colour)
                 row = table.loc[name]
                 value, bar = row[f"{place}_m_s"], row[f"{place}_m_s_bar"]
                 look = {"fmt": "o", "ms": 7, "capsize": 5, "color": colour, "mec": "white"}
@@ -65,17 +66,25 @@ def draw_peaks(path, runs, table):
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
 
 
+def _medians(distance, speed):
+    """Middle of each distance that holds bodies, in even ratios, and the median speed there."""
+    edges = np.geomspace(FITTED[0], distance.max(), 9)
+    place = np.clip(np.searchsorted(edges, distance) - 1, 0, len(edges) - 2)
+    held = np.unique(place)
+    medians = [np.median(speed[place == one]) for one in held]
+    return np.sqrt(edges[held] * edges[held + 1]), medians
+
+
 def draw_energy(path, table):
     """What the work of the gas went into, a bar a design; hatched: the spread over meshes."""
     with picture(path, size=(8.4, 1.4 + 0.65 * len(table))) as (figure, axes):
-        left = np.zeros(len(table))
-        for part, colour in SHADES.items():
-            share = 100.0 * table[f"{part}_share"].to_numpy()
-            spread = 100.0 * np.nan_to_num(table[f"{part}_share_bar"].to_numpy())
-            axes.barh(table.index, share, left=left, color=colour, label=part)
-            ends = left + share - np.minimum(spread, share)
-            axes.barh(table.index, np.minimum(2.0 * spread, share), left=ends, **HATCHED)
-            left += share
+        shares = 100.0 * table[[f"{part}_share" for part in SHADES]].to_numpy().T
+        bars = 100.0 * np.nan_to_num(table[[f"{part}_share_bar" for part in SHADES]].to_numpy().T)
+        ends = shares.cumsum(axis=0)
+        for share, end, (part, colour) in zip(shares, ends, SHADES.items()):
+            axes.barh(table.index, share, left=end - share, color=colour, label=part)
+        for end, bar in zip(ends, bars):
+            axes.barh(table.index, 2.0 * bar, left=end - bar, **HATCHED)
         axes.set(xlabel="share of the work of the gas [%]", xlim=(0.0, None))
         axes.invert_yaxis()
         figure.legend(loc="outside upper center", ncols=6)
