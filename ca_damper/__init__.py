@@ -13,6 +13,7 @@ from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
 from ca_damper.report.certificate import Certificate
 from ca_damper.report.report import Report, needed_effects
+from ca_damper.runs.best_damper import BestDamper, best_damper
 from ca_damper.runs.damper_map import DamperMap, damper_map
 from ca_damper.runs.film import film
 from ca_damper.runs.frequency_sweep import Sweep, sweep_up_and_down
@@ -38,6 +39,7 @@ __all__ = [
     "Answer",
     "Automaton",
     "Batch",
+    "BestDamper",
     "Box",
     "Branch",
     "Certificate",
@@ -62,6 +64,7 @@ __all__ = [
     "Sweep",
     "TimeHistory",
     "__version__",
+    "best_damper",
     "collect_and_collide",
     "damper_map",
     "excitation",

@@ -36,7 +36,7 @@ PARTICLE = Work(bytes=36, flops=4)
 #: is a product and a sum; four walls are as many differences. Its neighbours are left out.
 SPHERE = Work(bytes=64, flops=12)
 #: Fillings of the figure of the response, and the share of its frequencies that is run.
-RESPONSES, EVERY = ("dem", "ca_static", "ca_landing", "ca_ejection"), 8
+RESPONSES, EVERY = ("dem", "ca_static", "ca_landing", "ca_place"), 8
 #: Ends of the short and of the whole run [s].
 SHORT, WHOLE = 1e-4, 5e-4
 #: Step and displacement limit of the paper, end of its run here [s], and the evaluations of bonds
@@ -119,6 +119,7 @@ def damper(quick):
         return lambda: 1e-6 * count / step_seconds(batch, scene, least)
 
     works = {"scan": (rate(scan, CELLS), repeats), "list": (rate(listed, 50), repeats)}
+    works["place"] = rate(shaken(Automaton(), 1e-4), 50), repeats
     for number in WANTED:
         works[number] = rate(spheres, number, NUMBERS.index(number)), repeats
     found = by_turns(works)
@@ -126,6 +127,8 @@ def damper(quick):
     yield Figure(name, "million cells/s", found["scan"], ">= 500", CELL)
     name = "automaton, list, N = 50"
     yield Figure(name, "million particle steps/s", found["list"], ">= 100", PARTICLE)
+    name = "automaton, rules of place, N = 50"
+    yield Figure(name, "million particle steps/s", found["place"], ">= 80", PARTICLE)
     gains = [least_gain(scan, listed, least) for _ in range(1 if quick else 2)]
     yield Figure("automaton, scan / list, least of N = 1 .. 120", "1", gains, "> 1")
     for number, wanted in WANTED.items():

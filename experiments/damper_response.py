@@ -1,16 +1,18 @@
-"""Response of the damped structure over frequency: spheres and three automata (Figs. 3 and 11).
+"""How much lower is the peak with free grains than with the same grains fixed?
 
-    python experiments/damper_response.py                       # about six minutes on two cores
-    python experiments/damper_response.py --fillings ca_static  # the best automaton: a minute
+    python experiments/damper_response.py                       # about four minutes on two cores
+    python experiments/damper_response.py --fillings dem,ca_static,ca_landing  # those of the paper
     python experiments/damper_response.py --quick
     python experiments/damper_response.py --accuracy 1%         # the peaks alone, with error bars
     python experiments/damper_response.py --accuracy 5% --budget filling --fillings dem
 
-Every particle number, frequency and seed is a scene; all scenes of a filling run as one batch.
-Bands show the range of the seeds, lines their median. A rigid mass of the particles' weight is
-drawn for comparison: a lower peak is damping, a shifted one apparent mass. A sweep up and down,
-which carries the state on, shows where two motions are possible. A quick run takes spheres and the
-automaton with static contact.
+Figs. 3 and 11 of the paper. Fixed grains, drawn beside free ones, detune the structure as much:
+what free ones take off that peak is damping. Expect 30 of them to leave 0.76, 0.48 and 0.34 of it
+on a base that moves by 0.3, 0.6 and 1.2 mm. Then come the peaks by number of grains, apparent mass
+and loss, and a sweep up and down, the state carried on, which shows where two motions are possible.
+The paper's automaton has landing impulses alone, ca_landing; static contact, ca_static, moves its
+peak as that of the spheres. Every number, frequency and seed is a scene; bars and bands are lowest
+and highest of the seeds, lines their median.
 
 With --accuracy, the program finds place and height of the peaks to this share of their value. It
 chooses frequencies, steps, seeds and cycles, whatever the other options say, and prints each answer
@@ -28,7 +30,12 @@ import numpy as np
 import pandas as pd
 
 import ca_damper as ca
-from ca_damper.plot.curves import picture_hysteresis, picture_measures, picture_responses
+from ca_damper.plot.curves import (
+    picture_damping,
+    picture_hysteresis,
+    picture_measures,
+    picture_peaks,
+)
 from ca_damper.runs.response import OUTSIDE, Grid
 from taichi_dem.kit import study
 from taichi_dem.kit.study import number, several, whole
@@ -39,14 +46,15 @@ COARSE = ([0.80, 0.84, 0.87, 0.89], [1.04, 1.06, 1.09, 1.12])
 RATIOS = np.round(np.concatenate([COARSE[0], np.arange(0.90, 1.0201, 0.005), COARSE[1]]), 4)
 #: Of both fillings [kg].
 PARTICLE_MASS = ca.Spheres().particle_mass
-#: Those of the paper.
-ACCOUNTINGS = ("landing", "landing+ejection", "all")
-AUTOMATA = [ca.Automaton(rules="paper", accounting=word) for word in ACCOUNTINGS]
+#: Those of the paper with and without static contact.
+PAPER = [ca.Automaton(rules="paper", accounting=word) for word in ("all", "landing")]
 #: The fillings compared, by label.
-FILLINGS = {filling.label: filling for filling in (ca.Spheres(), *AUTOMATA)}
+FILLINGS = {filling.label: filling for filling in (ca.Spheres(), ca.Automaton(), *PAPER)}
+#: Number of grains beside fixed ones, and amplitude of the base of their curves [m].
+SHOWN, BASE = 30, ca.Oscillator().base_amplitude
 NUMBERS = several(whole(0, 160))
 SETTINGS = {
-    "fillings": (list(FILLINGS), ["dem", "ca_static"], several(str), ", ".join(FILLINGS)),
+    "fillings": (["dem", "ca_place"], ["dem", "ca_place"], several(str), ", ".join(FILLINGS)),
     "particles": ([10, 20, 30, 40, 50], [10, 30], NUMBERS, "default 10,20,30,40,50"),
     "seeds": (5, 2, whole(1, 1000), "seeds of the automata, default 5"),
     "dem_seeds": (1, 1, whole(1, 1000), "seeds of the spheres, default 1"),
@@ -57,6 +65,8 @@ SETTINGS = {
     "sweep_particles": ([10, 50], [10], NUMBERS, "numbers of particles swept, default 10,50"),
     "sweep_seeds": (2, 1, whole(1, 1000), "seeds of the sweep, default 2"),
     "ratios": (RATIOS, RATIOS[::4]),
+    # Amplitudes of the base [m] over which free and fixed grains are compared.
+    "bases": ((0.15e-3, 0.3e-3, BASE, 0.9e-3, 1.2e-3, 1.8e-3), (0.3e-3, BASE, 1.2e-3)),
 }
 
 
@@ -79,19 +89,32 @@ def run(options):
         raise ca.InputError(f"resume must be left out: there is no checkpoint in {options.out}")
     jobs = {label: jobs_of(FILLINGS[label], options) for label in options.fillings}
     folder = study.begin(options)
-    responses, sweeps = {}, {}
-    for label, (response, sweep) in jobs.items():
+    responses, strengths, sweeps = {}, {}, {}
+    for label, (response, strength, sweep) in jobs.items():
         responses[label] = made(ca.frequency_response, response, f"{label}_response", options)
+        strengths[label] = made(ca.frequency_response, strength, f"{label}_bases", options)
         sweeps[label] = made(ca.sweep_up_and_down, sweep, f"{label}_sweep", options)
     write_tables(responses, sweeps, folder)
-    picture_responses(folder / "response.png", responses, PARTICLE_MASS)
+    shares = {label: (one.amplitudes, shares_of(one)) for label, one in strengths.items()}
+    curves = {label: one[options.bases.index(BASE)] for label, one in strengths.items()}
+    picture_damping(folder / "response.png", curves, shares, (SHOWN, SHOWN * PARTICLE_MASS))
+    picture_peaks(folder / "peaks.png", responses, PARTICLE_MASS)
     picture_measures(folder / "measures.png", responses, PARTICLE_MASS)
     picture_hysteresis(folder / "hysteresis.png", sweeps)
     peaks = peaks_of(responses)
     print(peaks.to_string(index=False, float_format="{:.4g}".format, na_rep=OUTSIDE), "\n")
     figures = figures_of(peaks, responses, sweeps)
-    reports = [one.report for one in (*responses.values(), *sweeps.values())]
-    study.finish(options, NAME, figures, reports)
+    for label, (bases, share) in shares.items():
+        for base, values in zip(bases, share):
+            figures[f"peak_share_{label}_{1e6 * base:.0f}um"] = float(np.median(values)), "1"
+    runs = (*responses.values(), *(one[0] for one in strengths.values()), *sweeps.values())
+    study.finish(options, NAME, figures, [one.report for one in runs])
+
+
+def shares_of(strength):
+    """Peaks with free grains over those with the same grains fixed, (amplitudes, seeds)."""
+    fixed = [one.oscillator.peak(SHOWN * PARTICLE_MASS)[1] for one in strength]
+    return strength.peaks()[1][:, 0] / np.array(fixed)[:, None]
 
 
 def run_to_accuracy(options):
@@ -119,7 +142,7 @@ def run_to_accuracy(options):
 
 
 def jobs_of(filling, options):
-    """Arguments of the response and of the sweep; InputError for those that would be refused."""
+    """Arguments of both responses and of the sweep; InputError for those that would be refused."""
     dt, seeds = options.ca_dt, options.seeds
     if filling.label == "dem":
         dt, seeds = options.dem_dt, options.dem_seeds
@@ -128,8 +151,13 @@ def jobs_of(filling, options):
     shared = {"filling": filling, "ratios": options.ratios, "dt": dt}
     for particles, *_ in (response, sweep):
         Grid(particles=particles, seeds=1, oscillator=None, **shared)
-    names, shared["measured_cycles"] = ("particles", "seeds", "transient_cycles"), options.measured
-    return [{**shared, **dict(zip(names, one))} for one in (response, sweep)]
+    shared["measured_cycles"] = options.measured
+    strength = SHOWN, min(seeds, 2), options.transient
+    names = "particles", "seeds", "transient_cycles"
+    made = [{**shared, **dict(zip(names, one))} for one in (response, strength, sweep)]
+    near = [ratio for ratio in options.ratios if COARSE[0][-1] < ratio < COARSE[1][0]]
+    made[1].update(base_amplitude=options.bases, ratios=near)
+    return made
 
 
 def made(work, arguments, name, options):

@@ -81,6 +81,6 @@ def _beyond_place(automaton, driven):
     highest = max(automaton.restitution, automaton.wall_restitution)
     if some.any() and highest > 0.9:
         yield (
-            f"restitution {highest:g}, above 0.9 (of 1 without friction, 20 grains keep 0.16 to "
-            "0.27 of their energy in 3 s, spheres 0.999)"
+            f"restitution {highest:g}, above 0.9 (of 1 without friction, two grains keep their "
+            "energy in 3 s, five 0.5 to 0.9 of it, twenty 0.16 to 0.22, spheres 0.999)"
         )

@@ -13,17 +13,10 @@ import numpy as np
 
 from ca_damper.excitation.signal import Signal, end_slope, integral, nodes, spline
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import (
-    FileName,
-    choice,
-    flag,
-    path_name,
-    shown,
-    told_apart,
-)
+from taichi_dem.kit.validation import choice, flag, positive, told_apart
 
-#: What samples are of: the signal itself or its second derivative.
-OF = ("value", "acceleration")
+#: What samples are of: the signal itself, its first or its second derivative.
+OF = ("value", "velocity", "acceleration")
 #: Distance of a time from the even grid, as a share of the step: times may be rounded.
 _UNEVEN = 0.1
 #: Distance that is rounding, as a share of the largest time.
@@ -33,7 +26,12 @@ SAMPLES_A_CYCLE, POWER_SHARE = 4.0, 0.99
 
 
 def from_samples(
-    time_s: Any, values: Any, *, of: str = "value", correct_baseline: bool = False
+    time_s: Any,
+    values: Any,
+    *,
+    of: str = "value",
+    correct_baseline: bool = False,
+    resample: float | None = None,
 ) -> Signal:
     """Signal through measured samples; its own time counts from the first of them.
 
@@ -45,11 +43,15 @@ def from_samples(
         Samples, shape (samples,), of the kind that ``of`` names.
     of : str, default "value"
         ``"value"``: of the signal itself, such as a displacement [m] or a force [N].
-        ``"acceleration"``: of its second derivative [m/s^2], which is integrated twice from rest.
+        ``"velocity"``: of its derivative [m/s], which is integrated from zero. ``"acceleration"``:
+        of its second derivative [m/s^2], which is integrated twice from rest.
     correct_baseline : bool, default False
         Subtract from an acceleration the straight line that makes the motion end at rest where it
         began: for a record with an offset, which integrates to a large drift. Do not use it for a
         shock, which changes the speed for good. A report says what was done.
+    resample : float, optional
+        New step [s]: values at even times are taken from a cubic spline through the samples, whose
+        times need not be even then.
 
     Returns
     -------
@@ -73,16 +75,42 @@ def from_samples(
     times, samples = nodes("time_s", time_s), nodes("values", values)
     if len(times) != len(samples):
         raise InputError(f"values must be {len(times)}, as many as times, got {len(samples)}")
+    if resample is not None:
+        times, samples = _resampled(times, samples, positive("resample", resample))
     step, evened = _even_step(times)
     _check_spectrum(step, samples)
     if of == "value":
         made, treated = spline(step, samples, "samples"), ""
+    elif of == "velocity":
+        made, treated = _integrated(step, samples), "integrated from zero"
     elif correct_baseline:
         made, treated = _at_rest_again(step, samples)
     else:
         made = integral(step, samples, "samples")
         treated = "integrated twice from rest, without a base line correction"
+    if resample is not None:
+        evened = f"resampled to {step:.6g} s"
     return replace(made, treated="; ".join(filter(None, (evened, treated))))
+
+
+def _resampled(times, samples, step):
+    """Even times at about a step, and the values of a cubic spline there; InputError."""
+    from scipy.interpolate import CubicSpline
+
+    if not (np.diff(times) > 0.0).all():
+        k = int(np.argmin(np.diff(times))) + 1
+        raise InputError(f"times must ascend, got {times[k]:.9g} s in sample {k + 1}")
+    count = 1 + max(3, round((times[-1] - times[0]) / step))
+    even = np.linspace(times[0], times[-1], count)
+    return even, CubicSpline(times, samples)(even)
+
+
+def _integrated(step, samples):
+    """Signal whose derivative has these samples, zero at first; exact for a cubic spline."""
+    from scipy.interpolate import CubicSpline
+
+    times = step * np.arange(len(samples))
+    return spline(step, CubicSpline(times, samples).antiderivative()(times), "samples")
 
 
 def _even_step(times):
@@ -97,8 +125,8 @@ def _even_step(times):
         k = int(np.abs(steps - usual).argmax()) + 1
         raise InputError(
             f"times must ascend evenly, to {_UNEVEN:g} of their step of {usual:g} s, got "
-            f"{times[k]:.9g} s after {times[k - 1]:.9g} s in sample {k + 1}: fill the gap, or read "
-            "one part at a time"
+            f"{times[k]:.9g} s after {times[k - 1]:.9g} s in sample {k + 1}: fill the gap, read "
+            "one part at a time, or give a step to resample to"
         )
     is_even = late.max() <= _ROUNDED * max(step, abs(times[0]), abs(times[-1]))
     return step, "" if is_even else f"times evened by up to {late.max():.2g} s"
@@ -139,103 +167,3 @@ def _at_rest_again(step, samples):
         f"{line[0]:.3g} to {line[-1]:.3g} m/s^2 that takes {speed:.3g} m/s and {place:.3g} m away"
     )
     return integral(step, samples - line, "samples"), treated
-
-
-#: Seconds in the unit of a column of times.
-TIMES = {"time_s": 1.0, "time_ms": 1e-3}
-#: Of each other column: what its values are of, and how much of the SI unit is 1.
-COLUMNS = {
-    "displacement_m": ("value", 1.0),
-    "displacement_mm": ("value", 1e-3),
-    "displacement_um": ("value", 1e-6),
-    "acceleration_m_s2": ("acceleration", 1.0),
-    "acceleration_mm_s2": ("acceleration", 1e-3),
-    "acceleration_g": ("acceleration", 9.80665),
-    "force_N": ("value", 1.0),
-}
-
-
-def from_csv(
-    path: FileName, column: str | None = None, *, correct_baseline: bool = False
-) -> Signal:
-    """Signal from a CSV file, such as a measured motion of a base.
-
-    The first line that is not empty and does not begin with "#" names the columns: time_s or
-    time_ms, and what was measured: displacement_m, _mm or _um, acceleration_m_s2, _mm_s2 or _g, or
-    force_N.
-
-    Parameters
-    ----------
-    path : path
-        CSV file.
-    column : str, optional
-        Column to take; needed if there are several.
-    correct_baseline : bool, default False
-        For an acceleration: subtract a straight line so that the motion ends at rest where it
-        began, as in ``from_samples``; right for a record with an offset, wrong for a shock.
-
-    Returns
-    -------
-    Signal
-        Displacement [m] or force [N].
-
-    Raises
-    ------
-    InputError
-        The file cannot be read; it holds text, empty cells, NaN, gaps or times that run backwards;
-        or its step is too coarse for the spectrum of the motion.
-    """
-    name = path_name("path", path)
-    flag("correct_baseline", correct_baseline)
-    table = _table(name)
-    wanted, times = _wanted(name, table, COLUMNS, column), _wanted(name, table, TIMES)
-    time_s = TIMES[times] * _numbers(name, table, times)
-    of, unit = COLUMNS[wanted]
-    samples = unit * _numbers(name, table, wanted)
-    try:
-        made = from_samples(time_s, samples, of=of, correct_baseline=correct_baseline)
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
-    return replace(made, label=f"{wanted} of {name}")
-
-
-def _table(name):
-    """Columns of a file as a DataFrame, by their names."""
-    import pandas
-
-    layout = {"comment": "#", "index_col": False, "dtype": str}
-    try:
-        found = pandas.read_csv(name, encoding="utf-8-sig", **layout)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{name} must be a CSV file that can be read: {reason}") from None
-    return found.rename(columns=str.strip)
-
-
-def _wanted(name, table, known, column=None):
-    """The one of the columns known that a file has, or that is asked for; InputError."""
-    if column is not None:
-        choice("column", column, known)
-    there = [one for one in table.columns if one in known and column in (None, one)]
-    if len(there) != 1:
-        raise InputError(
-            f"column must say which of {', '.join(known)} is meant where {name} has not one of "
-            f"them, got {shown(column)} and {shown(list(table.columns))}"
-        )
-    return there[0]
-
-
-def _numbers(name, table, column):
-    """Numbers of a column; InputError that names the row of the first cell that holds none."""
-    cells = table[column].to_numpy(object)
-    try:
-        found = cells.astype(np.float64)
-    except ValueError as error:
-        raise InputError(f"{name} must hold numbers in column {column}: {error}") from None
-    bad = np.flatnonzero(~np.isfinite(found))
-    if len(bad):
-        raise InputError(
-            f"{name} must hold a finite number in column {column} of row {bad[0] + 1}, "
-            f"got {shown(cells[bad[0]])}"
-        )
-    return found

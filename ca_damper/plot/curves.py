@@ -19,25 +19,29 @@ _SHADES = colormaps["viridis"]
 _FINE = 400
 
 
-def picture_responses(path: FileName, responses: Mapping[str, Any], particle_mass: float) -> None:
-    """A panel a filling: RMS over frequency for every particle number (Figs. 3 and 11); the peaks.
+def picture_damping(path: FileName, curves: Any, shares: Any, fixed: tuple[int, float]) -> None:
+    """Response of free and of fixed grains in one frame, and how their peaks compare.
 
-    responses: Response by label. particle_mass [kg], for the rigid mass drawn for scale.
+    curves: Response of one number of grains, by label. shares: by label, amplitudes of the base [m]
+    and peaks over those with fixed grains, (amplitudes, seeds). fixed: the number, and its mass.
     """
-    count = len(responses)
-    columns = 2 if count < 4 else 3
-    rows = (count + 2 + columns - 1) // columns
-    size = (min(4.2, 9.2 / columns) * columns, 3.0 * rows)
-    with picture(path, rows, columns, size, squeeze=False) as (figure, axes):
-        panels = axes.ravel()
-        for axis, (label, response) in zip(panels, responses.items()):
-            _draw_curves(axis, response)
-            axis.set_title(styles_of(responses)[label].label)
-        _share_height(panels[:count])
-        _legend_of_bands(figure, panels[0])
-        _draw_peaks(panels[count], panels[count + 1], responses, particle_mass)
-        for axis in panels[count + 2 :]:
-            axis.set_axis_off()
+    (count, mass), first = fixed, next(iter(curves.values()))
+    heavy = {"color": BLACK, "lw": 2.2, "label": f"the same {count} grains, fixed"}
+    with picture(path, 1, 2, (9.2, 4.6), width_ratios=(3, 2)) as (figure, (curve, share)):
+        for label, style in styles_of(curves).items():
+            size, values = shares[label]
+            _bars(share, 1e3 * np.array(size), values, np.median(values, axis=1), style, 6)
+            rms = 1e3 * curves[label].rms[0]
+            _bars(curve, first.ratios, rms, np.median(rms, axis=1), style, 4)
+        own, fine = first.oscillator, np.linspace(first.ratios[0], first.ratios[-1], _FINE)
+        curve.plot(fine, 1e3 * own.rms(fine * own.natural_frequency, mass), **heavy)
+        _draw_empty(curve, own, first.ratios)
+        words = f"{count} grains on a base that moves by ±{1e3 * own.base_amplitude:g} mm"
+        curve.set(title=words, ylim=(0.0, None))
+        share.axhline(1.0, **heavy)
+        share.set(title="what free grains leave of the peak", xlabel="amplitude of the base [mm]")
+        share.set(ylabel="peak / peak with fixed grains [1]", ylim=(0.0, 1.08))
+        figure.legend(*curve.get_legend_handles_labels(), loc="outside upper left", ncols=4)
 
 
 def picture_compared(path: FileName, curves: Any, oscillator: Oscillator) -> None:
@@ -107,37 +111,30 @@ def _shade(response, k):
     return _SHADES(0.1 + 0.8 * k / max(1, len(response.particles) - 1))
 
 
-def _share_height(panels):
-    """The same height for all, without the peak of the empty container."""
-    highest = max(np.nanmax(line.get_ydata()) for axis in panels for line in axis.lines[:-1])
-    for axis in panels:
-        axis.set_ylim(0.0, 1.08 * highest)
-
-
-def _draw_peaks(place, height, responses, particle_mass=None):
+def picture_peaks(path: FileName | None, responses: Any, particle_mass: Any = None) -> Figure:
     """Place and height of the peaks over the particle number; bars from seed to seed.
 
-    particle_mass [kg]: of the rigid mass drawn for scale, None for none.
+    responses: Response by label. particle_mass [kg]: of the rigid mass drawn for scale, None for
+    none.
     """
-    styles = styles_of(responses)
-    for label, response in responses.items():
-        ratio, rms = response.peaks()
-        for axis, values in ((place, ratio), (height, 1e3 * rms)):
-            middle = np.median(values, axis=1)
-            _bars(axis, response.particles, values, middle, styles[label], 4.5)
-    first = next(iter(responses.values()))
-    if particle_mass is not None:
-        rigid = [first.oscillator.peak(n * particle_mass) for n in first.particles]
-        words = "rigid mass of the same weight"
-        place.plot(first.particles, [r for r, _ in rigid], color=GREY, ls=":", label=words)
-    place.set(title="place of the peak; bars: seeds", xlabel="particles N [1]")
-    place.set_ylabel("f / f$_0$ of the peak [1]")
-    height.set(title="its height; bars: seeds", xlabel="particles N [1]")
-    height.set(ylabel="peak RMS displacement [mm]", ylim=(0, None))
-    keys, labels = place.get_legend_handles_labels()
-    height.figure.legend(keys, labels, loc="outside lower right", ncols=3)
-    for axis in (place, height):
-        axis.set_xticks(first.particles)
+    styles, first = styles_of(responses), next(iter(responses.values()))
+    with picture(path, 1, 2, (9.2, 4.2)) as (figure, (place, height)):
+        for label, response in responses.items():
+            ratio, rms = response.peaks()
+            for axis, values in ((place, ratio), (height, 1e3 * rms)):
+                middle = np.median(values, axis=1)
+                _bars(axis, response.particles, values, middle, styles[label], 4.5)
+        if particle_mass is not None:
+            rigid = np.array([first.oscillator.peak(n * particle_mass) for n in first.particles])
+            look = {"color": BLACK, "ls": ":", "label": "fixed grains"}
+            place.plot(first.particles, rigid[:, 0], **look)
+            height.plot(first.particles, 1e3 * rigid[:, 1], **look)
+        place.set(xlabel="particles N [1]", ylabel="f / f$_0$ of the peak [1]")
+        height.set(xlabel="particles N [1]", ylabel="peak RMS displacement [mm]", ylim=(0, None))
+        figure.legend(*place.get_legend_handles_labels(), loc="outside upper left", ncols=3)
+        for axis in (place, height):
+            axis.set_xticks(first.particles)
+    return figure
 
 
 def picture_measures(path: FileName, responses: Mapping[str, Any], particle_mass: float) -> None:
@@ -252,9 +249,7 @@ class ResponsePlots:
 
     def peaks(self, *, path: FileName | None = None) -> Figure:
         """Draw place and height of the peaks over the particle number."""
-        with picture(path, 1, 2, size=(8.4, 3.6)) as (figure, (place, height)):
-            _draw_peaks(place, height, {self._response.label: self._response})
-        return figure
+        return picture_peaks(path, {self._response.label: self._response})
 
 
 def _explain_curves(axis, response):

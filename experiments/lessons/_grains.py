@@ -15,8 +15,11 @@ from taichi_dem.kit.session_thread import session
 #: Frequencies by the natural one of the empty box, and the cycles before and while measuring.
 RATIOS = (0.88, 0.9, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.99, 1.0, 1.02, 1.05)
 TRANSIENT, MEASURED = 60, 15
-PAGE, WAIT, ALT = "why_a_box_of_grains_damps", "Shaking.", "Response, energy a cycle, box"
-SIZE, TALL = (8.8, 5.6), (4.4, 11.0)
+PAGE, WAIT = "why_a_box_of_grains_damps", "Shaking."
+ALT = "Response, free decay, energy a cycle, box"
+SIZE, TALL = (11.0, 5.8), (4.4, 14.0)
+#: Height from which the box is let go [m], and the cycles of its decay.
+DROP, DECAY = 30e-3, 24
 CONTROLS = {
     "base": ((0.05, 0.1, 0.2, 0.4, 0.6, 1.0, 1.5, 2.0), 0.6, "base moves by [mm]"),
     "ratio": (RATIOS, 0.97, "frequency / own frequency"),
@@ -35,7 +38,7 @@ class Answer:
     one. frames: of one cycle. omega: of the base [rad/s]. swing: amplitude of the box [m]. throw:
     its largest acceleration by that of gravity, above 1 it throws its grains. energy: J a cycle
     that "base" gives and that "dashpot" and "filling" take, first harmonics. damping_ratio: of
-    dashpot and grains together.
+    dashpot and grains together. decay: amplitude [m] of each cycle of a box that is let go.
     """
 
     def __init__(self, grains, share, base, ratio):
@@ -49,6 +52,7 @@ class Answer:
         values = damping_ratio, self.cycles.amplitude, self.cycles.omega
         self.damping_ratio, self.swing, self.omega = map(self.at_ratio, values)
         self.throw = self.omega**2 * self.swing / FILLING.gravity
+        self.decay = let_go(grains, o)
 
     def at_ratio(self, values):
         """The chosen one of values at all RATIOS."""
@@ -103,13 +107,24 @@ def shaken(grains, o):
     return batch.run(0, MEASURED), tuple(zip(*shots))
 
 
+@session.remember
+def let_go(grains, o):
+    """Amplitude of each cycle [m] of a box that is let go from DROP on a base at rest."""
+    table = SceneTable(grains, 1, FILLING.default_dt, o.natural_frequency, 0.0)
+    batch = Batch(FILLING, table, measured_cycles=DECAY)
+    numbers = {"mass": o.mass, "stiffness": o.stiffness, "damping": o.damping}
+    batch.change(**numbers)
+    batch.start(displacement=DROP)
+    return np.sqrt(2.0) * batch.run(0, DECAY).rms_by_cycle[0]
+
+
 def draw(figure, answer, tall):
-    """Response, energy a cycle, and the box through one cycle."""
-    above, below = figure.add_gridspec(2, 1, height_ratios=(1.0, 1.15))
-    grid = (2, 1) if tall else (1, 2)
-    response, energy = above.subgridspec(*grid, width_ratios=(1.7, 1.0)[: grid[1]]).subplots()
-    _response(response, answer)
-    _energy(energy, answer)
+    """Response, free decay, energy a cycle, and the box through one cycle."""
+    above, below = figure.add_gridspec(2, 1, height_ratios=(1.5 if tall else 1.0, 1.15))
+    grid = (3, 1) if tall else (1, 3)
+    made = above.subgridspec(*grid, width_ratios=(1.6, 1.2, 1.1)[: grid[1]]).subplots()
+    for axes, one in zip(made, (_response, _decay, _energy)):
+        one(axes, answer)
     rows = 2 if tall else 1
     _boxes(figure, below.subgridspec(rows, PICTURES // rows).subplots().ravel(), answer)
 
@@ -131,8 +146,22 @@ def _response(axes, answer):
     axes.legend(loc="upper left")
 
 
+def _decay(axes, answer):
+    """Amplitude over cycles after the box is let go, with free grains and with glued ones."""
+    o, cycles = answer.oscillator, np.arange(DECAY) + 0.5
+    heavy = o.mass * (1.0 + answer.share)
+    lost = 0.5 * o.damping / heavy / o.natural_frequency
+    axes.plot(cycles, 1e3 * DROP * np.exp(-lost * cycles), color=GREY, ls="--", lw=1.2)
+    look = {"color": STYLES[FILLING.label].colour, "ms": 4}
+    axes.plot(cycles, 1e3 * answer.decay, "o-", **look)
+    axes.axhline(1e3 * FILLING.gravity * o.mass / o.stiffness, color=BLACK, ls=":", lw=1.0)
+    axes.text(DECAY, 1e3 * FILLING.gravity * o.mass / o.stiffness, "1 g", ha="right", va="bottom")
+    axes.set(xlabel="cycles [1]", ylabel="amplitude [mm]", ylim=(0.0, 1.05e3 * DROP))
+    axes.set_title("let go, nothing shakes")
+
+
 def _energy(axes, answer):
-    shown = {"base gives": GREEN, "dashpot takes": GREY, "grains take": BLUE}
+    shown = {"base\ngives": GREEN, "dashpot\ntakes": GREY, "grains\ntake": BLUE}
     values = [1e3 * value for value in answer.energy.values()]
     bars = axes.bar(list(shown), values, color=list(shown.values()))
     axes.bar_label(bars, fmt="%.3g", fontsize=8.5)

@@ -152,6 +152,10 @@ def _excitations():
     with open(path("s.csv"), "w") as file:
         file.writelines(["time_s,force_N\n", *(f"{0.01 * k},{k * (49 - k)}\n" for k in range(50))])
     yield f"{where}.from_csv", excitation.from_csv, {"path": path("s.csv"), "column": "force_N"}
+    with open(path("s.at2"), "w") as file:
+        file.write("PEER\n\nACCELERATION IN UNITS OF G\nNPTS= 50, DT= .01 SEC\n")
+        file.writelines(f"{k * (49 - k):e}\n" for k in range(50))
+    yield f"{where}.from_at2", excitation.from_at2, {"path": path("s.at2")}
     noise = {"frequencies": [1.0, 10.0], "density": [1.0, 1.0], "duration": 1.0}
     yield f"{where}.random_vibration", excitation.random_vibration, noise
     tones = {"frequencies": 1.0, "amplitudes": 1.0, "duration": 1.0}
@@ -181,6 +185,9 @@ def _answers():
     ways = {"amplitudes": 1e-3, "frequencies": 6.0, "particles": 10, "clearances": 0.024}
     once = {"seeds": 1, "dt": 1e-3, **CYCLES, **SILENT}
     yield "damper_map", ca.damper_map, {"filling": ca.Automaton(), **ways, **once}
+    found = {"structure": OSCILLATOR, "motion": 1e-3, "mass": 6e-3, "box": (0.06, 0.096)}
+    found |= {"particles": 5, "seeds": 2, "heights": 1, "cycles": (1, 1), "confirm": ca.Automaton()}
+    yield "best_damper", ca.best_damper, found
     asked = {"goal": goals.rms_at(1.0), "tolerance": 0.5, "budget_s": 60.0, "ratios": (0.9, 1.1)}
     yield "solve_response", ca.solve_response, {**filled, **asked}
     yield "needed_effects", ca.needed_effects, {"result": answer()}

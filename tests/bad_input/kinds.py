@@ -76,7 +76,7 @@ KINDS = {
         thickness element size particle_mass diameter reference_speed wall_young v_max mass
         stiffness atol interval duration until budget_s seconds frequency frequencies Every.time_s
         wall_s every_s every_wall_s slip_energy ratio ratios low high step ImpactDamper.clearance
-        masses""",
+        masses resample""",
     "zero or positive": """cohesion normal_damping shear_damping friction contact_damping ramp
         damping_ratio wall_friction gravity static_threshold base_amplitude damping rtol added_mass
         weld_tolerance effects.GasPressure.start nearest dashpot_floor clearance clearances gap
@@ -85,18 +85,18 @@ KINDS = {
         excitation.SineForce.frequency effects.Pressure.rise needed_effects.tolerance
         damper_map.amplitudes collect_and_collide.amplitude""",
     "share": """restitution wall_restitution sleep share theta confidence solve.tolerance
-        solve_response.tolerance""",
+        solve_response.tolerance best_damper.tolerance""",
     "limited": "friction_angle poisson wall_poisson",
     "index": "bodies frame number",
     "whole": """body columns rows count cycles divisions done every_steps force_place frame_every
-        frames level_jump macro_step measured_cycles modes neighbours_per_body
+        frames heights level_jump macro_step measured_cycles modes neighbours_per_body
         pairs_per_body particles effects.BodyContact.parts place record_every
         recorded_samples s sample_every samples scatter scene scenes sectors seed seeds
         spheres_per_body steps substeps sweeps threads total transient_cycles""",
     "word": """accounting accumulator arch colour dashpot driver effects friction_law
         if_diverged kind measure mount neighbour of outer_faces pair_rule rules search
         start traversal way progress term Spheres.damping""",
-    "any": """about acceleration axis base bend by displacement factor force history hole notch
+    "any": """about acceleration axis base bend box by displacement factor force history hole notch
         normal phase phases points shapes start_velocity t time_s times times_s turned u v values
         value velocity x y spin sizes motion tetrahedra goal boxes excitation observers amplitude
         amplitudes effects.Pressure.peak report.measures.Cycles.base_amplitude

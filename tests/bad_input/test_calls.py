@@ -17,8 +17,8 @@ from tests.public_api import PACKAGES, declared, entries, parameters, returned
 CALLS = {"taichi_dem": functools.cache(blast_calls), "ca_damper": functools.cache(damper_calls)}
 #: Classes that users are given and do not make.
 GIVEN = """Answer Branch Progress Received RunView AmplitudeResponse
-    Certificate CollectAndCollide DamperMap Report Response SimulationDiverged StructureHistory
-    Sweep TimeHistory runtime.Settings""".split()
+    BestDamper Certificate CollectAndCollide DamperMap Report Response SimulationDiverged
+    StructureHistory Sweep TimeHistory runtime.Settings""".split()
 #: Functions that need more than values to be tried: processes, an STL file, or a session.
 APART = """sweep parameter_grid shapes.from_surface methods.order_of methods.structure_of
     runtime.check_session runtime.check_thread runtime.when_cleared""".split()

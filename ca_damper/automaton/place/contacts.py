@@ -27,6 +27,9 @@ _AT_END, _AT_SIDE, _ABOVE, _BESIDE = range(4)
 
 #: Least free width [diameters] that a row leaves: its grains never stand at quite the same height.
 LEAST_WIDTH = 0.125
+#: A diameter, and the largest ``contact_rate`` by the approach, with more than rounding added.
+_NEAR = 1.0 + 1e-9
+_MOST_RATE = _NEAR * 4.0 / LEAST_WIDTH
 
 
 @ti.func
@@ -105,33 +108,38 @@ class Contacts(Part):
     """Find the events of a step and the grains that each of them needs.
 
     events: cell, second cell and kind in one number; ranks: of their claims; shape (scenes, cells,
-    SLOTS), filled from the first.
+    SLOTS), filled from the first. shared: hash of seed and step, (scenes,): read where an event is
+    noted, it keeps the compiler from computing ranks of all cells ahead.
     """
 
     def __init__(self, automaton: Any):
         super().__init__(automaton)
         self.events = self.table.field(ti.i32, "cells", SLOTS)
         self.ranks = self.table.field(ti.i64, "cells", SLOTS)
+        self.shared = self.table.field(ti.u32)
 
     @ti.func
     def find_all(self, s, step, shared, pull, pressed):
         """Note and claim all events; returns their number."""
         count, traversal = 0, self.cells.traversal
+        self.shared[s] = shared
+        # A bound of the probability to meet, by the relative speed.
+        steep = _MOST_RATE * self.table.dt[s] / self.parameters.width[None]
         for k in range(traversal.begin(), traversal.end(s)):
             cell = traversal.cell(s, k)
             kind = self.cells.at(s, cell)
             if kind == UP:
-                count = self.at_ends(s, step, shared, count, cell, pull, pressed)
+                count = self.at_ends(s, step, count, cell, pull, pressed)
                 count = self.at_side(s, step, shared, count, cell)
             if kind == UP or kind == HELD:
-                count = self.above(s, step, shared, count, cell, pull, pressed)
-                count = self.beside(s, step, shared, count, cell)
+                count = self.above(s, step, count, cell, pull, pressed)
+                count = self.beside(s, step, shared, count, cell, steep)
         return count
 
     @ti.func
-    def note(self, s, step, shared, count, owner, slot, cell, other, kind: ti.template()):
+    def note(self, s, step, count, owner, slot, cell, other, kind: ti.template()):
         """Note an event and claim its grains; other: second grain, 0 for none."""
-        ranked = rank_in_phase(step, shared, _BLOWS, owner, slot)
+        ranked = rank_in_phase(step, self.shared[s], _BLOWS, owner, slot)
         self.conflict_resolution.claim(s, cell, ranked)
         if other != 0:
             self.conflict_resolution.claim(s, other, ranked)
@@ -161,18 +169,18 @@ class Contacts(Part):
         return result and (other == 0 or self.conflict_resolution.holds(s, other, ranked))
 
     @ti.func
-    def at_ends(self, s, step, shared, count, cell, pull, pressed):
+    def at_ends(self, s, step, count, cell, pull, pressed):
         """Floor and ceiling, where the container has them at the end of the step."""
         result = count
         over = self.cells.travelled[s, cell] - self.cells.offset[s]
         approach = self.cells.container[s] - self.cells.speed[s, cell]
         if over <= 0.0 and approach > 0.0 and self.cells.at(s, cell - 1) == WALL:
             if self.resting.takes(approach, pull, pressed):
-                result = self.note(s, step, shared, count, cell, _AT_END, cell, 0, JOIN)
+                result = self.note(s, step, count, cell, _AT_END, cell, 0, JOIN)
             else:
-                result = self.note(s, step, shared, count, cell, _AT_END, cell, 0, END)
+                result = self.note(s, step, count, cell, _AT_END, cell, 0, END)
         elif over >= 0.0 and approach < 0.0 and self.cells.at(s, cell + 1) == WALL:
-            result = self.note(s, step, shared, count, cell, _AT_END, cell, 0, END)
+            result = self.note(s, step, count, cell, _AT_END, cell, 0, END)
         return result
 
     @ti.func
@@ -185,11 +193,11 @@ class Contacts(Part):
             if self.lattice.in_side_wall(cell + way * self.lattice.size[None].height):
                 share = ti.abs(velocity) * self.table.dt[s] / self.parameters.width[None]
                 if unit(bits(shared, cell, SIDE)) < share:
-                    result = self.note(s, step, shared, count, cell, _AT_SIDE, cell, 0, BRUSH)
+                    result = self.note(s, step, count, cell, _AT_SIDE, cell, 0, BRUSH)
         return result
 
     @ti.func
-    def above(self, s, step, shared, count, cell, pull, pressed):
+    def above(self, s, step, count, cell, pull, pressed):
         """The grain above in the column, once its place is less than a diameter away."""
         result, upper = count, cell + 1
         held = self.cells.at(s, cell) == HELD
@@ -197,51 +205,82 @@ class Contacts(Part):
             approach = self.cells.velocity(s, cell)[1] - self.cells.velocity(s, upper)[1]
             if approach > 0.0 and self.cells.overlap(s, cell) >= 0.0:
                 if held and self.resting.takes(approach, pull, pressed):
-                    result = self.note(s, step, shared, count, cell, _ABOVE, upper, 0, JOIN)
+                    result = self.note(s, step, count, cell, _ABOVE, upper, 0, JOIN)
                 elif held:
-                    result = self.note(s, step, shared, count, cell, _ABOVE, upper, 0, END)
+                    result = self.note(s, step, count, cell, _ABOVE, upper, 0, END)
                 else:
-                    result = self.note(s, step, shared, count, cell, _ABOVE, cell, upper, LINE)
+                    result = self.note(s, step, count, cell, _ABOVE, cell, upper, LINE)
         return result
 
     @ti.func
-    def beside(self, s, step, shared, count, cell):
-        """Grains of the column to the right less than a diameter higher or lower."""
+    def beside(self, s, step, shared, count, cell, steep):
+        """Grains of the column to the right less than a diameter higher or lower.
+
+        steep: bound of the probability of a blow in this step, by the relative speed [s/m].
+        """
         result, height = count, self.lattice.size[None].height
-        base = self.lattice.column_beside(cell, 1)
-        if not self.lattice.in_side_wall(base):
-            # The columns stand half a cell apart, so that one of five rows is too far.
+        if not self.lattice.in_side_wall(self.lattice.column_beside(cell, 1)):
+            # The columns stand half a cell apart, so that one of five rows is too far; beyond floor
+            # and ceiling of that column there are walls alone.
             lowest = cell + height - 2 + ti.cast(self.lattice.raised[cell], ti.i32)
-            held = self.cells.at(s, cell) == HELD
-            for k in range(4):
-                other = lowest + k
-                if base < other < base + height - 1 and self.cells.is_grain(s, other):
-                    if not (held and self.cells.at(s, other) == HELD):
-                        # Rows and columns together: the lowest is one cell and a half below.
-                        if self.meets(s, shared, cell, other, k - 1.5):
-                            result = self.note(
-                                *(s, step, shared, result, cell, _BESIDE + k, cell, other, OBLIQUE)
-                            )
+            left = self.partners(s, lowest, self.cells.at(s, cell))
+            while left != 0:
+                # Number of the lowest bit, and the others.
+                bit = left & -left
+                k, left = (bit >> 1) - (bit >> 3), left ^ bit
+                # Rows and columns together: the lowest is one cell and a half below.
+                if self.meets(s, shared, cell, lowest + k, k - 1.5, steep):
+                    result = self.note(
+                        *(s, step, result, cell, _BESIDE + k, cell, lowest + k, OBLIQUE)
+                    )
         return result
 
     @ti.func
-    def meets(self, s, shared, cell, other, rows):
+    def partners(self, s, lowest, kind):
+        """Which of four cells hold a grain that one of a kind may meet, a bit each.
+
+        Not two that rest. Without a branch, which would go either way by chance.
+        """
+        result = 0
+        for k in ti.static(range(4)):
+            other = self.cells.at(s, lowest + k)
+            there = ti.select(other == UP, 1, ti.select((other == HELD) & (kind == UP), 1, 0))
+            result |= there << k
+        return result
+
+    @ti.func
+    def meets(self, s, shared, cell, other, rows, steep):
         """Whether two grains of neighbouring columns touch in this step, by chance.
 
-        rows: by how many cells the second cell is higher.
+        rows: by how many cells the second cell is higher. steep: as of ``beside``.
         """
         width, result = self.parameters.width[None], False
-        rise = rows + (self.cells.way(s, other) - self.cells.way(s, cell)) / width
-        if rise * rise < 1.0:
-            line = ti.Vector([chord(rise), rise])
-            approach = (self.cells.velocity(s, cell) - self.cells.velocity(s, other)).dot(line)
-            if approach > 0.0:
-                draw = unit(scrambled(bits(shared, cell, GLANCE) + ti.cast(other, ti.u32)))
-                chance = draw / self.table.dt[s]
-                # Most draws say no whatever stands beside the two, which takes long to find.
-                if chance < contact_rate(approach / width, rise, 0.0):
-                    free = 2.0 - self.taken(s, cell, -1) - self.taken(s, other, 1)
-                    result = chance < contact_rate(approach / width, rise, free)
+        way = self.cells.way(s, other) - self.cells.way(s, cell)
+        # Most pairs are told apart without a division or a root.
+        if ti.abs(rows * width + way) < _NEAR * width:
+            relative = self.cells.velocity(s, cell) - self.cells.velocity(s, other)
+            draw = unit(scrambled(bits(shared, cell, GLANCE) + ti.cast(other, ti.u32)))
+            if draw < steep * (ti.abs(relative[0]) + ti.abs(relative[1])):
+                rise = rows + way / width
+                result = self.touches(s, draw / self.table.dt[s], cell, other, relative, rise)
+        return result
+
+    @ti.func
+    def touches(self, s, chance, cell, other, relative, rise):
+        """The same of two that are less than a diameter apart, from a draw by the step [1/s].
+
+        relative: velocity [m/s]. rise: of the second over the first [diameters].
+        """
+        width, result = self.parameters.width[None], False
+        approach = relative.dot(ti.Vector([chord(rise), rise]))
+        # Most draws say no whatever stands beside the two, which takes long to find.
+        if (
+            rise * rise < 1.0
+            and approach > 0.0
+            and chance < contact_rate(approach / width, rise, 0.0)
+        ):
+            free = 2.0 - self.taken(s, cell, -1) - self.taken(s, other, 1)
+            result = chance < contact_rate(approach / width, rise, free)
         return result
 
     @ti.func

@@ -139,8 +139,9 @@ class Transport(Part):
         count = 0
         for k in range(self.traversal.begin(), self.traversal.end(s)):
             cell = self.traversal.cell(s, k)
-            away = self.cells.travelled[s, cell] / self.parameters.width[None]
-            if ti.abs(away) > 0.5 and self.cells.at(s, cell) == UP:
+            away, width = self.cells.travelled[s, cell], self.parameters.width[None]
+            # A product first: a division of every grain takes longer than the rest.
+            if ti.abs(away) > 0.5 * width and ti.abs(away / width) > 0.5:
                 target = cell + (1 if away > 0.0 else -1)
                 if self.cells.at(s, target) == EMPTY:
                     ranked = rank_in_phase(step, shared, _ALONG, cell, 0)

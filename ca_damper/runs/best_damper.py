@@ -1,0 +1,355 @@
+"""Search for the box of grains that lets a structure swing least under a given motion."""
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ca_damper.automaton import Automaton
+from ca_damper.excitation.excitation import Excitation, excitation_of
+from ca_damper.excitation.signal import Signal
+from ca_damper.fixed_mass import RigidMass
+from ca_damper.oscillator import Oscillator
+from ca_damper.runs.response import frequency_response
+from ca_damper.runs.shake import shake
+from ca_damper.scenes.clock import automatic_dt
+from ca_damper.spheres import Spheres
+from taichi_dem.kit.bars.chance import mean_and_deviation, t_quantile
+from taichi_dem.kit.data_table import Tabulated
+from taichi_dem.kit.display import listed
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import (
+    between,
+    choice,
+    instance,
+    is_real,
+    positive,
+    several,
+    shown,
+    whole,
+)
+
+#: Of the default grains [kg/m^3].
+DENSITY = Automaton.particle_mass / (math.pi / 6.0 * Automaton.width**3)
+#: Numbers of grains that are tried.
+NUMBERS = (5, 10, 20, 30, 50)
+#: Frequencies f/f0 from this far below the peak with fixed grains to above that of the empty
+#: container, and their number in a first look and later.
+_BELOW, _ABOVE, _FIRST, _RATIOS = 0.03, 1.02, 7, 13
+#: Boxes that the first look leaves, and its share of the cycles.
+_LEFT, _BRIEF = 4, 0.4
+#: Steps of the automaton in the longest one it bears. Its peaks of 30 grains are then 0.14 % off.
+_STEPS = 6.0
+_CONFIDENCE = 0.95
+#: Fillings whose grains and box can be replaced.
+_KINDS = (Automaton, Spheres)
+
+
+class Grains(NamedTuple):
+    """Grains in a box: number, mass of each [kg], diameter [m], inner width and height [m]."""
+
+    particles: int
+    mass: float
+    diameter: float
+    width: float
+    height: float
+
+    @property
+    def clearance(self) -> float:
+        """Distance from the settled grains to the lid [m]."""
+        columns = int(self.width / self.diameter * (1.0 + 1e-9))
+        return self.height - self.diameter * self.particles / columns
+
+    def put_into(self, filling: Any) -> Any:
+        """The filling with these grains in this box."""
+        if isinstance(filling, Spheres):
+            box = {"diameter": self.diameter, "width": self.width, "height": self.height}
+        else:
+            columns, rows = (round(x / self.diameter) for x in (self.width, self.height))
+            box = {"width": self.diameter, "columns": columns, "rows": rows}
+        return replace(filling, particle_mass=self.mass, **box)
+
+
+@dataclass(frozen=True)
+class Value:
+    """Mean over seeds [m] and half-width of its bar of 95 % [m], infinite of one seed."""
+
+    mean: float
+    error: float
+
+    @classmethod
+    def of(cls, values: np.ndarray) -> "Value":
+        """Of a value a seed."""
+        count = len(values)
+        mean, deviation = mean_and_deviation(values)
+        half = t_quantile(_CONFIDENCE, count - 1) * deviation / math.sqrt(count)
+        return cls(mean, half if count > 1 else math.inf)
+
+    def __str__(self) -> str:
+        return f"{1e3 * self.mean:.3g} +- {1e3 * self.error:.2g} mm"
+
+
+@dataclass(frozen=True, eq=False)
+class BestDamper(Tabulated):
+    """The best box that was found; as a table, all boxes of the first look.
+
+    Parameters
+    ----------
+    grains : Grains
+        Number, mass and diameter of the grains, and their box.
+    value : Value
+        Peak or RMS that was asked for [m], by the filling that searched.
+    confirmed : Value or None
+        The same by the filling that confirms.
+    fixed : float
+        The same with the grains fixed [m].
+    equals : tuple of (Grains, Value)
+        Boxes whose bars overlap that of the best: chance does not tell them apart.
+    errors : dict of str to Value
+        The value after errors of manufacture, by the filling that confirms.
+    tried : tuple of (Grains, float)
+        Boxes of the first look and their values [m].
+    search_seconds : float
+        CPU time of the search and its bar [s], compiling included.
+    confirmation_seconds : float
+        CPU time of the confirmation and of the errors of manufacture [s].
+    """
+
+    grains: Grains
+    value: Value
+    confirmed: Value | None
+    fixed: float
+    equals: tuple[tuple[Grains, Value], ...]
+    errors: dict[str, Value]
+    tried: tuple[tuple[Grains, float], ...]
+    search_seconds: float
+    confirmation_seconds: float
+
+    def __str__(self) -> str:
+        best, mm = self.grains, 1e3
+        words = [
+            f"{best.particles} grains of {mm * best.diameter:.3g} mm in a box of "
+            f"{mm * best.width:.3g} x {mm * best.height:.3g} mm, clearance "
+            f"{mm * best.clearance:.3g} mm: {self.value}; with fixed grains "
+            f"{mm * self.fixed:.3g} mm",
+        ]
+        if self.confirmed is not None:
+            words.append(f"confirmed: {self.confirmed}")
+        words += [f"{name}: {value}" for name, value in self.errors.items()]
+        if self.equals:
+            words.append(f"{len(self.equals)} other boxes are as good to within the bars")
+        return "\n".join(words)
+
+    def columns(self) -> dict[str, Any]:
+        """A row a box of the first look.
+
+        Returns
+        -------
+        dict
+            Columns by name, which ends in the unit.
+        """
+        boxes, values = zip(*self.tried)
+        return {
+            "particles": [one.particles for one in boxes],
+            "diameter_m": [one.diameter for one in boxes],
+            "clearance_m": [one.clearance for one in boxes],
+            "value_m": [*values],
+        }
+
+
+def best_damper(
+    structure: Oscillator,
+    motion: float | Signal | Excitation,
+    *,
+    mass: float,
+    box: tuple[float, float],
+    particles: int | Sequence[int] = NUMBERS,
+    density: float = DENSITY,
+    goal: str = "peak",
+    tolerance: float = 0.1,
+    seeds: int = 5,
+    heights: int = 6,
+    cycles: tuple[int, int] = (120, 20),
+    filling: Any = None,
+    confirm: Any = None,
+) -> BestDamper:
+    """Find number and size of grains, and the clearance, that damp a motion best.
+
+    All boxes are looked at briefly, the best of them again with more frequencies, cycles and seeds.
+    A second filling then confirms the winner, and shifts clearance, number and size of its grains
+    by the tolerance.
+
+    Parameters
+    ----------
+    structure : Oscillator
+        Primary structure with the empty container.
+    motion : float or Signal or Excitation
+        Amplitude of the base [m], for sines over the resonance; or what ``shake`` takes.
+    mass : float
+        Mass of all grains [kg], at most that of the structure.
+    box : tuple of (float, float)
+        Inner width and greatest inner height [m].
+    particles : int or sequence of int, default (5, 10, 20, 30, 50)
+        Numbers of grains to try; their size follows from the mass.
+    density : float
+        Density of a grain [kg/m^3]; that of the default grains if not given.
+    goal : str, default "peak"
+        ``"peak"`` or ``"rms"`` of the displacement from the base under a Signal; for sines both are
+        the largest RMS over the frequencies.
+    tolerance : float, default 0.1
+        Share by which clearance, number and size may be off.
+    seeds : int, default 5
+        Seeds of the bars.
+    heights : int, default 6
+        Heights of the box that are tried for each number, at most.
+    cycles : tuple of (int, int), default (120, 20)
+        Cycles of sines before those that are measured, and these; a first look takes 0.4 of them.
+    filling : Automaton or Spheres, optional
+        Filling that searches, whose grains and box are replaced; ``Automaton()`` if None.
+    confirm : Automaton or Spheres, optional
+        Filling that confirms; ``Spheres()`` if None, nothing where spheres search.
+
+    Returns
+    -------
+    BestDamper
+        The best box, with bars.
+
+    Raises
+    ------
+    InputError
+        A number is out of its range, the grains weigh more than the structure, or no box holds
+        them.
+
+    Examples
+    --------
+    >>> best_damper(
+    ...     Oscillator(), 0.6e-3, mass=6e-3, box=(60e-3, 96e-3)
+    ... ).grains.particles  # doctest: +SKIP
+    """
+    case = _Case(structure, motion, mass, goal, cycles)
+    between("tolerance", tolerance, 0.0, 0.5)
+    whole("seeds", seeds, 2, 1000)
+    counts = several("particles", particles, lambda name, n: whole(name, n, 1, 1000))
+    layers = whole("heights", heights, 1, 100)
+    boxes = _boxes(case.mass, counts, box, positive("density", density), layers)
+    filling = instance("filling", Automaton() if filling is None else filling, _KINDS)
+    if confirm is None and not isinstance(filling, Spheres):
+        confirm = Spheres()
+    if confirm is not None:
+        instance("confirm", confirm, _KINDS)
+    times = [time.process_time()]
+    tried = [(one, float(case.values(filling, one, 1, brief=True)[0])) for one in boxes]
+    left = [one for one, _ in sorted(tried, key=lambda pair: pair[1])[:_LEFT]]
+    judged = [(one, Value.of(case.values(filling, one, seeds))) for one in left]
+    # By the upper end of the bar: a box whose motion nobody can tell is no good box.
+    (best, value), *others = sorted(judged, key=lambda pair: pair[1].mean + pair[1].error)
+    times.append(time.process_time())
+    confirmed, errors = None, {}
+    if confirm is not None:
+        confirmed = Value.of(case.values(confirm, best, seeds))
+        for name, one in _shifted(best, tolerance):
+            errors[name] = Value.of(case.values(confirm, one, seeds))
+    times.append(time.process_time())
+    return BestDamper(
+        *(best, value, confirmed, case.fixed()),
+        tuple((one, v) for one, v in others if v.mean - v.error < value.mean + value.error),
+        *(errors, tuple(tried), times[1] - times[0], times[2] - times[1]),
+    )
+
+
+class _Case:
+    """Structure, motion, and what of its motion is to be small; mass: of all grains [kg]."""
+
+    def __init__(self, structure: Any, motion: Any, mass: Any, goal: Any, cycles: Any):
+        self.structure = instance("structure", structure, Oscillator)
+        self.goal = choice("goal", goal, ("peak", "rms"))
+        words = "the cycles before those that are measured, and these"
+        self.cycles = _pair("cycles", cycles, words, lambda name, n: whole(name, n, 1, 100_000))
+        self.mass = positive("mass", mass)
+        if self.mass > self.structure.mass:
+            raise InputError(
+                f"mass must be at most that of the structure, {structure.mass:g} kg, got {mass:g}"
+            )
+        self.signal = None if is_real(motion) else excitation_of(motion)
+        if self.signal is None:
+            self.structure = replace(structure, base_amplitude=positive("motion", motion))
+
+    def values(self, filling: Any, grains: Grains, seeds: Any, brief: bool = False) -> np.ndarray:
+        """What is to be small [m] of a box, a value a seed; brief: in a first look."""
+        made = grains.put_into(filling)
+        job = {"particles": grains.particles, "seeds": seeds, "progress": None}
+        if self.signal is not None:
+            run = shake(made, self.signal, oscillator=self.structure, dt=_step(made), **job)
+            found = run.relative_peak if self.goal == "peak" else run.relative_rms
+            return np.asarray(found[0])
+        low = self.structure.peak(grains.particles * grains.mass)[0] - _BELOW
+        ratios = np.linspace(low, _ABOVE, _FIRST if brief else _RATIOS)
+        share = _BRIEF if brief else 1.0
+        transient, measured = (math.ceil(share * one) for one in self.cycles)
+        highest = _ABOVE * self.structure.natural_frequency
+        job |= {"ratios": ratios, "dt": automatic_dt(_step(made), highest)}
+        job |= {"transient_cycles": transient, "measured_cycles": measured}
+        run = frequency_response(made, oscillator=self.structure, **job)
+        peaks = run.peaks()[1][0]
+        # At an end of the ratios there is no vertex.
+        return np.where(np.isnan(peaks), run.rms[0].max(axis=0), peaks)
+
+    def fixed(self) -> float:
+        """The same with all grains fixed [m]."""
+        if self.signal is None:
+            return self.structure.peak(self.mass)[1]
+        job = {"oscillator": self.structure, "particles": 1, "seeds": 1, "progress": None}
+        run = shake(RigidMass(particle_mass=self.mass), self.signal, **job)
+        return float((run.relative_peak if self.goal == "peak" else run.relative_rms)[0, 0])
+
+
+def _step(filling: Any) -> float:
+    """Step of a filling in a search [s]."""
+    if isinstance(filling, Automaton):
+        return filling.longest_dt / _STEPS
+    return min(filling.default_dt, filling.step_bound[0])
+
+
+def _pair(name: str, value: Any, words: str, check: Any) -> tuple[Any, Any]:
+    """Two values that have passed a check; InputError for anything but two."""
+    if not isinstance(value, (tuple, list)) or len(value) != 2:
+        raise InputError(f"{name} must be {words}, got {shown(value)}")
+    return check(name, value[0]), check(name, value[1])
+
+
+def _boxes(
+    mass: float, counts: Sequence[int], box: Any, density: float, heights: int
+) -> list[Grains]:
+    """Boxes to look at: grains of one mass in whole cells of their size."""
+    width, height = _pair("box", box, "an inner width and a greatest inner height [m]", positive)
+    found = []
+    for count in counts:
+        own = mass / count
+        size = (6.0 * own / (math.pi * density)) ** (1.0 / 3.0)
+        columns, most = (int(one / size * (1.0 + 1e-9)) for one in (width, height))
+        least = 1 + math.ceil(count / max(1, columns))
+        if columns > 0 and most >= least:
+            rows = np.unique(np.linspace(least, most, heights).round().astype(int))
+            found += [Grains(count, own, size, columns * size, row * size) for row in rows]
+    if not found:
+        raise InputError(
+            f"box must hold {mass:g} kg of grains with a layer free above them, got "
+            f"{shown(box)} m for {listed(counts)} grains"
+        )
+    return found
+
+
+def _shifted(best: Grains, share: float) -> Iterator[tuple[str, Grains]]:
+    """Boxes with an error of manufacture, and its name, where the grains still fit."""
+    for sign in (1.0, -1.0):
+        by, words = 1.0 + sign * share, f"{100.0 * sign * share:+.3g} %"
+        count = round(by * best.particles)
+        taller = best.height + sign * share * best.clearance
+        yield f"clearance {words}", best._replace(height=taller)
+        yield f"number {words}", best._replace(particles=max(1, count))
+        other = best._replace(diameter=by * best.diameter, mass=by**3 * best.mass)
+        if other.clearance > 0.0:
+            yield f"size {words}", other
