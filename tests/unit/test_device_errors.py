@@ -3,6 +3,7 @@
 import pytest
 import taichi as ti
 from taichi._snode.fields_builder import FieldsBuilder
+from taichi.lang import impl
 
 from taichi_dem import InputError
 from taichi_dem.kit import backend
@@ -21,10 +22,17 @@ class Lost:
         raise RuntimeError("CUDA_ERROR_LAUNCH_FAILED:\n unspecified launch failure")
 
 
+def launched_in(program, monkeypatch, context, returns):
+    """A Launch that has been called in a program, which is that of the session."""
+    monkeypatch.setattr(impl.get_runtime(), "prog", program)
+    launch = Launch(None)
+    launch._ready = (program, None, context, returns)
+    return launch
+
+
 @pytest.mark.parametrize("call", [Launch.__call__, Launch.queue])
 def test_a_lost_device_is_told_with_what_to_do(call, monkeypatch):
-    launch = Launch(None)
-    launch._ready = (Lost(), None, Lost, True)
+    launch = launched_in(Lost(), monkeypatch, Lost, True)
     monkeypatch.setattr(backend, "is_cpu", lambda: False)
     with pytest.raises(InputError, match=r"^the device no longer answers .*checkpoint, or"):
         call(launch, 1)
@@ -48,9 +56,8 @@ class Spending:
         context.spent = True
 
 
-def test_a_context_is_launched_once():
-    launch = Launch(None)
-    launch._ready = (Spending(), None, OneLaunch, False)
+def test_a_context_is_launched_once(monkeypatch):
+    launch = launched_in(Spending(), monkeypatch, OneLaunch, False)
     for call in (Launch.__call__, Launch.queue) * 2:
         call(launch, 1)
 
