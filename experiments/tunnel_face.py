@@ -13,7 +13,7 @@ ones.
 
     python experiments/tunnel_face.py --quick                    # two designs, one mesh: no bars
     python experiments/tunnel_face.py                            # needs gmsh: make mesh
-    python experiments/tunnel_face.py --near 0.035               # 60,000 tetrahedra and more
+    python experiments/tunnel_face.py --near 0.03                # 50,000 tetrahedra and more
     python experiments/tunnel_face.py --holes holes.csv          # beside the parallel holes
     python experiments/tunnel_face.py --delay 2.5e-4 --exponent 1.4   # one by one; gas expands
 
