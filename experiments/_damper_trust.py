@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import ca_damper as ca
-from ca_damper.runs.best_damper import DENSITY, Grains
+from ca_damper.runs.best_damper import DENSITY, Grains, diameter_of
 
 FILLINGS = (ca.Automaton(), ca.Spheres())
 OWN, GRAVITY, CELL = ca.Oscillator(), 9.81, 6e-3
@@ -48,11 +48,8 @@ def masri(filling, options):
     ratios, found = options.grid[3], []
     for share, e, cells in itertools.product(*options.grid[:3]):
         mass = share * OWN.mass
-        if filling.label == "dem":
-            box = {"width": CELL, "height": (cells + 1) * CELL}
-        else:
-            box = {"columns": 1, "rows": cells + 1}
-        grain = with_restitution(filling, e, particle_mass=mass, gravity=0.0, **box)
+        box = Grains(1, mass, CELL, CELL, (cells + 1) * CELL)
+        grain = with_restitution(box.put_into(filling), e, gravity=0.0)
         run = {"transient_cycles": options.long, "measured_cycles": 50, "progress": None}
         rms = ca.frequency_response(grain, particles=1, seeds=1, ratios=ratios, **run).rms[0, :, 0]
         for ratio, value in zip(ratios, rms):
@@ -92,11 +89,9 @@ def open_boxes(filling, options):
     job |= {"transient_cycles": options.cycles, "measured_cycles": 3 * options.cycles}
     drawn = {}
     for columns in options.columns:
-        if filling.label == "dem":
-            box = replace(filling, width=columns * CELL, height=ROWS * CELL)
-        else:
-            box = replace(filling, columns=columns, rows=ROWS)
-        made = ca.damper_map(box, amplitudes=size, particles=columns * LAYERS, **job)
+        count = columns * LAYERS
+        box = Grains(count, filling.particle_mass, CELL, columns * CELL, ROWS * CELL)
+        made = ca.damper_map(box.put_into(filling), amplitudes=size, particles=count, **job)
         drawn[columns] = (one[0, 0, :, 0].mean(axis=-1) for one in (made.mass_share, made.loss))
         drawn[columns] = levels, *drawn[columns]
         words, source = f"open box, {columns} column{'s' * (columns > 1)}: ", "Ferreyra et al. 2021"
@@ -122,7 +117,7 @@ def equal_mass(filling, options):
     peaks, base = [], 6e-3
     for count, e, friction in options.fillings:
         own = base / count
-        size = (6.0 * own / (np.pi * DENSITY)) ** (1.0 / 3.0)
+        size = diameter_of(own, DENSITY)
         columns, rows = int(60e-3 / size), int(96e-3 / size)
         box = Grains(count, own, size, columns * size, rows * size)
         made = with_restitution(box.put_into(filling), e, friction=friction, wall_friction=friction)

@@ -16,7 +16,7 @@ from taichi_dem import effects, shapes
 from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.boreholes import drilled_rock
-from taichi_dem.mesh.gmsh import places_and_rows, session
+from taichi_dem.mesh.gmsh import places_and_rows, prism, session
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import circle, drawn_out, in_space_order
 
@@ -48,11 +48,8 @@ def eighth_by_gmsh(seed):
         # Twelve sides around the area of the circle.
         wide = 2.0 * RADIUS * np.sqrt(np.pi / 3.0)
         corners = circle((0.0, 0.0), wide, np.pi * wide / 12.0)
-        ring = [occ.addPoint(x, y, -OUTER) for x, y in corners]
-        lines = [occ.addLine(*pair) for pair in zip(ring, ring[1:] + ring[:1])]
-        base = occ.addPlaneSurface([occ.addCurveLoop(lines)])
-        made = occ.extrude([(2, base)], 0, 0, OUTER + OPEN)
-        occ.cut([(3, ball)], [one for one in made if one[0] == 3])
+        ring = [(x, y, -OUTER) for x, y in corners]
+        occ.cut([(3, ball)], [prism(occ, ring, (0, 0, OUTER + OPEN))])
         occ.synchronize()
         edges = field.add("MathEval")
         away = f"Sqrt(x*x + y*y + (z - Min(z, {OPEN}))^2) - {RADIUS}"
@@ -144,9 +141,8 @@ def read_at(rock):
     around = np.degrees(np.arctan2(places[:, 1], places[:, 0]))
     # Not those beside the planes of symmetry, which rollers hold.
     inside = (rock.shell[0] < away) & (away < rock.shell[1]) & (abs(around - 45.0) < 35.0)
-    corners = rock.mesh.points[rock.mesh.tetrahedra[inside]]
-    pairs = corners[:, [0, 0, 0, 1, 1, 2]] - corners[:, [1, 2, 3, 2, 3, 3]]
-    return np.flatnonzero(inside), places[inside], np.linalg.norm(pairs, axis=2).mean()
+    edges = geometry.edge_lengths(rock.mesh.points, rock.mesh.tetrahedra[inside])
+    return np.flatnonzero(inside), places[inside], edges.mean()
 
 
 def speeds_of(places, moved, turn, half, start):

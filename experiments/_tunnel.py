@@ -10,6 +10,7 @@ import taichi_dem as dem
 from taichi_dem.kit.validation import choice
 from taichi_dem.mesh.boreholes import Hole, drilled_rock, read_holes, with_charges
 from taichi_dem.mesh.mesh import volumes
+from taichi_dem.output.hole_monitor import Attenuation
 
 #: Rock behind the face [m], and the middle of the round on it.
 SIZE, MIDDLE = (4.0, 4.0, 3.0), (2.0, 2.0)
@@ -131,21 +132,35 @@ def kept_mesh(name):
 def scene_of(mesh, design, exponent=0.0):
     """The rock with gas in its charges; exponent: of gas that expands, 0 for the pressure given."""
     mesh, stages = with_charges(mesh, SIZE[2], design.holes)
-    gas = {"peak": PEAK, "rise": RISE}
+    kind = dem.effects.GasPressure
     if exponent:
-        kind = partial(dem.effects.ExpandingGas, exponent=exponent)
-    else:
-        kind = dem.effects.GasPressure
-    loads = [kind(stage, start=delay, **gas) for stage, delay in stages.items()]
+        gas = {"radius": radius_of(design), "exponent": exponent}
+        kind = partial(dem.effects.ExpandingGas, **gas)
+    loads = [kind(one, start=delay, peak=PEAK, rise=RISE) for one, delay in stages.items()]
     quiet = [dem.effects.QuietBoundary(side) for side in QUIET]
     return dem.Scene(mesh, ROCK, "auto", loads=[*loads, *quiet])
 
 
+def charged(design):
+    """Holes of a design that have a charge."""
+    return [hole for hole in design.holes if hole.charged_m > 0.0]
+
+
+def radius_of(design):
+    """Radius of all charged holes [m], which gas that expands asks for; InputError for several."""
+    wide = sorted({hole.diameter_m for hole in charged(design)})
+    if len(wide) > 1:
+        words = ", ".join(f"{one:g}" for one in wide)
+        raise dem.InputError(
+            f"diameter_m of the charged holes must be one number with --exponent, got {words}"
+        )
+    return 0.5 * wide[0]
+
+
 def middle_of(design):
     """Middle of the charges (3,) [m]."""
-    charged = [hole for hole in design.holes if hole.charged_m > 0.0]
-    ends = [hole.at(SIZE[2], 0.5 * (hole.charge_from_m + hole.length_m)) for hole in charged]
-    return np.mean(ends, axis=0)
+    middles = [0.5 * (hole.charge_from_m + hole.length_m) for hole in charged(design)]
+    return np.mean([h.at(SIZE[2], m) for h, m in zip(charged(design), middles)], axis=0)
 
 
 def peaks(result, middle):
@@ -163,9 +178,9 @@ def peaks(result, middle):
 
 def power_law(distance, speed, chosen):
     """Exponent of the fall of peak speeds with distance, and the speed at ``PLACE`` [m/s]."""
-    chosen = chosen & (FITTED[0] < distance) & (distance < FITTED[1]) & (speed > 0.0)
-    slope, level = np.polyfit(np.log(distance[chosen] / PLACE), np.log(speed[chosen]), 1)
-    return -slope, float(np.exp(level))
+    fall = Attenuation(distance / PLACE, speed, chosen & (distance < FITTED[1]))
+    slope, level = fall.power_law(FITTED[0] / PLACE)
+    return -slope, level
 
 
 def pieces(result):

@@ -49,10 +49,10 @@ def _area(result):
 
 def draw_peaks(path, runs, table):
     """Peak velocity behind and beside the round over distance; bars over meshes at one place."""
+    found = {name: peaks(result, middle_of(design)) for name, (design, result) in runs.items()}
     with picture(path, 1, 2, size=(9.6, 4.4), sharey=True) as (figure, panels):
         for axes, place in zip(panels, ("beside", "behind")):
-            for (name, (design, result)), colour in zip(runs.items(), COLOURS):
-                distance, speed, behind, beside = peaks(result, middle_of(design))
+            for (name, (distance, speed, behind, beside)), colour in zip(found.items(), COLOURS):
                 chosen = (behind if place == "behind" else beside) & (distance > FITTED[0])
                 axes.plot(distance[chosen], speed[chosen], ".", ms=1.5, alpha=0.2, color=colour)
                 axes.plot(*_medians(distance[chosen], speed[chosen]), lw=2.5, color=colour)

@@ -1,7 +1,8 @@
 """Tables of tunnel rounds: means over meshes with their bars, what differs, what a bar costs."""
 
 import numpy as np
-from scipy.stats import t as student
+
+from taichi_dem.kit.bars.chance import t_quantile
 
 #: What is compared between designs, with its unit.
 COMPARED = {
@@ -27,7 +28,8 @@ def with_bars(rows):
     by_size = [own.drop(columns="near_m") for _, own in kept.groupby("near_m")]
     finer, *coarser = (own.groupby("design", sort=False) for own in by_size)
     mean, count = finer.mean(), finer.size()
-    bar = finer.std().mul(student.ppf(0.975, count - 1) / np.sqrt(count), axis=0)
+    wide = count.map(lambda n: t_quantile(0.95, n - 1) if n > 1 else np.nan)
+    bar = finer.std().mul(wide / np.sqrt(count), axis=0)
     for other in coarser:
         bar = bar + (other.mean() - mean).abs()
     return mean.join(bar.add_suffix("_bar"))

@@ -97,9 +97,7 @@ def row_of(kind, found):
 
 def page_of(rows):
     """The table in Markdown."""
-    header, cells = TABLE.cells(TABLE.rows(rows))
-    lines = [header, ["---"] * len(header), *cells]
-    return "".join(f"| {' | '.join(one)} |\n" for one in lines)
+    return study.markdown_of(*TABLE.cells(TABLE.rows(rows)))
 
 
 def draw(path, found, held):

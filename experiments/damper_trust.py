@@ -117,8 +117,7 @@ def run(options):
     cells = [cells_of(*pair) for pair in rows]
     study.print_table(cells, HEADER)
     study.write_rows(folder / "trust.csv", cells, " ".join(HEADER))
-    lines = [HEADER, ["---"] * len(HEADER), *cells]
-    write_text(folder / f"{NAME}.md", "".join(f"| {' | '.join(line)} |\n" for line in lines))
+    write_text(folder / f"{NAME}.md", study.markdown_of(HEADER, cells))
     draw(folder / "trust.png", found)
     figures = {f"{row.key}_{label}": (float(row.ours), "1") for label, row in rows}
     figures["holds"] = sum(one[-1] == "holds" for one in cells), "1"

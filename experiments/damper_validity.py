@@ -98,8 +98,7 @@ def run(options):
     cells = [cells_of(row) for row in rows]
     study.print_table(cells, HEADER)
     pd.DataFrame(rows).to_csv(folder / "validity.csv", index=False)
-    lines = [HEADER, ["---"] * len(HEADER), *cells]
-    write_text(folder / "validity.md", "".join(f"| {' | '.join(line)} |\n" for line in lines))
+    write_text(folder / "validity.md", study.markdown_of(HEADER, cells))
     names = pd.MultiIndex.from_product(
         [options.accelerations, options.frequencies], names=["acceleration_g", "frequency_Hz"]
     )

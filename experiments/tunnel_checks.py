@@ -28,7 +28,7 @@ import numpy as np
 
 import taichi_dem as dem
 from _radiation import ELEMENTS, SIZES, coarse_eighth, eighth_by_gmsh, radiated
-from _tunnel import ROCK
+from _tunnel import GROWTH, LENGTH, PEAK, RISE, ROCK, UNCHARGED
 from _tunnel_checks import BEHIND, DAMAGED, MIDDLES, REACH, draw, figures_of_lobes, figures_of_shots
 from taichi_dem import effects
 from taichi_dem.kit import study
@@ -43,13 +43,13 @@ SETTINGS = {
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 LIMITS = dem.StepControl(safety=0.4, dashpot_floor=2e-7)
 METHOD = dem.Multirate(1.6e-6, 1e-4, control=LIMITS, dashpot="limited")
-#: Burdens [m]; rock behind the hole, its height and depth, the hole, what is not charged of it [m].
+#: Burdens [m]; rock behind the hole, its height and depth [m].
 BURDENS = 0.2, 0.4, 0.8
-ROOM, HEIGHT, DEPTH, LENGTH, UNCHARGED = 2.0, 2.0, 1.5, 1.0, 1.0 / 3.0
-#: Edges of elements near and far [m] and their growth; end [s].
-NEAR, FAR, GROWTH, END = 0.06, 0.25, 0.35, 5.2e-4
-#: The gas of the first paper: peak [Pa] and rise [s]; share of bonds that is left in weaker rock.
-PEAK, RISE, LEFT = 575e6, 1.33e-4, 0.3
+ROOM, HEIGHT, DEPTH = 2.0, 2.0, 1.5
+#: Edges of elements near and far [m]; end [s].
+NEAR, FAR, END = 0.06, 0.25, 5.2e-4
+#: Share of bonds that is left in weaker rock.
+LEFT = 0.3
 SHOTS = BURDENS, ROOM, HEIGHT, DEPTH, UNCHARGED, NEAR, FAR, GROWTH, END, PEAK, RISE, REACH, LEFT
 QUIET = "right", "bottom", "top", "back"
 

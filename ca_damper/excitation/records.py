@@ -94,7 +94,7 @@ def from_csv(
             f"force, such as time_s and acceleration_g, got {shown(column)} and "
             f"{shown(list(table.columns))}"
         )
-    (wanted, (what, own)), _ = motions.popitem(), None
+    wanted, (what, own) = motions.popitem()
     factor = _factor(f"column {wanted} of {name}", what, own, unit)
     time = UNITS["time"][known[times[0]][1] or "s"] * _numbers(name, table, times[0], comma)
     values = factor * _numbers(name, table, wanted, comma)

@@ -283,8 +283,7 @@ class _Case:
         job = {"particles": grains.particles, "seeds": seeds, "progress": None}
         if self.signal is not None:
             run = shake(made, self.signal, oscillator=self.structure, dt=_step(made), **job)
-            found = run.relative_peak if self.goal == "peak" else run.relative_rms
-            return np.asarray(found[0])
+            return self._of_record(run)
         low = self.structure.peak(grains.particles * grains.mass)[0] - _BELOW
         ratios = np.linspace(low, _ABOVE, _FIRST if brief else _RATIOS)
         share = _BRIEF if brief else 1.0
@@ -303,7 +302,11 @@ class _Case:
             return self.structure.peak(self.mass)[1]
         job = {"oscillator": self.structure, "particles": 1, "seeds": 1, "progress": None}
         run = shake(RigidMass(particle_mass=self.mass), self.signal, **job)
-        return float((run.relative_peak if self.goal == "peak" else run.relative_rms)[0, 0])
+        return float(self._of_record(run)[0])
+
+    def _of_record(self, run: Any) -> np.ndarray:
+        """What is to be small [m] of a TimeHistory, a value a seed."""
+        return np.asarray((run.relative_peak if self.goal == "peak" else run.relative_rms)[0])
 
 
 def _step(filling: Any) -> float:
@@ -320,6 +323,11 @@ def _pair(name: str, value: Any, words: str, check: Any) -> tuple[Any, Any]:
     return check(name, value[0]), check(name, value[1])
 
 
+def diameter_of(mass: float, density: float) -> float:
+    """Diameter of a ball [m]."""
+    return (6.0 * mass / (math.pi * density)) ** (1.0 / 3.0)
+
+
 def _boxes(
     mass: float, counts: Sequence[int], box: Any, density: float, heights: int
 ) -> list[Grains]:
@@ -328,7 +336,7 @@ def _boxes(
     found = []
     for count in counts:
         own = mass / count
-        size = (6.0 * own / (math.pi * density)) ** (1.0 / 3.0)
+        size = diameter_of(own, density)
         columns, most = (int(one / size * (1.0 + 1e-9)) for one in (width, height))
         least = 1 + math.ceil(count / max(1, columns))
         if columns > 0 and most >= least:

@@ -5,7 +5,7 @@ lie in planes of equal height y.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import combinations
 from typing import Any
 
@@ -16,7 +16,7 @@ from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.kit.sweeps.table import checked_rows
 from taichi_dem.kit.validation import FileName, between, plain_fields, positive, whole
 from taichi_dem.mesh import tetrahedra as geometry
-from taichi_dem.mesh.gmsh import places_and_rows, session
+from taichi_dem.mesh.gmsh import places_and_rows, prism, session
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
 from taichi_dem.mesh.shapes import in_space_order
 
@@ -225,11 +225,7 @@ def _prism(occ, depth, hole, turn, sides):
     begin = hole.at(depth, -outside)
     around = angle * (np.arange(count) + turn)
     ring = begin + radius * (np.outer(np.cos(around), across) + np.outer(np.sin(around), up))
-    points = [occ.addPoint(*place) for place in ring]
-    lines = [occ.addLine(*pair) for pair in zip(points, points[1:] + points[:1])]
-    base = occ.addPlaneSurface([occ.addCurveLoop(lines)])
-    made = occ.extrude([(2, base)], *((outside + hole.length_m) * way))
-    return next(one for one in made if one[0] == 3)
+    return prism(occ, ring, (outside + hole.length_m) * way)
 
 
 def _set_sizes(model, size, near, far, growth):
@@ -273,25 +269,24 @@ def with_charges(mesh: Mesh, depth: float, holes: Sequence[Hole]) -> tuple[Mesh,
     if not delays:
         raise InputError("a table of holes must have one that is charged, got none")
     stages = {f"stage_{k}": delay for k, delay in enumerate(delays, 1)}
-    charged = [(k, hole) for k, hole in enumerate(holes, 1) if hole.charged_m > 0.0]
-    walls = {k: _wall(mesh, depth, k, hole) for k, hole in charged}
-    groups = dict(mesh.groups)
+    outer, groups = geometry.outer_faces(mesh.tetrahedra), dict(mesh.groups)
     for name, delay in stages.items():
-        groups[name] = np.vstack([walls[k] for k, hole in charged if hole.delay_s == delay])
-    return checked_mesh(mesh.points, mesh.tetrahedra, groups), stages
+        together = [one for one in enumerate(holes, 1) if one[1].delay_s == delay]
+        walls = [_wall(mesh.points, outer, depth, *one) for one in together if one[1].charged_m]
+        groups[name] = np.vstack(walls)
+    return replace(mesh, groups=groups), stages
 
 
-def _wall(mesh, depth, number, hole):
+def _wall(points, outer, depth, number, hole):
     """Outer faces of the charged part of a hole and of its end."""
-    outer = geometry.outer_faces(mesh.tetrahedra)
-    corners = mesh.points[outer]
+    corners = points[outer]
     away = corners - hole.at(depth, 0.0)
     along = dot(away, hole.direction)
     across = length(away - along[..., None] * hole.direction)
     middle, reach = along.mean(axis=1), _ON_WALL * 0.5 * hole.diameter_m
     inside = (hole.charge_from_m <= middle) & (middle <= hole.length_m + 0.1 * hole.diameter_m)
     on = inside & (across.max(axis=1) <= reach)
-    area = length(geometry.area_vectors(mesh.points, outer[on])).sum()
+    area = length(geometry.area_vectors(points, outer[on])).sum()
     share = area / (np.pi * hole.diameter_m * hole.charged_m)
     if share < _SEEN:
         raise InputError(

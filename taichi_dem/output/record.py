@@ -109,6 +109,8 @@ class Recorder:
         loads = enumerate(self.model.loads)
         self.gas = [place for place, load in loads if isinstance(load, GasPressure)]
         self.forces = force_names(self.model)
+        grounds = self.forces[len(self.model.loads) :][: len(self.model.ground)]
+        self.grounds = [f"{name.removesuffix('_force')}_J" for name in grounds]
         self.rows: list[dict[str, float]] = []
         self.frames: list[Frame] = []
         self.peak_speed = np.zeros(self.model.body_count)
@@ -154,13 +156,10 @@ class Recorder:
 
     def _ground_work(self):
         """Energy that each of several grounds has taken, columns of the time series."""
-        grounds = [name for name in self.forces if name.startswith("ground_")]
-        if len(self.model.ground) == 1:
+        if len(self.grounds) == 1:
             return {}
         taken = self.simulation.energy_balance.works()[:, -len(self.model.ground) :].sum(axis=0)
-        return {
-            f"{name.removesuffix('_force')}_J": float(-one) for name, one in zip(grounds, taken)
-        }
+        return dict(zip(self.grounds, (-taken).tolist()))
 
     def snapshot(self) -> None:
         """Keep the block as it is now."""

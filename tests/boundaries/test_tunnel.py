@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from _tunnel import QUICK, SIZE, designs, kept_mesh, scene_of
+from _tunnel import QUICK, SIZE, Design, designs, kept_mesh, radius_of, scene_of
 from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, effects, simulate
 from taichi_dem.mesh.boreholes import Hole, check_holes, drilled_rock, read_holes, with_charges
 from taichi_dem.mesh.mesh import volumes
@@ -173,3 +173,12 @@ def test_five_quiet_sides_and_many_delays_fit_an_engine():
     assert len(scene.loads) == 8
     simulation = Simulation(scene, Uniform(1e-7))
     assert simulation.model.body_count == kept_mesh("V cut").body_count
+
+
+def test_gas_expands_by_the_radius_of_the_holes_it_fills():
+    """Half the diameter of the charged holes; holes of two widths have no one radius."""
+    narrow, wide = Hole(1, 2, 1, diameter_m=0.04), Hole(3, 2, 1, diameter_m=0.08)
+    empty = Hole(2, 2, 1, charge_from_m=1, diameter_m=0.38)
+    assert radius_of(Design((narrow, empty))) == 0.02
+    with pytest.raises(InputError, match=r"diameter_m of the charged holes .* got 0.04, 0.08"):
+        radius_of(Design((narrow, wide)))

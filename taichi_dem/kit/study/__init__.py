@@ -27,6 +27,7 @@ from taichi_dem.kit.study.summary import (
     add_to_summary,
     figure,
     finish,
+    markdown_of,
     show_answer,
     show_report,
     versions,

@@ -242,6 +242,12 @@ class Table:
         }
 
 
+def markdown_of(header: Sequence[str], cells: Iterable[Sequence[str]]) -> str:
+    """A table of texts in Markdown."""
+    lines = [header, ["---"] * len(header), *cells]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
 def write_rows(path: Any, rows: Sequence, names: str | Sequence[str] | None = None) -> None:
     """Write rows as CSV.
 
