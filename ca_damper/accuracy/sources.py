@@ -35,7 +35,7 @@ def _other_kind(filling):
         size = filling.width
         box: dict[str, Any] = {"width": filling.columns * size, "height": filling.rows * size}
         return Spheres(diameter=size, **box, **_shared(filling))
-    if isinstance(filling, Spheres) and filling.sizes is None and np.ndim(filling.gravity) == 0:
+    if isinstance(filling, Spheres) and filling.sizes is None:
         size = filling.diameter
         columns, rows = (math.floor(x / size + _WHOLE) for x in (filling.width, filling.height))
         places: dict[str, Any] = {"columns": columns, "rows": rows}

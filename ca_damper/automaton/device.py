@@ -12,6 +12,7 @@ from ca_damper.automaton.lattice import EMPTY, HELD, WALL, Geometry, Lattice
 from ca_damper.engine.random_numbers import stream
 from ca_damper.engine.recorder import EventCounts
 from ca_damper.filling import Action
+from ca_damper.scenes.gravity import gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.effect_usage import EffectUse
@@ -31,12 +32,13 @@ _BY = {name: (kind,) for name, (kind, _) in _COUNTED.items()}
 class Parameters:
     """Parameters that kernels read; in fields, so that another value compiles nothing.
 
-    width of a cell [m], mass of a particle [kg], gravity [m/s^2], restitution of particle and wall;
-    threshold of static contact in units of g dt; friction of two particles, and wall_friction.
+    width of a cell [m], mass of a particle [kg], gravity downwards and sideways, to the right
+    [m/s^2], restitution of particle and wall; threshold of static contact in units of g dt;
+    friction of two particles, and wall_friction.
     """
 
     def __init__(self):
-        for name in ("width", "mass", "gravity", "particle", "wall", "threshold"):
+        for name in ("width", "mass", "gravity", "sideways", "particle", "wall", "threshold"):
             setattr(self, name, ti.field(ti.f64, shape=()))
         self.friction, self.wall_friction = (ti.field(ti.f64, shape=()) for _ in range(2))
 
@@ -45,7 +47,8 @@ class Parameters:
         values = {
             "width": options.width,
             "mass": options.particle_mass,
-            "gravity": options.gravity,
+            "gravity": gravity_along(options),
+            "sideways": options.sideways,
             "particle": options.restitution,
             "wall": options.wall_restitution,
             "threshold": options.static_threshold,

@@ -78,6 +78,12 @@ def _beyond_place(automaton, driven):
     levels = driven.acceleration[moved] / _G
     for level in {levels.min(initial=0.8), levels.max(initial=8.0)}.difference({0.8, 8.0}):
         yield f"a motion of {level:.2g} g"
+    if some.any() and automaton.sideways:
+        yield (
+            "gravity across the columns (a box on its side: loss within 5 % of that of spheres in "
+            "the median of 135 points, 32 % at nine of ten, 76 % at worst, with beds of several "
+            "layers, which interlock)"
+        )
     highest = max(automaton.restitution, automaton.wall_restitution)
     if some.any() and highest > 0.9:
         yield (

@@ -174,6 +174,11 @@ class Lattice:
         return self.level[cell]
 
     @ti.func
+    def column_of(self, cell):
+        """Column of a cell, -1 for the left wall."""
+        return ti.cast(self.bottom[cell], ti.i32) // self.size[None].height - 1
+
+    @ti.func
     def column_beside(self, cell, way):
         """Lowest cell of the column to the right (way 1) or left (-1) of a cell, a wall."""
         return ti.cast(self.bottom[cell], ti.i32) + way * self.size[None].height

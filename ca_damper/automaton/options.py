@@ -12,6 +12,7 @@ from ca_damper.automaton.place.device import PlaceAutomaton
 from ca_damper.automaton.transport import READINGS
 from ca_damper.filling import Structure
 from ca_damper.report.checked_range import CheckedRange, Driven
+from ca_damper.scenes.gravity import checked_gravity
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import GRAIN, GRAIN_MASS, in_unit
@@ -68,8 +69,9 @@ class Automaton:
         Number of rows of cells inside the walls.
     particle_mass : float, default 0.0002
         Mass of a particle [kg].
-    gravity : float, default 10.0
-        Gravity, downwards [m/s^2].
+    gravity : float or tuple of (float, float), default 10.0
+        Gravity [m/s^2]: downwards, or (to the right, downwards) for a box that lies or is tilted,
+        for rules ``"place"`` only.
     v_max : float, default 5.0
         Largest particle speed to expect [m/s]. It bounds the step: dt < width / v_max.
     start : tuple of (int, int), optional
@@ -115,7 +117,7 @@ class Automaton:
     columns: int = 10
     rows: int = 16
     particle_mass: float = 0.2e-3
-    gravity: float = 10.0
+    gravity: float | tuple = 10.0
     v_max: float = 5.0
     start: tuple | None = None
     traversal: str = "list"
@@ -139,14 +141,19 @@ class Automaton:
             positive(name, getattr(self, name))
         in_unit("width", self.width, GRAIN)
         in_unit("particle_mass", self.particle_mass, GRAIN_MASS, self.particle_mass / self.width**3)
-        for name in ("gravity", "static_threshold"):
-            positive(name, getattr(self, name), zero_allowed=True)
+        positive("static_threshold", self.static_threshold, zero_allowed=True)
+        object.__setattr__(self, "gravity", checked_gravity(self.gravity))
         if self.static_contact is not None:
             flag("static_contact", self.static_contact)
         self._check_rules()
         self._check_lattice()
 
     def _check_rules(self) -> None:
+        if self.sideways and self.rules != "place":
+            raise InputError(
+                f"gravity must be one number with rules {self.rules!r}, whose lattice stands along "
+                f"it, got {shown(self.gravity)}"
+            )
         for name in ("friction", "wall_friction"):
             value = getattr(self, name)
             if value is not None:
@@ -206,6 +213,11 @@ class Automaton:
         asked = (self.friction, self.wall_friction)
         between, at_wall = (usual if value is None else value for value in asked)
         return between, at_wall
+
+    @property
+    def sideways(self) -> float:
+        """Gravity to the right [m/s^2]."""
+        return self.gravity[0] if isinstance(self.gravity, tuple) else 0.0
 
     @property
     def label(self) -> str:
@@ -316,7 +328,7 @@ class Automaton:
     def structure(self) -> Structure:
         """Rules are compiled; numbers, the size of the lattice and the cells of start are not."""
         rules = self.rules, self._accounting, self.pair_rule, self.accumulator
-        key = (*rules, self.particles_rest, self.traversal, self.start is None)
+        key = (*rules, self.particles_rest, self.traversal, self.start is None, self.sideways != 0)
         # One more for the cell beyond the lattice.
         return Structure(key, {"cells": (self.columns + 2) * (self.rows + 2) + 1})
 

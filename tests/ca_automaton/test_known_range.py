@@ -42,3 +42,11 @@ def test_the_paper_s_rules_warn_before_a_run_where_they_fail(name):
 @pytest.mark.parametrize("name", INSIDE)
 def test_the_paper_s_rules_are_silent_inside_their_range(name):
     assert not checked(paper, *INSIDE[name]).warning
+
+
+def test_a_run_says_where_rules_of_place_are_off():
+    """Gravity across the columns is one of these places."""
+    lying = checked(Automaton, {"gravity": (9.8, 0.0)}, FEW, "spring")
+    upright = checked(Automaton, {"gravity": (0.0, 9.8)}, FEW, "spring")
+    assert len(lying.outside) == len(upright.outside) + 1
+    assert "gravity across the columns" in " ".join(lying.outside)

@@ -33,13 +33,14 @@ from ca_damper.scenes.scene_fields import Part
 class Collisions(Part):
     """Carry out the collisions of a step; no two of them change the same grain.
 
-    Of a step, (scenes,): count: of the grains that meet the container, ends: of them on floor and
-    ceiling, approaches: their velocities seen from it [quanta].
+    tilted: whether gravity acts across the columns too. Of a step, (scenes,): count: of the grains
+    that meet the container, ends: of them on floor and ceiling, approaches: their velocities seen
+    from it [quanta].
     """
 
-    def __init__(self, automaton: Any):
+    def __init__(self, automaton: Any, tilted: bool):
         super().__init__(automaton)
-        table, self.contacts = self.table, Contacts(automaton)
+        table, self.contacts, self.tilted = self.table, Contacts(automaton), tilted
         self.count, self.ends = table.field(ti.i32), table.field(ti.i32)
         self.approaches = table.field(ti.i64)
 
@@ -81,6 +82,10 @@ class Collisions(Part):
             line = ti.Vector([chord(rise), rise])
         else:
             line = line_of_centres(unit(bits(shared, cell, LINE_DRAW)))
+            if ti.static(self.tilted):
+                # Grains of a bed lie on one wall, and meet head on.
+                if self.cells.across[s, cell] == 0.0 and self.cells.across[s, other] == 0.0:
+                    line = ti.Vector([0.0, 1.0])
         self.resting.free(s, cell, carried)
         self.resting.free(s, other, carried)
         relative = self.cells.velocity(s, cell) - self.cells.velocity(s, other)

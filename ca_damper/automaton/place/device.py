@@ -21,7 +21,8 @@ class PlaceAutomaton(LatticeDevice):
         super().__init__(table)
         grains = Grains(self, options.traversal == "list")
         self._fill(options, grains, Heap(self, grains, None, options.particles_rest), UP)
-        self.transport, self.collisions = Transport(self), Collisions(self)
+        tilted = options.sideways != 0.0
+        self.transport, self.collisions = Transport(self, tilted), Collisions(self, tilted)
 
     @ti.func
     def find_blows(self, s, step, motion):
@@ -32,12 +33,13 @@ class PlaceAutomaton(LatticeDevice):
     @ti.func
     def energy(self, s):
         """Kinetic and potential energy [J]; held grains move as the container did last."""
-        total = 0.0
+        total, sideways = 0.0, self.parameters.sideways[None] * self.parameters.width[None]
         for cell in range(self.lattice.size[None].cells):
             if self.cells.is_grain(s, cell):
                 velocity = self.cells.velocity(s, cell)
                 height = self.cells.height(s, cell) - self.cells.offset[s]
                 total += 0.5 * velocity.dot(velocity) + self.parameters.gravity[None] * height
+                total -= sideways * self.lattice.column_of(cell)
         return self.parameters.mass[None] * total
 
     @ti.func

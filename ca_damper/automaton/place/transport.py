@@ -7,8 +7,10 @@ from typing import Any
 
 import taichi as ti
 
+from ca_damper.automaton.accounting import quanta
 from ca_damper.automaton.conflict_resolution import rank_in_phase
 from ca_damper.automaton.lattice import EMPTY, UP
+from ca_damper.automaton.place.contacts import dragged, most_drag
 from ca_damper.engine.random_numbers import HOP, bits, unit
 from ca_damper.scenes.scene_fields import Part
 
@@ -21,11 +23,13 @@ _NOWHERE = -1
 class Transport(Part):
     """Grains keep their places in the room when the lattice steps, and fly under full gravity.
 
-    movers, targets: cells that grains leave and enter, shape (scenes, cells).
+    movers, targets: cells that grains leave and enter, shape (scenes, cells). tilted: whether
+    gravity acts across the columns too.
     """
 
-    def __init__(self, automaton: Any):
+    def __init__(self, automaton: Any, tilted: bool):
         super().__init__(automaton)
+        self.tilted = tilted
         self.traversal = self.cells.traversal
         self.movers = self.table.field(ti.i16, "cells")
         self.targets = self.table.field(ti.i16, "cells")
@@ -56,19 +60,45 @@ class Transport(Part):
     @ti.func
     def fly_all(self, s, motion, pull):
         """One step of all grains under way and of the container, exact for constant gravity."""
-        dt = self.table.dt[s]
+        dt, gained = self.table.dt[s], ti.cast(0, ti.i64)
+        after = motion.v + motion.a * dt
         for k in range(self.traversal.begin(), self.traversal.end(s)):
             cell = self.traversal.cell(s, k)
             if self.cells.at(s, cell) == UP:
                 speed = self.cells.speed[s, cell] - pull
+                if ti.static(self.tilted):
+                    drag = self.fall(s, cell, speed - after)
+                    speed -= drag
+                    gained -= quanta(drag)
                 self.cells.speed[s, cell] = speed
                 self.cells.travelled[s, cell] = (
                     self.cells.travelled[s, cell] + (speed + 0.5 * pull) * dt
                 )
         self.cells.offset[s] = self.cells.offset[s] + (motion.v + 0.5 * motion.a * dt) * dt
-        self.cells.container[s] = motion.v + motion.a * dt
+        self.cells.container[s] = after
         self.cells.closing[s] = motion.a + self.parameters.gravity[None]
-        return ti.cast(0, ti.i64)
+        return gained
+
+    @ti.func
+    def fall(self, s, cell, slip):
+        """Fall across the columns, or lie on what stands there; returns the drag of that [m/s].
+
+        A grain that has no room and fell less than a diameter lies, and presses by its weight
+        on the bed that the container carries: all layers together are dragged as one body is.
+        """
+        result, sideways = 0.0, self.parameters.sideways[None]
+        across, pull = self.cells.across[s, cell], ti.abs(sideways)
+        way = 1 if sideways > 0.0 else -1
+        slow = across * way >= 0.0 and across * across < 2.0 * pull * self.parameters.width[None]
+        if slow and self.free_place(s, cell, way) == _NOWHERE:
+            self.cells.across[s, cell] = 0.0
+            push = pull * self.table.dt[s] + ti.abs(across)
+            share = self.parameters.mass[None] * self.table.recoil[s] * self.table.particles[s]
+            most = ti.min(self.parameters.wall_friction[None] * push, most_drag(slip, share))
+            result = dragged(slip, most)
+        else:
+            self.cells.across[s, cell] = across + sideways * self.table.dt[s]
+        return result
 
     @ti.func
     def move_all(self, s, step, shared):
