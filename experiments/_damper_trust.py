@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import ca_damper as ca
-from ca_damper.runs.best_damper import DENSITY, Grains, diameter_of
+from ca_damper.runs.grains import DENSITY, Grains, diameter_of
 
 FILLINGS = (ca.Automaton(), ca.Spheres())
 OWN, GRAVITY, CELL = ca.Oscillator(), 9.81, 6e-3

@@ -2,9 +2,9 @@
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,14 +13,17 @@ from ca_damper.excitation.excitation import Excitation, excitation_of
 from ca_damper.excitation.signal import Signal
 from ca_damper.fixed_mass import RigidMass
 from ca_damper.oscillator import Oscillator
+from ca_damper.report.progress import OpenEnded
+from ca_damper.runs.grains import DENSITY, Grains, boxes_of, pair_of, shifted
 from ca_damper.runs.response import frequency_response
 from ca_damper.runs.shake import shake
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.spheres import Spheres
 from taichi_dem.kit.bars.chance import mean_and_deviation, t_quantile
 from taichi_dem.kit.data_table import Tabulated
-from taichi_dem.kit.display import listed
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress import Listener
+from taichi_dem.kit.progress_bar import reporting
 from taichi_dem.kit.validation import (
     between,
     choice,
@@ -28,12 +31,9 @@ from taichi_dem.kit.validation import (
     is_real,
     positive,
     several,
-    shown,
     whole,
 )
 
-#: Of the default grains [kg/m^3].
-DENSITY = Automaton.particle_mass / (math.pi / 6.0 * Automaton.width**3)
 #: Numbers of grains that are tried.
 NUMBERS = (5, 10, 20, 30, 50)
 #: Frequencies f/f0 from this far below the peak with fixed grains to above that of the empty
@@ -46,31 +46,6 @@ _STEPS = 6.0
 _CONFIDENCE = 0.95
 #: Fillings whose grains and box can be replaced.
 _KINDS = (Automaton, Spheres)
-
-
-class Grains(NamedTuple):
-    """Grains in a box: number, mass of each [kg], diameter [m], inner width and height [m]."""
-
-    particles: int
-    mass: float
-    diameter: float
-    width: float
-    height: float
-
-    @property
-    def clearance(self) -> float:
-        """Distance from the settled grains to the lid [m]."""
-        columns = int(self.width / self.diameter * (1.0 + 1e-9))
-        return self.height - self.diameter * self.particles / columns
-
-    def put_into(self, filling: Any) -> Any:
-        """The filling with these grains in this box."""
-        if isinstance(filling, Spheres):
-            box = {"diameter": self.diameter, "width": self.width, "height": self.height}
-        else:
-            columns, rows = (round(x / self.diameter) for x in (self.width, self.height))
-            box = {"width": self.diameter, "columns": columns, "rows": rows}
-        return replace(filling, particle_mass=self.mass, **box)
 
 
 @dataclass(frozen=True)
@@ -175,6 +150,7 @@ def best_damper(
     cycles: tuple[int, int] = (120, 20),
     filling: Any = None,
     confirm: Any = None,
+    progress: Listener | str | None = "auto",
 ) -> BestDamper:
     """Find number and size of grains, and the clearance, that damp a motion best.
 
@@ -211,6 +187,8 @@ def best_damper(
         Filling that searches, whose grains and box are replaced; ``Automaton()`` if None.
     confirm : Automaton or Spheres, optional
         Filling that confirms; ``Spheres()`` if None, nothing where spheres search.
+    progress : callable or str or None, default "auto"
+        As in ``frequency_response``.
 
     Returns
     -------
@@ -234,41 +212,56 @@ def best_damper(
     whole("seeds", seeds, 2, 1000)
     counts = several("particles", particles, lambda name, n: whole(name, n, 1, 1000))
     layers = whole("heights", heights, 1, 100)
-    boxes = _boxes(case.mass, counts, box, positive("density", density), layers)
+    boxes = boxes_of(case.mass, counts, box, positive("density", density), layers)
     filling = instance("filling", Automaton() if filling is None else filling, _KINDS)
     if confirm is None and not isinstance(filling, Spheres):
         confirm = Spheres()
     if confirm is not None:
         instance("confirm", confirm, _KINDS)
-    times = [time.process_time()]
+    with reporting(progress, "best damper") as listener:
+        case.tell = OpenEnded(listener)
+        found = _searched(case, filling, boxes, seeds)
+        sure = _confirmed(case, confirm, found["grains"], seeds, tolerance)
+        case.tell.end()
+    return BestDamper(**found, **sure, fixed=case.fixed())
+
+
+def _searched(case, filling, boxes, seeds):
+    """The winner among boxes and what was seen on the way: fields of a BestDamper."""
+    begun = time.process_time()
     tried = [(one, float(case.values(filling, one, 1, brief=True)[0])) for one in boxes]
     left = [one for one, _ in sorted(tried, key=lambda pair: pair[1])[:_LEFT]]
     judged = [(one, Value.of(case.values(filling, one, seeds))) for one in left]
     # By the upper end of the bar: a box whose motion nobody can tell is no good box.
     (best, value), *others = sorted(judged, key=lambda pair: pair[1].mean + pair[1].error)
-    times.append(time.process_time())
-    confirmed, errors = None, {}
-    if confirm is not None:
-        confirmed = Value.of(case.values(confirm, best, seeds))
-        for name, one in _shifted(best, tolerance):
-            errors[name] = Value.of(case.values(confirm, one, seeds))
-    times.append(time.process_time())
-    return BestDamper(
-        *(best, value, confirmed, case.fixed()),
-        tuple((one, v) for one, v in others if v.mean - v.error < value.mean + value.error),
-        *(errors, tuple(tried), times[1] - times[0], times[2] - times[1]),
-    )
+    equals = ((one, v) for one, v in others if v.mean - v.error < value.mean + value.error)
+    found = {"grains": best, "value": value, "equals": tuple(equals), "tried": tuple(tried)}
+    return {**found, "search_seconds": time.process_time() - begun}
+
+
+def _confirmed(case, filling, best, seeds, tolerance):
+    """The winner by another filling, and after errors of manufacture: fields of a BestDamper."""
+    begun, confirmed, errors = time.process_time(), None, {}
+    if filling is not None:
+        confirmed = Value.of(case.values(filling, best, seeds))
+        for name, one in shifted(best, tolerance):
+            errors[name] = Value.of(case.values(filling, one, seeds))
+    spent = time.process_time() - begun
+    return {"confirmed": confirmed, "errors": errors, "confirmation_seconds": spent}
 
 
 class _Case:
-    """Structure, motion, and what of its motion is to be small; mass: of all grains [kg]."""
+    """Structure, motion, and what of its motion is to be small.
+
+    mass: of all grains [kg]. tell: is told of the progress of each run.
+    """
 
     def __init__(self, structure: Any, motion: Any, mass: Any, goal: Any, cycles: Any):
         self.structure = instance("structure", structure, Oscillator)
         self.goal = choice("goal", goal, ("peak", "rms"))
         words = "the cycles before those that are measured, and these"
-        self.cycles = _pair("cycles", cycles, words, lambda name, n: whole(name, n, 1, 100_000))
-        self.mass = positive("mass", mass)
+        self.cycles = pair_of("cycles", cycles, words, lambda name, n: whole(name, n, 1, 100_000))
+        self.mass, self.tell = positive("mass", mass), OpenEnded(None)
         if self.mass > self.structure.mass:
             raise InputError(
                 f"mass must be at most that of the structure, {structure.mass:g} kg, got {mass:g}"
@@ -280,7 +273,7 @@ class _Case:
     def values(self, filling: Any, grains: Grains, seeds: Any, brief: bool = False) -> np.ndarray:
         """What is to be small [m] of a box, a value a seed; brief: in a first look."""
         made = grains.put_into(filling)
-        job = {"particles": grains.particles, "seeds": seeds, "progress": None}
+        job = {"particles": grains.particles, "seeds": seeds, "progress": self.tell}
         if self.signal is not None:
             run = shake(made, self.signal, oscillator=self.structure, dt=_step(made), **job)
             return self._of_record(run)
@@ -314,50 +307,3 @@ def _step(filling: Any) -> float:
     if isinstance(filling, Automaton):
         return filling.longest_dt / _STEPS
     return min(filling.default_dt, filling.step_bound[0])
-
-
-def _pair(name: str, value: Any, words: str, check: Any) -> tuple[Any, Any]:
-    """Two values that have passed a check; InputError for anything but two."""
-    if not isinstance(value, (tuple, list)) or len(value) != 2:
-        raise InputError(f"{name} must be {words}, got {shown(value)}")
-    return check(name, value[0]), check(name, value[1])
-
-
-def diameter_of(mass: float, density: float) -> float:
-    """Diameter of a ball [m]."""
-    return (6.0 * mass / (math.pi * density)) ** (1.0 / 3.0)
-
-
-def _boxes(
-    mass: float, counts: Sequence[int], box: Any, density: float, heights: int
-) -> list[Grains]:
-    """Boxes to look at: grains of one mass in whole cells of their size."""
-    width, height = _pair("box", box, "an inner width and a greatest inner height [m]", positive)
-    found = []
-    for count in counts:
-        own = mass / count
-        size = diameter_of(own, density)
-        columns, most = (int(one / size * (1.0 + 1e-9)) for one in (width, height))
-        least = 1 + math.ceil(count / max(1, columns))
-        if columns > 0 and most >= least:
-            rows = np.unique(np.linspace(least, most, heights).round().astype(int))
-            found += [Grains(count, own, size, columns * size, row * size) for row in rows]
-    if not found:
-        raise InputError(
-            f"box must hold {mass:g} kg of grains with a layer free above them, got "
-            f"{shown(box)} m for {listed(counts)} grains"
-        )
-    return found
-
-
-def _shifted(best: Grains, share: float) -> Iterator[tuple[str, Grains]]:
-    """Boxes with an error of manufacture, and its name, where the grains still fit."""
-    for sign in (1.0, -1.0):
-        by, words = 1.0 + sign * share, f"{100.0 * sign * share:+.3g} %"
-        count = round(by * best.particles)
-        taller = best.height + sign * share * best.clearance
-        yield f"clearance {words}", best._replace(height=taller)
-        yield f"number {words}", best._replace(particles=max(1, count))
-        other = best._replace(diameter=by * best.diameter, mass=by**3 * best.mass)
-        if other.clearance > 0.0:
-            yield f"size {words}", other

@@ -7,7 +7,8 @@ import pytest
 
 from ca_damper import Automaton, Oscillator, best_damper, excitation
 from ca_damper.errors import InputError
-from ca_damper.runs.best_damper import DENSITY, Value, _boxes, _shifted
+from ca_damper.runs.best_damper import Value
+from ca_damper.runs.grains import DENSITY, boxes_of, shifted
 
 BOX = (60e-3, 96e-3)
 JOB = {"mass": 6e-3, "box": BOX, "particles": 30, "seeds": 2, "heights": 2, "cycles": (10, 4)}
@@ -15,7 +16,7 @@ JOB = {"mass": 6e-3, "box": BOX, "particles": 30, "seeds": 2, "heights": 2, "cyc
 
 def test_boxes_hold_the_mass_in_whole_cells_with_a_layer_free():
     """30 grains of 6 g are those of 0.2 g and 6 mm, in rows of ten."""
-    boxes = _boxes(6e-3, (30, 10), BOX, DENSITY, 3)
+    boxes = boxes_of(6e-3, (30, 10), BOX, DENSITY, 3)
     first = boxes[0]
     assert (first.mass, first.diameter, first.width) == pytest.approx((0.2e-3, 6e-3, 60e-3))
     assert [round(one.height / one.diameter) for one in boxes[:3]] == [4, 10, 16]
@@ -29,8 +30,8 @@ def test_boxes_hold_the_mass_in_whole_cells_with_a_layer_free():
 
 
 def test_errors_of_manufacture_change_one_number_each():
-    best = _boxes(6e-3, (30,), BOX, DENSITY, 1)[0]
-    changed = dict(_shifted(best, 0.1))
+    best = boxes_of(6e-3, (30,), BOX, DENSITY, 1)[0]
+    changed = dict(shifted(best, 0.1))
     assert changed["clearance +10 %"].clearance == pytest.approx(1.1 * best.clearance)
     assert changed["number -10 %"].particles == 27
     larger = changed["size +10 %"]
