@@ -1,4 +1,4 @@
-"""Figures of the bench: the damper, the paper's blast, steps of a large block."""
+"""Figures of the bench: the damper and the paper's blast."""
 
 import time
 from collections.abc import Sequence
@@ -9,13 +9,13 @@ from typing import NamedTuple
 import taichi as ti
 
 from _blast import METHODS, paper_scene
-from _threads import VISIT, bytes_a_step, thread_gains, thread_job, work_since
+from _threads import VISIT, bytes_a_step, work_since
 from ca_damper import Automaton, Spheres, frequency_response
 from damper_cost import cycle_seconds, scenes
 from damper_response import FILLINGS, SETTINGS
 from taichi_dem import ImplicitDashpots, Multirate, Simulation, Uniform, simulate
 from taichi_dem.kit.study import call_in_process, on_device, seconds_of
-from taichi_dem.kit.study.floors import MEMORY, Work
+from taichi_dem.kit.study.floors import Work
 from taichi_dem.observers import macro_steps
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
 
@@ -55,12 +55,6 @@ RUNS = {
     "controlled": ("multirate_controlled", 2, "<= 8"),
     "l = 1e-07 m": ("paper_multirate", 1, "<= 14"),
 }
-#: Boxes along the edges of a block, six tetrahedra each.
-SMALL, LARGE, LARGEST = (20, 10, 10), (40, 20, 20), (112, 39, 39)
-#: Steps that are timed together, how often, and turns of one and of two threads.
-BLOCK_STEPS, REPEATS, ROUNDS = 3, 3, 1
-#: Floor of the steps on two threads, measured beside them.
-BOTH = f"{MEMORY}, two threads"
 
 
 class Figure(NamedTuple):
@@ -323,29 +317,3 @@ def paper_run(method, until):
 def timed(name, runs, bound=""):
     """Figure of the seconds of runs."""
     return Figure(name, "s", [one.seconds for one in runs], bound, runs[0].work)
-
-
-def block(quick):
-    """Yield a block's steps a second by every method, and the gain of a second thread."""
-    methods = ["explicit_limited"] if quick else [*METHODS]
-    if quick or on_device():
-        for cells in (SMALL,) if quick else (LARGE, LARGEST):
-            yield from speeds(thread_job("", cells, methods, 1, BLOCK_STEPS, REPEATS), "", MEMORY)
-        return
-    found = thread_gains("", LARGE, methods, BLOCK_STEPS, ROUNDS, REPEATS)
-    for name, one in found.items():
-        title = f"block of {one['bodies']}, {name}, two threads over one"
-        # By the busiest thread: other programs may have kept the cores busy.
-        gain = one["gain"] if one["busy"] is None else one["busy"]
-        yield Figure(title, "1", [gain], ">= 1.8")
-    yield Figure(BOTH, "GB/s", [1e-9 * median(one["bandwidth"] for one in found.values())])
-    yield from speeds(found, ", two threads", BOTH)
-
-
-def speeds(found, threads, store):
-    """Yield steps a second by method, and milliseconds of a solved step; store: floor of bytes."""
-    for name, one in found.items():
-        title, work = f"block of {one['bodies']}, {name}{threads}", Work(*one["work"], store)
-        yield Figure(title, "steps/s", [1.0 / s for s in one["seconds"]], "", work)
-        if name == "implicit":
-            yield Figure(f"{title}, a step", "ms", [1e3 * s for s in one["seconds"]], "", work)

@@ -18,8 +18,8 @@ from taichi_dem.mesh.shapes import bar, in_space_order
 
 #: How often runs on one and on two threads take turns.
 ROUNDS = 2
-#: Length and width of the bar that stands for a block [m].
-BAR = (2.0, 1.0)
+#: Edge of the boxes of the bar that stands for a block [m]: more bodies make it larger.
+BOX = 0.05
 #: The visit of a bond, in f64 and without regard to how things are stored. It reads two numbers of
 #: bodies (8 bytes), the symmetric 6x6 block (21 numbers), the branch (3), the twist of the last
 #: visit (6), and of both bodies twist (6), symmetric inverse inertia (6) and inverse mass (1). It
@@ -100,7 +100,8 @@ def scene_of(mesh, cells):
         return Scene(in_space_order(read_mesh(mesh)), CONCRETE, paper_effects())
     blown = [e for e in paper_effects() if e.name != "gas_pressure"]
     gas = effects.GasPressure(group="left")
-    return Scene(in_space_order(bar(*BAR, cells)), CONCRETE, [*blown, gas])
+    block = bar(BOX * cells[0], BOX * cells[1], cells)
+    return Scene(in_space_order(block), CONCRETE, [*blown, gas])
 
 
 def whole_steps(mesh, cells, methods, steps, repeats):

@@ -1,6 +1,6 @@
 """How fast is it? Rates of both packages, the papers' problems, and the first wait.
 
-    make bench                          # about 8 minutes on two quiet cores
+    make bench                          # about 12 minutes on two quiet cores
     python experiments/bench.py --quick # a minute
 
 Figures are CPU time of one core unless they say otherwise, and wall time with --arch cuda, without
@@ -10,8 +10,10 @@ Between the parts, the floors of the machine are measured on one core: copies in
 cache, multiplications and additions. A figure with a known least work is given as a share of its
 floor: the time of that work at these rates over the measured time.
 
-Writes bench.json to results/, adds a line to bench_history.jsonl there, and draws bench.png: all
-figures over the commits measured on such a processor.
+The table also has what other programs take, measured on another machine: bench.md.
+
+Writes bench.json and bench.md to results/, adds a line to bench_history.jsonl there, and draws
+bench.png: all figures over the commits measured on such a processor.
 """
 
 import json
@@ -21,7 +23,9 @@ import textwrap
 import time
 from dataclasses import asdict
 
-from _bench import TIMES, Figure, blast, block, damper
+from _bench import TIMES, Figure, blast, damper
+from _bench_block import block, growth
+from _bench_others import OTHERS
 from _bench_waits import waits
 from taichi_dem.kit import runtime, study
 from taichi_dem.kit.files import output_folder, write_text
@@ -31,7 +35,9 @@ from taichi_dem.kit.study.floors import MULTIPLY_ADD, Floors
 
 NAME = "bench"
 #: Functions that yield figures; quick: fewer of them, shorter jobs.
-PARTS = (damper, waits, blast, block)
+PARTS = (damper, waits, blast, block, growth)
+#: Columns of the table; the floor: the time that memory and arithmetic need over the time taken.
+HEADER = ("work", "ours", "spread", "unit", "wanted", "of the floor", "others'", "times", "by")
 #: Runs with the same of these can be compared.
 ALIKE = ("processor", "arch", "threads", "quick")
 #: Panels in a row; height of one and of what is around them, and width of a page [inch].
@@ -67,8 +73,8 @@ def run(options):
     # Floors are the figures with such a unit.
     rates = {one.name: 1e9 * one.middle for one in figures if one.unit in ("GB/s", "GFlop/s")}
     rows = [row_of(one, one.share(rates)) for one in figures]
-    header = ["figure", "median", "spread", "unit", "bound", "share of the floor"]
-    study.print_table(rows, header)
+    study.print_table(rows, HEADER)
+    write_text(os.path.join(folder, "bench.md"), study.markdown_of(HEADER, rows))
     keys = {one.name: one.middle for one in figures if one.name.endswith("_seconds")}
     place = {"processor": study.processor(), "versions": study.versions()}
     shown = [
@@ -80,7 +86,7 @@ def run(options):
     history = os.path.join(folder, "bench_history.jsonl")
     draw_history(os.path.join(folder, "bench.png"), add_run(history, figures, rates, options.quick))
     seconds = time.perf_counter() - started
-    print(f"measured in {seconds:.0f} s; bench.json, bench.png, bench_history.jsonl in {folder}")
+    print(f"measured in {seconds:.0f} s; bench.md, bench.json, bench.png are in {folder}")
 
 
 def measured(quick):
@@ -105,7 +111,15 @@ def row_of(one, share):
     """Cells of a figure in the table."""
     spread = f"{min(one.values):.3g} .. {max(one.values):.3g}"
     of_floor = "" if share is None else f"{100 * share:.3g} %"
-    return one.name, f"{one.middle:.3g}", spread, one.unit, one.bound, of_floor
+    theirs = compared(one) if one.name in OTHERS else ("", "", "")
+    return one.name, f"{one.middle:.3g}", spread, one.unit, one.bound, of_floor, *theirs
+
+
+def compared(one):
+    """Cells of another program's figure: its value, how many times as fast ours is, and by whom."""
+    value, program, source = OTHERS[one.name]
+    times = value / one.middle if one.is_time else one.middle / value
+    return f"{value:g}", f"{times:.2g}", f"{program} ({source})"
 
 
 def add_run(path, figures, rates, quick):

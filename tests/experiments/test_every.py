@@ -97,6 +97,7 @@ def test_a_quick_bench_measures_waits_and_shares_of_the_floors(tmp_path):
     content = json.loads((tmp_path / "bench.json").read_text())
     assert content["first_scene_cold_seconds"] > content["second_scene_seconds"] > 0.0
     assert any(one["share_of_floor"] for one in content["figures"])
+    assert "LAMMPS" in (tmp_path / "bench.md").read_text()
 
 
 @QUICK
