@@ -116,8 +116,11 @@ class FieldTree:
 
     def destroy(self) -> None:
         """Free the memory; the fields must not be used any more."""
-        _bases.pop(self._builder.root.ptr.id, None)
-        _destroyed.add(self._builder.root.ptr.id)
+        number = self._builder.root.ptr.id
+        _bases.pop(number, None)
+        _destroyed.add(number)
+        for field in [field for field in _arrays if _layout(field)[0].id == number]:
+            del _arrays[field]
         self._tree.destroy()
         self._tree = None
 
@@ -234,10 +237,14 @@ def _found_layout(field):
 
 def values(field: ti.Field, wanted: Any = ...) -> np.ndarray:
     """Copy of entries of a field; wanted: their slice or their numbers, all by default."""
-    if not in_tree(field):
-        return field.to_numpy()[wanted]
+    _forget_other_sessions()
+    array = _arrays.get(field)
+    if array is None:
+        if not in_tree(field):
+            return field.to_numpy()[wanted]
+        array = array_of(field)
     impl.get_runtime().prog.synchronize()
-    return np.array(array_of(field)[wanted])
+    return np.array(array[wanted])
 
 
 def assign(field: ti.Field, array: ArrayLike) -> None:
