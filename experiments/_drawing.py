@@ -1,4 +1,4 @@
-"""Films of runs, cracks of a block in sections, and costs of methods, which several pages draw."""
+"""Films of runs and cracks of a block in sections, which several pages draw."""
 
 import contextlib
 import itertools
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-from taichi_dem.kit.plot_style import GREY, STYLE, filming, picture, styles_of, write_gif
+from taichi_dem.kit.plot_style import GREY, STYLE, filming, write_gif
 from taichi_dem.kit.progress import drawing
 from taichi_dem.plot.view import ALONG_Z, View, draw_bodies, frame_block, move_bodies
 
@@ -19,8 +19,6 @@ _SMALL = {
     **dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "legend.fontsize"), 6.5),
     "lines.linewidth": 1.2,
 }
-#: Displacements that methods may be compared by, and how they are called.
-_COMPARED = {"hole_radial_displacement_mm": "hole", "monitor_displacement_mm": "monitored body"}
 
 
 @contextlib.contextmanager
@@ -133,37 +131,3 @@ def in_space(axes, triangles, time_ms, box, look):
     axes.locator_params(nbins=4)
     if np.ptp(box[:, 1]) < 0.5 * np.ptp(box, axis=0).max():
         axes.locator_params(axis="y", nbins=2)
-
-
-def plot_methods(path, series, column):
-    """What methods cost over time, and how far their displacement lies apart.
-
-    series: method -> columns time_s, cpu_s, evaluations and the one compared, of ``_COMPARED``; the
-    first is the one the others are compared with.
-    """
-    with picture(path, 2, 2, size=(9.0, 6.4)) as (_, ((cost, work), (moved, words))):
-        first, styles = next(iter(series.values())), styles_of(series)
-        for name, made in series.items():
-            style = styles[name]
-            look = {"color": style.colour, "linestyle": style.line, "label": style.label}
-            time = 1e3 * np.asarray(made["time_s"])
-            cost.plot(time, made["cpu_s"], **look)
-            work.plot(time, 1e-6 * np.asarray(made["evaluations"]), **look)
-            # Largest steps differ, and with them the times of the samples.
-            there = np.interp(time, 1e3 * first["time_s"], first[column])
-            there = np.where(there > 1e-3 * there.max(), there, np.nan)
-            moved.plot(time, 100.0 * (np.asarray(made[column]) / there - 1.0), **look)
-        cost.set(ylabel="CPU time of stepping [s]")
-        work.set(ylabel="evaluations of bonds\nand contact pairs [10⁶]")
-        for axes, name, unit in ((cost, "cpu_s", 1.0), (work, "evaluations", 1e6)):
-            last = [made[name][-1] / unit for made in series.values()]
-            # A run begins with nothing done, where a logarithm has no end.
-            log = max(last) > 20.0 * min(last)
-            axes.set_yscale("log" if log else "linear")
-            axes.set_ylim(0.01 * min(last) if log else 0.0, None)
-        base = next(iter(styles.values())).label
-        moved.set(ylabel=f"displacement of the {_COMPARED[column]},\ndifference from\n{base} [%]")
-        for axes in (cost, work, moved):
-            axes.set(xlabel="time [ms]", xlim=(0.0, time[-1] or 1.0))
-        words.set_axis_off()
-        words.legend(*moved.get_legend_handles_labels(), loc="center left", handlelength=4.0)

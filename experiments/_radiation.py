@@ -26,7 +26,6 @@ RADIUS, OPEN, CHARGE = 0.025, 0.17, 0.05
 NEAR, FAR, GROWTH, CHANGE = 0.015, 0.06, 0.3, 0.04
 #: Where rock ends, and the shell in which the motion is read [m].
 OUTER, SHELL = 2.1, (1.4, 1.6)
-SIZES = RADIUS, OPEN, CHARGE, NEAR, FAR, GROWTH, CHANGE, OUTER, SHELL
 #: The same without Gmsh: radius, half of the charge, edge, end and shell [m].
 COARSE = {"radius": 0.08, "charge": 0.08, "far": 0.1, "outer": 1.1, "shell": (0.7, 0.9)}
 #: Pressure [Pa], small: the rock stays elastic.

@@ -10,26 +10,24 @@ Between the parts, the floors of the machine are measured on one core: copies in
 cache, multiplications and additions. A figure with a known least work is given as a share of its
 floor: the time of that work at these rates over the measured time.
 
-The table also has what other programs take, measured on another machine: bench.md.
-
-Writes bench.json and bench.md to results/, adds a line to bench_history.jsonl there, and draws
-bench.png: all figures over the commits measured on such a processor.
+The table also has what other programs take, measured on other machines, and the change since the
+last run in this folder of the same kind on such a processor. Writes it to bench.md, all figures to
+bench.json, and adds a line to bench_history.jsonl, in results/.
 """
 
 import json
 import os
 import sys
-import textwrap
 import time
 from dataclasses import asdict
+from pathlib import Path
 
-from _bench import TIMES, Figure, blast, damper
+from _bench import Figure, blast, damper
 from _bench_block import block, growth
 from _bench_others import OTHERS
 from _bench_waits import waits
 from taichi_dem.kit import runtime, study
 from taichi_dem.kit.files import output_folder, write_text
-from taichi_dem.kit.plot_style import BLACK, BLUE, line_key, picture
 from taichi_dem.kit.provenance import commit, git
 from taichi_dem.kit.study.floors import MULTIPLY_ADD, Floors
 
@@ -37,28 +35,8 @@ NAME = "bench"
 #: Functions that yield figures; quick: fewer of them, shorter jobs.
 PARTS = (damper, waits, blast, block, growth)
 #: Columns of the table; the floor: the time that memory and arithmetic need over the time taken.
-HEADER = ("work", "ours", "spread", "unit", "wanted", "of the floor", "others'", "times", "by")
-#: Runs with the same of these can be compared.
-ALIKE = ("processor", "arch", "threads", "quick")
-#: Panels in a row; height of one and of what is around them, and width of a page [inch].
-COLUMNS, HEIGHT, AROUND, WIDTH = 5, 1.13, 1.1, 7.0
-#: Sizes of letters [pt], and letters in a line of a title.
-TITLE, SMALL, LINE = 7.0, 6.5, 24
-#: Most commits of a picture, the latest ones.
-MOST = 12
-#: Colour and marker of a share of the floor, and of a figure over its first one.
-SHARE, SPEED = "share of the machine's floor", "speed over that of the first run shown"
-LOOKS = {SHARE: {"color": BLUE, "marker": "o"}, SPEED: {"color": BLACK, "marker": "s"}}
-#: Names of the code that are parts of names of figures, in words.
-WORDS = {
-    "paper_uniform": "uniform",
-    "paper_multirate": "multirate",
-    "multirate_controlled": "controlled",
-    "explicit_limited": "limited",
-    "l = 1e-07 m": "l = 0.1 µm",
-    "l = 1e-08 m": "l = 0.01 µm",
-    "0.8 us": "0.8 µs",
-}
+HEADER = ["work", "ours", "spread", "unit", "change", "wanted", "of the floor"]
+HEADER += ["others'", "times", "by"]
 
 
 def options_parser():
@@ -72,21 +50,22 @@ def run(options):
     figures = measured(options.quick)
     # Floors are the figures with such a unit.
     rates = {one.name: 1e9 * one.middle for one in figures if one.unit in ("GB/s", "GFlop/s")}
-    rows = [row_of(one, one.share(rates)) for one in figures]
+    history, place = os.path.join(folder, "bench_history.jsonl"), place_of(options.quick)
+    before = medians_before(history, place)
+    rows = [row_of(one, one.share(rates), before.get(one.name)) for one in figures]
     study.print_table(rows, HEADER)
     write_text(os.path.join(folder, "bench.md"), study.markdown_of(HEADER, rows))
     keys = {one.name: one.middle for one in figures if one.name.endswith("_seconds")}
-    place = {"processor": study.processor(), "versions": study.versions()}
     shown = [
         {**dict(zip(("name", "unit", "values", "bound"), one)), "share_of_floor": one.share(rates)}
         for one in figures
     ]
-    content = {"figures": shown, **keys, **place, **asdict(runtime.settings())}
+    made_by = {"processor": study.processor(), "versions": study.versions()}
+    content = {"figures": shown, **keys, **made_by, **asdict(runtime.settings())}
     write_text(os.path.join(folder, "bench.json"), json.dumps(content, indent=1))
-    history = os.path.join(folder, "bench_history.jsonl")
-    draw_history(os.path.join(folder, "bench.png"), add_run(history, figures, rates, options.quick))
+    add_run(history, figures, place)
     seconds = time.perf_counter() - started
-    print(f"measured in {seconds:.0f} s; bench.md, bench.json, bench.png are in {folder}")
+    print(f"measured in {seconds:.0f} s; bench.md and bench.json are in {folder}")
 
 
 def measured(quick):
@@ -107,12 +86,14 @@ def measured(quick):
     return [Figure(name, units.get(name, "GB/s"), one) for name, one in rates.items()] + figures
 
 
-def row_of(one, share):
-    """Cells of a figure in the table."""
+def row_of(one, share, before):
+    """Cells of a figure in the table; before: its median in an earlier run, if any."""
+    change = f"{100.0 * (one.middle / before - 1.0):+.0f} %" if before else ""
     spread = f"{min(one.values):.3g} .. {max(one.values):.3g}"
     of_floor = "" if share is None else f"{100 * share:.3g} %"
     theirs = compared(one) if one.name in OTHERS else ("", "", "")
-    return one.name, f"{one.middle:.3g}", spread, one.unit, one.bound, of_floor, *theirs
+    measured_here = one.name, f"{one.middle:.3g}", spread, one.unit, change, one.bound, of_floor
+    return *measured_here, *theirs
 
 
 def compared(one):
@@ -122,71 +103,29 @@ def compared(one):
     return f"{value:g}", f"{times:.2g}", f"{program} ({source})"
 
 
-def add_run(path, figures, rates, quick):
-    """Add a run to the history; returns the latest run of each commit that can be compared to it.
-
-    rates: of the floors, in bytes and operations a second.
-    """
+def place_of(quick):
+    """What is alike of runs that can be compared."""
     settings = runtime.settings()
+    return [study.processor(), settings.arch, settings.threads, quick]
+
+
+def medians_before(path, place):
+    """Medians by name of the last run in the history of such a place, none where there is none."""
+    runs = Path(path).read_text(encoding="utf-8").splitlines() if os.path.exists(path) else ()
+    alike = [run for run in map(json.loads, runs) if run.get("place") == place]
+    return alike[-1]["medians"] if alike else {}
+
+
+def add_run(path, figures, place):
+    """Add a run to the history, a line each."""
     last = {
         "commit": commit() + ("+" if git("status", "--porcelain", "-uno") else ""),
         "date": time.strftime("%Y-%m-%d %H:%M"),
-        **{"processor": study.processor(), "arch": settings.arch, "threads": settings.threads},
-        "quick": quick,
+        "place": place,
         "medians": {one.name: one.middle for one in figures},
-        "units": {one.name: one.unit for one in figures},
-        "shares": {one.name: one.share(rates) for one in figures if one.work and rates},
-        "floors": rates,
     }
-    with open(path, "a+", encoding="utf-8") as file:
+    with open(path, "a", encoding="utf-8") as file:
         file.write(json.dumps(last) + "\n")
-        file.seek(0)
-        runs = [json.loads(line) for line in file]
-    alike = [run for run in runs if all(run[name] == last[name] for name in ALIKE)]
-    return list({run["commit"]: run for run in alike}.values())[-MOST:]
-
-
-def draw_history(path, runs):
-    """Draw all figures of the last run over the commits that have been measured like it."""
-    names = [*runs[-1]["medians"]]
-    rows = -(-len(names) // COLUMNS)
-    shape = {"size": (WIDTH, AROUND + HEIGHT * rows), "sharex": True, "squeeze": False}
-    with picture(path, rows, COLUMNS, **shape) as (figure, axes):
-        # The first row is the one with gaps, so that the last one has commits below each column.
-        gap = rows * COLUMNS - len(names)
-        for axis in axes[0, COLUMNS - gap :]:
-            axis.set_axis_off()
-        for axis, name in zip((*axes[0, : COLUMNS - gap], *axes[1:].ravel()), names):
-            draw_figure(axis, name, runs)
-        keys = [line_key(label, ms=4, lw=1.0, **look) for label, look in LOOKS.items()]
-        words = f"Last value in the titles; commits below; on {runs[-1]['processor']}"
-        look = {"title": words, "alignment": "left", "title_fontsize": TITLE + 1.0}
-        figure.legend(handles=keys, loc="outside upper left", ncols=2, **look)
-
-
-def draw_figure(axis, name, runs):
-    """One figure over the runs, in percent; its last median in the title."""
-    last = runs[-1]
-    kind, kept = (SHARE, "shares") if name in last["shares"] else (SPEED, "medians")
-    places, values = zip(*((k, run[kept][name]) for k, run in enumerate(runs) if name in run[kept]))
-    if kind == SPEED:
-        less_is_better = last["units"][name] in TIMES
-        values = [values[0] / now if less_is_better else now / values[0] for now in values]
-    values = [100.0 * one for one in values]
-    axis.plot(places, values, ms=3, lw=1.0, **LOOKS[kind])
-    axis.set(ylim=(0.0, 1.25 * max(values)), xlim=(-0.5, len(runs) - 0.5))
-    axis.set_xticks(range(len(runs)), [f"@{run['commit']}" for run in runs], rotation=90)
-    axis.locator_params(axis="y", nbins=3)
-    axis.tick_params(labelsize=SMALL, length=2.0)
-    axis.set_ylabel("[%]", fontsize=SMALL, labelpad=1.0)
-    value, unit = last["medians"][name], last["units"][name].replace("1", "")
-    words = f"{value:,.0f} {unit}" if value >= 1000.0 else f"{value:.3g} {unit}".strip()
-    for code, plain in WORDS.items():
-        name = name.replace(code, plain)
-    title = f"{name.replace('_seconds', '').replace('_', ' ')}: {words}"
-    # It begins where the numbers of the axis do [pt].
-    look = {"textcoords": "offset points", "va": "bottom", "fontsize": TITLE}
-    axis.annotate(textwrap.fill(title, LINE), (0, 1), (-26, 2), "axes fraction", **look)
 
 
 if __name__ == "__main__":

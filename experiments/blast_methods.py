@@ -24,10 +24,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from _blast import METHODS, blast_parser, paper_scene, run_costs, run_options
-from _drawing import plot_methods
 from taichi_dem import ImplicitDashpots, ProgressBar, SimulationDiverged, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.plot_style import picture, styles_of
 from taichi_dem.plot.series import level_shares, plot_levels
 
 NAME = "blast_methods"
@@ -41,6 +41,8 @@ SETTINGS = {
     "samples": (100, 10),
     "doublings": (8, 0, study.whole(0, 20), "tried for the largest stable step, default 8"),
 }
+#: CPU seconds of the paper's runs to 0.5 ms, section 4.3.
+PAPER = {"paper_uniform": 3897 * 60.0, "paper_multirate": 2702 * 60.0}
 #: Error of the displacement beyond which a run counts as unstable though no body ran away.
 USABLE = 0.1
 MOVED = "hole_radial_displacement_mm"
@@ -96,6 +98,33 @@ def largest_stable_step(scene, one, exact, options):
     return step
 
 
+def draw(path, series):
+    """Cost, work and displacement of the hole over time, its difference from the first method.
+
+    series: by method, columns of its history.
+    """
+    with picture(path, 2, 2, size=(9.0, 6.4)) as (_, ((cost, work), (moved, words))):
+        first, styles = next(iter(series.values())), styles_of(series)
+        for name, made in series.items():
+            style, time = styles[name], 1e3 * made["time_s"]
+            look = {"color": style.colour, "linestyle": style.line, "label": style.label}
+            # A run begins with nothing done, where a logarithm has no end.
+            cost.plot(time[1:], made["cpu_s"][1:], **look)
+            work.plot(time[1:], 1e-6 * np.asarray(made["evaluations"][1:]), **look)
+            # Largest steps differ, and with them the times of the samples.
+            there = np.interp(time, 1e3 * first["time_s"], first[MOVED])
+            there = np.where(there > 1e-3 * there.max(), there, np.nan)
+            moved.plot(time, 100.0 * (made[MOVED] / there - 1.0), **look)
+        cost.set(yscale="log", ylabel="CPU time of stepping [s]")
+        work.set(yscale="log", ylabel="evaluations of bonds\nand contact pairs [10⁶]")
+        base = next(iter(styles.values())).label
+        moved.set_ylabel(f"displacement of the hole,\ndifference from\n{base} [%]")
+        for axes in (cost, work, moved):
+            axes.set(xlabel="time [ms]", xlim=(0.0, time[-1]))
+        words.set_axis_off()
+        words.legend(*moved.get_legend_handles_labels(), loc="center left", handlelength=4.0)
+
+
 def run(options):
     """Run the reference and all methods, compare, picture."""
     scene, at = paper_scene(options.mesh), study.output_paths(options.out)
@@ -107,14 +136,15 @@ def run(options):
     rows, best = TABLE.rows(runs), reference.report
     study.write_rows(at("methods.csv"), rows)
     TABLE.show(rows)
-    plot_methods(at("methods.png"), {r.name: r.series for r in (reference, *runs)}, MOVED)
+    draw(at("methods.png"), {one.name: one.series for one in (reference, *runs)})
     figures = {
         "reference_displacement_mm": (reference.moved, "mm"),
         "reference_broken_faces": (best.broken_faces, "1"),
         "reference_seconds": (best.run_cpu_seconds, "s"),
     }
     for row in rows:
-        figures.update(TABLE.figures(row, "{key}_{method}"))
+        paper = {"seconds": PAPER.get(row["method"]) if options.until == 5e-4 else None}
+        figures.update(TABLE.figures(row, "{key}_{method}", paper))
     study.finish(options, NAME, figures, [one.report for one in (reference, *runs)])
 
 

@@ -1,31 +1,46 @@
-"""Cost of accuracy of the damper's response: automaton, spheres and RK45 on one scale.
+"""What does an error of 10 or 1 % in the damper's response cost, by automaton, spheres and RK45?
 
     python experiments/cost_of_accuracy_damper.py          # about four minutes on one core
     python experiments/cost_of_accuracy_damper.py --quick
 
 Automaton and spheres are different models, so each is compared with its own limit: the same method
-at a step far below those of the sweep, with other seeds (kept in OUT/references). The reference is
-checked twice: by the finest run of the sweep, and by the force measured on the container, from
-which the transfer function gives the motion. A second picture takes the spheres' curve as the
-truth. RK45 is compared with the transfer function of the empty container.
+at a step far below those of the sweep, with other seeds. A second panel takes the spheres' limit as
+the truth. In a third, RK45 is compared with the transfer function of the empty container.
+
+The error is the RMS over the frequencies of (response - truth), mean over seeds, as a share of the
+peak. Dotted is what seeds alone make of it. Seconds are CPU seconds of one thread, of the fastest
+repeat.
+
+Writes work_precision.png, curves.png, points.csv, answers.csv and summary.json to
+results/cost_of_accuracy_damper/.
 """
 
+import math
 import sys
-import time
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ca_damper import Automaton, Batch, Empty, Oscillator, ProgressBar, SceneTable, Spheres
-from ca_damper.accuracy.step_study import StepStudy
+from _work_precision import Point, cheapest
+from ca_damper import (
+    Automaton,
+    Batch,
+    Empty,
+    Oscillator,
+    ProgressBar,
+    SceneTable,
+    SimulationDiverged,
+    Spheres,
+    frequency_response,
+)
 from ca_damper.plot.curves import picture_compared
-from ca_damper.report.measures import curve_distance
+from ca_damper.report.measures import curve_distance, seed_variance
+from taichi_dem import InputError
 from taichi_dem.kit import study
-from taichi_dem.kit.plot_style import power, seconds, styles_of
-from taichi_dem.kit.study.work_precision import Point, answers
-from taichi_dem.kit.study.work_precision_picture import picture_work_precision
+from taichi_dem.kit.plot_style import picture, power, seconds, styles_of
 
 NAME = "cost_of_accuracy_damper"
 OSCILLATOR = Oscillator()
@@ -44,15 +59,17 @@ METHODS = {
     "dem_printed": (PRINTED, (6e-5, 4e-5, 2e-5), (), 5e-6, 3),
     "dem_soft": (SOFT, SOFT_STEPS, (2e-4,), 2.5e-5, 3),
 }
+#: Seeds of a reference are counted from here: a run that shares them would look too good.
+FIRST_SEED = 1001
 SETTINGS = {
     "ratios": ((0.92, 0.95, 0.966, 0.98, 1.0, 1.04), (0.95, 0.98, 1.0)),
     "cycles": ((40, 40), (10, 10)),
-    "twins": (tuple(METHODS), (SPHERES,)),
     "seeds": (range(1, 4), range(1, 3)),
-    "repeats": (5, 2),
+    # The first may compile.
+    "repeats": (3, 2),
 }
-#: Repeats of a point end when they took so long together [s].
-ENOUGH = 1.5
+#: Errors that are asked for.
+TARGETS = (0.1, 0.01, 0.001)
 #: RK45 on the empty container: relative tolerances in the kernel and in Python.
 TOLERANCES = {"kernel": (1e-6, 1e-8, 1e-10, 1e-12), "python": (0.1, 0.01, 1e-3, 1e-4, 1e-6, 1e-8)}
 #: A Batch takes at least 40 steps a cycle: the first is the longest [s].
@@ -63,23 +80,74 @@ SAMPLES = 8
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
 
-def sweep_of(name, options, folder, bar):
-    """All runs of a method: a ``StepStudy``."""
+class Sweep(NamedTuple):
+    """Responses of a method [m], (ratios, seeds) each: of the reference, and by step of the runs.
+
+    seconds: of the fastest repeat, by step. failures: "refused" or "diverged", by step.
+    """
+
+    reference: np.ndarray
+    runs: dict
+    seconds: dict
+    failures: dict
+
+    @property
+    def truth(self):
+        """Curve of the reference [m], (ratios,)."""
+        return self.reference.mean(axis=1)
+
+
+def sweep_of(name, options, bar):
+    """All runs of a method, and their seconds of compiling."""
     filling, steps, quick, finest, count = METHODS[name]
-    steps = quick if options.quick else steps
-    finest, count = (0.5 * min(steps), 2) if options.quick else (finest, count)
+    if options.quick:
+        steps, finest, count = quick, 0.5 * min(quick), 2
     cycles = dict(zip(("transient_cycles", "measured_cycles"), options.cycles))
-    job = {"ratios": options.ratios, "start": "rigid", "progress": bar, **cycles}
-    made = StepStudy(name, filling, PARTICLES, options.seeds, **job)
-    settings = filling, PARTICLES, OSCILLATOR, options.ratios, options.cycles, finest, count
-    place = folder / "references", name, settings, ("ca_damper",)
-    made.reference, kept = study.cached(*place, lambda: made.make_reference(finest, count))
-    made.compile_s += 0.0 if kept else made.reference["compile_s"]
+    job = {"particles": PARTICLES, "ratios": options.ratios, "start": "rigid", "progress": bar}
+    respond = partial(frequency_response, filling, **job, **cycles)
+    found = respond(dt=finest, seeds=range(FIRST_SEED, FIRST_SEED + count))
+    made, compiling = Sweep(found.rms[0], {}, {}, {}), found.report.compile_seconds
     for dt in steps:
-        made.run(dt, options.repeats, ENOUGH)
-    if name in options.twins and made.runs:
-        made.measure_roundoff(max(made.runs))
-    return made
+        try:
+            repeats, spent = [], []
+            for _ in range(options.repeats):
+                started = study.clock()
+                repeats.append(respond(dt=dt, seeds=options.seeds))
+                spent.append(study.clock() - started)
+        except (InputError, SimulationDiverged) as error:
+            made.failures[dt] = "refused" if isinstance(error, InputError) else "diverged"
+            continue
+        reports = [one.report for one in repeats]
+        compiling += sum(one.compile_seconds for one in reports)
+        if any(one.diverged for one in reports):
+            made.failures[dt] = "diverged"
+        else:
+            made.runs[dt] = repeats[0].rms[0]
+            made.seconds[dt] = min(spent)
+    return made, compiling
+
+
+def floor_of(reference, runs):
+    """Error of a run against the reference that seeds alone make; responses (ratios, seeds).
+
+    The variance from seed to seed is the mean over all runs of the method, as a single run may see
+    one of several steady motions only.
+    """
+    variance = np.mean([seed_variance(rms) for rms in (reference, *runs)])
+    seeds = reference.shape[1], runs[0].shape[1]
+    return float((variance * (1.0 / seeds[0] + 1.0 / seeds[1])) ** 0.5)
+
+
+def points_of(name, sweep, truth):
+    """Points of a method with errors against a curve [m]."""
+    good = [
+        Point(name, dt, seconds(dt), sweep.seconds[dt], curve_distance(rms.mean(axis=1), truth))
+        for dt, rms in sweep.runs.items()
+    ]
+    bad = [
+        Point(name, dt, seconds(dt), math.nan, failure=why) for dt, why in sweep.failures.items()
+    ]
+    return [*bad, *good]
 
 
 def rk45_points(frequency, repeats, quick):
@@ -92,14 +160,13 @@ def rk45_points(frequency, repeats, quick):
         batch, spent = Batch(Empty(), table, measured_cycles=1, rtol=rtol, atol=1e-3 * rtol), []
         # The first run compiles.
         for _ in range(1 + repeats):
-            started = time.perf_counter()
+            started = study.clock()
             batch.start("empty")
             rms = batch.run(RK45_CYCLES - 1, 1).rms
-            spent.append(time.perf_counter() - started)
+            spent.append(study.clock() - started)
         error = curve_distance(rms, OSCILLATOR.rms(frequency))
-        found = 6 * int(batch.attempts().sum()), error, study.Timing.of(spent[1:])
         label = power(swept) if swept == rtol else f"{1e3 * dt:g} ms"
-        points.append(Point(method, swept, label, *found))
+        points.append(Point(method, swept, label, min(spent[1:]), error))
         compiling += batch.compile_seconds
     for rtol in TOLERANCES["python"][::every]:
         points.append(Point("rk45_python", rtol, power(rtol), *rk45_in_python(frequency, rtol)))
@@ -107,83 +174,109 @@ def rk45_points(frequency, repeats, quick):
 
 
 def rk45_in_python(frequency, rtol):
-    """(Evaluations, error, timing) of the last cycle, begun in the steady state."""
-    started, found = time.perf_counter(), []
+    """(Seconds, error) of the last cycle, begun in the steady state."""
+    started, found = study.clock(), []
     cycles = RK45_CYCLES - 1 + np.arange(SAMPLES) / SAMPLES
     for f in frequency:
         job = OSCILLATOR.right_hand_side(f), (0.0, RK45_CYCLES / f), OSCILLATOR.steady_state(f)
-        found.append(solve_ivp(*job, rtol=rtol, atol=1e-3 * rtol, t_eval=cycles / f))
-    spent = study.Timing.of([time.perf_counter() - started])
-    x, evaluations = zip(*((one.y[0], one.nfev) for one in found))
-    return sum(evaluations), curve_distance(np.std(x, axis=1), OSCILLATOR.rms(frequency)), spent
+        found.append(solve_ivp(*job, rtol=rtol, atol=1e-3 * rtol, t_eval=cycles / f).y[0])
+    spent = study.clock() - started
+    return spent, curve_distance(np.std(found, axis=1), OSCILLATOR.rms(frequency))
 
 
-def draw(folder, options, made, own, toward, empty, floors):
-    """Work-precision diagrams: by method, toward the spheres, of the empty container; curves."""
-    ratios, (transient, measured) = options.ratios, options.cycles
-    shared = {"floors": floors, "work_name": "particle steps [1]"}
-    shorter = max(sweep.reference["step"] / min(sweep.runs) for sweep in made.values())
-    scenes = (
-        f"{PARTICLES} particles, f/f0 = {', '.join(f'{r:g}' for r in ratios)}, "
-        f"{len(options.seeds)} seeds, {transient} + {measured} cycles. Error: RMS over the "
-        "frequencies of (response - reference), mean over seeds, as a share of the peak.\n"
-    )
-    force = "mean force on the container: missing share of the weight [1]"
-    picture_work_precision(
-        *(folder / "work_precision.png", own),
-        error_name="error of the response curve / its peak [1]",
-        **{"residual_names": ("step [µs]", force), "step_unit": 1e-6},
-        caption=f"{scenes}Reference of each method: itself with other seeds, at {shorter:.2g} of "
-        "its finest step or less. Dotted: spread from seed to seed alone.",
-        **shared,
-    )
-    finest = seconds(made[SPHERES].reference["step"])
-    caption = f"{scenes}Reference of all: spheres, p = 1/4, at {finest}."
-    words = {"error_name": "difference to the spheres' curve / its peak [1]", "caption": caption}
-    picture_work_precision(folder / "against_spheres.png", toward, **words, **shared)
-    picture_work_precision(
-        *(folder / "rk45.png", empty),
-        **{"floors": {}, "order": 5},
-        error_name="error of the response curve / its peak [1]",
-        work_name="evaluations of the right-hand side [1]",
-        caption="Empty container. Error: RMS over the frequencies of (response - transfer "
-        "function), as a share of the peak. Steps are at most 3.9 ms; rtol 0.01 where the longest "
-        "step is swept, free steps in Python.",
-    )
-    curves = {name: (ratios, sweep.rms) for name, sweep in made.items()}
-    picture_compared(folder / "curves.png", curves, OSCILLATOR)
+def by_method(points):
+    """Points by method."""
+    found = {}
+    for point in points:
+        found.setdefault(point.method, []).append(point)
+    return found
+
+
+def draw(path, own, toward, empty, floors):
+    """Errors over seconds: by method, toward the spheres, of the empty container."""
+    panels = {"against its own limit": own, "against the spheres": toward, "RK45": empty}
+    places = [["against its own limit"] * 2, ["against the spheres", "RK45"]]
+    with picture(path, 0, size=(9.2, 9.6)) as (figure, _):
+        drawn = figure.subplot_mosaic(places)
+        for title, axes in drawn.items():
+            draw_points(axes, by_method(panels[title]), {} if title == "RK45" else floors)
+            axes.set(xscale="log", yscale="log", title=title, xlabel="CPU time [s]")
+            axes.set_ylabel("error of the response curve / its peak [1]")
+        keys = [*drawn["against its own limit"].get_lines(), *drawn["RK45"].get_lines()]
+        keys = [key for key in keys if not key.get_label().startswith("_")]
+        figure.legend(handles=keys, loc="outside upper left", ncols=2)
+
+
+def draw_points(axes, points, floors):
+    """A line a method; its coarsest and finest steps at their points, what failed in the legend."""
+    for name, look in styles_of(points).items():
+        good = [one for one in points[name] if not one.failure]
+        failed = ", ".join(one.label for one in points[name] if one.failure)
+        label, colour = look.label + f" (failed at {failed})" * bool(failed), look.colour
+        costs, errors = [one.seconds for one in good], [one.error for one in good]
+        axes.plot(costs, errors, color=colour, marker=look.marker, ms=5, lw=1.2, label=label)
+        for one in (*good[:1], *good[-1:]):
+            at = {"xytext": (4, 4), "textcoords": "offset points", "color": colour}
+            axes.annotate(one.label, (one.seconds, one.error), fontsize=8.5, **at)
+        if name in floors:
+            axes.axhline(floors[name], color=colour, ls=":", lw=1.0)
+
+
+def answers_of(points, floors):
+    """Rows (method, error asked for, step, seconds, error) of the cheapest steps of each method."""
+    return [
+        (name, f"{target:g}", *(_cells(best) if best else ("none", "", "")))
+        for target in TARGETS
+        for name, some in points.items()
+        for best in [cheapest(some, target, floors[name])]
+    ]
+
+
+def _cells(point):
+    return point.label, f"{point.seconds:.3g}", f"{point.error:.2g}"
+
+
+def figures_of(points, floors, target, words):
+    """Figures of the cheapest method for an error: its seconds and name."""
+    found = [cheapest(some, target, floors[name]) for name, some in points.items()]
+    best = min(filter(None, found), key=lambda one: one.seconds, default=None)
+    return {
+        f"cheapest_seconds_{words}": (best and best.seconds, "s"),
+        f"cheapest_method_{words}": (best and best.method, ""),
+    }
 
 
 def run(options):
     """Measure all methods, write pictures and tables, find the cheapest method for an error."""
-    folder = study.begin(options)
+    folder, made, compiling = study.begin(options), {}, 0.0
     with ProgressBar("sweep") as bar:
-        names = [name for name, one in METHODS.items() if one[2] or not options.quick]
-        made = {name: sweep_of(name, options, folder, bar) for name in names}
+        for name, one in METHODS.items():
+            if one[2] or not options.quick:
+                made[name], spent = sweep_of(name, options, bar)
+                compiling += spent
     frequency = np.array(options.ratios) * OSCILLATOR.natural_frequency
-    empty, compiling = rk45_points(frequency, options.repeats, options.quick)
-    truth = made[SPHERES].mean
-    own = [point for sweep in made.values() for point in sweep.points(sweep.mean)]
-    toward = [point for sweep in made.values() for point in sweep.points(truth)]
-    floors = {name: sweep.floor for name, sweep in made.items()}
-    titles = {name: style.label for name, style in styles_of(made).items()}
-    figures = study.give_answers(options.out, own, floors, titles)
-    draw(folder, options, made, own, toward, empty, floors)
-    near = "cheapest_seconds", "to_spheres_within_2_percent"
-    figures.update(study.cheapest_figures(toward, 0.02, floors, *near))
+    empty, spent = rk45_points(frequency, options.repeats, options.quick)
+    truth = made[SPHERES].truth
+    own = [point for name, one in made.items() for point in points_of(name, one, one.truth)]
+    toward = [point for name, one in made.items() for point in points_of(name, one, truth)]
+    floors = {name: floor_of(one.reference, [*one.runs.values()]) for name, one in made.items()}
+    rows, header = answers_of(by_method(own), floors), "method asked step seconds error"
+    study.write_rows(folder / "points.csv", [*own, *empty], Point._fields)
+    study.write_rows(folder / "answers.csv", rows, header)
+    study.print_table(rows, header.split())
+    draw(folder / "work_precision.png", own, toward, empty, floors)
+    curves = {name: (options.ratios, one.reference) for name, one in made.items()}
+    picture_compared(folder / "curves.png", curves, OSCILLATOR)
+    figures = figures_of(by_method(own), floors, 0.01, "at_1_percent")
+    figures |= figures_of(by_method(own), floors, 0.1, "at_10_percent")
+    figures |= figures_of(by_method(toward), floors, 0.02, "to_spheres_within_2_percent")
     figures["chaos_floor"] = min(floors.values()), "1"
-    figures["rk45_evaluations_at_1e-6"] = answers(empty, 1e-6, {})[0].point.evaluations, "1"
-    for label, sweep in made.items():
-        values = {
-            "chaos_floor": sweep.floor,
-            "roundoff_spread": sweep.roundoff,
-            "seed_spread": sweep.seed_spread,
-            "check_step": curve_distance(sweep.curve(), sweep.mean),
-            "check_force": sweep.reference["force_check"],
-            "distance_to_spheres": curve_distance(sweep.mean, truth),
-        }
-        figures |= {f"{key}_{label}": (one, "1") for key, one in values.items() if one is not None}
-    study.finish(options, NAME, figures, compiling + sum(one.compile_s for one in made.values()))
+    for name, one in made.items():
+        best = cheapest(by_method(own)[name], 0.01, floors[name])
+        figures[f"seconds_at_1_percent_{name}"] = best and best.seconds, "s"
+        figures[f"chaos_floor_{name}"] = floors[name], "1"
+        figures[f"distance_to_spheres_{name}"] = curve_distance(one.truth, truth), "1"
+    study.finish(options, NAME, figures, compiling + spent)
 
 
 if __name__ == "__main__":

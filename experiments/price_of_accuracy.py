@@ -26,12 +26,13 @@ from typing import NamedTuple
 
 import taichi_dem as dem
 from _blast import blast_parser, paper_scene, run_costs
-from cost_of_accuracy_blast import PAPER_DT0, PAPER_L
+from _work_precision import Point, cheapest
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLUE, GREY, LIGHT_GREY, picture, seconds, styles_of
-from taichi_dem.kit.study.work_precision import Point, answers
 
 NAME = "price_of_accuracy"
+#: The paper's largest step [s], and its largest way in a step [m].
+PAPER_DT0, PAPER_L = 1e-8, 1e-8
 SETTINGS = {
     "until": (1e-4, 6e-5, study.number(0, 1), "simulated time [s], default 1e-4"),
     "l": (PAPER_L, 1e-7, study.number(0, 1), "limit of a displacement in a step [m], default 1e-8"),
@@ -75,12 +76,11 @@ def cheapest_run(name, scene, options, true):
     points, look = [], styles_of([name])[name]
     for step in getattr(options, name):
         value, _, spent = run_of(scene, METHODS[name](step), options, f"{name}, {seconds(step)}")
-        error, timing = abs(value / true - 1.0), study.Timing.of([spent])
-        points.append(Point(name, step, seconds(step), 0.0, error, timing))
-    (found,) = answers(points, ASKED, {})
-    best = found.point or points[-1]
+        points.append(Point(name, step, seconds(step), spent, abs(value / true - 1.0)))
+    found = cheapest(points, ASKED)
+    best = found or points[-1]
     words = f"{WORDS[name]}, {best.label}"
-    return Price(name, words, look.colour, best.low, best.error, bool(found.point))
+    return Price(name, words, look.colour, best.seconds, best.error, bool(found))
 
 
 def answer_of(scene, options, tolerance):

@@ -27,7 +27,7 @@ from functools import partial
 import numpy as np
 
 import taichi_dem as dem
-from _radiation import ELEMENTS, SIZES, coarse_eighth, eighth_by_gmsh, radiated
+from _radiation import ELEMENTS, coarse_eighth, eighth_by_gmsh, radiated
 from _tunnel import GROWTH, LENGTH, PEAK, RISE, ROCK, UNCHARGED
 from _tunnel_checks import BEHIND, DAMAGED, MIDDLES, REACH, draw, figures_of_lobes, figures_of_shots
 from taichi_dem import effects
@@ -50,7 +50,6 @@ ROOM, HEIGHT, DEPTH = 2.0, 2.0, 1.5
 NEAR, FAR, END = 0.06, 0.25, 5.2e-4
 #: Share of bonds that is left in weaker rock.
 LEFT = 0.3
-SHOTS = BURDENS, ROOM, HEIGHT, DEPTH, UNCHARGED, NEAR, FAR, GROWTH, END, PEAK, RISE, REACH, LEFT
 QUIET = "right", "bottom", "top", "back"
 
 
@@ -78,7 +77,7 @@ def shot(burden, mesh, damage="", cracks=(), gas=effects.GasPressure):
 
 
 def shots(mesh):
-    """Peak velocities [m/s] by case and what is known of all shots on a mesh, as JSON has it."""
+    """Peak velocities [m/s] by case and what is known of all shots on a mesh."""
     results = {f"{burden:g} m": shot(burden, mesh) for burden in BURDENS}
     results["fresh, gas expands"] = shot(DAMAGED, mesh, gas=effects.ExpandingGas)
     for end, gas in (("", effects.GasPressure), (", gas expands", effects.ExpandingGas)):
@@ -96,17 +95,11 @@ def shots(mesh):
 
 
 def radiation(mesh, quick):
-    """What a charge in elastic rock radiates, on a mesh, as JSON has it."""
+    """What a charge in elastic rock radiates, on a mesh."""
     if quick:
         return radiated(coarse_eighth(), dem.Uniform(6e-7), 6e-6)
     method = dem.Multirate(1.6e-6, 1e-4, control=dem.StepControl(safety=0.4))
     return radiated(eighth_by_gmsh(mesh), method, 8e-6)
-
-
-def kept(options, work, *given):
-    """The dict that work gives; from the folder of the output where it was computed before."""
-    place = str(study.begin(options) / "kept"), f"{work.__name__}_{given[0]}"
-    return study.cached(*place, (SHOTS, SIZES, given), ("taichi_dem",), partial(work, *given))[0]
 
 
 def write_tables(at, made, peaks):
@@ -134,8 +127,8 @@ def run(options):
     if options.quick:
         print("Left out: holes beside a free face and in damaged rock, whose meshes Gmsh makes.")
     else:
-        fired = [kept(options, shots, mesh) for mesh in range(options.meshes)]
-    made = [kept(options, radiation, mesh, options.quick) for mesh in range(options.elastic)]
+        fired = [shots(mesh) for mesh in range(options.meshes)]
+    made = [radiation(mesh, options.quick) for mesh in range(options.elastic)]
     names = fired[0]["peaks"] if fired else ()
     peaks = {name: np.array([one["peaks"][name] for one in fired]) for name in names}
     write_tables(at, made, peaks)

@@ -1,15 +1,12 @@
 """Measures of signals whose measures are known: RMS, apparent mass and damping, power, peaks."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from ca_damper import Automaton, Oscillator, Spheres
-from ca_damper.accuracy.step_study import StepStudy
+from ca_damper import Automaton, Batch, Oscillator, SceneTable
 from ca_damper.report.measures import COLUMNS, Cycles, peak
-from ca_damper.runs.force_check import checked_response, force_mismatch
 
 STEPS, COUNT, OMEGA = 500, 4, 2.0 * math.pi * 6.0
 
@@ -88,6 +85,22 @@ def test_what_the_base_gives_the_dashpot_and_the_filling_take():
     assert powers["base"][0] > 0.0 == powers["filling"][0]
 
 
+def force_mismatch(cycles, o, begin, end):
+    """Distance of the harmonic of x from that by the measured force, as a share of the peak.
+
+    By M x'' + C x' + K x = K y + C y' + f for the first harmonics, with Y = -i y0. Over whole
+    cycles of length T the harmonic of x' is i w X + 2 (x_end - x_begin) / T, and so on: the motion
+    need not be periodic. begin, end: of ``Batch.sample``.
+    """
+    omega, share = cycles.omega, 2.0 * cycles.frequency / cycles.record.shape[1]
+    shift, push = share * (end["x"] - begin["x"]), share * (end["v"] - begin["v"])
+    held = o.stiffness + 1j * omega * o.damping
+    given = -1j * o.base_amplitude * held + cycles.harmonic("f")
+    given -= o.mass * push + (1j * omega * o.mass + o.damping) * shift
+    x = cycles.harmonic("x")
+    return np.abs(given / (held - o.mass * omega**2) - x).max() / np.abs(x).max()
+
+
 @pytest.mark.parametrize("share", [0.0, 0.25])
 def test_a_force_that_is_not_the_one_that_acted_is_found_out(share):
     """X = (K + i w C)(-i y0 + F / held) / ...: a share more of the force shifts X by as much."""
@@ -105,8 +118,14 @@ def test_a_force_that_is_not_the_one_that_acted_is_found_out(share):
 
 def test_the_container_moves_as_the_measured_force_demands():
     """Sums take x at n points a cycle: an n-th part of its change over the cycles is missed."""
-    job = {"particles": 10, "ratios": (0.95, 1.0), "seeds": 2, "dt": 2e-4, "start": "rigid"}
-    _, mismatch = checked_response(Automaton(), **job, transient_cycles=3, measured_cycles=4)
+    o = Oscillator()
+    frequency = np.repeat([0.95, 1.0], 2) * o.natural_frequency
+    table = SceneTable(10, [1, 2, 1, 2], 2e-4, frequency, o.base_amplitude)
+    batch = Batch(Automaton(), table, measured_cycles=4)
+    batch.start("rigid")
+    batch.run(3, 0)
+    begin = batch.sample()
+    mismatch = force_mismatch(batch.run(0, 4), o, begin, batch.sample())
     assert 0.0 < mismatch < 1e-3
 
 
@@ -131,13 +150,3 @@ def test_noise_is_no_resonance_between_the_points():
     assert peak(ratios[1:4], curve[1:4])[1] > 2.0 * max(curve)
     ratio, height = peak(ratios, curve)
     assert 1.0 < ratio < 1.02 and max(curve) < height < 1.1 * max(curve)
-
-
-def test_the_floor_is_the_spread_of_means_over_the_seeds():
-    # Seeds 2 and 4 at one of two frequencies: variance 2, over both 1, over the peak squared 1 / 9;
-    # the run has none, so that half of it is left.
-    study = StepStudy("dem", Spheres(), 2, range(1, 3), ratios=(0.95, 1.0))
-    study.reference = {"rms": [[2.0, 4.0], [1.0, 1.0]]}
-    study.runs = {2e-5: [SimpleNamespace(rms=np.full((1, 2, 2), 3.0))]}
-    assert study.seed_spread == pytest.approx((0.5 / 9.0) ** 0.5)
-    assert study.floor == pytest.approx(study.seed_spread * (1.0 / 2.0 + 1.0 / 2.0) ** 0.5)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from _effects import KNOWN_LISTS, WARM, FrozenBatch, FrozenScene, scene_of
+from _effects import WARM, FrozenBatch, FrozenScene
 from _threads import thread_job
-from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.mesh.shapes import bar
 
 pytestmark = pytest.mark.experiment
@@ -29,15 +29,6 @@ def test_a_frozen_batch_goes_on_with_the_bits_of_its_run():
         assert first.seconds(0) > 0.0
         for name, values in first.batch.snapshot(3).items():
             assert np.array_equal(values, wanted[name]), name
-
-
-def test_a_known_list_leaves_out_nothing():
-    """Runs of the best list miss no effect, up to the time of the blast."""
-    material, peak, best = KNOWN_LISTS["weak pulse"]
-    scene = scene_of(best, material, peak)
-    report = simulate(scene, method=ImplicitDashpots(4e-7), until=2.5e-4, samples=25).report
-    assert report.needs == () and report.broken_faces == 0
-    assert len(report.effects) == 1 + len(best)
 
 
 def test_a_frozen_scene_goes_on_with_the_bits_of_its_run_as_often_as_it_is_asked():

@@ -8,11 +8,10 @@ from hypothesis.extra.numpy import arrays
 
 from _meshes import group_area, mirrored_copies
 from _scaling import even_cuts, share_costs
+from _work_precision import Point, cheapest
 from ca_damper.theory.bouncing import Fall, RecordedFall
-from cost_of_accuracy_blast import SPLIT, displacement_error, energy_error, faces_error
+from cost_of_accuracy_damper import floor_of
 from taichi_dem import CONCRETE, PAPER_BLOCK, read_mesh
-from taichi_dem.kit.study import Timing
-from taichi_dem.kit.study.work_precision import Point, answers, cheapest
 from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.output.hole_monitor import Attenuation, attenuation_of
@@ -20,54 +19,37 @@ from taichi_dem.state.model import Model
 from tests.trust.blast import laws
 
 
-def outcome(moved=((3.0, 0.0, 0.0), (0.0, 4.0, 0.0)), broken=(1, 2), **energy):
-    terms = {**dict.fromkeys(SPLIT, 0.0), "load_work": 10.0, **energy}
-    return {"moved": moved, "broken": broken, "energy": terms}
-
-
-def test_errors_of_a_blast_are_those_of_its_displacement_faces_and_energy():
-    """Difference (0, 0, 1) of one body over sqrt(9 + 16); 1 J of 10 J is booked elsewhere."""
-    run = outcome(moved=((3.0, 0.0, 1.0), (0.0, 4.0, 0.0)))
-    assert displacement_error(run, outcome()) == pytest.approx(0.2, rel=1e-15)
-    # A face too many and one too few do not cancel.
-    assert faces_error(outcome(broken=(1, 3)), outcome()) == 1.0
-    run = outcome(kinetic=3.0, bond_strain=1.0)
-    assert energy_error(run, outcome(kinetic=2.0, bond_strain=2.0)) == pytest.approx(0.1)
-
-
-def point(method, step, error, failure=""):
+def point(step, error):
     """A run that takes 1 / step seconds."""
-    timing = None if failure else Timing.of([1.0 / step])
-    return Point(method, step, f"{step:g} s", 100.0 / step, error, timing, failure=failure)
+    return Point("", step, f"{step:g} s", 1.0 / step, error)
 
 
 # A first-order method with an error of 8 % at a step of one, and one that diverges above a step
 # of 0.5 and is all but exact below.
-ROWS = [
-    *(point("slow", step, 0.08 * step) for step in (1.0, 0.1, 0.01)),
-    *(point("sharp", 1.0, np.nan, "diverged"), point("sharp", 0.5, 0.02)),
-    point("sharp", 0.25, 1e-5),
-]
-
-
-def steps(rows, tolerance, floors=None):
-    """Step of each method that is accurate enough, None without one."""
-    found = answers(rows, tolerance, floors or {})
-    return {one.method: one.point and one.point.step for one in found}
+SLOW = [point(step, 0.08 * step) for step in (1.0, 0.1, 0.01)]
+SHARP = [point(1.0, np.nan), point(0.5, 0.02), point(0.25, 1e-5)]
 
 
 def test_the_cheapest_of_what_is_accurate_enough_is_the_answer():
-    assert cheapest(ROWS, 0.01, {}) == (4.0, "sharp")
-    assert cheapest(ROWS, 1e-9, {}) == (None, None)
-    assert steps(ROWS, 0.01) == {"sharp": 0.25, "slow": 0.1}
-    assert steps(ROWS, 0.1) == {"slow": 1.0, "sharp": 0.5}
+    assert cheapest(SHARP, 0.01).step == 0.25 and cheapest(SHARP, 0.1).step == 0.5
+    assert cheapest(SLOW, 0.01).step == 0.1 and cheapest(SLOW, 0.1).step == 1.0
+    assert cheapest(SHARP, 1e-9) is None
 
 
 def test_luck_and_noise_are_no_answers():
     """A lucky coarse step, a coarse step above one that fails, an error below the floor."""
-    assert steps([*ROWS, point("slow", 2.0, 1e-6)], 0.001)["slow"] == 0.01
-    assert steps([*ROWS, point("slow", 0.001, np.nan, "diverged")], 0.1)["slow"] is None
-    assert steps(ROWS, 0.001, {"sharp": 0.005})["sharp"] is None
+    assert cheapest([*SLOW, point(2.0, 1e-6)], 0.001).step == 0.01
+    assert cheapest([*SLOW, point(0.001, np.nan)], 0.1) is None
+    assert cheapest(SHARP, 0.001, floor=0.005) is None
+
+
+def test_the_floor_is_the_spread_of_means_over_the_seeds():
+    """2 and 4 at one of two frequencies: variance 2, over both 1, over the peak squared 1 / 9.
+
+    The run has none, so that half of it is left.
+    """
+    reference, run = np.array([[2.0, 4.0], [1.0, 1.0]]), np.full((2, 2), 3.0)
+    assert floor_of(reference, [run]) == pytest.approx((0.5 / 9.0 * (0.5 + 0.5)) ** 0.5)
 
 
 def test_mirrored_copies_are_one_block():

@@ -1,4 +1,4 @@
-"""Experiments in a user's shell: JSON alone, kept results, Ctrl-C and going on again."""
+"""Experiments in a user's shell: JSON alone, Ctrl-C and going on again."""
 
 import json
 import os
@@ -11,7 +11,6 @@ import pytest
 
 import blast_fracture
 from taichi_dem.kit import study
-from taichi_dem.kit.study import cached, digest
 from tests.experiments.contract import command
 from tests.processes import users_environment
 from tests.terminal import phases_of, run_in_terminal
@@ -33,19 +32,6 @@ def test_json_is_the_summary_alone_and_the_bar_stays_on_the_terminal(tmp_path):
     said = (tmp_path / "said").read_text()
     assert said == (folder / "summary.json").read_text() + "\n"
     assert json.loads(said)["experiment"] == SMALLEST
-
-
-def test_a_kept_result_is_computed_once_for_the_same_settings_and_sources(tmp_path):
-    calls = []
-
-    def compute():
-        calls.append(1)
-        return {"value": 0.1 + 0.2}
-
-    made = [cached(tmp_path, "x", settings, (), compute) for settings in (1, 1, 2)]
-    assert [kept for _, kept in made] == [False, True, False]
-    assert all(result == {"value": 0.1 + 0.2} for result, _ in made) and len(calls) == 2
-    assert digest(1, ("ca_damper",)) != digest(1, ("taichi_dem",))
 
 
 def test_a_blast_with_its_pictures_imports_neither_scipy_nor_pandas(tmp_path):

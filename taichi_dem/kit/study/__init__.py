@@ -1,7 +1,7 @@
-"""Tools of a study: options, tables, figures of a summary, timings, kept results, workers."""
+"""Tools of a study: options, tables, figures of a summary, timings, processes."""
 
 from taichi_dem.kit.provenance import processor
-from taichi_dem.kit.study.costly_work import cached, call_all, call_in_process, digest
+from taichi_dem.kit.study.costly_work import call_in_process
 from taichi_dem.kit.study.program import (
     Parser,
     accuracy_sources,
@@ -34,6 +34,5 @@ from taichi_dem.kit.study.summary import (
     write_accuracy,
     write_rows,
 )
-from taichi_dem.kit.study.work_precision import cheapest_figures, give_answers
 from taichi_dem.kit.terminal import print_table
-from taichi_dem.kit.timing import Timing, clock, on_device, seconds_of
+from taichi_dem.kit.timing import clock, on_device, seconds_of

@@ -15,7 +15,7 @@ from pathlib import Path
 from taichi_dem.kit import children, runtime
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_text
-from taichi_dem.kit.study.costly_work import digest
+from taichi_dem.kit.sweeps.dependencies import HOUSE, digest_of_files
 from taichi_dem.kit.sweeps.jobs import Job, run_job
 from taichi_dem.kit.sweeps.sweep import RESULTS, Ended, swept
 from taichi_dem.kit.sweeps.table import ADDED, Row, checked_rows
@@ -100,9 +100,10 @@ def _argument(made, name, cell):
 def _sources(script, common):
     """Digest of the packages, of the scripts in a folder, and of files among common arguments."""
     words = [word for text in common for word in text.split("=")]
-    paths = [*sorted(Path(script).parent.glob("*.py")), *filter(os.path.isfile, words)]
-    contents = {str(path): Path(path).read_bytes().hex() for path in paths}
-    return digest(contents, ("taichi_dem", "ca_damper"))
+    house = Path(__file__).parents[3]
+    packages = [path for name in HOUSE for path in (house / name).rglob("*.py")]
+    scripts = Path(script).parent.glob("*.py")
+    return digest_of_files([*packages, *scripts, *filter(os.path.isfile, words)])
 
 
 def run_program(row: Row) -> Row:

@@ -16,7 +16,7 @@ from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import output_folder, write_text
 from taichi_dem.kit.progress_bar import hide_bars
 from taichi_dem.kit.provenance import commit, machine
-from taichi_dem.kit.sweeps.dependencies import Dependencies, named_file
+from taichi_dem.kit.sweeps.dependencies import digest_of_sources, named_file
 from taichi_dem.kit.sweeps.table import ADDED, SEED, Row, Value, column_of, plain_value
 from taichi_dem.kit.validation import FileName, shown
 from taichi_dem.kit.version import __version__
@@ -42,7 +42,7 @@ class Record(NamedTuple):
 
 
 class Job(NamedTuple):
-    """row: with its seed. digest: of the function and the row. files: named there, by digest."""
+    """row: with its seed. digest: of the sources and the row. files: named there, by digest."""
 
     row: Row
     digest: str
@@ -69,9 +69,9 @@ def identity_of(work: Any) -> str:
 
 def jobs_of(work: Any, rows: Sequence[Row], seed: int | None) -> list[Job]:
     """A job for each row; one without a seed gets it from the sweep's, if any, and its number."""
-    seen = Dependencies(work)
-    depends = [identity_of(work), seen.digest, __version__]
-    known, jobs = dict(seen.files), []
+    depends = [identity_of(work), digest_of_sources(work), __version__]
+    known: dict[str, str] = {}
+    jobs = []
     for number, given in enumerate(rows):
         row = dict(given)
         if seed is not None:
@@ -80,7 +80,7 @@ def jobs_of(work: Any, rows: Sequence[Row], seed: int | None) -> list[Job]:
         for value in row.values():
             own.update(named_file(value, known) if isinstance(value, str) else {})
         known.update(own)
-        jobs.append(Job(row, _digest([*depends, row]), {**seen.files, **own}))
+        jobs.append(Job(row, _digest([*depends, row]), own))
     return jobs
 
 
@@ -123,9 +123,7 @@ def failed(error: str) -> Record:
     return Record({}, error, False, 0.0)
 
 
-def table_of(
-    jobs: Sequence[Job], records: Sequence[Record], seeded: bool, unseen: Sequence[str] = ()
-) -> Any:
+def table_of(jobs: Sequence[Job], records: Sequence[Record], seeded: bool) -> Any:
     """DataFrame of jobs and what running them left; seeded: whether the input has seeds."""
     given = [name for name in jobs[0].row if name != SEED or seeded]
     columns: dict[str, list] = {name: [job.row[name] for job in jobs] for name in given}
@@ -136,8 +134,7 @@ def table_of(
         columns.setdefault(SEED, [job.row[SEED] for job in jobs])
     for name in ADDED[1:]:
         columns[name] = [getattr(record, name) for record in records]
-    arrays = {name: column_of(values) for name, values in columns.items()}
-    return data_frame(arrays, unseen=tuple(unseen))
+    return data_frame({name: column_of(values) for name, values in columns.items()})
 
 
 def _checked_values(values, row):

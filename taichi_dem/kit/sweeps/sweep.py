@@ -17,7 +17,6 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.progress import Listener, Progress
 from taichi_dem.kit.progress_bar import reporting
-from taichi_dem.kit.sweeps.dependencies import Dependencies
 from taichi_dem.kit.sweeps.jobs import (
     Job,
     Journal,
@@ -80,9 +79,9 @@ def sweep(
         rows instead; each has one thread.
     out : path, optional
         Folder that keeps each finished row. The same call later runs only rows that are missing
-        or changed, or for which the function changed, what it calls, names or closes over in the
-        user's files, a file that it or the row names, or the version of the package; and those
-        whose results name a file that is gone.
+        or changed, or for which the function's file has changed, one of the user's files that it
+        imports, a file that the row names, or the version of the package; and those whose results
+        name a file that is gone.
     seed : int
         Seed from which those of the rows follow, a whole number from 0 to 2^63.
     progress : "auto", function or None
@@ -94,7 +93,7 @@ def sweep(
         A row for each row of the table, in its order: the columns of the table, the results, NaN or
         "" where a row has none, ``error``, the sentence of a row that failed, and ``seed``,
         ``version``, ``commit``, ``machine``, ``seconds`` on the wall. All but the last three are
-        the same bits wherever a row ran. ``attrs["unseen"]`` says of what a change is not noticed.
+        the same bits wherever a row ran.
 
     Raises
     ------
@@ -131,7 +130,7 @@ def swept(
     journal = Journal(out, identity_of(function))
     jobs = jobs_of(function, rows, seed)
     records = _run_missing(start, jobs, journal, progress)
-    made = table_of(jobs, records, SEED in rows[0], Dependencies(function).unseen)
+    made = table_of(jobs, records, SEED in rows[0])
     if journal.folder:
         write_csv(os.path.join(journal.folder, RESULTS), arrays_of(made))
     return made
