@@ -69,6 +69,8 @@ class BroadPhase:
         self.searches = ti.field(ti.i32, shape=())
         ends = self._is_free, self._put_free, self._end_free
         self.listing = RunningSums(Some(self._body_count, n, light=True), 1, *ends)
+        # No whole body is nearer to another for a face that is free now.
+        self.set_free = VISITED if contacts.law.meets_bodies else COMPARED
         self.phases = self._phases(n)
         self.tasks = tasks(self.phases, n)
 
@@ -224,8 +226,10 @@ class BroadPhase:
     def _choose(self, a):
         """Mark a free body that used up much of its skin, or of which a face was set free."""
         i = self.free[a]
-        if self.everywhere[None] == 1 or self.breaks.free_since(i, self.searched[None] + 1) == 1:
+        if self.everywhere[None] == 1:
             self.mark[i] = COMPARED
+        elif self.breaks.free_since(i, self.searched[None] + 1) == 1:
+            self.mark[i] = self.set_free
         elif self.contacts.is_far(i, FAR):
             self.mark[i] = VISITED
         if self.mark[i] >= VISITED:
@@ -235,17 +239,22 @@ class BroadPhase:
     @ti.func
     def _visit(self, a):
         """Compare a free body with each neighbour, where either is visited and they may meet."""
-        i = self.free[a]
+        # Few bodies are visited: in the rows of all others nothing but marks is read.
+        i, least = self.free[a], VISITED
+        if self.mark[i] >= VISITED or self.neighbours.making() == 1:
+            least = FREE
         for k in range(self.neighbours.first[i], self.neighbours.last[i]):
             j = self.neighbours.body[k]
-            if self.mark[j] >= FREE:
-                mark = ti.max(self.mark[i], self.mark[j])
-                if self.neighbours.making() == 1:
-                    mark = COMPARED
-                meets = self.neighbours.until[k] < self.contacts.horizons(i, j)
-                if mark == COMPARED or (mark == VISITED and meets):
-                    if not self.breaks.bonded(i, j):
-                        self._compare(k, i, j)
+            if self.mark[j] >= least:
+                self._visit_entry(k, i, j)
+
+    @ti.func
+    def _visit_entry(self, k, i, j):
+        """Compare an entry if it may meet, or has a body that is compared whatever its path."""
+        mark = ti.max(self.mark[i], self.mark[j])
+        if mark == COMPARED or self.neighbours.until[k] < self.contacts.horizons(i, j):
+            if not self.breaks.bonded(i, j):
+                self._compare(k, i, j)
 
     @ti.func
     def _compare(self, k, i, j):

@@ -49,12 +49,10 @@ class VerletList:
         self.grid = CellGrid(self.tables, self.reach, self.listed_anew)
         self.first = ti.field(ti.i32, shape=n + 1)
         self.last, self.changed = (ti.field(ti.i32, shape=n) for _ in range(2))
-        # Stored contiguously: every search reads many entries that are no longer in the cache.
-        read = [ti.field(ti.i32), ti.field(real)]
-        ti.root.dense(ti.i, self.capacity).place(*read)
-        self.body, self.until = read
-        self.slot, self.found, self.is_new = (
-            ti.field(ti.i32, shape=self.capacity) for _ in range(3)
+        # Apart, as every search reads the bodies of all entries, and little else of most.
+        self.until = ti.field(real, shape=self.capacity)
+        self.body, self.slot, self.found, self.is_new = (
+            ti.field(ti.i32, shape=self.capacity) for _ in range(4)
         )
         self.stale = ti.field(ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())

@@ -154,7 +154,7 @@ class BodyContact(SphereContact):
         force, moment, middle = vec3(0.0), vec3(0.0), vec3(0.0)
         doubled, volume, outside, ones = 0.0, 0.0, 1e30, vec4(1.0)
         for side in range(2):
-            at, planes, total, slope, apart = self._side(side, a, b, turn, offset, True)
+            at, planes, total, slope, apart = self._side(side, a, b, turn, offset, True, 0.0)
             # Rays of a large body miss a small one, or stand for more than all of it.
             weight = self._weight(a, b)
             if side == 1:
@@ -182,7 +182,7 @@ class BodyContact(SphereContact):
     @ti.func
     def find(self, i, j, turn, offset, faces, margin, far):
         """Bodies i and j make one contact where a ray of one may enter the other soon."""
-        count, gap = 0, self.gap(i, j, turn, offset)
+        count, gap = 0, self.gap(i, j, turn, offset, margin)
         if gap < margin:
             count, gap = 1, margin
         return count, gap
@@ -193,18 +193,22 @@ class BodyContact(SphereContact):
         self.store.sphere[place] = [i, j]
 
     @ti.func
-    def gap(self, a, b, turn, offset):
-        """A bound of the way that bodies may go before a ray of one enters the other [m]."""
+    def gap(self, a, b, turn, offset, enough):
+        """A bound of the way that bodies may go before a ray of one enters the other [m].
+
+        Once it is below enough, the remaining rays are left out.
+        """
         outside = 1e30
         for side in range(2):
-            outside = ti.min(outside, self._side(side, a, b, turn, offset, False)[4])
+            if outside >= enough:
+                outside = ti.min(outside, self._side(side, a, b, turn, offset, False, enough)[4])
         return outside
 
     @ti.func
-    def _side(self, side, a, b, turn, offset, whole: ti.template()):
+    def _side(self, side, a, b, turn, offset, whole: ti.template(), enough):
         """Corners of one body and planes of the other in the first's frame; their ``sum_of_rays``.
 
-        side: 0 for the rays of body a, 1 for those of body b.
+        side: 0 for the rays of body a, 1 for those of body b. enough: as in ``gap``.
         """
         body, at, planes = a, self.corner[a], matmul_transposed(self.outward[b], turn)
         distances = self.plane[b] + matvec(planes, offset)
@@ -220,6 +224,7 @@ class BodyContact(SphereContact):
             self.least_weight[None],
             self.end_count[None],
             whole,
+            enough,
         )
         return at, planes, total, slope, apart
 

@@ -139,7 +139,7 @@ def highest_end(depth, face, least):
 
 @ti.func
 def sum_of_rays(
-    depth, centre, volume, far, ends: ti.template(), least, count, whole: ti.template()
+    depth, centre, volume, far, ends: ti.template(), least, count, whole: ti.template(), enough
 ):
     """Integral of the least depth over a body [m4], and its derivatives by the depths [m3].
 
@@ -147,7 +147,7 @@ def sum_of_rays(
     corner c of the body below plane g of the other [m]. centre: weights of the corners in its
     incentre. far: distance from which on a pyramid is left out at once [m]. ends, least, count: of
     ``ray_ends``, their smallest weight on a face, and their number. whole: whether to integrate, or
-    only to find how far rays are outside.
+    only to find how far rays are outside, and no further once it is below enough.
     """
     total, slope, outside = 0.0, mat4(0.0), 1e30
     start = transposed_matvec(depth, centre)
@@ -158,6 +158,9 @@ def sum_of_rays(
         else:
             share = 12.0 * volume * centre[face] / count
             for r in range(face * count // 4, (face + 1) * count // 4):
+                if ti.static(not whole):
+                    if outside < enough:
+                        break
                 change = transposed_matvec(depth, ends[r])
                 highest = smallest(ti.max(start, change))
                 if highest > 0.0:

@@ -98,7 +98,7 @@ def test_an_overlap_at_the_start_is_at_rest_until_it_shrinks():
 def _gap(law: ti.template(), state: ti.template()) -> ti.f64:
     branch = state.position[1] - state.position[0]
     turn, offset = place_in(state.rotation(0), state.rotation(1), branch)
-    return law.gap(0, 1, turn, offset)
+    return law.gap(0, 1, turn, offset, 0.0)
 
 
 def test_bodies_that_move_less_than_their_gap_do_not_touch():
