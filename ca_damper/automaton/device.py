@@ -12,7 +12,7 @@ from ca_damper.automaton.lattice import EMPTY, HELD, WALL, Geometry, Lattice
 from ca_damper.engine.random_numbers import stream
 from ca_damper.engine.recorder import EventCounts
 from ca_damper.filling import Action
-from ca_damper.scenes.gravity import gravity_along
+from ca_damper.scenes.gravity import gravity_across, gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.effect_usage import EffectUse
@@ -48,7 +48,7 @@ class Parameters:
             "width": options.width,
             "mass": options.particle_mass,
             "gravity": gravity_along(options),
-            "sideways": options.sideways,
+            "sideways": gravity_across(options),
             "particle": options.restitution,
             "wall": options.wall_restitution,
             "threshold": options.static_threshold,

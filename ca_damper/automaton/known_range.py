@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from ca_damper.report.checked_range import CheckedRange, Driven
+from ca_damper.scenes.gravity import gravity_across
 
 _G = 9.81
 _PAPER = (
@@ -78,7 +79,7 @@ def _beyond_place(automaton, driven):
     levels = driven.acceleration[moved] / _G
     for level in {levels.min(initial=0.8), levels.max(initial=8.0)}.difference({0.8, 8.0}):
         yield f"a motion of {level:.2g} g"
-    if some.any() and automaton.sideways:
+    if some.any() and gravity_across(automaton):
         yield (
             "gravity across the columns (a box on its side: loss within 5 % of that of spheres in "
             "the median of 135 points, 32 % at nine of ten, 76 % at worst, with beds of several "

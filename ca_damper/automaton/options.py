@@ -12,7 +12,7 @@ from ca_damper.automaton.place.device import PlaceAutomaton
 from ca_damper.automaton.transport import READINGS
 from ca_damper.filling import Structure
 from ca_damper.report.checked_range import CheckedRange, Driven
-from ca_damper.scenes.gravity import checked_gravity
+from ca_damper.scenes.gravity import checked_gravity, gravity_across
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import GRAIN, GRAIN_MASS, in_unit
@@ -149,7 +149,7 @@ class Automaton:
         self._check_lattice()
 
     def _check_rules(self) -> None:
-        if self.sideways and self.rules != "place":
+        if gravity_across(self) and self.rules != "place":
             raise InputError(
                 f"gravity must be one number with rules {self.rules!r}, whose lattice stands along "
                 f"it, got {shown(self.gravity)}"
@@ -213,11 +213,6 @@ class Automaton:
         asked = (self.friction, self.wall_friction)
         between, at_wall = (usual if value is None else value for value in asked)
         return between, at_wall
-
-    @property
-    def sideways(self) -> float:
-        """Gravity to the right [m/s^2]."""
-        return self.gravity[0] if isinstance(self.gravity, tuple) else 0.0
 
     @property
     def label(self) -> str:
@@ -328,7 +323,8 @@ class Automaton:
     def structure(self) -> Structure:
         """Rules are compiled; numbers, the size of the lattice and the cells of start are not."""
         rules = self.rules, self._accounting, self.pair_rule, self.accumulator
-        key = (*rules, self.particles_rest, self.traversal, self.start is None, self.sideways != 0)
+        tilted = gravity_across(self) != 0.0
+        key = (*rules, self.particles_rest, self.traversal, self.start is None, tilted)
         # One more for the cell beyond the lattice.
         return Structure(key, {"cells": (self.columns + 2) * (self.rows + 2) + 1})
 

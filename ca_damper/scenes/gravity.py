@@ -11,6 +11,11 @@ def gravity_along(filling: Any) -> float:
     return float(filling.gravity[1] if isinstance(filling.gravity, tuple) else filling.gravity)
 
 
+def gravity_across(filling: Any) -> float:
+    """Gravity of a filling across the motion, to the right [m/s^2]."""
+    return float(filling.gravity[0]) if isinstance(filling.gravity, tuple) else 0.0
+
+
 def checked_gravity(value: Any) -> Any:
     """One number [m/s^2], or two as a tuple; InputError for anything else."""
     if not isinstance(value, (tuple, list)):

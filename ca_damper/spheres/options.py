@@ -6,7 +6,7 @@ from operator import mul
 from typing import ClassVar
 
 from ca_damper.filling import LEAST_PLACES, DeviceFilling, Structure
-from ca_damper.scenes.gravity import checked_gravity, gravity_along
+from ca_damper.scenes.gravity import checked_gravity, gravity_across, gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.contact_law import FRICTION_LAWS, POWERS, contact_duration, pair_numbers
 from ca_damper.spheres.dynamics import DIVERGENCES, DeviceSpheres
@@ -259,8 +259,7 @@ class Spheres:
     @property
     def fall(self) -> tuple[float, float]:
         """Acceleration by gravity [m/s^2], to the right and downwards."""
-        across = self.gravity[0] if isinstance(self.gravity, tuple) else 0.0
-        return across, gravity_along(self)
+        return gravity_across(self), gravity_along(self)
 
     @property
     def lattice(self) -> tuple[int, int]:

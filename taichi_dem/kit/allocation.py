@@ -195,16 +195,17 @@ def in_tree(field: ti.Field) -> bool:
     return _base(_layout(field)[0]) != 0
 
 
-def array_of(field: ti.Field) -> np.ndarray:
-    """Array that lies where a field of a ``FieldTree`` does; on a CPU only.
+def array_of(field: ti.Field) -> np.ndarray | None:
+    """Array that lies where a field of a ``FieldTree`` does, on a CPU; else None.
 
     Writing to it writes to the field. It serves as long as the tree exists.
     """
     _forget_other_sessions()
-    if field not in _arrays:
+    array = _arrays.get(field)
+    if array is None and in_tree(field):
         root, offset, kind, shape, strides = _layout(field)
-        _arrays[field] = _array_at(_base(root) + offset, kind, shape, strides)
-    return _arrays[field]
+        array = _arrays[field] = _array_at(_base(root) + offset, kind, shape, strides)
+    return array
 
 
 #: Where fields lie in their trees, and their arrays, which are asked for thousands of times a run.
@@ -237,12 +238,9 @@ def _found_layout(field):
 
 def values(field: ti.Field, wanted: Any = ...) -> np.ndarray:
     """Copy of entries of a field; wanted: their slice or their numbers, all by default."""
-    _forget_other_sessions()
-    array = _arrays.get(field)
+    array = array_of(field)
     if array is None:
-        if not in_tree(field):
-            return field.to_numpy()[wanted]
-        array = array_of(field)
+        return field.to_numpy()[wanted]
     impl.get_runtime().prog.synchronize()
     return np.array(array[wanted])
 
@@ -255,7 +253,8 @@ def assign(field: ti.Field, array: ArrayLike) -> None:
     array = np.asarray(array)
     if array.ndim == 0 and field.shape:
         array = np.full(values(field).shape, array)
-    if not in_tree(field):
+    place = array_of(field)
+    if place is None:
         if array.shape[:1] == field.shape[:1]:
             field.from_numpy(array.astype(to_numpy_type(field.dtype)))
             return
@@ -264,7 +263,6 @@ def assign(field: ti.Field, array: ArrayLike) -> None:
         field.from_numpy(whole)
         return
     ti.sync()
-    place = array_of(field)
     place[slice(len(array)) if array.ndim else ()] = array
 
 

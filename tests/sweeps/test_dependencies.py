@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from taichi_dem.kit.sweeps.dependencies import digest_of_sources
 from taichi_dem.kit.sweeps.jobs import Journal, jobs_of, run_job
 from tests.sweeps import jobs
 
@@ -46,6 +47,27 @@ def test_a_changed_source_runs_rows_again_and_one_taken_back_does_not(place, fil
     for text, again in (("\nX = 1\n", EDITS[file]), ("", False)):
         (place / file).write_text(FILES[file] + text)
         assert kept(place, rows)[2] == [not again]
+
+
+def test_a_source_that_a_package_imports_from_its_own_place_counts(tmp_path, monkeypatch):
+    """By ``from .parts import far``; the text of both files is in the digest."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    files = {
+        "__init__": "",
+        "job": FILES["job.py"].replace("parts", ".parts"),
+        "parts": "far = abs",
+    }
+    (tmp_path / "packed").mkdir()
+    for name, text in files.items():
+        (tmp_path / "packed" / f"{name}.py").write_text(text)
+    work = importlib.import_module("packed.job").work
+    digests = [digest_of_sources(work)]
+    for name in ("job", "parts"):
+        (tmp_path / "packed" / f"{name}.py").write_text(files[name] + "\nX = 1\n")
+        digests.append(digest_of_sources(work))
+    for name in ("packed.job", "packed.parts", "packed"):
+        del sys.modules[name]
+    assert len(set(digests)) == 3
 
 
 def test_a_changed_input_file_runs_the_rows_that_name_it_again(place):

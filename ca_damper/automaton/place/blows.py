@@ -33,14 +33,13 @@ from ca_damper.scenes.scene_fields import Part
 class Collisions(Part):
     """Carry out the collisions of a step; no two of them change the same grain.
 
-    tilted: whether gravity acts across the columns too. Of a step, (scenes,): count: of the grains
-    that meet the container, ends: of them on floor and ceiling, approaches: their velocities seen
-    from it [quanta].
+    Of a step, (scenes,): count: of the grains that meet the container, ends: of them on floor and
+    ceiling, approaches: their velocities seen from it [quanta].
     """
 
-    def __init__(self, automaton: Any, tilted: bool):
+    def __init__(self, automaton: Any):
         super().__init__(automaton)
-        table, self.contacts, self.tilted = self.table, Contacts(automaton), tilted
+        table, self.contacts = self.table, Contacts(automaton)
         self.count, self.ends = table.field(ti.i32), table.field(ti.i32)
         self.approaches = table.field(ti.i64)
 

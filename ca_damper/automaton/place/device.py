@@ -10,19 +10,23 @@ from ca_damper.automaton.lattice import UP
 from ca_damper.automaton.place.blows import Collisions
 from ca_damper.automaton.place.grains import Grains, Heap
 from ca_damper.automaton.place.transport import Transport
+from ca_damper.scenes.gravity import gravity_across
 from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented
 class PlaceAutomaton(LatticeDevice):
-    """Grains fly in any direction, and collide where their positions meet."""
+    """Grains fly in any direction, and collide where their positions meet.
+
+    tilted: whether gravity acts across the columns too.
+    """
 
     def __init__(self, options: Any, table: SceneFields):
         super().__init__(table)
+        self.tilted = gravity_across(options) != 0.0
         grains = Grains(self, options.traversal == "list")
         self._fill(options, grains, Heap(self, grains, None, options.particles_rest), UP)
-        tilted = options.sideways != 0.0
-        self.transport, self.collisions = Transport(self, tilted), Collisions(self, tilted)
+        self.transport, self.collisions = Transport(self), Collisions(self)
 
     @ti.func
     def find_blows(self, s, step, motion):

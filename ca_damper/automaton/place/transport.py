@@ -23,13 +23,11 @@ _NOWHERE = -1
 class Transport(Part):
     """Grains keep their places in the room when the lattice steps, and fly under full gravity.
 
-    movers, targets: cells that grains leave and enter, shape (scenes, cells). tilted: whether
-    gravity acts across the columns too.
+    movers, targets: cells that grains leave and enter, shape (scenes, cells).
     """
 
-    def __init__(self, automaton: Any, tilted: bool):
+    def __init__(self, automaton: Any):
         super().__init__(automaton)
-        self.tilted = tilted
         self.traversal = self.cells.traversal
         self.movers = self.table.field(ti.i16, "cells")
         self.targets = self.table.field(ti.i16, "cells")

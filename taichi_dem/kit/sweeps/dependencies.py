@@ -1,5 +1,6 @@
 """Files on which the result of a function depends: sources of the user, and what a text names."""
 
+import contextlib
 import hashlib
 import os
 import sys
@@ -18,12 +19,20 @@ _INSTALLED = {"site-packages", "dist-packages"}
 def digest_of_sources(work: Callable[..., Any]) -> str:
     """Digest of the file of a function and of those of the user that it imports, at any depth.
 
-    Imports that Python resolves while it runs, such as relative ones, do not count.
+    Imports of names that are computed do not count.
     """
+    module = sys.modules[work.__module__]
     finder = ModuleFinder([*filter(_is_of_user, sys.path)], excludes=HOUSE)
-    finder.run_script(str(sys.modules[work.__module__].__file__))
-    files = (getattr(one, "__file__", None) for one in finder.modules.values())
-    return digest_of_files(filter(None, files))
+    package = sys.modules.get((module.__package__ or "").partition(".")[0])
+    # A module of a library is not found, and is its own file alone.
+    with contextlib.suppress(ImportError):
+        if getattr(package, "__file__", None) and module.__spec__ is not None:
+            # By its name in its package, from which relative imports start.
+            finder.import_hook(module.__spec__.name)
+        else:
+            finder.run_script(str(module.__file__))
+    found = (getattr(one, "__file__", None) for one in finder.modules.values())
+    return digest_of_files({str(module.__file__), *filter(None, found)})
 
 
 def _is_of_user(folder):

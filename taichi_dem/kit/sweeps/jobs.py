@@ -57,7 +57,7 @@ def identity_of(work: Any) -> str:
     except (AttributeError, KeyError, TypeError):
         found = None
     file = getattr(sys.modules.get(module), "__file__", None)
-    if found is not work or not file:
+    if found is not work or not file or not os.path.isfile(file):
         raise InputError(
             "function must be defined at the top of a file, where other processes can import it, "
             f"got {name or shown(work)}"
