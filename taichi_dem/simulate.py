@@ -153,16 +153,15 @@ def run_simulation(
 ) -> Result:
     """Run a Simulation, whose motion may have been set, to a time; otherwise as ``simulate``.
 
-    brief: whether the report leaves out all that needs a comparison of the bodies at the end, and
-    frames the stress.
+    brief: whether the report leaves out missing effects, and frames the stress.
     """
     instance("simulation", simulation, Simulation)
     scene, method = simulation.scene, simulation.method
-    plan = _Plan(scene, method, until, samples, frames, observers, progress)
+    plan = _Plan(scene, method, until, samples, frames, observers, progress, brief)
     with reporting(progress, title) as tell:
         simulation, recorder = _started(simulation, brief)
-        more = {"brief": brief, "start": simulation.first_motion}
-        result, error = _result(simulation, recorder, CheckpointWriter(), plan, tell, **more)
+        given = simulation, recorder, CheckpointWriter(), plan, tell
+        result, error = _result(*given, start=simulation.first_motion)
     if error is not None:
         raise error
     return result
@@ -172,10 +171,13 @@ def result_of(run: Callable[..., Result], *arguments: Any, **options: Any) -> Re
     """Result of ``simulate`` or ``run_simulation``, also of a run that diverged.
 
     Its ``diverged`` is then the sentence of the program, else "". arguments, options: of run.
+    Raises SimulationDiverged for a scene that cannot begin.
     """
     try:
         return run(*arguments, **options)
     except SimulationDiverged as diverged:
+        if diverged.result is None:
+            raise
         return diverged.result
 
 
@@ -202,7 +204,9 @@ class _Plan:
         frames: int,
         observers: Sequence[Observer],
         progress: Listener | str | None,
+        brief: bool = False,
     ):
+        self.brief = brief
         self.dt0, self.last = method.dt0, macro_steps(until, method.dt0)
         whole("samples", samples, 1, MOST_CALLS)
         whole("frames", frames, 0, MOST_CALLS)
@@ -221,7 +225,7 @@ class _Plan:
 
         def sample(_):
             with simulation.readings.held():
-                simulation.sample()
+                simulation.sample(self.brief)
                 recorder.sample()
 
         def progress(_):
@@ -272,13 +276,13 @@ def _receivers_among(observers):
 def _started(simulation, brief=False):
     """A simulation ready to step and its recorder, with all kernels compiled."""
     recorder = Recorder(simulation, *watched_groups(simulation.scene), brief=brief)
-    simulation.start()
+    simulation.start(brief)
     compiling("recording", PARTS, PARTS)
     recorder.compile()
     return simulation, recorder
 
 
-def _result(simulation, recorder, writer, plan, tell, brief=False, start=None):
+def _result(simulation, recorder, writer, plan, tell, start=None):
     """Run to the end, or as far as the run stays within its bounds.
 
     Returns the result, and the SimulationDiverged that holds it or None.
@@ -298,7 +302,7 @@ def _result(simulation, recorder, writer, plan, tell, brief=False, start=None):
         frames=tuple(recorder.frames),
         broken_time=recorder.broken_time(),
         peak_speed=recorder.peak_speed,
-        report=simulation.report(brief),
+        report=simulation.report(plan.brief),
         diverged=str(error) if error else "",
         start=start,
         acting_since=simulation.acting_since(),

@@ -224,10 +224,15 @@ class Simulation:
         """Number of largest steps done."""
         return int(values(self.state.tick)) // MACRO_TICKS
 
-    def start(self) -> None:
+    def start(self, brief: bool = False) -> None:
         """Choose the first steps, evaluate the bonds and open the account; done once.
 
         Compiles everything, so that the time of the run is that of stepping alone.
+
+        Parameters
+        ----------
+        brief : bool, default False
+            Whether to leave out the first sample.
 
         Raises
         ------
@@ -246,6 +251,11 @@ class Simulation:
         compiling("time step", 2, PARTS)
         with self._undivided("it was started"):
             self._start()
+            with self.readings.held():
+                self._open_balance()
+                if not brief:
+                    self.sample()
+                self.divergence_check.check()
         self.compile_seconds += time.perf_counter() - started
 
     def _start(self):
@@ -262,9 +272,6 @@ class Simulation:
         self._check_capacity()
         compiling("energy balance", 4, PARTS)
         self.readings.step_back()
-        self._open_balance()
-        self.sample()
-        self.divergence_check.check()
 
     def _open_balance(self):
         """Begin the energy balance and all else that is followed."""
@@ -304,9 +311,18 @@ class Simulation:
             motion[name] = table[:, 3 * place : 3 * place + 3].copy()
         return motion
 
-    def sample(self) -> None:
-        """Sample missing effects, slip of bonds, and bonds that the step does not resolve."""
-        self.missing_effects.sample(self.time_s)
+    def sample(self, brief: bool = False) -> None:
+        """Sample missing effects, slip of bonds, and bonds that the step does not resolve.
+
+        Parameters
+        ----------
+        brief : bool, default False
+            Whether to look only for what ends a run, or makes it depend on chance.
+        """
+        if not brief:
+            self.missing_effects.sample(self.time_s)
+        elif self.divergence_check.sees_shared_volume:
+            self.shared_volume.sample(self.time_s)
         self.divergence_check.check_shared(self.shared_volume)
         self.step_resolution.sample(self.time_s)
 
@@ -410,6 +426,10 @@ class Simulation:
         flag("brief", brief)
         if self.energy_balance is None:
             raise InputError("report must follow start(), but the simulation was not started")
+        with self.readings.held():
+            return self._reported(brief)
+
+    def _reported(self, brief):
         here = slice(self.model.body_count)
         # A look of its own: to report changes nothing of what later samples find.
         shared_volume = copy.copy(self.shared_volume)

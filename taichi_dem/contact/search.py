@@ -82,9 +82,6 @@ class BroadPhase:
     def ask(self, everywhere: bool = False) -> None:
         """Request a search before the next step."""
         assign(self.everywhere, int(everywhere))
-        if everywhere and self.contacts.law.meets_bodies:
-            # Bodies may have been moved by hand.
-            assign(self.contacts.clear_until, 0.0)
         assign(self.contacts.search_requested, 1)
 
     def renew(self) -> None:
@@ -94,6 +91,9 @@ class BroadPhase:
 
     def search(self, everywhere: bool = True) -> None:
         """Renew the lists now. Raises InputError when they exceed their capacity."""
+        if everywhere and self.contacts.law.meets_bodies:
+            # Bodies may have been moved by hand.
+            assign(self.contacts.clear_until, 0.0)
         self.ask(everywhere)
         self.renew()
         self.check_capacity()

@@ -90,12 +90,12 @@ def largest_bond_rate(
     mesh: Mesh, topology: Topology, density: Density, coefficients: tuple[Constant, Constant]
 ) -> float:
     """Largest of ``bond_rates``, in a tenth of the time: by LAPACK, so but for its last bits."""
-    root, blocks = _roots_and_blocks(mesh, topology, density, coefficients)
-    scaled = product(root, product(blocks.sum(axis=1), transposed(root)))
+    root, blocks = _roots_and_blocks(mesh, topology, density, coefficients, np.matmul)
+    scaled = root @ blocks.sum(axis=1) @ transposed(root)
     return max(0.0, float(np.linalg.eigvalsh(scaled).max()))
 
 
-def _roots_and_blocks(mesh, topology, density, coefficients):
+def _roots_and_blocks(mesh, topology, density, coefficients, multiply=product):
     """``inverse_root`` of every body, (n, 6, 6), and the blocks of its four bonds, (n, 4, 6, 6)."""
     mass, centre, inertia = body_properties(mesh, density)
     body, face = np.nonzero(topology.body_bond >= 0)
@@ -104,7 +104,7 @@ def _roots_and_blocks(mesh, topology, density, coefficients):
     vertices = face_vertices(mesh, body, face)
     area, law = face_laws(mesh.points, vertices, laws)
     arms = mesh.points[vertices] - centre[body][:, None]
-    blocks[body, face] = area[:, None, None] / 3.0 * point_blocks(arms, law)
+    blocks[body, face] = area[:, None, None] / 3.0 * point_blocks(arms, law, multiply)
     return inverse_root(mass, inertia), blocks
 
 
@@ -145,14 +145,14 @@ def contact_eigenvalues(mesh: Mesh, density: Density, divisions: int, friction: 
     return largest
 
 
-def point_blocks(arms: np.ndarray, law: np.ndarray) -> np.ndarray:
+def point_blocks(arms: np.ndarray, law: np.ndarray, multiply: Any = product) -> np.ndarray:
     """Sum over points of J^T law J, J the map from (velocity, spin) to the point's velocity.
 
     arms: points from the centre [m], shape (n, points, 3). law: what resists their velocity,
-    shape (n, 3, 3). Returns (n, 6, 6).
+    shape (n, 3, 3). multiply: stacks of matrices. Returns (n, 6, 6).
     """
     lever = levers(arms)
-    return product(transposed(lever), product(law[:, None], lever)).sum(axis=1)
+    return multiply(transposed(lever), multiply(law[:, None], lever)).sum(axis=1)
 
 
 def levers(arms: np.ndarray) -> np.ndarray:

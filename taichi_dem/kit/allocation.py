@@ -262,7 +262,7 @@ def assign(field: ti.Field, array: ArrayLike) -> None:
         whole[slice(len(array)) if whole.ndim else ()] = array
         field.from_numpy(whole)
         return
-    ti.sync()
+    impl.get_runtime().prog.synchronize()
     place[slice(len(array)) if array.ndim else ()] = array
 
 

@@ -41,12 +41,14 @@ class Launch:
             self._launched(values, waits=False)
 
     def _launched(self, values, waits):
-        program, compiled, make_context, _ = self._ready
+        program, compiled, make_context, inner, _ = self._ready
         # One a launch: CUDA's leaves the address of the device's copy of the values in it.
         context = make_context()
         for place, value in enumerate(values):
             if isinstance(value, np.ndarray):
-                where = value.ctypes.data, value.nbytes, value.shape
+                # Of an array of vectors, the shape is that of the vectors alone.
+                shape = value.shape[: value.ndim - inner[place]]
+                where = value.ctypes.data, value.nbytes, shape
                 context.set_arg_external_array_with_shape((place,), *where, 0)
             else:
                 context.set_arg_int((place,), value)
@@ -60,13 +62,18 @@ class Launch:
         return None
 
     def _prepared(self, values):
-        """Taichi's program, the compiled kernel, what makes a context, and whether it returns."""
+        """Taichi's program, the compiled kernel, what makes a context, and whether it returns.
+
+        Before the last, the axes that an entry of each array has.
+        """
         kernel = self._kernel._primal
         owner = [self._kernel._kernel_owner] if hasattr(self._kernel, "_kernel_owner") else []
         key = kernel.ensure_compiled(*owner, *self._templates, *values)
         found, program = kernel.compiled_kernels[key], impl.get_runtime().prog
         compiled = program.compile_kernel(program.config(), program.get_device_caps(), found)
-        return program, compiled, found.make_launch_context, kernel.return_type is not None
+        kinds = [one.annotation for one in kernel.arguments[-len(values) :]] if values else []
+        inner = [getattr(getattr(kind, "dtype", None), "ndim", 0) for kind in kinds]
+        return program, compiled, found.make_launch_context, inner, kernel.return_type is not None
 
 
 def _failed(error):

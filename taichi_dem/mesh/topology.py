@@ -5,7 +5,7 @@ Local face f of a body is the face opposite its local vertex f. Bonds of one col
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -36,6 +36,7 @@ class Topology:
     outer_body, outer_face: (outer_count,) int32 body and local face of the free faces.
     is_open: (outer_count,) whether another body lies behind the free face: no bond joins them.
     bonded_share: (bond_count,) share of the face's area that is bonded (``Mesh.bonded_by``).
+    groups: by name, what ``faces_of_group`` has found so far.
     Source: Konno et al., section 2.1 (master is the body of lower index).
     """
 
@@ -49,6 +50,7 @@ class Topology:
     outer_face: np.ndarray
     is_open: np.ndarray
     bonded_share: np.ndarray
+    groups: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict, repr=False)
 
     @property
     def bond_count(self) -> int:
@@ -132,6 +134,12 @@ def faces_of_group(mesh: Mesh, topology: Topology, name: str) -> tuple[np.ndarra
     has no such group, or bonds join its faces.
     """
     check_free(mesh, name)
+    if name not in topology.groups:
+        topology.groups[name] = _faces_of_group(mesh, topology, name)
+    return topology.groups[name]
+
+
+def _faces_of_group(mesh, topology, name):
     outer = face_vertices(mesh, topology.outer_body, topology.outer_face)
     number, wanted = geometry.numbers_in(outer, mesh.group_faces(name))
     place = np.full(max(number.max(), wanted.max()) + 1, -1)

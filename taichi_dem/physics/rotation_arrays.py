@@ -1,11 +1,13 @@
 """Rotation of all bodies of a scene, from arrays to arrays, by the functions of the step.
 
-The kernels read no field: they are compiled once a session, whatever engines it has.
+The kernels read no field: they are compiled once a session, whatever engines it has. On a CPU one
+thread does it all: to wake others takes longer, up to some thousand bodies.
 """
 
 import numpy as np
 import taichi as ti
 
+from taichi_dem.kit import backend
 from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.products import matvec, transposed_matvec
 from taichi_dem.kit.types import mat3, vec3, vec4
@@ -69,6 +71,7 @@ def _rotation(rows: ti.template(), i):
 
 @ti.kernel
 def _find_momenta(orientation: _ROWS, spin: _ROWS, inertia: _MATRICES, found: _ROWS):
+    ti.loop_config(serialize=ti.static(backend.is_cpu()))
     for i in range(spin.shape[0]):
         rotation = _rotation(orientation, i)
         own = transposed_matvec(rotation, _vector(spin, i))
@@ -79,6 +82,7 @@ def _find_momenta(orientation: _ROWS, spin: _ROWS, inertia: _MATRICES, found: _R
 
 @ti.kernel
 def _find_rotations(orientation: _ROWS, found: _MATRICES):
+    ti.loop_config(serialize=ti.static(backend.is_cpu()))
     for i in range(orientation.shape[0]):
         rotation = _rotation(orientation, i)
         for r, c in ti.static(ti.ndrange(3, 3)):
@@ -87,6 +91,7 @@ def _find_rotations(orientation: _ROWS, found: _MATRICES):
 
 @ti.kernel
 def _find_spins(orientation: _ROWS, inertia_inverse: _MATRICES, momentum: _ROWS, found: _ROWS):
+    ti.loop_config(serialize=ti.static(backend.is_cpu()))
     for i in range(momentum.shape[0]):
         inverse = _matrix(inertia_inverse, i)
         spin = spin_of(_rotation(orientation, i), inverse, _vector(momentum, i))

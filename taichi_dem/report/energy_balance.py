@@ -83,7 +83,7 @@ class EnergyBalance(Kept):
     def __init__(self, run: Run):
         self.run, self.start_energy, self.start = run, 0.0, np.zeros(len(TERMS))
         self.start_works = np.zeros(1)
-        first = self.account()
+        first = self._account()
         self.start_energy = sum(first[name] for name in HELD)
         # Half a step of what acts from the start is booked at time zero.
         held = *HELD, "residual"

@@ -39,6 +39,8 @@ class Readings:
         self._held: dict[str, Any] | None = None
         self._rooms: dict[str, np.ndarray] = {}
         self._launch_push, self._launch_visit = Launch(self._push), Launch(self._visit)
+        self.bond_shares = Launch(self._lower_bond_shares)
+        self.contact_shares = Launch(self._note_contact_shares)
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
@@ -73,7 +75,7 @@ class Readings:
         if self.contacts is None:
             return np.zeros((0, 2), dtype=np.int32)
         store = self.contacts.store
-        return values(store.body)[values(store.near_slot, slice(int(values(store.near_count))))]
+        return values(store.body, values(store.near_slot, slice(int(values(store.near_count)))))
 
     def contact_wrenches(self) -> np.ndarray:
         """Force [N] and moment about its centre [N m] of the contacts on every body, (n, 6)."""
@@ -283,14 +285,14 @@ class Readings:
             table[b, 0], table[b, 1] = found[0], found[1]
 
     @ti.kernel
-    def bond_shares(self, share: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+    def _lower_bond_shares(self, share: ti.types.ndarray(dtype=ti.f64, ndim=1)):
         """Lower each bond's entry to the share of its dashpots that the present steps leave."""
         for b in range(self.tables.bond_count[None]):
             if self.state.broken_tick[b] < 0:
                 share[b] = ti.min(share[b], self.advance.bond_share(b))
 
     @ti.kernel
-    def contact_shares(
+    def _note_contact_shares(
         self,
         share: ti.types.ndarray(dtype=ti.f64, ndim=1),
         taken: ti.types.ndarray(dtype=ti.f64, ndim=1),

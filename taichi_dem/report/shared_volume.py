@@ -11,6 +11,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.tetrahedra import points_of_parts
 from taichi_dem.physics.rotation_arrays import rotations
@@ -155,7 +156,7 @@ class SharedVolume(Kept):
         found = np.zeros((0, 3))
         while count[0] > len(found):
             found, count = np.zeros((max(_ROOM, count[0]), 3)), np.zeros(1, np.int32)
-            _find_pairs(last, box, own, mass, *self.points, found, count)
+            _launch_pairs(last, box, own, mass, *self.points, found, count)
         found = found[: count[0]]
         pairs = body[found[:, :2].astype(np.int32)]
         strangers = (tied[pairs[:, 0]] != pairs[:, 1:]).all(axis=1)
@@ -211,6 +212,9 @@ def _find_pairs(
                         a = ti.atomic_add(count[0], 1)
                         if a < found.shape[0]:
                             found[a, 0], found[a, 1], found[a, 2] = i, j, share
+
+
+_launch_pairs = Launch(_find_pairs)
 
 
 @ti.func

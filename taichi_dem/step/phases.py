@@ -8,6 +8,7 @@ import taichi as ti
 
 from taichi_dem.contact.search import BroadPhase
 from taichi_dem.kit import backend
+from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.ordered import Once, Phases, Places
 from taichi_dem.kit.products import squared
 from taichi_dem.step.advance import Advance
@@ -96,6 +97,7 @@ class Step:
         self.parts = self._parts()
         self.phases = self._phases()
         self.start_phases = self._before_bonds(), self._after_bonds()
+        self._launch_starts = tuple(Launch(self._start, last) for last in range(2))
 
     def _before_bonds(self):
         """First levels and full lists."""
@@ -182,9 +184,12 @@ class Step:
         """Whether a phase also belongs to the start of a run: that of the bonds does."""
         return item == self.advance.bond
 
-    @ti.kernel
-    def start(self, last: ti.template()):
+    def start(self, last: int) -> None:
         """Run the phases of the start before the bonds, or the last, after them."""
+        self._launch_starts[last]()
+
+    @ti.kernel
+    def _start(self, last: ti.template()):
         for members, item in ti.static(self.start_phases[last]):
             for a in range(members.count(0)):
                 item(members.pick(a))

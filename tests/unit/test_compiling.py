@@ -22,7 +22,7 @@ BUDGET = {
     "Resident._steps": 31694,
     "Resident._search": 15835,
     "Readings._visit": 4386,
-    "Step.start": 6918,
+    "Step._start": 6918,
     "_find_pairs": 2266,
     "Coupling.advance": 16068,
     "Coupling.start": 1765,

@@ -26,7 +26,7 @@ def launched_in(program, monkeypatch, context, returns):
     """A Launch that has been called in a program, which is that of the session."""
     monkeypatch.setattr(impl.get_runtime(), "prog", program)
     launch = Launch(None)
-    launch._ready = (program, None, context, returns)
+    launch._ready = (program, None, context, [0], returns)
     return launch
 
 
