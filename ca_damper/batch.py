@@ -6,7 +6,7 @@ numbers (see ``engine/damper_engine.py``).
 
 import contextlib
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from ca_damper.engine.loaded_scenes import LoadedScenes
 from ca_damper.engine.modal_mount import ModalMount, checked_mount
 from ca_damper.engine.recorder import ROOM
 from ca_damper.excitation.excitation import Excitation
-from ca_damper.filling import Filling, check_filling
+from ca_damper.filling import Filling, Fillings
 from ca_damper.report import measures
 from ca_damper.report.certificate import EFFECTS, Certificate, Periods
 from ca_damper.report.checked_range import checked_range, warn_outside
@@ -55,8 +55,9 @@ class Batch(LoadedScenes):
 
     Parameters
     ----------
-    filling : Filling
-        Filling of the containers, such as ``Automaton()`` or ``Spheres()``.
+    filling : Filling or sequence of Filling
+        Filling of the containers, such as ``Automaton()`` or ``Spheres()``; or one for each scene,
+        all of one class with the same rules and effects, which differ in numbers and sizes.
     table : SceneTable
         Parameters of the scenes; the batch copies them. ``table.dt`` holds the largest step of each
         scene [s], which is shortened so that a whole number of steps makes a cycle of the base.
@@ -112,7 +113,7 @@ class Batch(LoadedScenes):
 
     def __init__(
         self,
-        filling: Filling,
+        filling: Filling | Sequence[Filling],
         table: SceneTable,
         *,
         mount: str = "spring",
@@ -127,14 +128,15 @@ class Batch(LoadedScenes):
     ):
         self.asked_effects = choice("effects", effects, EFFECTS)
         self.count = instance("table", table, SceneTable).count
-        self.filling, self.estimates = activated(check_filling(filling), table, effects)
+        given = Fillings(filling, self.count)
+        self.fillings, self.estimates = activated(given, table, effects)
         runtime.session()
         self.if_diverged = choice("if_diverged", if_diverged, ("nan", "raise"))
         self.mount, self.modal = checked_mount(mount, structure)
         self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
         tolerances = positive("rtol", rtol, zero_allowed=True), positive("atol", atol)
         has_box = None if self.modal is None else self.modal.has_box(self.count)
-        self.numbers = self._checked(SceneNumbers(self.filling, table, has_box))
+        self.numbers = self._checked(SceneNumbers(self.fillings, table, has_box))
         self.excitation = checked_excitation(excitation, mount)
         self.recorded_samples = whole("recorded_samples", recorded_samples, 0, MOST_CYCLES)
         self.time_origin = np.zeros(self.count)
@@ -149,12 +151,12 @@ class Batch(LoadedScenes):
         """Borrow an engine and write the numbers of the batch to it."""
         counts = self.count, self.measured_cycles, self.recorded_samples
         kind = self.mount if self.modal is None else self.modal.structure.mode_count
-        asked = self.filling, kind, self.excitation.kind, counts, self.excitation.sizes
+        asked = self.fillings, kind, self.excitation.kind, counts, self.excitation.sizes
         self._engine = borrow(*asked, owner=self)
         self._tell_compiling("set-up", 1)
         engine = self.engine
         engine.clear()
-        engine.load(self.filling, self.table, rtol, atol, self.excitation)
+        engine.load(self.fillings, self.table, rtol, atol, self.excitation)
         if self.modal is not None:
             engine.container.hang(self.modal)
         self._load_pace()
@@ -169,7 +171,8 @@ class Batch(LoadedScenes):
         return numbers
 
     def __repr__(self) -> str:
-        return in_brief(self, self.filling.label, f"{self.count:,} scenes", f"on the {self.mount}")
+        label, count = self.fillings.kinds[0].label, f"{self.count:,} scenes"
+        return in_brief(self, label, count, f"on the {self.mount}")
 
     @property
     def run_seconds(self) -> float:
@@ -424,7 +427,7 @@ class Batch(LoadedScenes):
             The file cannot be read or written, or belongs to another run.
         """
         self._check_started()
-        own = {"version": version_text(), "filling": identity_of(self.filling)}
+        own = {"version": version_text(), "filling": identity_of(self.fillings.identity)}
         if self.excitation != Excitation():
             own["excitation"] = self.excitation.identity()
         identity = {**own, **identity}
@@ -488,29 +491,41 @@ class Batch(LoadedScenes):
             Figures of all scenes since the last ``start``.
         """
         particles, dt = self.table.column("particles"), self.table.column("dt")
-        sprung = self.mount != "base"
+        sprung, kind = self.mount != "base", self.fillings.kinds[0]
         return Report(
-            method=self.filling.label,
+            method=kind.label,
             mount=self.mount,
-            effects=self.filling.effects,
-            effect_activity=self.device.uses(self.filling.effects),
+            effects=kind.effects,
+            effect_activity=self.device.uses(kind.effects),
             scenes=self.count,
             particles=(int(particles.min()), int(particles.max())),
             dt_s=(float(dt.min()), float(dt.max())),
             simulated_s=float(self.time_s.max()),
             scene_steps=self.launches.scene_steps,
             particle_steps=self.launches.particle_steps,
-            step_bound=self.filling.step_bound,
+            **self._bound_of_step(),
             momentum_error=self._momentum_error(),
             container_evaluations=RK45_STAGES * int(self.attempts().sum()) if sprung else 0,
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
-            order=getattr(self.filling, "order", None),
+            order=getattr(kind, "order", None),
             certificate=self.certificate,
             diverged=tuple(map(str, self.divergences())),
             excitation=self.excitation.in_words(),
             checked=checked_range(self),
         )
+
+    def _bound_of_step(self) -> dict[str, Any]:
+        """Fields of a Report: the bound of which a scene takes the largest share, and that."""
+        if self.fillings.kinds[0].step_bound is None:
+            return {"step_bound": None}
+        bound = self.fillings.of_scenes(lambda one: one.step_bound[0])
+        shares = self.table.column("dt") / bound
+        worst = int(shares.argmax())
+        return {
+            "step_bound": self.fillings.of(worst).step_bound,
+            "bound_taken": float(shares[worst]),
+        }
 
     @property
     def certificate(self) -> Certificate:

@@ -13,6 +13,8 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.display import counted
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
@@ -92,6 +94,80 @@ class Structure:
 
     key: Hashable
     sizes: dict[str, int] = field(default_factory=dict)
+
+
+class Fillings:
+    """The filling of each scene of a batch: of one class and compiled structure, of any numbers.
+
+    kinds: those that differ. which: of these that each scene has, (scenes,).
+    """
+
+    def __init__(self, given: Any, scenes: int):
+        """Of one filling for all scenes, or a sequence with one for each; InputError."""
+        listed = given if isinstance(given, (list, tuple)) else [given]
+        if listed is given and len(given) != scenes:
+            raise InputError(
+                f"filling must be one, or one for each of {counted(scenes, 'scene')}, got "
+                f"{counted(len(given), 'filling')}"
+            )
+        numbers: dict[Any, int] = {}
+        which = [numbers.setdefault(check_filling(one), len(numbers)) for one in listed]
+        self.kinds, self.which = tuple(numbers), np.resize(which, scenes)
+        first = self.kinds[0]
+        for one in self.kinds:
+            if (type(one), one.structure.key) != (type(first), first.structure.key):
+                raise InputError(
+                    "filling must be of one class, with the same rules and effects, in all scenes "
+                    f"of a batch, got {shown(first)} and {shown(one)}"
+                )
+
+    @property
+    def structure(self) -> "Structure":
+        """What is compiled, with room for the largest."""
+        sizes = [one.structure.sizes for one in self.kinds]
+        most = {name: max(one[name] for one in sizes) for name in sizes[0]}
+        return Structure(self.kinds[0].structure.key, most)
+
+    @property
+    def one(self) -> Any:
+        """The filling of all scenes; InputError where they differ."""
+        if len(self.kinds) > 1:
+            raise InputError(
+                "filling must be the same in all scenes of a batch for this, got "
+                f"{len(self.kinds)} different ones"
+            )
+        return self.kinds[0]
+
+    @property
+    def identity(self) -> Any:
+        """What tells them from others, for the identity of a checkpoint."""
+        return self.kinds[0] if len(self.kinds) == 1 else (self.kinds, self.which)
+
+    def of(self, s: int) -> Any:
+        """The filling of a scene."""
+        return self.kinds[self.which[s]]
+
+    def of_scenes(self, value: Any) -> np.ndarray:
+        """What a function finds of the filling of each scene, (scenes, ...)."""
+        return np.array([value(one) for one in self.kinds])[self.which]
+
+    def write(self, field: Any, value: Any) -> None:
+        """Write what a function finds of each scene to a field, members of structs by name.
+
+        Zeros follow where it finds fewer numbers than there is room for.
+        """
+        if hasattr(field, "field_dict"):
+            found = {one: value(one) for one in self.kinds}
+            for name in found[self.kinds[0]]:
+                self.write(field.get_member_field(name), lambda one, name=name: found[one][name])
+            return
+        room = values(field, 0)
+        rows = np.zeros((len(self.kinds), *room.shape), room.dtype)
+        for k, one in enumerate(self.kinds):
+            part = np.asarray(value(one))
+            place: tuple[Any, ...] = (k, *map(slice, part.shape))
+            rows[place] = part
+        assign(field, rows[self.which])
 
 
 @runtime_checkable
@@ -198,8 +274,8 @@ class DeviceFilling(Protocol):
     and ``carry_out(s, step, motion, recoil)`` with a Recoil returns the Action.
     """
 
-    def load(self, filling: Filling) -> None:
-        """Take over all numbers of a filling of the same structure."""
+    def load(self, fillings: Fillings) -> None:
+        """Take over the numbers of the filling of each scene, all of the same structure."""
 
     def reset(self, s: int) -> None:
         """Place the particles of scene s at their start, from its seed."""

@@ -6,9 +6,8 @@ from typing import ClassVar
 import numpy as np
 import taichi as ti
 
-from ca_damper.filling import Action, Filling, Structure
+from ca_damper.filling import Action, Fillings, Structure
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import plain_fields, positive, shown, whole
@@ -91,17 +90,16 @@ class FixedMass:
 
     def __init__(self, table: SceneFields):
         self.table = table
-        self.particle_mass = ti.field(ti.f64, shape=())
-        self.velocity = table.field(ti.f64)
+        self.particle_mass, self.velocity = table.field(ti.f64), table.field(ti.f64)
 
-    def load(self, filling: Filling) -> None:
-        """Take over the mass of a particle."""
-        assign(self.particle_mass, filling.particle_mass)
+    def load(self, fillings: Fillings) -> None:
+        """Take over the mass of a particle of each scene."""
+        fillings.write(self.particle_mass, lambda one: one.particle_mass)
 
     @ti.func
     def mass(self, s):
         """Mass of all particles of scene s [kg]."""
-        return self.table.particles[s] * self.particle_mass[None]
+        return self.table.particles[s] * self.particle_mass[s]
 
     @ti.func
     def reset(self, s):

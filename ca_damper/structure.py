@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ca_damper.filling import Filling, check_filling
 from ca_damper.oscillator import check_steady
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
@@ -258,7 +259,7 @@ class ModalStructure:
 
 @dataclass(frozen=True)
 class Box:
-    """A container with particles, of the filling's own size, at a place of a structure.
+    """A container with particles, of the size of its filling, at a place of a structure.
 
     The mass of the box itself is part of the masses of the structure.
 
@@ -271,6 +272,9 @@ class Box:
     seed : int, optional
         Number that starts its particles, together with the seed of the run. None: the number of the
         box in the list, so that boxes differ.
+    filling : Filling, optional
+        Its own filling, of the class, rules and effects of the others: grains and box of another
+        size. None: that of the run.
 
     Raises
     ------
@@ -281,12 +285,15 @@ class Box:
     place: int
     particles: int
     seed: int | None = None
+    filling: Filling | None = None
 
     def __post_init__(self) -> None:
         for name, most in (("place", MOST_PLACES - 1), ("particles", 2**31 - 1)):
             object.__setattr__(self, name, whole(name, getattr(self, name), 0, most))
         if self.seed is not None:
             object.__setattr__(self, "seed", whole("seed", self.seed, 0, 1_000_000))
+        if self.filling is not None:
+            check_filling(self.filling)
 
 
 def _array(name: str, value: Any, axes: int, least: float = -LARGEST) -> np.ndarray:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import taichi as ti
 
-from ca_damper.filling import LEAST_PLACES, Motion
+from ca_damper.filling import LEAST_PLACES, Fillings, Motion
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.allocation import values
@@ -17,7 +17,7 @@ _PAD = 512
 
 @ti.data_oriented
 class DrivenEngine(Engine):
-    """A filling in containers that move as x = A sin(2 pi f t); structure: (sizes, filling).
+    """Fillings in containers that move as x = A sin(2 pi f t).
 
     impulse: on each container since the reset [N s]. trace: after each of the first ``traced``
     steps impulse, carried mass, momentum and energy.
@@ -25,7 +25,7 @@ class DrivenEngine(Engine):
 
     def declare(self):
         scenes, traced, *places = self.capacity
-        filling = self.structure.filling
+        filling = self.structure.fillings.kinds[0]
         sizes = dict(zip(filling.structure.sizes, places))
         self.table = SceneFields(scenes, {"traced": traced, **sizes})
         self.device = filling.bind(self.table)
@@ -67,10 +67,10 @@ class DrivenEngine(Engine):
 
 
 class _Structure:
-    """Compares as the structure of a filling, and holds one of them."""
+    """Compares as the structure of fillings, and holds them."""
 
-    def __init__(self, filling):
-        self.filling, self.key = filling, (type(filling), filling.structure.key)
+    def __init__(self, fillings):
+        self.fillings, self.key = fillings, (type(fillings.kinds[0]), fillings.structure.key)
 
     def __hash__(self):
         return hash(self.key)
@@ -83,20 +83,24 @@ _POOL = EnginePool(DrivenEngine, (8, 1, *(LEAST_PLACES,) * 32))
 
 
 class Driven:
-    """Scenes of a filling in containers that are driven, or stand still.
+    """Scenes of a filling, or of one each, in containers that are driven, or stand still.
 
     done: steps taken, of all scenes.
     """
 
     def __init__(self, filling, particles, seed, dt, amplitude, frequency, traced=0):
         table = SceneTable(particles, seed, dt, frequency, amplitude)
-        size = (table.count, traced, *filling.structure.sizes.values())
-        self.filling, self.count, self.done = filling, table.count, 0
-        self.engine = _POOL.borrow(_Structure(filling), size, filling, self)
+        self.fillings, self.count, self.done = Fillings(filling, table.count), table.count, 0
+        size = (table.count, traced, *self.fillings.structure.sizes.values())
+        self.engine = _POOL.borrow(_Structure(self.fillings), size, filling, self)
         self.engine.clear()
         self.table.load(table)
-        self.device.load(filling)
+        self.device.load(self.fillings)
         self.engine.reset(traced)
+
+    @property
+    def filling(self):
+        return self.fillings.one
 
     @property
     def device(self):

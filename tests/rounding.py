@@ -15,6 +15,6 @@ def momentum_rounding(batch):
     """
     exchanged = batch.engine.table.in_use(batch.engine.account.exchanged)
     steps = batch.engine.table.in_use(batch.engine.coupling.step)
-    mass = batch.table.column("particles") * batch.filling.particle_mass
+    mass = batch.table.column("particles") * batch.fillings.of_scenes(lambda one: one.particle_mass)
     rounding = mass * 1.5 * QUANTUM * steps + 4.0 * _EPS * steps * (exchanged + 10.0 * mass)
     return float((rounding / np.maximum(exchanged, 1e-300)).max())

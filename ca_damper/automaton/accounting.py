@@ -112,7 +112,7 @@ class Landings(Uncounted):
     @ti.func
     def clear(self, s):
         """No particle has moved yet."""
-        for cell in range(self.lattice.size[None].cells + 1):
+        for cell in range(self.lattice.size.cells[s] + 1):
             self.arrived[s, cell] = ti.cast(0, ti.i8)
 
     @ti.func

@@ -4,10 +4,10 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.automaton.lattice import EMPTY, WALL, Lattice
+from ca_damper.automaton.lattice import EMPTY, WALL, Lattice, geometry_of
 from ca_damper.engine.random_numbers import START, uniform
+from ca_damper.filling import Fillings
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit.allocation import assign
 
 
 @ti.data_oriented
@@ -27,14 +27,14 @@ class Traversal:
             self.cells, self.number = table.field(ti.i16, "cells"), table.field(ti.i16, "cells")
 
     @ti.func
-    def begin(self):
+    def begin(self, s):
         """First of the numbers k of the cells to visit in a step."""
-        return 0 if ti.static(self.listed) else self.lattice.size[None].first
+        return 0 if ti.static(self.listed) else self.lattice.size.first[s]
 
     @ti.func
     def end(self, s):
         """One past the last of them."""
-        return self.table.particles[s] if ti.static(self.listed) else self.lattice.size[None].end
+        return self.table.particles[s] if ti.static(self.listed) else self.lattice.size.end[s]
 
     @ti.func
     def cell(self, s, k):
@@ -61,7 +61,7 @@ class Traversal:
         """Number the particles by their cells again: neighbours then mostly do alike, and fast."""
         if ti.static(self.listed):
             count = 0
-            for cell in range(self.lattice.size[None].first, self.lattice.size[None].end):
+            for cell in range(self.lattice.size.first[s], self.lattice.size.end[s]):
                 kind = cells.at(s, cell)
                 if kind != EMPTY and kind != WALL:
                     self.placed(s, count, cell)
@@ -89,8 +89,8 @@ class Cells:
     @ti.func
     def clear(self, s):
         """Walls and nothing else."""
-        for cell in range(self.lattice.size[None].cells + 1):
-            self.put(s, cell, ti.cast(self.lattice.blank[cell], ti.i32), 0.0, 0.0)
+        for cell in range(self.lattice.size.cells[s] + 1):
+            self.put(s, cell, self.lattice.blank(s, cell), 0.0, 0.0)
         self.follower.clear(s)
 
     @ti.func
@@ -133,6 +133,12 @@ class Cells:
         return way
 
 
+def _named_cells(options):
+    """Numbers of the cells of which a user gave column and row."""
+    geometry = geometry_of(options)
+    return [geometry.cell_of(*cell) for cell in options.start]
+
+
 @ti.data_oriented
 class Placement:
     """First cells of the particles: named by the user, or drawn from the scene's seed.
@@ -141,42 +147,37 @@ class Placement:
     that every choice of them is equally likely (selection sampling, Knuth, The Art of Computer
     Programming 2, 3.4.2).
 
-    way: direction in which the particles head. named, count: cells that the user named.
+    way: direction in which the particles head. named: cells that the user named, of each scene.
     """
-
-    constant_fields = ("named", "count")
 
     def __init__(self, table: SceneFields, cells: Cells, way: int, is_named: bool):
         self.table, self.cells, self.lattice = table, cells, cells.lattice
         self.way, self.is_named = way, is_named
         if is_named:
-            self.count = ti.field(ti.i32, shape=())
-            self.named = ti.field(ti.i32, shape=table.length("cells"))
+            self.named = table.field(ti.i32, "cells")
 
-    def load(self, start: Any) -> None:
-        """Take over the user's cells: (column, row) of each."""
+    def load(self, fillings: Fillings) -> None:
+        """Take over the user's cells."""
         if self.is_named:
-            geometry = self.lattice.geometry
-            assign(self.count, len(start))
-            assign(self.named, [geometry.cell_of(*cell) for cell in start])
+            fillings.write(self.named, _named_cells)
 
     @ti.func
     def fill(self, s):
         """Put the particles of scene s into their cells, at rest."""
         if ti.static(self.is_named):
-            for k in range(self.count[None]):
-                self._put(s, k, self.named[k])
+            for k in range(self.table.particles[s]):
+                self._put(s, k, self.named[s, k])
         else:
             self._draw(s)
 
     @ti.func
     def _draw(self, s):
         placed, count = 0, self.table.particles[s]
-        size = self.lattice.size[None]
+        size = self.lattice.size[s]
         left = size.columns * size.rows
         for column in range(size.columns):
             for row in range(size.rows):
-                cell = self.lattice.cell_of(column, row)
+                cell = self.lattice.cell_of(s, column, row)
                 if left * uniform(self.table.seed[s], 0, cell, START) < count - placed:
                     self._put(s, placed, cell)
                     placed += 1

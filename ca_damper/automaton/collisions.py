@@ -106,12 +106,12 @@ class Collisions(Part):
     def find_event(self, s, cell, velocity, pull, pressed):
         """Event of a particle, and the speed of its obstacle."""
         kind = self.cells.at(s, cell)
-        ahead = self.lattice.cell_ahead(cell, kind)
+        ahead = self.lattice.cell_ahead(s, cell, kind)
         met = self.cells.at(s, ahead)
         event, other = PAIR, self.cells.speed[s, ahead] * self.lattice.cosine[met, kind]
         if met >= WALL:
             event, other = FLOOR, velocity * self.lattice.upward(kind)
-            if met == WALL and self.lattice.in_side_wall(ahead):
+            if met == WALL and self.lattice.in_side_wall(s, ahead):
                 event, other = SIDE, 0.0
         if self.cells.speed[s, cell] <= other or met == EMPTY:
             event = NOTHING
@@ -128,7 +128,7 @@ class Collisions(Part):
             self.conflict_resolution.claim(s, cell, ranked)
             if event == PAIR:
                 self.conflict_resolution.claim(
-                    s, self.lattice.cell_ahead(cell, self.cells.at(s, cell)), ranked
+                    s, self.lattice.cell_ahead(s, cell, self.cells.at(s, cell)), ranked
                 )
 
     @ti.func
@@ -138,7 +138,7 @@ class Collisions(Part):
         if ti.static(self.both):
             result = self.conflict_resolution.holds(s, cell, ranked)
             if event == PAIR and result:
-                ahead = self.lattice.cell_ahead(cell, self.cells.at(s, cell))
+                ahead = self.lattice.cell_ahead(s, cell, self.cells.at(s, cell))
                 result = self.conflict_resolution.holds(s, ahead, ranked)
         return result
 
@@ -166,7 +166,7 @@ class Collisions(Part):
     def rebound(self, s, cell, event, wall):
         """Meet a wall or the heap: side walls mirror, all else sends straight back (5.4)."""
         kind = self.cells.at(s, cell)
-        speed = speed_after_wall(self.cells.speed[s, cell], wall, self.parameters.wall[None])
+        speed = speed_after_wall(self.cells.speed[s, cell], wall, self.parameters.wall[s])
         back = turned_back(kind)
         if event == SIDE:
             back = mirrored(kind)
@@ -185,8 +185,8 @@ class Collisions(Part):
         """
         line = self.cells.at(s, cell)
         speed = self.cells.speed[s, cell]
-        restitution = self.parameters.particle[None]
-        ahead = self.lattice.cell_ahead(cell, line)
+        restitution = self.parameters.particle[s]
+        ahead = self.lattice.cell_ahead(s, cell, line)
         before = self.cells.vertical_speed(s, cell) + self.cells.vertical_speed(s, ahead)
         self.go_on(s, shared, cell, line, speed_after_pair(speed, other, restitution))
         if ti.static(self.both):

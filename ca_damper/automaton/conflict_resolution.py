@@ -49,7 +49,7 @@ class ConflictResolution:
     @ti.func
     def clear(self, s):
         """No claims."""
-        for cell in range(self.lattice.size[None].cells + 1):
+        for cell in range(self.lattice.size.cells[s] + 1):
             self.claims[s, cell] = ti.cast(0, ti.i64)
 
     @ti.func

@@ -8,13 +8,12 @@ import taichi as ti
 from ca_damper.automaton.accounting import QUANTUM
 from ca_damper.automaton.cells import Cells, Placement
 from ca_damper.automaton.conflict_resolution import ConflictResolution
-from ca_damper.automaton.lattice import EMPTY, HELD, WALL, Geometry, Lattice
+from ca_damper.automaton.lattice import EMPTY, HELD, WALL, Lattice
 from ca_damper.engine.random_numbers import stream
 from ca_damper.engine.recorder import EventCounts
-from ca_damper.filling import Action
+from ca_damper.filling import Action, Fillings
 from ca_damper.scenes.gravity import gravity_across, gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.effect_usage import EffectUse
 
 PAIRS, WALLS, PUSHES, HOLDS = range(4)
@@ -28,34 +27,38 @@ _COUNTED = {
 _BY = {name: (kind,) for name, (kind, _) in _COUNTED.items()}
 
 
-@ti.data_oriented
+@ti.dataclass
 class Parameters:
-    """Parameters that kernels read; in fields, so that another value compiles nothing.
+    """Numbers of the options of a scene.
 
     width of a cell [m], mass of a particle [kg], gravity downwards and sideways, to the right
     [m/s^2], restitution of particle and wall; threshold of static contact in units of g dt;
     friction of two particles, and wall_friction.
     """
 
-    def __init__(self):
-        for name in ("width", "mass", "gravity", "sideways", "particle", "wall", "threshold"):
-            setattr(self, name, ti.field(ti.f64, shape=()))
-        self.friction, self.wall_friction = (ti.field(ti.f64, shape=()) for _ in range(2))
+    width: ti.f64
+    mass: ti.f64
+    gravity: ti.f64
+    sideways: ti.f64
+    particle: ti.f64
+    wall: ti.f64
+    threshold: ti.f64
+    friction: ti.f64
+    wall_friction: ti.f64
 
-    def load(self, options: Any) -> None:
-        """Take the values from the options."""
-        values = {
-            "width": options.width,
-            "mass": options.particle_mass,
-            "gravity": gravity_along(options),
-            "sideways": gravity_across(options),
-            "particle": options.restitution,
-            "wall": options.wall_restitution,
-            "threshold": options.static_threshold,
-            **dict(zip(("friction", "wall_friction"), options.frictions)),
-        }
-        for name, value in values.items():
-            assign(getattr(self, name), value)
+
+def _parameters(options: Any) -> dict[str, float]:
+    """Members of Parameters."""
+    return {
+        "width": options.width,
+        "mass": options.particle_mass,
+        "gravity": gravity_along(options),
+        "sideways": gravity_across(options),
+        "particle": options.restitution,
+        "wall": options.wall_restitution,
+        "threshold": options.static_threshold,
+        **dict(zip(("friction", "wall_friction"), options.frictions)),
+    }
 
 
 @ti.data_oriented
@@ -65,12 +68,16 @@ class LatticeDevice:
     Rules add ``transport`` (with follow, fly_all and move_all), ``collisions`` (with resolve,
     recoil and strike_container), and ``motion_of(s, kind, travelled, speed)``, which returns places
     off the centres of cells [m] and velocities [m/s] of particles under way, (cells, 2) each.
+    looks_ahead: whether rules ask for the cell ahead of a particle.
     velocity: of the container at the beginning of the last step [m/s]. gained: velocity along x
     that the container gave to the particles in this step [quanta]. Both (scenes,).
     """
 
-    def __init__(self, table: SceneFields):
-        self.table, self.parameters, self.lattice = table, Parameters(), Lattice(table)
+    constant_fields = ("parameters",)
+
+    def __init__(self, table: SceneFields, looks_ahead: bool):
+        self.table, self.lattice = table, Lattice(table, looks_ahead)
+        self.parameters = table.structs(Parameters)
         self.conflict_resolution = ConflictResolution(table, self.lattice)
         self.event_counts = EventCounts(table, len(_BY), _BY)
         self.velocity, self.gained = table.field(ti.f64), table.field(ti.i64)
@@ -80,11 +87,11 @@ class LatticeDevice:
         self.cells, self.resting = cells, resting
         self.placement = Placement(self.table, cells, way, options.start is not None)
 
-    def load(self, options: Any) -> None:
-        """Take over the numbers of an automaton of the same structure."""
-        self.lattice.load(Geometry(options.columns, options.rows))
-        self.parameters.load(options)
-        self.placement.load(options.start)
+    def load(self, fillings: Fillings) -> None:
+        """Take over the numbers of the automaton of each scene."""
+        self.lattice.load(fillings)
+        fillings.write(self.parameters, _parameters)
+        self.placement.load(fillings)
 
     @ti.func
     def reset(self, s):
@@ -105,7 +112,7 @@ class LatticeDevice:
     @ti.func
     def meet(self, s, step, motion):
         """First part of a step: the lattice follows the container, particles fly and meet."""
-        gravity = self.parameters.gravity[None]
+        gravity = self.parameters.gravity[s]
         pull, pressed = gravity * self.table.dt[s], motion.a > -gravity
         shared = stream(self.table.seed[s], step)
         self.velocity[s], self.event_counts.step[s] = motion.v, step
@@ -121,16 +128,16 @@ class LatticeDevice:
         """Second part of a step: blows that wait for the container's recoil, changes of cell."""
         gained = self.gained[s] + self.collisions.strike_container(s, recoil)
         self.transport.move_all(s, step, stream(self.table.seed[s], step))
-        mass = self.parameters.mass[None]
+        mass = self.parameters.mass[s]
         return Action(-mass * QUANTUM * ti.cast(gained, ti.f64), mass * self.resting.held[s])
 
     @ti.func
     def momentum(self, s):
         """Momentum along x [kg m/s]; held particles move as the container did last."""
         total = self.resting.held[s] * self.velocity[s]
-        for cell in range(self.lattice.size[None].cells):
+        for cell in range(self.lattice.size.cells[s]):
             total += self.cells.vertical_speed(s, cell)
-        return self.parameters.mass[None] * total
+        return self.parameters.mass[s] * total
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """How often each of the named effects acted; without their energy, all of them steer."""
@@ -140,14 +147,14 @@ class LatticeDevice:
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""
-        geometry, cells = self.lattice.geometry, self.cells
+        geometry, cells = self.lattice.geometry(s), self.cells
         kind, travelled, speed = (
             self.table.row(field, s)[: geometry.cells]
             for field in (cells.kind, cells.travelled, cells.speed)
         )
         shift, velocity = self.motion_of(s, kind, travelled, speed)
         velocity[kind == HELD, 1] = self.velocity[s]
-        position = geometry.centres(self.parameters.width[None]) + shift
+        position = geometry.centres(self.parameters.width[s]) + shift
         present = (kind != EMPTY) & (kind != WALL)
         return {"position": position[present], "velocity": velocity[present]}
 

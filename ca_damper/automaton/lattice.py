@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
+from ca_damper.filling import Fillings
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit.allocation import assign, assign_members
+from taichi_dem.kit.allocation import assign
 
 #: Content of a cell: a particle that moves in one of six directions, clockwise from up ...
 UP, UP_RIGHT, DOWN_RIGHT, DOWN, DOWN_LEFT, UP_LEFT = range(6)
@@ -20,7 +21,6 @@ UP, UP_RIGHT, DOWN_RIGHT, DOWN, DOWN_LEFT, UP_LEFT = range(6)
 EMPTY, WALL, HELD = 6, 7, 8
 KINDS = 9
 DIRECTIONS = 6
-
 _ANGLE = np.deg2rad(60.0) * np.arange(DIRECTIONS)
 
 
@@ -54,6 +54,22 @@ class Geometry:
         """Whether a particle may stand there; arrays welcome."""
         return (0 <= column) & (column < self.columns) & (0 <= row) & (row < self.rows)
 
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Members of a LatticeSize."""
+        first, end = self.cell_of(0, 0), self.cell_of(self.columns - 1, self.rows)
+        return {**vars(self), "first": first, "end": end}
+
+    def levels(self) -> np.ndarray:
+        """Height of the centre of each cell above the floor of lower columns [half cells]."""
+        column, row = np.divmod(np.arange(self.cells + 1), self.height)
+        return 2 * row - 1 + column % 2
+
+    def bottoms(self) -> np.ndarray:
+        """Lowest cell of the column of each cell, a wall."""
+        cell = np.arange(self.cells + 1)
+        return cell - cell % self.height
+
     def neighbours(self) -> np.ndarray:
         """Cell ahead of a particle, by its cell and kind, shape (cells + 1, KINDS).
 
@@ -66,17 +82,11 @@ class Geometry:
             *((column, row + 1), (column + 1, row + high), (column + 1, row + high - 1)),
             *((column, row - 1), (column - 1, row + high - 1), (column - 1, row + high)),
         )
-        table = np.full((self.cells + 1, KINDS), self.cells, dtype=np.int32)
+        table = np.full((self.cells + 1, KINDS), self.cells, dtype=np.int16)
         for direction, (c, r) in enumerate(steps):
             known = (-1 <= c) & (c <= self.columns) & (-1 <= r) & (r <= self.rows)
             table[:-1, direction] = np.where(known, self.cell_of(c, r), self.cells)
         return table
-
-    def blank(self) -> np.ndarray:
-        """WALL or EMPTY for each cell and the one beyond the lattice, shape (cells + 1,)."""
-        column, row = self.column_and_row(np.arange(self.cells))
-        kinds = np.where(self.inside(column, row), EMPTY, WALL)
-        return np.append(kinds, EMPTY).astype(np.int32)
 
     def centres(self, width: float) -> np.ndarray:
         """Horizontal and vertical centre of every cell [m], shape (cells, 2).
@@ -85,6 +95,11 @@ class Geometry:
         """
         column, row = self.column_and_row(np.arange(self.cells))
         return width * np.column_stack([column + 0.5, row + 0.5 + 0.5 * ((column + 1) % 2)])
+
+
+def geometry_of(options: Any) -> Geometry:
+    """Geometry of the options of an automaton."""
+    return Geometry(options.columns, options.rows)
 
 
 @ti.dataclass
@@ -104,54 +119,54 @@ class LatticeSize:
 
 @ti.data_oriented
 class Lattice:
-    """The tables of a geometry on the device, with room for others.
+    """The lattice of each scene on the device.
 
-    size: a LatticeSize, shape (). level: height of a cell's centre above the floor of the lower
-    columns, in cells. bottom: lowest cell of its column, a wall. raised: whether that column stands
-    half a cell higher.
+    Of the scenes, size, and the tables of a Geometry: level, bottom, and neighbour where
+    ``looks_ahead``. cosine: between directions.
     """
 
-    constant_fields = ("size", "neighbour", "blank", "cosine", "level", "bottom", "raised")
+    constant_fields = ("size", "neighbour", "cosine", "level", "bottom")
 
-    def __init__(self, table: SceneFields):
-        most = table.length("cells")
-        self.size = LatticeSize.field(shape=())
-        self.neighbour = ti.field(ti.i16, shape=(most, KINDS))
-        self.blank = ti.field(ti.i8, shape=most)
+    def __init__(self, table: SceneFields, looks_ahead: bool):
+        self.size, self.looks_ahead = table.structs(LatticeSize), looks_ahead
+        of_cells = table.capacity, table.length("cells")
+        self.level, self.bottom = (ti.field(ti.i16, shape=of_cells) for _ in range(2))
+        if looks_ahead:
+            self.neighbour = ti.field(ti.i16, shape=(*of_cells, KINDS))
         self.cosine = ti.field(ti.f64, shape=(KINDS, DIRECTIONS))
-        self.level = ti.field(ti.f64, shape=most)
-        self.bottom, self.raised = ti.field(ti.i16, shape=most), ti.field(ti.i8, shape=most)
 
-    def load(self, geometry: Geometry) -> None:
-        """Take over the tables of a geometry."""
+    def load(self, fillings: Fillings) -> None:
+        """Take over the geometry of each scene."""
         cosines = np.zeros((KINDS, DIRECTIONS))
         cosines[:DIRECTIONS] = alignments()
-        first, end = geometry.cell_of(0, 0), geometry.cell_of(geometry.columns - 1, geometry.rows)
-        assign_members(self.size, **vars(geometry), first=first, end=end)
-        column, row = np.divmod(np.arange(geometry.cells + 1), geometry.height)
-        assign(self.level, row - 0.5 + 0.5 * (column % 2))
-        assign(self.bottom, column * geometry.height)
-        assign(self.raised, column % 2)
-        assign(self.blank, geometry.blank())
-        assign(self.neighbour, geometry.neighbours())
         assign(self.cosine, cosines)
+        fillings.write(self.size, lambda one: geometry_of(one).sizes)
+        fillings.write(self.level, lambda one: geometry_of(one).levels())
+        fillings.write(self.bottom, lambda one: geometry_of(one).bottoms())
+        if self.looks_ahead:
+            fillings.write(self.neighbour, lambda one: geometry_of(one).neighbours())
 
-    @property
-    def geometry(self) -> Geometry:
-        """The geometry that is loaded."""
-        size = self.size[None]
-        return Geometry(int(size.columns), int(size.rows))
+    def geometry(self, s: int) -> Geometry:
+        """The geometry of a scene."""
+        return Geometry(int(self.size.columns[s]), int(self.size.rows[s]))
 
     @ti.func
-    def nearest_row(self, base, height):
+    def blank(self, s, cell):
+        """What is in a cell without particles: WALL, or EMPTY inside and beyond the lattice."""
+        row = cell % self.size.height[s]
+        outer = self.in_side_wall(s, cell) or row == 0 or row == self.size.rows[s] + 1
+        return WALL if outer and cell < self.size.cells[s] else EMPTY
+
+    @ti.func
+    def nearest_row(self, s, base, height):
         """Row nearest to a height [cells] in the column whose lowest cell, a wall, is ``base``."""
-        row = ti.cast(ti.floor(height - self.level[base + 1] + 0.5), ti.i32)
-        return ti.math.clamp(row, 0, self.size[None].rows - 1)
+        row = ti.cast(ti.floor(height - self.height_of(s, base + 1) + 0.5), ti.i32)
+        return ti.math.clamp(row, 0, self.size.rows[s] - 1)
 
     @ti.func
-    def cell_ahead(self, cell, kind):
+    def cell_ahead(self, s, cell, kind):
         """Cell ahead of a particle of this kind."""
-        return ti.cast(self.neighbour[cell, kind], ti.i32)
+        return ti.cast(self.neighbour[s, cell, kind], ti.i32)
 
     @ti.func
     def upward(self, kind):
@@ -159,35 +174,40 @@ class Lattice:
         return self.cosine[kind, UP]
 
     @ti.func
-    def cell_of(self, column, row):
+    def cell_of(self, s, column, row):
         """Number of the cell in a column and row, both counted inside the walls."""
-        return (column + 1) * self.size[None].height + row + 1
+        return (column + 1) * self.size.height[s] + row + 1
 
     @ti.func
-    def cell_from(self, column, k, way):
+    def cell_from(self, s, column, k, way):
         """The k-th cell of a column, counted upwards (way 1) or downwards (-1)."""
-        return self.cell_of(column, k if way > 0 else self.size[None].rows - 1 - k)
+        return self.cell_of(s, column, k if way > 0 else self.size.rows[s] - 1 - k)
 
     @ti.func
-    def height_of(self, cell):
+    def height_of(self, s, cell):
         """Height of a cell's centre above the floor of the lower columns, in cells."""
-        return self.level[cell]
+        return 0.5 * self.level[s, cell]
 
     @ti.func
-    def column_of(self, cell):
+    def raised(self, s, cell):
+        """1 for a cell whose column stands half a cell higher, else 0."""
+        return (ti.cast(self.level[s, cell], ti.i32) + 1) & 1
+
+    @ti.func
+    def column_of(self, s, cell):
         """Column of a cell, -1 for the left wall."""
-        return ti.cast(self.bottom[cell], ti.i32) // self.size[None].height - 1
+        return ti.cast(self.bottom[s, cell], ti.i32) // self.size.height[s] - 1
 
     @ti.func
-    def column_beside(self, cell, way):
+    def column_beside(self, s, cell, way):
         """Lowest cell of the column to the right (way 1) or left (-1) of a cell, a wall."""
-        return ti.cast(self.bottom[cell], ti.i32) + way * self.size[None].height
+        return ti.cast(self.bottom[s, cell], ti.i32) + way * self.size.height[s]
 
     @ti.func
-    def in_side_wall(self, cell):
+    def in_side_wall(self, s, cell):
         """Whether a wall cell belongs to a side wall; the corners do."""
-        size = self.size[None]
-        return cell < size.height or cell >= size.cells - size.height
+        height = self.size.height[s]
+        return cell < height or cell >= self.size.cells[s] - height
 
 
 @ti.func

@@ -46,7 +46,7 @@ class StaticContact:
             kind = self.cells.at(s, cell)
             if pressed and (kind == UP or kind == DOWN):
                 relative = self.cells.vertical_speed(s, cell) - velocity
-                if abs(relative) < self.parameters.threshold[None] * pull:
+                if abs(relative) < self.parameters.threshold[s] * pull:
                     result = self.supported(s, cell)
         return result
 
@@ -71,7 +71,7 @@ class StaticContact:
         if self.held[s] > 0:
             kind = UP if velocity > 0.0 else DOWN
             travelled = self.accumulator.at_wall(kind, self.cells.offset[s])
-            for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
+            for k in range(self.cells.traversal.begin(s), self.cells.traversal.end(s)):
                 cell = self.cells.traversal.cell(s, k)
                 if self.cells.at(s, cell) == HELD:
                     self.cells.put(s, cell, kind, abs(velocity), travelled)

@@ -96,7 +96,7 @@ class Transport(Part):
     def fly_all(self, s, motion, pull):
         """One step of all particles; returns what the lattice gives the container [quanta]."""
         touching, crossing, oblique = 0, 0, 0
-        for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
+        for k in range(self.cells.traversal.begin(s), self.cells.traversal.end(s)):
             cell = self.cells.traversal.cell(s, k)
             touches, free, upward = self.fly(s, cell, self.table.dt[s], pull)
             if touches:
@@ -132,11 +132,11 @@ class Transport(Part):
             kind = DOWN
             self.cells.kind[s, cell] = ti.cast(DOWN, ti.i8)
         travelled += speed * dt
-        due = travelled >= self.parameters.width[None]
-        blocked = self.cells.at(s, self.lattice.cell_ahead(cell, kind)) != EMPTY
+        due = travelled >= self.parameters.width[s]
+        blocked = self.cells.at(s, self.lattice.cell_ahead(s, cell, kind)) != EMPTY
         if blocked and due:
             # No particle gets deeper into another than where the next step frees it.
-            travelled = self.parameters.width[None]
+            travelled = self.parameters.width[s]
         self.cells.speed[s, cell] = speed
         self.cells.travelled[s, cell] = travelled
         touches = blocked or self.resting.noticed(s, cell, kind)
@@ -149,28 +149,28 @@ class Transport(Part):
         for k in range(self.crossing_count[s]):
             cell = ti.cast(self.crossing[s, k], ti.i32)
             # A collision may have turned it since.
-            if self.cells.travelled[s, cell] >= self.parameters.width[None]:
-                target = self.lattice.cell_ahead(cell, self.cells.at(s, cell))
+            if self.cells.travelled[s, cell] >= self.parameters.width[s]:
+                target = self.lattice.cell_ahead(s, cell, self.cells.at(s, cell))
                 if self.cells.at(s, target) == EMPTY:
                     self.conflict_resolution.claim(s, target, rank(step, shared, cell, MOVE))
                     self.crossing[s, claimants] = ti.cast(cell, ti.i16)
                     claimants += 1
         for k in range(claimants):
             cell = ti.cast(self.crossing[s, k], ti.i32)
-            target = self.lattice.cell_ahead(cell, self.cells.at(s, cell))
+            target = self.lattice.cell_ahead(s, cell, self.cells.at(s, cell))
             if self.conflict_resolution.holds(s, target, rank(step, shared, cell, MOVE)):
-                left = self.cells.travelled[s, cell] - self.parameters.width[None]
+                left = self.cells.travelled[s, cell] - self.parameters.width[s]
                 self.cells.relocate(s, cell, target, left)
                 self.accounting.arrive(s, target)
 
     @ti.func
     def follow(self, s, step, motion):
         """Follow the container's staircase; returns what pushes give it [quanta]."""
-        way = self.cells.step_along(s, step, motion, self.parameters.width[None])
+        way = self.cells.step_along(s, step, motion, self.parameters.width[s])
         impulse = ti.cast(0, ti.i64)
         if way != 0:
             self.mark(s, way)
-            for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
+            for k in range(self.cells.traversal.begin(s), self.cells.traversal.end(s)):
                 cell = self.cells.traversal.cell(s, k)
                 if self.pushed[s, cell] == 1 and self.cells.at(s, cell) != HELD:
                     impulse += self.push(s, cell, way, motion.v)
@@ -181,17 +181,16 @@ class Transport(Part):
     @ti.func
     def mark(self, s, way):
         """Mark the particles that touch the wall behind and all that hang together with them."""
-        number, lattice = 0, self.lattice.size[None]
-        for cell in range(lattice.cells + 1):
+        number, size = 0, self.lattice.size[s]
+        for cell in range(size.cells + 1):
             self.pushed[s, cell] = ti.cast(0, ti.i8)
-        for column in range(lattice.columns):
-            row = 0 if way > 0 else lattice.rows - 1
-            number = self.reach(s, self.lattice.cell_of(column, row), way, number)
+        for column in range(size.columns):
+            number = self.reach(s, self.lattice.cell_from(s, column, 0, way), way, number)
         while number > 0:
             number -= 1
             cell = ti.cast(self.border[s, number], ti.i32)
             for direction in range(DIRECTIONS):
-                number = self.reach(s, self.lattice.cell_ahead(cell, direction), way, number)
+                number = self.reach(s, self.lattice.cell_ahead(s, cell, direction), way, number)
 
     @ti.func
     def reach(self, s, cell, way, number):
@@ -221,15 +220,15 @@ class Transport(Part):
         else:
             gain = 0.0
             self.cells.travelled[s, cell] = self.accumulator.distance_to_wall(
-                self.cells.travelled[s, cell], kind, way, self.parameters.width[None]
+                self.cells.travelled[s, cell], kind, way, self.parameters.width[s]
             )
         return self.accounting.push(s, gain)
 
     @ti.func
     def shift(self, s, way):
         """Keep all others in place in the room: one cell the other way, those in front first."""
-        for column in range(self.lattice.size[None].columns):
-            for k in range(self.lattice.size[None].rows):
-                cell = self.lattice.cell_from(column, k, way)
+        for column in range(self.lattice.size.columns[s]):
+            for k in range(self.lattice.size.rows[s]):
+                cell = self.lattice.cell_from(s, column, k, way)
                 if self.cells.at(s, cell) < DIRECTIONS and self.pushed[s, cell] == 0:
                     self.cells.relocate(s, cell, cell - way, self.cells.travelled[s, cell])

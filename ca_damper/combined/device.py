@@ -12,13 +12,12 @@ from typing import Any, ClassVar
 
 import taichi as ti
 
-from ca_damper.filling import Action, Motion, Structure
+from ca_damper.filling import Action, Fillings, Motion, Structure
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import vec2
 from ca_damper.spheres.dynamics import DeviceSpheres
 from ca_damper.spheres.effect_activity import FLIGHTS
 from ca_damper.spheres.options import Spheres
-from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import whole
 
@@ -30,17 +29,17 @@ _CLEAR = 1.5
 class DeviceCombined(DeviceSpheres):
     """The grains of all scenes of a table; see ``ca_damper.filling``.
 
-    substeps: short steps of a step, shape (). substep: short steps and flights since the reset.
+    substeps: short steps of a step. substep: short steps and flights since the reset.
     """
 
     def __init__(self, options: Any, table: SceneFields):
         super().__init__(options, table)
-        self.substeps, self.substep = ti.field(ti.i32, shape=()), table.field(ti.i32)
+        self.substeps, self.substep = table.field(ti.i32), table.field(ti.i32)
 
-    def load(self, options: Any) -> None:
-        """Take over the numbers of grains of the same structure."""
-        super().load(options)
-        assign(self.substeps, options.substeps)
+    def load(self, fillings: Fillings) -> None:
+        """Take over the numbers of the grains of each scene."""
+        super().load(fillings)
+        fillings.write(self.substeps, lambda one: one.substeps)
 
     @ti.func
     def reset(self, s):
@@ -68,14 +67,15 @@ class DeviceCombined(DeviceSpheres):
         bodies, search = self.bodies, self.search
         lead, clear = bodies.lead[s], False
         if lead > 0.0:
-            low, high = bodies.reach_of_walls(motion.x + lead * (motion.v + 0.5 * lead * motion.a))
+            floor = motion.x + lead * (motion.v + 0.5 * lead * motion.a)
+            low, high = bodies.reach_of_walls(s, floor)
             least, most = 0.5 / lead * search.least[s], 0.5 / lead * search.most[s]
-            time, pull = _CLEAR * dt, ti.abs(bodies.body[None].pull)
+            time, pull = _CLEAR * dt, ti.abs(bodies.body[s].pull)
             walls = ti.abs(motion.v) + time * ti.abs(motion.a)
             fall = time * (vec2(0.0, walls) + time * pull)
             fastest = ti.max(ti.abs(least), ti.abs(most)).max()
             ahead = vec2(time * (most - least).norm(), time * fastest + fall.norm())
-            if (ahead < search.cells.grid[None].skin).all():
+            if (ahead < search.cells.grid[s].skin).all():
                 search.refresh(s, low, high, ahead)
                 clear = search.is_clear(s, time, low, high, fall)
             else:
@@ -112,7 +112,7 @@ class DeviceCombined(DeviceSpheres):
     @ti.func
     def _take_short_steps(self, s, step, full, motion):
         """Take the grains over a step by short ones; returns the impulse of all [N s]."""
-        count, total = self.substeps[None], 0.0
+        count, total = self.substeps[s], 0.0
         dt = full / count
         since = dt + self._shift(s, 0.5 * dt)
         x, v = motion.x, motion.v

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ca_damper.filling import Fillings
 from ca_damper.report.certificate import Certificate, Periods
 from ca_damper.report.measures import Cycles
 from ca_damper.report.steady_state import period
@@ -20,23 +21,31 @@ from taichi_dem.kit.effect_usage import EffectUse
 ALIKE = 1e-3
 
 
-def activated(filling: Any, table: Any, effects: str) -> tuple[Any, tuple[Estimate, ...]]:
-    """The filling with the effects that are asked for, and estimates of those decided on."""
-    if effects == "listed" or not hasattr(filling, "activated"):
-        return filling, ()
-    chosen: tuple[Any, tuple[Estimate, ...]] = filling.activated(_most_particles(table))
-    return chosen
+def activated(
+    fillings: Fillings, table: Any, effects: str
+) -> tuple[Fillings, tuple[Estimate, ...]]:
+    """The fillings with the effects that are asked for, and estimates of those decided on."""
+    if effects == "listed" or not hasattr(fillings.kinds[0], "activated"):
+        return fillings, ()
+    most = _most_particles(table)
+    chosen, estimates = zip(*(one.activated(most) for one in fillings.kinds))
+    return Fillings([chosen[k] for k in fillings.which], table.count), _largest(estimates)
+
+
+def _largest(estimates):
+    """Of the estimates of each filling, in one order of the effects, the largest of each effect."""
+    return tuple(max(of_one, key=lambda one: one.group) for of_one in zip(*estimates))
 
 
 def certificate_of(batch: Any) -> Certificate:
     """Certificate of a batch since its start."""
-    filling, device = batch.filling, batch.device
-    left_out = getattr(filling, "left_out", None)
+    kinds, device, most = batch.fillings.kinds, batch.device, _most_particles(batch.table)
+    left_out = [one.left_out(most) for one in kinds if hasattr(one, "left_out")]
     audit = device.audit() if hasattr(device, "audit") else None
     return Certificate(
         effects=batch.asked_effects,
         acting=_acting(batch, device) if hasattr(device, "first_steps") else (),
-        left_out=left_out(_most_particles(batch.table)) if left_out else (),
+        left_out=_largest(left_out),
         estimates=batch.estimates,
         audits=() if audit is None else (audit,),
         periods=batch.periods,
@@ -63,7 +72,7 @@ def _most_particles(table: Any) -> int:
 def _acting(batch, device):
     """In how many scenes each effect acted, and from when [s], for fillings that note it."""
     found = []
-    for name, steps in device.first_steps(batch.filling.effects).items():
+    for name, steps in device.first_steps(batch.fillings.kinds[0].effects).items():
         times = batch.time_origin + steps * batch.table.column("dt")
         acted = times[np.isfinite(times)]
         since = float(acted.min()) if acted.size else None

@@ -29,7 +29,7 @@ _STAGES = (1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0)
 class Container:
     """Base of all containers; by itself it takes over nothing."""
 
-    def load(self, gravity: float, rtol: float, atol: float) -> None:
+    def load(self, rtol: float, atol: float) -> None:
         """Take over the numbers of a batch."""
 
     @ti.func
@@ -41,18 +41,17 @@ class Container:
 class IntegratedContainer(Container):
     """Base of containers that RK45 moves on under the action of the filling.
 
-    impulse [N s] and carried [kg] in the present step. gravity [m/s^2]. tolerance: local error
-    allowed, rtol and atol, the latter in m and m/s.
+    impulse [N s] and carried [kg] in the present step. tolerance: local error allowed, rtol and
+    atol, the latter in m and m/s.
     """
 
     def __init__(self, table: SceneFields):
         self.table = table
         self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
-        self.gravity, self.tolerance = ti.field(ti.f64, shape=()), ti.field(ti.f64, shape=2)
+        self.tolerance = ti.field(ti.f64, shape=2)
 
-    def load(self, gravity: float, rtol: float, atol: float) -> None:
+    def load(self, rtol: float, atol: float) -> None:
         """Take over the numbers of a batch."""
-        assign(self.gravity, gravity)
         assign(self.tolerance, [rtol, atol])
 
 
@@ -152,7 +151,7 @@ class SprungContainer(SpringContainer):
         stiffness, damping = table.stiffness[s] * per_mass, table.damping[s] * per_mass
         by_spring = stiffness * table.base_amplitude[s]
         by_dashpot = damping * omega * table.base_amplitude[s]
-        force = action.impulse / table.dt[s] - action.carried * self.gravity[None]
+        force = action.impulse / table.dt[s] - action.carried * self.table.gravity[s]
         return Forcing(
             stiffness=stiffness,
             damping=damping,
@@ -229,7 +228,7 @@ class ExcitedContainer(SpringContainer):
         if ti.static(self.lifts):
             # On a spring the weight of the container itself is in x = 0.
             heavy += self.table.mass[s]
-        force = action.impulse / self.table.dt[s] - heavy * self.gravity[None]
+        force = action.impulse / self.table.dt[s] - heavy * self.table.gravity[s]
         return Load(
             scene=s,
             start=self.elapsed[s] * self.table.dt[s],

@@ -38,13 +38,13 @@ class MomentumAccount:
 
     Counted from the end of the first step, when all carried particles move along.
 
-    weight: of a particle [N]. expected: momentum that a filling should have [kg m/s]. late: part of
-    it that the carried mass takes over at its next step [kg m/s]. exchanged: sum of the magnitudes
-    of the impulses on the container [N s].
+    expected: momentum that a filling should have [kg m/s]. late: part of it that the carried mass
+    takes over at its next step [kg m/s]. exchanged: sum of the magnitudes of the impulses on the
+    container [N s].
     """
 
     def __init__(self, table: SceneFields):
-        self.table, self.weight = table, ti.field(ti.f64, shape=())
+        self.table = table
         self.expected, self.late, self.exchanged = (table.field(ti.f64) for _ in range(3))
 
     @ti.func
@@ -57,7 +57,7 @@ class MomentumAccount:
         """Book a step with a mean force [N] on the container."""
         dt = self.table.dt[s]
         self.expected[s] = (
-            self.expected[s] - (force + self.table.particles[s] * self.weight[None]) * dt
+            self.expected[s] - (force + self.table.particles[s] * self.table.weight[s]) * dt
         )
         self.exchanged[s] = self.exchanged[s] + ti.abs(force) * dt
         self.late[s] = late
@@ -80,9 +80,8 @@ class MomentumAccount:
 class Coupling:
     """Filling, container and clock of all scenes, tied together.
 
-    device: what ``filling.bind`` gave. account: a MomentumAccount. recorder: a Recorder. gravity
-    [m/s^2]. record: of the measured cycles, shape (scenes, cycles, columns of
-    ``measures.COLUMNS``).
+    device: what ``filling.bind`` gave. account: a MomentumAccount. recorder: a Recorder. record: of
+    the measured cycles, shape (scenes, cycles, columns of ``measures.COLUMNS``).
     """
 
     def __init__(
@@ -97,7 +96,6 @@ class Coupling:
         self.table, self.clock, self.container, self.device = table, clock, container, device
         self.account, self.recorder = account, recorder
         self.padding = _CPU_BLOCK if backend.is_cpu() else 1
-        self.gravity = ti.field(ti.f64, shape=())
         for name in ("order", "step", "begin", "goal", "measure_from", "cycle", "status"):
             setattr(self, name, table.field(ti.i32))
         self.attempts, self.force = table.field(ti.i64), table.field(ti.f64)
@@ -204,7 +202,7 @@ class Coupling:
     def _force(self, s, action, speed_gain):
         """Mean force [N] of the filling on the container over a step with a gain in speed [m/s]."""
         dt = self.table.dt[s]
-        return action.impulse / dt - action.carried * (self.gravity[None] + speed_gain / dt)
+        return action.impulse / dt - action.carried * (self.table.gravity[s] + speed_gain / dt)
 
     @ti.func
     def _enter(self, s, step, late):

@@ -11,12 +11,11 @@ from ca_damper.engine.modal_container import ModalContainer
 from ca_damper.engine.recorder import ROOM, Recorder
 from ca_damper.engine.signals import DeviceExcitation
 from ca_damper.excitation.excitation import Excitation, ExcitationKind
-from ca_damper.filling import LEAST_PLACES
+from ca_damper.filling import LEAST_PLACES, Fillings
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.gravity import gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.scenes.table import SceneTable
-from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.engine_pool import Engine, EnginePool
 from taichi_dem.kit.errors import InputError
 
@@ -75,35 +74,39 @@ class DamperEngine(Engine):
         self.is_compiled = False
 
     def load(
-        self, filling: Any, table: SceneTable, rtol: float, atol: float, excitation: Excitation
+        self,
+        fillings: Fillings,
+        table: SceneTable,
+        rtol: float,
+        atol: float,
+        excitation: Excitation,
     ) -> None:
         """Take over the numbers of a batch; the state follows with ``coupling.start``."""
         self.table.load(table)
-        gravity = gravity_along(filling)
-        self.container.load(gravity, rtol, atol)
+        fillings.write(self.table.gravity, gravity_along)
+        fillings.write(self.table.weight, lambda one: one.particle_mass * gravity_along(one))
+        self.container.load(rtol, atol)
         self.excitation.load(excitation)
-        assign(self.coupling.gravity, gravity)
-        assign(self.account.weight, filling.particle_mass * gravity)
-        self.device.load(filling)
+        self.device.load(fillings)
 
 
 _POOL = EnginePool(DamperEngine, _LEAST)
 
 
 def borrow(
-    filling: Any,
+    fillings: Fillings,
     mount: Hashable,
     kind: ExcitationKind,
     counts: tuple[int, int, int],
     more: dict[str, int],
     owner: Any,
 ) -> DamperEngine:
-    """An engine in which so many scenes of a filling find room, for an owner; or InputError.
+    """An engine in which so many scenes of fillings find room, for an owner; or InputError.
 
     mount: its word, or the number of modes. counts: scenes, measured cycles and samples. more:
-    sizes by name beside those of the filling.
+    sizes by name beside those of the fillings.
     """
-    structure = filling.structure
+    structure, filling = fillings.structure, fillings.kinds[0]
     scenes, *others = counts
     places = next(iter(structure.sizes.values()), 0)
     rooms = ("particles", places, _MOST_PLACES), ("cycles or samples", max(others), _MOST_RECORDS)

@@ -14,7 +14,7 @@ from ca_damper.engine.damper_engine import DamperEngine
 from ca_damper.engine.modal_mount import ModalMount
 from ca_damper.errors import SimulationDiverged
 from ca_damper.excitation.excitation import Excitation
-from ca_damper.filling import Filling
+from ca_damper.filling import Fillings
 from ca_damper.report import measures
 from ca_damper.scenes.scene_fields import SceneMemory
 from ca_damper.scenes.scene_numbers import SceneNumbers
@@ -30,14 +30,15 @@ _LOST_IN_WORDS = "has a container whose motion is not a finite number"
 
 
 class LoadedScenes:
-    """A filling and a table of scenes on an engine, put there by a Batch.
+    """Fillings and a table of scenes on an engine, put there by a Batch.
 
-    numbers: of the scenes, as SceneNumbers. time_origin: when step 0 would have been at the present
-    step [s], (scenes,). _told: scenes of which a warning has told that they diverged. _recording:
-    steps of the last run if it was recorded, those between samples, and number of samples.
+    fillings, numbers: of the scenes, as Fillings and SceneNumbers. time_origin: when step 0 would
+    have been at the present step [s], (scenes,). _told: scenes of which a warning has told that
+    they diverged. _recording: steps of the last run if it was recorded, those between samples, and
+    number of samples.
     """
 
-    filling: Filling
+    fillings: Fillings
     count: int
     if_diverged: str
     modal: ModalMount | None
@@ -57,6 +58,11 @@ class LoadedScenes:
         lost: np.ndarray = self._read_status()[2] != 0
         group = 1 if self.modal is None else self.modal.group
         return np.repeat(lost.reshape(-1, group).any(axis=1), group)
+
+    @property
+    def filling(self) -> Any:
+        """The filling of all scenes; InputError where they differ."""
+        return self.fillings.one
 
     @property
     def table(self) -> SceneTable:
@@ -86,7 +92,7 @@ class LoadedScenes:
     def memory(self) -> SceneMemory:
         """State of the batch on the device, as arrays."""
         sizes = {"cycles": max(1, self.measured_cycles), "samples": self.recorded_samples}
-        places = {**self.filling.structure.sizes, **self.excitation.sizes}
+        places = {**self.fillings.structure.sizes, **self.excitation.sizes}
         return SceneMemory(self.engine, {**sizes, **places})
 
     @property
@@ -251,10 +257,10 @@ class LoadedScenes:
         """
         step, _, status = self._read_status()
         # Scenes stop where they diverge.
-        time_s, filling, table = self.time_s, self.filling, self.table
+        time_s, of, table = self.time_s, self.fillings.of, self.table
         lost = sorted(np.flatnonzero(status), key=lambda s: time_s[s])
         return [
-            divergence(filling, table.row(s), int(status[s]), int(step[s]), float(time_s[s]))
+            divergence(of(s), table.row(s), int(status[s]), int(step[s]), float(time_s[s]))
             for s in map(int, lost)
         ]
 

@@ -253,7 +253,7 @@ class ModalContainer(IntegratedContainer):
             self.constant[first, i], self.lag[first, i] = 0.0, 0.0
         for s in range(first, first + self.boxes[None]):
             c, dt = self.carried[s], self.table.dt[first]
-            force = self.impulse[s] / dt - c * self.gravity[None]
+            force = self.impulse[s] / dt - c * self.table.gravity[s]
             for k in range(self.modes):
                 shape = self.shape[s, k]
                 self.constant[first, k] = self.constant[first, k] + force * shape

@@ -1,7 +1,7 @@
 """Range in which a filling was checked, and scenes of a batch outside it."""
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,8 +51,9 @@ class Driven(NamedTuple):
 
 
 def checked_range(batch: Any) -> CheckedRange | None:
-    """Of a batch; None where its filling names no range."""
-    if not hasattr(batch.filling, "checked_range"):
+    """Of a batch; None where its fillings name no range."""
+    kinds, which = batch.fillings.kinds, batch.fillings.which
+    if not hasattr(kinds[0], "checked_range"):
         return None
     particles, mass, size, frequency = map(
         batch.table.column, ("particles", "mass", "base_amplitude", "frequency")
@@ -66,13 +67,18 @@ def checked_range(batch: Any) -> CheckedRange | None:
         mass = np.full(batch.count, np.inf)
     if batch.mount != "base" or batch.excitation.kind.base != "sine":
         size = np.full(batch.count, np.nan)
-    driven = Driven(particles, mass, size, size * (2.0 * np.pi * frequency) ** 2)
-    found: CheckedRange = batch.filling.checked_range(driven)
-    return replace(found, knows_motion=bool((size > 0.0).all()))
+    driven = particles, mass, size, size * (2.0 * np.pi * frequency) ** 2
+    found: list[CheckedRange] = [
+        kind.checked_range(Driven(*(of_all[which == k] for of_all in driven)))
+        for k, kind in enumerate(kinds)
+    ]
+    outside = tuple(dict.fromkeys(words for one in found for words in one.outside))
+    warning = "; ".join(dict.fromkeys(one.warning for one in found if one.warning))
+    return CheckedRange(found[0].words, outside, warning, bool((size > 0.0).all()))
 
 
 def warn_outside(batch: Any) -> None:
-    """A UserWarning where the filling of a batch is known to fail on its scenes."""
+    """A UserWarning where the fillings of a batch are known to fail on its scenes."""
     found = checked_range(batch)
     if found is not None and found.warning:
         warnings.warn(found.warning, stacklevel=3)

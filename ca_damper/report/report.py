@@ -38,7 +38,8 @@ class Report:
     simulated_s : float
         Longest time of a scene since its start [s].
     step_bound : tuple of (float, str) or None
-        Longest step that the filling allows or advises [s], and why; None where any does.
+        Longest step that the filling allows or advises [s], and why; None where any does. Of
+        several fillings that of which a scene takes the largest share.
     momentum_error : float
         Momentum of the particles that no impulse explains, as a share of what they and the
         container exchanged, in the worst scene.
@@ -68,6 +69,8 @@ class Report:
     checked : CheckedRange, optional
         Range in which the filling was checked, and what of the run lies outside; None where the
         filling names none.
+    bound_taken : float, default 0.0
+        Step of that scene, as a share of ``step_bound``.
     """
 
     method: str
@@ -92,6 +95,7 @@ class Report:
     excitation: tuple[str, ...] = ()
     transient: str = ""
     checked: CheckedRange | None = None
+    bound_taken: float = 0.0
 
     def __repr__(self):
         particles = f"{_range(self.particles)} particles"
@@ -160,7 +164,7 @@ class Report:
         if self.step_bound is None:
             return ""
         most, why = self.step_bound
-        return f"{why}: {most:.3g} s, {self.dt_s[1] / most:.2g} of it taken"
+        return f"{why}: {most:.3g} s, {self.bound_taken:.2g} of it taken"
 
     def _rows(self):
         """All lines by name."""

@@ -230,13 +230,18 @@ def _searched(case, filling, boxes, seeds):
     """The winner among boxes and what was seen on the way: fields of a BestDamper."""
     begun = time.process_time()
     tried = [(one, float(case.values(filling, one, 1, brief=True)[0])) for one in boxes]
-    left = [one for one, _ in sorted(tried, key=lambda pair: pair[1])[:_LEFT]]
+    left = [one for one, _ in sorted(tried, key=lambda pair: _rank(pair[1]))[:_LEFT]]
     judged = [(one, Value.of(case.values(filling, one, seeds))) for one in left]
     # By the upper end of the bar: a box whose motion nobody can tell is no good box.
-    (best, value), *others = sorted(judged, key=lambda pair: pair[1].mean + pair[1].error)
+    (best, value), *others = sorted(judged, key=lambda pair: _rank(pair[1].mean + pair[1].error))
     equals = ((one, v) for one, v in others if v.mean - v.error < value.mean + value.error)
     found = {"grains": best, "value": value, "equals": tuple(equals), "tried": tuple(tried)}
     return {**found, "search_seconds": time.process_time() - begun}
+
+
+def _rank(value):
+    """A value, or infinity where scenes of a box have diverged."""
+    return math.inf if math.isnan(value) else value
 
 
 def _confirmed(case, filling, best, seeds, tolerance):

@@ -179,7 +179,7 @@ def film(
     Raises
     ------
     InputError
-        The batch was not started, or a number is out of range.
+        The batch was not started, its scenes have several fillings, or a number is out of range.
     SimulationDiverged
         All scenes diverged.
 
@@ -189,7 +189,7 @@ def film(
     """
     if not hasattr(batch, "sample") or isinstance(batch, type):
         raise InputError(f"batch must be a Batch that has been started, got {shown(batch)}")
-    steps = whole("steps", steps, 1, _MOST_STEPS)
+    steps, filling = whole("steps", steps, 1, _MOST_STEPS), batch.filling
     samples = range(0, steps + 1, whole("sample_every", sample_every, 1, _MOST_STEPS))
     frames = range(0)
     if frame_every is not None:
@@ -210,4 +210,4 @@ def film(
     if steps in frames:
         shots.append(frames_of(batch, present))
     history = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
-    return Film(history, tuple(zip(*shots)), batch.filling, batch.mount)
+    return Film(history, tuple(zip(*shots)), filling, batch.mount)

@@ -155,7 +155,7 @@ def shake_structure(
     Parameters
     ----------
     filling : Filling
-        Filling of all boxes.
+        Filling of the boxes that have none of their own.
     structure : ModalStructure
         Places and modes.
     boxes : Box or sequence of Box
@@ -208,24 +208,27 @@ def shake_structure(
             f"force_place must be {wanted} a force in the excitation, got {shown(force_place)}"
         )
     boxed = several("boxes", boxes, lambda name, box: instance(name, box, Box))
-    for box in boxed:
-        whole("particles", box.particles, 0, filling.capacity)
+    own = [filling if box.filling is None else box.filling for box in boxed]
+    for box, one in zip(boxed, own):
+        whole("particles", box.particles, 0, one.capacity)
     modal = ModalMount(structure, [box.place for box in boxed], force_place)
     scenes = modal.group * len(numbered)
     if scenes > MOST_SCENES:
         words = "(boxes + empty places) x seeds must be at most"
         raise InputError(f"{words} {MOST_SCENES}, got {scenes}")
-    window = _window(excitation, duration, _longest_step(filling, structure, dt), interval)
+    window = _window(excitation, duration, _longest_step(own, structure, dt), interval)
     start = {
         name: np.tile(_of_places(name, value, structure)[[*modal.scene_places]], len(numbered))
         for name, value in (("displacement", displacement), ("velocity", velocity))
     }
     table = _table_of_groups(modal, boxed, numbered, window)
+    # Nothing is in the others, whatever their filling.
+    fillings = [*own, *own[:1] * (modal.group - len(own))] * len(numbered)
     many = structure, boxed, numbered, window, force_place, start
     job = f"shaken structure {identity_of(many)}"
     options = {"excitation": excitation, "structure": modal, "effects": effects}
     common, motion = _recorded(
-        (filling, table), options, window, start, progress, (job, checkpoint, resume)
+        (fillings, table), options, window, start, progress, (job, checkpoint, resume)
     )
     # A place is that of the first scene there.
     places = [modal.scene_places.index(i) for i in range(structure.place_count)]
@@ -275,7 +278,8 @@ def _excitation(value: Any) -> Excitation:
 def _recorded(scenes, options, window, start, progress, saving):
     """Run a batch over its window: fields that all scenes share, and those over scenes at the end.
 
-    scenes: filling and table. saving: words for the job, and both options of checkpoints.
+    scenes: filling, or one for each, and table. saving: words for the job, and both options of
+    checkpoints.
     """
     job, checkpoint, resume = saving
     with reporting(progress, "shaking") as tell:
@@ -286,17 +290,18 @@ def _recorded(scenes, options, window, start, progress, saving):
             writer.save()
     series, sound = batch.time_series(), int(np.argmin(batch.diverged))
     common: dict[str, Any] = {"time_s": series["time_s"][:, sound], "base": series["y"][:, sound]}
-    common.update(label=scenes[0].label, excitation=batch.excitation, report=batch.report())
+    common.update(excitation=batch.excitation, report=batch.report())
+    common["label"] = common["report"].method
     highest = np.maximum(cycles.mean_of("x_max"), -cycles.mean_of("x_min"))
     motion = {name: series[name] for name in ("x", "v", "force")}
     return common, {**motion, "rms": cycles.rms, "peak": highest}
 
 
-def _longest_step(filling, structure, dt):
-    """Step asked for [s], or that of the filling and of the highest mode; InputError."""
+def _longest_step(fillings, structure, dt):
+    """Step asked for [s], or that of the fillings and of the highest mode; InputError."""
     highest = float(structure.frequencies.max())
     if dt is None:
-        return automatic_dt(filling.default_dt, highest)
+        return automatic_dt(min(one.default_dt for one in fillings), highest)
     most, longest = positive("dt", dt), 1.0 / (LEAST_STEPS_PER_CYCLE * highest)
     if most > longest * (1.0 + 1e-12):
         got, bound = told_apart(most, longest)

@@ -45,6 +45,7 @@ class SceneFields:
 
     particles [-], seed [-] (cast to u32 for hashing), dt [s], frequency [Hz] and base_amplitude [m]
     of the base motion, and the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
+    Of its filling, gravity: along the motion [m/s^2]; weight: of a particle along it [N].
     recoil: speed that a unit impulse gives the container [1/kg], 1 / mass on a spring and 0 for one
     whose motion is prescribed; written at the start of a run.
 
@@ -60,7 +61,7 @@ class SceneFields:
         for name in SceneTable.COLUMNS:
             kind = ti.i32 if name in ("particles", "seed") else ti.f64
             setattr(self, name, self.field(kind))
-        self.recoil = self.field(ti.f64)
+        self.gravity, self.weight, self.recoil = (self.field(ti.f64) for _ in range(3))
 
     def field(self, dtype: Any, *lengths: Length, flat: bool = False) -> ti.Field:
         """Declare a field of the scenes; lengths: of its axes after that of the scenes."""
@@ -69,6 +70,13 @@ class SceneFields:
     def vector(self, n: int, dtype: Any, *lengths: Length, flat: bool = False) -> ti.Field:
         """Declare a field of vectors with n components; else as ``field``."""
         return self._made(lambda shape: ti.Vector.field(n, dtype, shape=shape), lengths, flat)
+
+    def structs(self, kind: Any, *lengths: int) -> ti.StructField:
+        """Declare structs of numbers that are given; members lie apart, which kernels find faster.
+
+        They are no state: a class names them among its ``constant_fields``.
+        """
+        return kind.field(shape=(self.capacity, *lengths), layout=ti.Layout.SOA)
 
     def _made(self, make: Any, lengths: tuple[Length, ...], flat: bool) -> ti.Field:
         shape = (self.capacity, *(self.length(length) for length in lengths))

@@ -16,14 +16,14 @@ _STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
 class SceneNumbers:
     """A table of its own, whose steps are shortened so that a whole number of them makes a cycle.
 
-    largest_dt: the steps asked for [s]. steps_per_cycle: of each scene. Both (scenes,).
-    has_box: scenes whose number of particles the filling
-    checks, None for all. Plain NumPy. Raises InputError for a scene that the
-    filling refuses or a step out of range.
+    fillings: of the scenes, as Fillings. largest_dt: the steps asked for [s]. steps_per_cycle: of
+    each scene. Both (scenes,). has_box: scenes whose number of particles their filling checks, None
+    for all. Plain NumPy. Raises InputError for a scene that its filling refuses or a step out of
+    range.
     """
 
-    def __init__(self, filling: Any, table: SceneTable, has_box: np.ndarray | None = None):
-        self.filling, self.table = filling, table.copy()
+    def __init__(self, fillings: Any, table: SceneTable, has_box: np.ndarray | None = None):
+        self.fillings, self.table = fillings, table.copy()
         self.has_box = has_box
         self.largest_dt = self.table.column("dt")
         self.drive(self.table.column("frequency"))
@@ -32,7 +32,7 @@ class SceneNumbers:
         """The same with other numbers, as ``SceneTable.change``."""
         table = self.table.copy()
         table.change(**{"dt": self.largest_dt, **numbers})
-        return SceneNumbers(self.filling, table, self.has_box)
+        return SceneNumbers(self.fillings, table, self.has_box)
 
     def drive(self, frequency: np.ndarray) -> None:
         """Take other frequencies [Hz], (scenes,), and fit the steps to the cycles."""
@@ -40,9 +40,9 @@ class SceneNumbers:
         steps = np.array([steps_per_cycle(float(f), float(dt)) for f, dt in asked], np.int32)
         dt = 1.0 / (frequency * steps)
         checked = slice(None) if self.has_box is None else self.has_box
-        particles_of = self.table.column("particles")[checked].tolist()
-        for particles, step in sorted(set(zip(particles_of, dt[checked]))):
-            self.filling.check(particles, float(step))
+        columns = self.fillings.which, self.table.column("particles"), dt
+        for k, particles, step in sorted(set(zip(*(one[checked].tolist() for one in columns)))):
+            self.fillings.kinds[k].check(particles, step)
         self.table.drive(frequency, dt)
         self.steps_per_cycle = steps
 
@@ -57,12 +57,12 @@ class SceneNumbers:
 
     def initial(self, start: str) -> np.ndarray:
         """(x, v) of the container at the beginning, (scenes, 2); start: one of checks.STARTS."""
-        state, gravity = np.zeros((self.table.count, 2)), gravity_along(self.filling)
+        state = np.zeros((self.table.count, 2))
         if start == "rest":
             return state
         for s in range(self.table.count):
-            row = self.table.row(s)
+            row, filling = self.table.row(s), self.fillings.of(s)
             oscillator = Oscillator(**{name: row[name] for name in _STRUCTURE})
-            fixed = row["particles"] * self.filling.particle_mass if start == "rigid" else 0.0
-            state[s] = oscillator.steady_state(row["frequency"], fixed, gravity)
+            fixed = row["particles"] * filling.particle_mass if start == "rigid" else 0.0
+            state[s] = oscillator.steady_state(row["frequency"], fixed, gravity_along(filling))
         return state

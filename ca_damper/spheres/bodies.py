@@ -6,8 +6,9 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.engine.random_numbers import uniform
+from ca_damper.filling import Fillings
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit.allocation import assign, assign_members, values
+from taichi_dem.kit.allocation import values
 
 # Purposes of the random numbers drawn here; the automaton has those before.
 _CHOOSE, _SHIFT, _STIR, _SIZE = 4, 5, 6, 8
@@ -21,7 +22,7 @@ vec2 = ti.types.vector(2, ti.f64)
 
 @ti.dataclass
 class Body:
-    """Numbers of all spheres: radius of the largest [m], mean mass [kg], box [m].
+    """Numbers of all spheres of a scene: radius of the largest [m], mean mass [kg], box [m].
 
     pull: acceleration by gravity, to the left and downwards [m/s^2], as a vector that the compiler
     does not take apart: both components are then divided and subtracted by one instruction.
@@ -37,6 +38,15 @@ class Body:
     rows: ti.i32
 
 
+def _body(options: Any) -> dict[str, Any]:
+    """Members of a Body."""
+    across, down = options.fall
+    columns, rows = options.lattice
+    sphere = {"radius": options.radius, "mass": options.particle_mass, "pull": (0.0 - across, down)}
+    box = {"width": options.width, "height": options.height, "columns": columns, "rows": rows}
+    return {**sphere, **box}
+
+
 @ti.data_oriented
 class Bodies:
     """State of the spheres; sphere k of scene s has the index i = s * stride + k.
@@ -49,39 +59,37 @@ class Bodies:
     where there are several; radii [m], masses [kg] and counts of the spheres of each.
     """
 
+    constant_fields = ("body",)
+
     def __init__(self, table: SceneFields, given: bool, thrown: bool, kinds: int):
         self.table, self.given, self.thrown, self.kinds = table, given, thrown, kinds
         self.stride = table.length("spheres")
-        self.body = Body.field(shape=())
+        self.body = table.structs(Body)
         self.position = table.vector(2, ti.f64, "spheres", flat=True)
         self.velocity = table.vector(2, ti.f64, "spheres", flat=True)
         self.force = table.vector(2, ti.f64, "spheres", flat=True)
         self.lead = table.field(ti.f64)
         self.floor = table.field(ti.f64)
-        self.radii, self.masses = (ti.field(ti.f64, shape=kinds) for _ in range(2))
+        self.radii, self.masses = (table.field(ti.f64, kinds) for _ in range(2))
         if kinds > 1:
             self.kind = table.field(ti.i32, "spheres", flat=True)
-            self.counts = ti.field(ti.i32, shape=kinds)
+            self.counts = table.field(ti.i32, kinds)
         if given:
-            self.start = ti.Vector.field(2, ti.f64, shape=self.stride)
+            self.start = table.vector(2, ti.f64, "spheres")
         if thrown:
-            self.start_velocity = ti.Vector.field(2, ti.f64, shape=self.stride)
+            self.start_velocity = table.vector(2, ti.f64, "spheres")
 
-    def load(self, options: Any) -> None:
-        """Write the numbers of the options to the device."""
-        across, down = options.fall
-        columns, rows = options.lattice
-        sphere = {"radius": options.radius, "mass": options.particle_mass}
-        box = {"width": options.width, "height": options.height, "columns": columns, "rows": rows}
-        assign_members(self.body, **sphere, pull=(0.0 - across, down), **box)
-        assign(self.radii, options.radii)
-        assign(self.masses, options.masses)
+    def load(self, fillings: Fillings) -> None:
+        """Write the numbers of each scene to the device."""
+        fillings.write(self.body, _body)
+        fillings.write(self.radii, lambda one: one.radii)
+        fillings.write(self.masses, lambda one: one.masses)
         if self.kinds > 1:
-            assign(self.counts, [count for count, _ in options.sizes])
+            fillings.write(self.counts, lambda one: [count for count, _ in one.sizes])
         if self.given:
-            assign(self.start, np.reshape(options.start, (-1, 2)))
+            fillings.write(self.start, lambda one: np.reshape(one.start, (-1, 2)))
         if self.thrown:
-            assign(self.start_velocity, np.reshape(options.start_velocity, (-1, 2)))
+            fillings.write(self.start_velocity, lambda one: np.reshape(one.start_velocity, (-1, 2)))
 
     @ti.func
     def first(self, s):
@@ -102,45 +110,45 @@ class Bodies:
         return kind
 
     @ti.func
-    def mass(self, i):
+    def mass(self, s, i):
         """Mass of sphere i [kg]."""
-        return self.masses[self.kind_of(i)]
+        return self.masses[s, self.kind_of(i)]
 
     @ti.func
-    def radius(self, i):
+    def radius(self, s, i):
         """Radius of sphere i [m]."""
-        return self.radii[self.kind_of(i)]
+        return self.radii[s, self.kind_of(i)]
 
     @ti.func
-    def short_of_reach(self, i, j):
+    def short_of_reach(self, s, i, j):
         """Length by which spheres i and j touch at less than twice the largest radius [m]."""
         short = 0.0
         if ti.static(self.kinds > 1):
-            short = self.short_of_radius(i) + self.short_of_radius(j)
+            short = self.short_of_radius(s, i) + self.short_of_radius(s, j)
         return short
 
     @ti.func
-    def short_of_radius(self, i):
+    def short_of_radius(self, s, i):
         """Length by which the radius of sphere i is below the largest [m]."""
-        return self.body[None].radius - self.radius(i)
+        return self.body[s].radius - self.radius(s, i)
 
     @ti.func
     def position_in_box(self, s, i):
         """Centre of a sphere [m] from the container's lower left inner corner."""
         position = self.position[i] - self.lead[s] * self.velocity[i]
-        return position + vec2(0.5 * self.body[None].width, -self.floor[s])
+        return position + vec2(0.5 * self.body[s].width, -self.floor[s])
 
     @ti.func
-    def reach_of_walls(self, floor):
+    def reach_of_walls(self, s, floor):
         """Lowest and highest place of a sphere that touches no wall; floor: where it is [m]."""
-        body = self.body[None]
+        body = self.body[s]
         high = vec2(0.5 * body.width, floor + body.height) - body.radius
         return vec2(-0.5 * body.width, floor) + body.radius, high
 
     @ti.func
-    def height(self, place):
+    def height(self, s, place):
         """Drop times pull [m^2/s^2] of a place in the box: to the walls that gravity pulls to."""
-        body = self.body[None]
+        body = self.body[s]
         size = vec2(body.width, body.height)
         drop = ti.select(body.pull < 0.0, place - size, place)
         return body.pull[0] * drop[0] + body.pull[1] * drop[1]
@@ -152,9 +160,10 @@ class Bodies:
         self.force[i] = self.force[i] + force
 
     @ti.func
-    def kick(self, i, body, dt):
+    def kick(self, s, i, body, dt):
         """Take sphere i over a step under its contacts and gravity; returns its new velocity."""
-        rate = self.force[i] / self.mass(i) - body.pull
+        mass = body.mass if ti.static(self.kinds == 1) else self.mass(s, i)
+        rate = self.force[i] / mass - body.pull
         velocity = self.velocity[i] + dt * rate
         self.force[i] = vec2(0.0)
         self.velocity[i] = velocity
@@ -186,18 +195,18 @@ class Bodies:
             self._choose_kinds(s)
         if ti.static(self.given):
             for i in range(self.first(s), self.last(s)):
-                self._put(i, self.start[i - self.first(s)], vec2(0.0))
+                self._put(s, i, self.start[s, i - self.first(s)], vec2(0.0))
         else:
             self._scatter(s)
         if ti.static(self.thrown):
             for i in range(self.first(s), self.last(s)):
-                self.velocity[i] = self.start_velocity[i - self.first(s)]
+                self.velocity[i] = self.start_velocity[s, i - self.first(s)]
         self.lead[s], self.floor[s] = 0.0, 0.0
 
     @ti.func
-    def _put(self, i, place, velocity):
+    def _put(self, s, i, place, velocity):
         """Put a sphere at a place [m] counted from the lower left corner."""
-        self.position[i] = place - vec2(0.5 * self.body[None].width, 0.0)
+        self.position[i] = place - vec2(0.5 * self.body[s].width, 0.0)
         self.velocity[i], self.force[i] = velocity, vec2(0.0)
 
     @ti.func
@@ -208,8 +217,8 @@ class Bodies:
         choice of sites equally likely (selection sampling). Where sites are wider than spheres,
         each sphere is moved at random within its own; none can then overlap.
         """
-        body, count, seed = self.body[None], self.table.particles[s], self.table.seed[s]
-        columns, rows = self._sites(count)
+        body, count, seed = self.body[s], self.table.particles[s], self.table.seed[s]
+        columns, rows = self._sites(s, count)
         pitch = vec2(body.width / columns, body.height / rows)
         taken = 0
         for site in range(columns * rows):
@@ -219,7 +228,7 @@ class Bodies:
                 stir = 2.0 * self._random_pair(seed, site, _STIR) - 1.0
                 corner = vec2(site % columns, site // columns) * pitch
                 place = corner + body.radius + shift * (pitch - 2.0 * body.radius)
-                self._put(self.first(s) + taken, place, _STIR_SPEED * stir)
+                self._put(s, self.first(s) + taken, place, _STIR_SPEED * stir)
                 taken += 1
 
     @ti.func
@@ -234,27 +243,27 @@ class Bodies:
             drawn = ti.cast(k, ti.f64)
             if ti.static(not self.given):
                 drawn = uniform(self.table.seed[s], 0, k, _SIZE) * (count - k)
-            self._choose_kind(self.first(s), k, drawn)
+            self._choose_kind(s, k, drawn)
 
     @ti.func
-    def _choose_kind(self, first, k, drawn):
+    def _choose_kind(self, s, k, drawn):
         """Give sphere k the size in whose part of what is left a number lies."""
         below, chosen = 0, -1
         for kind in range(self.kinds):
-            left = self.counts[kind]
+            left = self.counts[s, kind]
             if ti.static(not self.given):
                 for before in range(k):
-                    left -= ti.cast(self.kind[first + before] == kind, ti.i32)
+                    left -= ti.cast(self.kind[self.first(s) + before] == kind, ti.i32)
             below += left
             if chosen < 0 and drawn < below:
                 chosen = kind
-        self.kind[first + k] = ti.max(chosen, 0)
+        self.kind[self.first(s) + k] = ti.max(chosen, 0)
 
-    def sizes_of(self, rows: slice) -> dict[str, np.ndarray]:
-        """Diameters of some spheres [m], where there are several sizes."""
+    def sizes_of(self, s: int, rows: slice) -> dict[str, np.ndarray]:
+        """Diameters of some spheres of scene s [m], where there are several sizes."""
         if self.kinds == 1:
             return {}
-        return {"diameter": 2.0 * values(self.radii)[values(self.kind)[rows]]}
+        return {"diameter": 2.0 * values(self.radii, s)[values(self.kind, rows)]}
 
     @ti.func
     def _random_pair(self, seed, site, purpose: ti.template()):
@@ -262,9 +271,9 @@ class Bodies:
         return vec2(uniform(seed, 0, site, purpose), uniform(seed, 1, site, purpose))
 
     @ti.func
-    def _sites(self, count):
+    def _sites(self, s, count):
         """Columns and rows of a grid with about twice as many sites as spheres, if so many fit."""
-        body = self.body[None]
+        body = self.body[s]
         most_columns, most_rows = body.columns, body.rows
         wanted = ti.min(2 * count, most_columns * most_rows)
         across = ti.cast(ti.ceil(ti.sqrt(wanted * body.width / body.height)), ti.i32)

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.allocation import assign_members
 from taichi_dem.kit.elementary import fifth_root
 
 # Exponents p of the dashpot k d^(3/2) + c d^p d', by the name of the law.
@@ -132,6 +131,25 @@ def _numbers(options, partner, radius, mass, reach):
     }
 
 
+def contact_members(
+    kinds: Sequence[Mapping[str, float]], tangential_share: float
+) -> dict[str, np.ndarray]:
+    """Members of Contacts of several kinds, (kinds,) each, before a step is known.
+
+    kinds: numbers of each. tangential_share: part of the effective mass that resists a tangential
+    impulse.
+    """
+    found = {name: np.array([one[name] for one in kinds]) for name in kinds[0]}
+    return {
+        **{name: found[name] for name in ("stiffness", "damping", "friction", "reach")},
+        "yielding": 0.5 / found["mass"],
+        "grip": SLIP_SHARE * tangential_share * found["mass"],
+        # The normal stiffness at an overlap is 3/2 k d^(1/2).
+        "shear": 1.5 * found["shear_ratio"] * found["stiffness"],
+        "shear_damping": np.sqrt(tangential_share * found["shear_ratio"]),
+    }
+
+
 @lru_cache(maxsize=64)
 def damping_number(restitution: float, power: float) -> float:
     """Number alpha of a dashpot d^power that lets spheres part at ``restitution`` times the speed.
@@ -219,26 +237,6 @@ class ContactLaw:
             root = fifth_root(share)
             ratio = root * root
         return ratio
-
-    def load(
-        self, field: ti.Field, kinds: Sequence[Mapping[str, float]], tangential_share: float
-    ) -> None:
-        """Write the numbers of contacts, before a step is known, to a Contact field.
-
-        kinds: numbers of each entry. tangential_share: part of the effective mass that resists a
-        tangential impulse.
-        """
-        found = {name: np.array([one[name] for one in kinds]) for name in kinds[0]}
-        given = {name: found[name] for name in ("stiffness", "damping", "friction", "reach")}
-        assign_members(
-            field,
-            **given,
-            yielding=0.5 / found["mass"],
-            grip=SLIP_SHARE * tangential_share * found["mass"],
-            # The normal stiffness at an overlap is 3/2 k d^(1/2).
-            shear=1.5 * found["shear_ratio"] * found["stiffness"],
-            shear_damping=np.sqrt(tangential_share * found["shear_ratio"]),
-        )
 
     @ti.func
     def over_step(self, contact, dt, since):

@@ -10,8 +10,9 @@ from typing import Any
 
 import taichi as ti
 
+from ca_damper.filling import Fillings
 from ca_damper.scenes.scene_fields import Part
-from ca_damper.spheres.contact_law import Contact, pair_numbers, wall_numbers
+from ca_damper.spheres.contact_law import Contact, contact_members, pair_numbers, wall_numbers
 
 #: Contacts that are evaluated together.
 LANES = 8
@@ -38,49 +39,54 @@ class Contacts:
 
 @ti.data_oriented
 class PairContacts(Part):
-    """Contacts of two spheres; contact: one for each pair of sizes, shape (kinds * kinds,)."""
+    """Contacts of two spheres; contact: one for each pair of sizes, (scenes, kinds * kinds)."""
+
+    constant_fields = ("contact",)
 
     def __init__(self, spheres: Any):
         super().__init__(spheres)
         self.kinds = self.bodies.kinds
-        self.contact = Contact.field(shape=self.kinds * self.kinds)
+        self.contact = self.table.structs(Contact, self.kinds * self.kinds)
 
-    def load(self, options: Any) -> None:
-        """Take over the numbers of spheres of the same structure."""
+    def load(self, fillings: Fillings) -> None:
+        """Take over the numbers of the spheres of each scene."""
+        fillings.write(self.contact, self._contacts)
+
+    def _contacts(self, options):
         pairs = [divmod(k, self.kinds) for k in range(self.kinds * self.kinds)]
         numbers = [pair_numbers(options, *pair) for pair in pairs]
-        self.law.load(self.contact, numbers, self.rotation.tangential_share)
+        return contact_members(numbers, self.rotation.tangential_share)
 
     @ti.func
-    def over_step(self, dt, since):
+    def over_step(self, s, dt, since):
         """The contact for a step, as of the law; of several sizes only its reach is the widest."""
-        contact = self.law.over_step(self.contact[0], dt, since)
+        contact = self.law.over_step(self.contact[s, 0], dt, since)
         if ti.static(self.kinds > 1):
-            contact.reach = 2.0 * self.bodies.body[None].radius
+            contact.reach = 2.0 * self.bodies.body[s].radius
         return contact
 
     @ti.func
-    def at_rest(self, i, j):
+    def at_rest(self, s, i, j):
         """The contact of spheres i and j, before a step is known."""
         k = 0
         if ti.static(self.kinds > 1):
             k = self.bodies.kind[i] * self.kinds + self.bodies.kind[j]
-        return self.contact[k]
+        return self.contact[s, k]
 
     @ti.func
-    def between(self, i, j, contact):
+    def between(self, s, i, j, contact):
         """The contact of spheres i and j for a step; contact: what ``over_step`` gave for it."""
         found = contact
         if ti.static(self.kinds > 1):
-            found = self.law.over_step(self.at_rest(i, j), contact.dt, contact.since)
+            found = self.law.over_step(self.at_rest(s, i, j), contact.dt, contact.since)
         return found
 
     @ti.func
-    def of_lanes(self, pairs: ti.template(), contact):
+    def of_lanes(self, s, pairs: ti.template(), contact):
         """The contacts of a vector of pairs; one for all of them where there is one size."""
         if ti.static(self.kinds == 1):
             return contact
-        found = [self.between(pairs[k][0], pairs[k][1], contact) for k in ti.static(range(LANES))]
+        found = [self.between(s, *pairs[k], contact) for k in ti.static(range(LANES))]
         return Contacts(
             stiffness=ti.Vector([found[k].stiffness for k in ti.static(range(LANES))]),
             damping=ti.Vector([found[k].damping for k in ti.static(range(LANES))]),
@@ -99,25 +105,30 @@ class PairContacts(Part):
 class WallContacts(Part):
     """Contacts of a sphere with the walls.
 
-    contact: a Contact with a wall that does not recoil for each size of spheres. recoiling: of each
-    scene and size, damping and yielding of floor and ceiling, and grip of the side walls.
+    Of each scene and size of spheres, contact: with a wall that does not recoil; recoiling: damping
+    and yielding of floor and ceiling, and grip of the side walls.
     """
+
+    constant_fields = ("contact",)
 
     def __init__(self, spheres: Any):
         super().__init__(spheres)
-        self.contact = Contact.field(shape=self.bodies.kinds)
+        self.contact = self.table.structs(Contact, self.bodies.kinds)
         self.recoiling = self.table.vector(3, ti.f64, self.bodies.kinds)
 
-    def load(self, options: Any) -> None:
-        """Take over the numbers of spheres of the same structure."""
+    def load(self, fillings: Fillings) -> None:
+        """Take over the numbers of the spheres of each scene."""
+        fillings.write(self.contact, self._contacts)
+
+    def _contacts(self, options):
         numbers = [wall_numbers(options, k) for k in range(self.bodies.kinds)]
-        self.law.load(self.contact, numbers, self.rotation.tangential_share)
+        return contact_members(numbers, self.rotation.tangential_share)
 
     @ti.func
     def reset(self, s):
         """Take over how the container of scene s recoils."""
         for k in range(self.bodies.kinds):
-            contact, recoil = self.contact[k], self.table.recoil[s]
+            contact, recoil = self.contact[s, k], self.table.recoil[s]
             mass = 0.5 / contact.yielding
             self.recoiling[s, k] = vec3(
                 contact.damping * self.law.damping_ratio(1.0 / (1.0 + mass * recoil)),
@@ -128,15 +139,16 @@ class WallContacts(Part):
     @ti.func
     def over_step(self, s, kind, dt, since):
         """The contacts for a step, as of the law: with side walls, and with floor and ceiling."""
-        side, ends, recoiling = self.contact[kind], self.contact[kind], self.recoiling[s, kind]
+        side, ends = self.contact[s, kind], self.contact[s, kind]
+        recoiling = self.recoiling[s, kind]
         ends.damping, ends.yielding = recoiling[0], recoiling[1]
         side.grip = recoiling[2]
         return self.law.over_step(side, dt, since), self.law.over_step(ends, dt, since)
 
     @ti.func
-    def at_rest(self, i):
+    def at_rest(self, s, i):
         """The contact of sphere i with a wall that does not recoil, before a step is known."""
-        return self.contact[self.bodies.kind_of(i)]
+        return self.contact[s, self.bodies.kind_of(i)]
 
     @ti.func
     def of(self, s, i, contacts):

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from ca_damper.filling import Action
+from ca_damper.filling import Action, Fillings
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.contact_law import ContactLaw
@@ -75,12 +75,10 @@ class DeviceSpheres:
         self.given, self.lost = table.field(ti.f64), table.field(ti.f64)
         self.held, self.allowed = table.field(ti.f64), table.field(ti.f64)
 
-    def load(self, options: Any) -> None:
-        """Take over the numbers of spheres of the same structure."""
-        self.bodies.load(options)
-        self.search.load(options)
-        self.pair_contacts.load(options)
-        self.wall_contacts.load(options)
+    def load(self, fillings: Fillings) -> None:
+        """Take over the numbers of the spheres of each scene."""
+        for part in (self.bodies, self.search, self.pair_contacts, self.wall_contacts):
+            part.load(fillings)
 
     @ti.func
     def reset(self, s):
@@ -127,9 +125,9 @@ class DeviceSpheres:
         moved on since the last step [s].
         """
         floor = motion.x + 0.5 * dt * (motion.v + 0.25 * dt * motion.a)
-        low, high = self.bodies.reach_of_walls(floor)
+        low, high = self.bodies.reach_of_walls(s, floor)
         # Seen from spheres that fall freely, as all that is foreseen of them is their fall.
-        pull = self.bodies.body[None].pull
+        pull = self.bodies.body[s].pull
         speed = vec2(0.5 * dt * pull[0], motion.v + 0.5 * dt * (motion.a + pull[1]))
         self.search.refresh(s, low, high, vec2(0.0))
         if ti.static(self.history.remembers):
@@ -152,7 +150,7 @@ class DeviceSpheres:
 
         low, high: where spheres begin to touch walls [m]; speed: of the container as they see it.
         """
-        contact = self.pair_contacts.over_step(dt, since)
+        contact = self.pair_contacts.over_step(s, dt, since)
         which, count = self.search.find(s, contact.reach)
         if count > 0:
             self.effect_activity.note(s, PAIRS)
@@ -167,11 +165,11 @@ class DeviceSpheres:
     @ti.func
     def move(self, s, dt):
         """Take the spheres over the step."""
-        body = self.bodies.body[None]
+        body = self.bodies.body[s]
         least, most = vec2(ti.math.inf), vec2(-ti.math.inf)
         for i in range(self.bodies.first(s), self.bodies.last(s)):
-            velocity = self.bodies.kick(i, body, dt)
-            self.rotation.kick(i, dt)
+            velocity = self.bodies.kick(s, i, body, dt)
+            self.rotation.kick(s, i, dt)
             # Not by ti.min and ti.max: what they do about NaN takes five instructions more.
             least = ti.select(velocity < least, velocity, least)
             most = ti.select(velocity > most, velocity, most)
@@ -196,11 +194,11 @@ class DeviceSpheres:
     @ti.func
     def _own_energy(self, s, i):
         """Kinetic and potential energy of a sphere and that of its contacts with walls [J]."""
-        body = self.bodies.body[None]
+        body = self.bodies.body[s]
         velocity, place = self.bodies.velocity[i], self.bodies.position_in_box(s, i)
-        mass, contact = self.bodies.mass(i), self.wall_contacts.at_rest(i)
-        total = mass * (0.5 * velocity.norm_sqr() + self.bodies.height(place))
-        total += self.rotation.energy(i)
+        mass, contact = self.bodies.mass(s, i), self.wall_contacts.at_rest(s, i)
+        total = mass * (0.5 * velocity.norm_sqr() + self.bodies.height(s, place))
+        total += self.rotation.energy(s, i)
         room = ti.min(place, vec2(body.width, body.height) - place)
         for axis in ti.static(range(2)):
             total += self.law.stored(contact, contact.reach - room[axis])
@@ -212,7 +210,7 @@ class DeviceSpheres:
     @ti.func
     def _pair_energy(self, s, i, j):
         """Energy of the contact of two spheres [J], none where they do not touch."""
-        contact = self.pair_contacts.at_rest(i, j)
+        contact = self.pair_contacts.at_rest(s, i, j)
         distance = (self.bodies.position_in_box(s, j) - self.bodies.position_in_box(s, i)).norm()
         return self.law.stored(contact, contact.reach - distance)
 
@@ -221,17 +219,17 @@ class DeviceSpheres:
         """Momentum along x [kg m/s]."""
         total = 0.0
         for i in range(self.bodies.first(s), self.bodies.last(s)):
-            total += self.bodies.mass(i) * self.bodies.velocity[i][1]
+            total += self.bodies.mass(s, i) * self.bodies.velocity[i][1]
         return total
 
     @ti.func
     def divergence_code(self, s):
         """Code of DIVERGENCES, or 0; "not" makes NaN fail a test."""
-        body, dt = self.bodies.body[None], self.table.dt[s]
+        body, dt = self.bodies.body[s], self.table.dt[s]
         self.crushed[s], self.held[s] = self.search.full[s], 0.0
         # Positions run half a step of the contacts ahead, and not at all before the first one.
         last = ti.select(self.bodies.lead[s] > 0.0, 2.0 * self.bodies.lead[s], dt)
-        contact = self.pair_contacts.over_step(last, last)
+        contact = self.pair_contacts.over_step(s, last, last)
         seen = 0
         self.search.each_listed_pair(s, contact, self._note_pair, seen)
         if ti.static(self.history.remembers):
@@ -245,15 +243,15 @@ class DeviceSpheres:
             place, speed = self.bodies.position_in_box(s, i), self.bodies.velocity[i].norm()
             if (place < 0.0).any() or (place > vec2(body.width, body.height)).any():
                 code = OVERLAP
-            radius = self.bodies.radius(i)
+            radius = self.bodies.radius(s, i)
             if not (speed * dt < radius):
                 code = RUNAWAY
             if not (speed < ti.math.inf):
                 code = NOT_FINITE
             room = ti.min(place, vec2(body.width, body.height) - place)
             at_wall = ti.cast((room < radius).any(), ti.i32)
-            going = 0.5 * self.bodies.mass(i) * speed * speed
-            self.effect_activity.note_sphere(s, at_wall, going, self.rotation.energy(i))
+            going = 0.5 * self.bodies.mass(s, i) * speed * speed
+            self.effect_activity.note_sphere(s, at_wall, going, self.rotation.energy(s, i))
         return code
 
     @ti.func
@@ -262,12 +260,12 @@ class DeviceSpheres:
 
         Seen from the container, as spheres that rest in the room meet a wall that comes to them.
         """
-        body, speed = self.bodies.body[None], self.speed[s]
+        body, speed = self.bodies.body[s], self.speed[s]
         weight = self.table.particles[s] * body.mass * body.pull[1]
         energy, shift = self.held[s], 0.0
         for i in range(self.bodies.first(s), self.bodies.last(s)):
             energy += self._own_energy(s, i)
-            mass, velocity = self.bodies.mass(i), self.bodies.velocity[i]
+            mass, velocity = self.bodies.mass(s, i), self.bodies.velocity[i]
             shift += mass * speed * (0.5 * speed - velocity[1])
         lost = self.given[s] - energy - weight * self.bodies.floor[s]
         kept = 1.0 - FORGOTTEN
@@ -281,7 +279,7 @@ class DeviceSpheres:
         """Note the energy of a pair, and whether it touches or overlaps by half its reach."""
         self.held[s] = self.held[s] + self._pair_energy(s, i, j)
         branch = self.bodies.position[j] - self.bodies.position[i]
-        distance, contact = branch.norm(), self.pair_contacts.between(i, j, for_step)
+        distance, contact = branch.norm(), self.pair_contacts.between(s, i, j, for_step)
         if distance < 0.5 * contact.reach:
             self.crushed[s] = 1
         if distance < contact.reach:
@@ -291,7 +289,7 @@ class DeviceSpheres:
             push = self.law.normal(contact, overlap, approach)
             if ti.static(self.rubs and not self.history.remembers):
                 across = relative.dot(vec2(-normal[1], normal[0]))
-                slip = self.rotation.slip_of_pair(i, j, distance, across)
+                slip = self.rotation.slip_of_pair(s, i, j, distance, across)
                 rubbed = -self.law.friction(contact, push, slip) * slip
             dragged = (push - self.law.elastic(contact, overlap)) * approach
             self.effect_activity.note_contact(s, dragged, rubbed)
@@ -317,6 +315,6 @@ class DeviceSpheres:
         rows = slice(s * self.bodies.stride, s * self.bodies.stride + count)
         velocity = values(self.bodies.velocity)[rows]
         position = values(self.bodies.position)[rows] - self.bodies.lead[s] * velocity
-        shift = np.array([0.5 * self.bodies.body[None].width, -self.bodies.floor[s]])
-        more = {**self.rotation.snapshot(rows), **self.bodies.sizes_of(rows)}
+        shift = np.array([0.5 * self.bodies.body[s].width, -self.bodies.floor[s]])
+        more = {**self.rotation.snapshot(rows), **self.bodies.sizes_of(s, rows)}
         return {"position": position + shift, "velocity": velocity, **more}

@@ -8,11 +8,10 @@ An audit makes all tests of some spheres in some steps, chosen by a counter so t
 about a thousand of all tests, and counts the contacts that the lists lack. It changes nothing else.
 """
 
-from typing import Any
-
 import taichi as ti
 
 from ca_damper.engine.random_numbers import bits, stream
+from ca_damper.filling import Fillings
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.search import EXPECTED, TOUCHING, AllPairs, CellList
@@ -66,9 +65,9 @@ class ExpectedContacts:
             setattr(self, name, table.field(ti.i64))
         self.tightness = ti.field(ti.f64, shape=())
 
-    def load(self, options: Any) -> None:
+    def load(self, fillings: Fillings) -> None:
         """Write the numbers of the search to the device."""
-        self.cells.load(options)
+        self.cells.load(fillings)
         self.tighten(1.0)
 
     def tighten(self, share: float) -> None:
@@ -108,7 +107,7 @@ class ExpectedContacts:
         walls [m]; fall: most that walls gain on a sphere beside the sphere's own way [m]. Two
         spheres go straight, as seen from each other.
         """
-        clear, reach = True, (2.0 + _ROUNDING) * self.bodies.body[None].radius
+        clear, reach = True, (2.0 + _ROUNDING) * self.bodies.body[s].radius
         for k in range(self.pair_count[s]):
             i, j = self.pair[s, EXPECTED, k][0], self.pair[s, EXPECTED, k][1]
             branch = self.bodies.position[j] - self.bodies.position[i]
@@ -134,12 +133,12 @@ class ExpectedContacts:
         nearer, margin = self.nearer[s] + way, self.margin[s]
         self.cells.moved(s, way[0])
         if self.cells.refresh(s, ahead[0]) or not (nearer[0] + ahead[0] < margin[0]):
-            margin[0], nearer[0] = self._margin(way[0], ahead[0]), 0.0
+            margin[0], nearer[0] = self._margin(s, way[0], ahead[0]), 0.0
             self._list_pairs(s, margin[0])
             self._count_unlisted(s)
         if not (nearer[1] + ahead[1] < margin[1]):
-            margin[1], nearer[1] = self._margin(way[1], ahead[1]), 0.0
-            self._list_spheres(s, low + self._reach(margin[1]), high - self._reach(margin[1]))
+            margin[1], nearer[1] = self._margin(s, way[1], ahead[1]), 0.0
+            self._list_spheres(s, low + self._reach(s, margin[1]), high - self._reach(s, margin[1]))
             self._count_unlisted(s)
         self.margin[s] = margin
         self.nearer[s], self.floor[s] = nearer, low[1]
@@ -151,21 +150,21 @@ class ExpectedContacts:
         self.unlisted[s] = tests - self.pair_count[s] - self.sphere_count[s]
 
     @ti.func
-    def _margin(self, way, ahead):
+    def _margin(self, s, way, ahead):
         """How far apart to list [m], for a way in a step and a further way [m]."""
-        skin = self.cells.grid[None].skin
+        skin = self.cells.grid[s].skin
         return ti.max(_NARROWEST * skin, ti.min(ti.max(_STEPS * way, 4.0 * ahead), skin))
 
     @ti.func
-    def _reach(self, margin):
+    def _reach(self, s, margin):
         """A margin with what rounding may add up to; the lists hold less in tests of the audit."""
-        return self.tightness[None] * margin + _ROUNDING * self.bodies.body[None].radius
+        return self.tightness[None] * margin + _ROUNDING * self.bodies.body[s].radius
 
     @ti.func
     def _list_pairs(self, s, margin):
         """List pairs that may touch before they come nearer by a margin [m]."""
-        reach, count = 2.0 * self.bodies.body[None].radius, vec2i(0)
-        self.cells.each_pair(s, vec2(reach, reach + self._reach(margin)), self._list_pair, count)
+        reach, count = 2.0 * self.bodies.body[s].radius, vec2i(0)
+        self.cells.each_pair(s, vec2(reach, reach + self._reach(s, margin)), self._list_pair, count)
         self.pair_count[s] = count[0]
         self.most_touch[s] = ti.cast(_NEARLY_ALL * count[1] > (_NEARLY_ALL - 1) * count[0], ti.i32)
 
@@ -184,7 +183,7 @@ class ExpectedContacts:
     def _list_pair(self, s, i, j, reach, count: ti.template()):
         """List a pair nearer than reach[1]; count those, and those nearer than reach[0]."""
         square = (self.bodies.position[j] - self.bodies.position[i]).norm_sqr()
-        short = self.bodies.short_of_reach(i, j)
+        short = self.bodies.short_of_reach(s, i, j)
         touching, near = reach[0] - short, reach[1] - short
         if square < near * near:
             self.pair[s, EXPECTED, count[0]] = ti.Vector([i, j])
@@ -202,7 +201,7 @@ class ExpectedContacts:
             for k in range(self.pair_count[s]):
                 pair = self.pair[s, EXPECTED, k]
                 branch = self.bodies.position[pair[1]] - self.bodies.position[pair[0]]
-                touching = reach - self.bodies.short_of_reach(pair[0], pair[1])
+                touching = reach - self.bodies.short_of_reach(s, pair[0], pair[1])
                 if branch.norm_sqr() < touching * touching:
                     self.pair[s, TOUCHING, count] = pair
                     count += 1
@@ -233,12 +232,12 @@ class ExpectedContacts:
         tests, contacts = self.table.particles[s], self._is_at_wall(i, low, high)
         for j in range(self.bodies.first(s), self.bodies.last(s)):
             if j != i:
-                contacts += self._touching(i, j, reach)
+                contacts += self._touching(s, i, j, reach)
         for k in range(self.pair_count[s]):
             pair = self.pair[s, EXPECTED, k]
             if pair[0] == i or pair[1] == i:
                 tests -= 1
-                contacts -= self._touching(pair[0], pair[1], reach)
+                contacts -= self._touching(s, pair[0], pair[1], reach)
         for k in range(self.sphere_count[s]):
             if self.sphere[s, k] == i:
                 tests -= 1
@@ -247,10 +246,10 @@ class ExpectedContacts:
         self.misses[s] = self.misses[s] + contacts
 
     @ti.func
-    def _touching(self, i, j, reach):
+    def _touching(self, s, i, j, reach):
         """1 for two spheres that touch, else 0; reach: distance at which the largest do [m]."""
         branch = self.bodies.position[j] - self.bodies.position[i]
-        touching = reach - self.bodies.short_of_reach(i, j)
+        touching = reach - self.bodies.short_of_reach(s, i, j)
         return ti.cast(branch.norm_sqr() < touching * touching, ti.i32)
 
     @ti.func

@@ -45,7 +45,7 @@ class PairForces(Part):
             ]
             if ti.static(self.history.remembers):
                 self._recall(s, first, count)
-            self._evaluate(s, self.pair_contacts.of_lanes(pairs, contact), pairs)
+            self._evaluate(s, self.pair_contacts.of_lanes(s, pairs, contact), pairs)
             for lane in ti.static(range(LANES)):
                 if first + lane < count:
                     self._push(s, pairs[lane], lane)
@@ -59,7 +59,7 @@ class PairForces(Part):
         self.bodies.push(pair[0], force)
         self.bodies.push(pair[1], -force)
         if ti.static(self.turns):
-            share, torque = self.rotation.share(pair[0], pair[1]), self.torque[s][lane]
+            share, torque = self.rotation.share(s, pair[0], pair[1]), self.torque[s][lane]
             self.rotation.twist(pair[0], share * torque)
             self.rotation.twist(pair[1], (1.0 - share) * torque)
 
@@ -100,7 +100,7 @@ class PairForces(Part):
         if ti.static(self.rubs):
             slip = ry * nx - rx * ny
             if ti.static(self.turns):
-                slip += distance * self._turning(pairs)
+                slip += distance * self._turning(s, pairs)
             drag = self._friction(s, contact, contact.reach - distance, push, slip)
             if self.effect_activity.is_new(s, FRICTION):
                 if (ti.select(touch, drag, 0.0) != 0.0).any():
@@ -121,10 +121,10 @@ class PairForces(Part):
         return x, y
 
     @ti.func
-    def _turning(self, pairs: ti.template()):
+    def _turning(self, s, pairs: ti.template()):
         """Slip by the spins of both spheres over their distance [1/s]."""
         return ti.Vector(
-            [self.rotation.turning(pairs[k][0], pairs[k][1]) for k in ti.static(range(LANES))]
+            [self.rotation.turning(s, pairs[k][0], pairs[k][1]) for k in ti.static(range(LANES))]
         )
 
 
@@ -142,7 +142,7 @@ class WallForces(Part):
         total, touching = 0.0, 0
         for k in range(self.search.sphere_count[s]):
             i = self.search.sphere[s, k]
-            place, short = self.bodies.position[i], self.bodies.short_of_radius(i)
+            place, short = self.bodies.position[i], self.bodies.short_of_radius(s, i)
             if (place < low - short).any() or (place > high + short).any():
                 if ti.static(self.history.remembers):
                     self.history.at_walls(s, i)

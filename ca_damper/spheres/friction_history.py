@@ -140,11 +140,11 @@ class FrictionHistory(Part):
         total, power = 0.0, 0.0
         for k in range(self.pair_count[s]):
             i, j = self.pair[s, k][0], self.pair[s, k][1]
-            contact = self.pair_contacts.at_rest(i, j)
+            contact = self.pair_contacts.at_rest(s, i, j)
             branch = self.bodies.position_in_box(s, j) - self.bodies.position_in_box(s, i)
             distance, relative = branch.norm(), self.bodies.velocity[i] - self.bodies.velocity[j]
             across = (relative[1] * branch[0] - relative[0] * branch[1]) / distance
-            slip = self.rotation.slip_of_pair(i, j, distance, across)
+            slip = self.rotation.slip_of_pair(s, i, j, distance, across)
             overlap, way = contact.reach - distance, self.bodies.lead[s] * slip
             energy, force = self._stored(contact, overlap, way, self.pair_spring[s, k])
             total, power = total + energy, power + ti.max(0.0, force * slip)

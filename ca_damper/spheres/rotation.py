@@ -31,25 +31,25 @@ class Rotation:
             self.spin[i], self.torque[i] = 0.0, 0.0
 
     @ti.func
-    def share(self, i, j):
+    def share(self, s, i, j):
         """Share of the distance of two spheres that lies on the side of the first."""
         share = 0.5
         if ti.static(self.bodies.kinds > 1):
-            own = self.bodies.radius(i)
-            share = own / (own + self.bodies.radius(j))
+            own = self.bodies.radius(s, i)
+            share = own / (own + self.bodies.radius(s, j))
         return share
 
     @ti.func
-    def turning(self, i, j):
+    def turning(self, s, i, j):
         """Slip of two spheres by their spins over their distance [1/s]."""
-        share = self.share(i, j)
+        share = self.share(s, i, j)
         return share * self.spin[i] + (1.0 - share) * self.spin[j]
 
     @ti.func
-    def slip_of_pair(self, i, j, distance, slip):
+    def slip_of_pair(self, s, i, j, distance, slip):
         """Slip [m/s] of two spheres whose centres are a distance [m] apart."""
         if ti.static(self.turns):
-            return slip + distance * self.turning(i, j)
+            return slip + distance * self.turning(s, i, j)
         return slip
 
     @ti.func
@@ -67,23 +67,23 @@ class Rotation:
             self.torque[i] = self.torque[i] + torque
 
     @ti.func
-    def kick(self, i, dt):
+    def kick(self, s, i, dt):
         """Change the spin of sphere i by its torques over a step [s]."""
         if ti.static(self.turns):
-            self.spin[i] = self.spin[i] + dt * self.torque[i] / self._inertia(i)
+            self.spin[i] = self.spin[i] + dt * self.torque[i] / self._inertia(s, i)
             self.torque[i] = 0.0
 
     @ti.func
-    def energy(self, i):
+    def energy(self, s, i):
         """Energy [J] of the turning."""
         if ti.static(self.turns):
-            return 0.5 * self._inertia(i) * self.spin[i] * self.spin[i]
+            return 0.5 * self._inertia(s, i) * self.spin[i] * self.spin[i]
         return 0.0
 
     @ti.func
-    def _inertia(self, i):
-        radius = self.bodies.radius(i)
-        return 0.4 * self.bodies.mass(i) * radius * radius
+    def _inertia(self, s, i):
+        radius = self.bodies.radius(s, i)
+        return 0.4 * self.bodies.mass(s, i) * radius * radius
 
     def snapshot(self, rows: slice) -> dict[str, np.ndarray]:
         """Spins [rad/s] of some spheres, where they turn."""

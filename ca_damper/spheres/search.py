@@ -8,9 +8,9 @@ from typing import Any
 
 import taichi as ti
 
+from ca_damper.filling import Fillings
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
-from taichi_dem.kit.allocation import assign_members
 
 # Pairs near each other per sphere. Discs of one size have three, at most five with the skin.
 _PAIRS_PER_SPHERE = 8
@@ -21,7 +21,7 @@ EXPECTED, TOUCHING = range(2)
 
 @ti.dataclass
 class Grid:
-    """Numbers of the search.
+    """Numbers of the search of a scene.
 
     skin: how far apart spheres are listed [m]; it changes the time taken and no result. columns,
     rows: of the cells. pairs: places in the list of a scene.
@@ -47,7 +47,7 @@ class AllPairs:
         self.sphere, self.sphere_count = table.field(ti.i32, "spheres"), table.field(ti.i32)
         self.full = table.field(ti.i32)
 
-    def load(self, options: Any) -> None:
+    def load(self, fillings: Fillings) -> None:
         """Nothing to write."""
 
     @ti.func
@@ -82,7 +82,7 @@ class AllPairs:
     @ti.func
     def _find(self, s, i, j, reach, count: ti.template()):
         branch = self.bodies.position[j] - self.bodies.position[i]
-        touching = reach - self.bodies.short_of_reach(i, j)
+        touching = reach - self.bodies.short_of_reach(s, i, j)
         if branch.norm_sqr() < touching * touching and count < self.places:
             self.pair[s, TOUCHING, count] = ti.Vector([i, j])
             count = count + 1
@@ -107,17 +107,19 @@ class AllPairs:
 class CellList:
     """List of pairs within a skin of touching, found by cells; renewed when the skin is used up.
 
-    grid: a Grid, shape (). cell_first, next: chains of the spheres in a cell, the first and each
-    one's next. pair: the list; that of a scene fills its places from the end, at ``_list_end``,
+    grid: of each scene. cell_first, next: chains of the spheres in a cell, the first and each one's
+    next. pair: the list; that of a scene fills its places from the end, at ``_list_end``,
     back to pair_first. full: whether more spheres lay near each other than spheres that do not
     interpenetrate can. travel: by how much two spheres may have come nearer since the search [m].
     """
+
+    constant_fields = ("grid",)
 
     def __init__(self, table: SceneFields, bodies: Bodies):
         self.bodies = bodies
         # A cell is larger than a sphere: there are no more of them.
         self.cell_stride, self.list_stride = table.length("spheres"), table.length("pairs")
-        self.grid = Grid.field(shape=())
+        self.grid = table.structs(Grid)
         self.cell_first = table.field(ti.i32, "spheres", flat=True)
         self.next = table.field(ti.i32, "spheres", flat=True)
         self.pair = table.vector(2, ti.i32, "pairs", flat=True)
@@ -125,21 +127,19 @@ class CellList:
         self.travel = table.field(ti.f64)
         self.full = table.field(ti.i32)
 
-    def load(self, options: Any) -> None:
-        """Write the skin and the grid to the device."""
-        columns, rows = grid_of(options)
-        grid = {"skin": skin_of(options), "columns": columns, "rows": rows}
-        assign_members(self.grid, pairs=listed_pairs(options.capacity), **grid)
+    def load(self, fillings: Fillings) -> None:
+        """Write the skin and the grid of each scene to the device."""
+        fillings.write(self.grid, grid_of)
 
     @ti.func
     def _list_end(self, s):
         """One past the last place of the list of scene s."""
-        return s * self.list_stride + self.grid[None].pairs
+        return s * self.list_stride + self.grid[s].pairs
 
     @ti.func
     def forget(self, s):
         """Empty the list of scene s; the next refresh renews it."""
-        self.travel[s] = self.grid[None].skin
+        self.travel[s] = self.grid[s].skin
         self.pair_first[s] = self._list_end(s)
         self.full[s] = 0
 
@@ -161,7 +161,7 @@ class CellList:
 
         "not" includes NaN.
         """
-        used_up = not (self.travel[s] + ahead < self.grid[None].skin)
+        used_up = not (self.travel[s] + ahead < self.grid[s].skin)
         if used_up:
             self._search(s)
             self.travel[s] = 0.0
@@ -170,7 +170,7 @@ class CellList:
     @ti.func
     def _search(self, s):
         """Go through the spheres backwards: those already in the cells have a higher index."""
-        grid, cells = self.grid[None], s * self.cell_stride
+        grid, cells = self.grid[s], s * self.cell_stride
         for c in range(cells, cells + grid.columns * grid.rows):
             self.cell_first[c] = -1
         self.full[s] = 0
@@ -188,7 +188,7 @@ class CellList:
     @ti.func
     def _cell_of(self, s, i):
         """Column and row of a sphere; a runaway belongs to the cell on its side."""
-        body, grid = self.bodies.body[None], self.grid[None]
+        body, grid = self.bodies.body[s], self.grid[s]
         place = self.bodies.position[i] + vec2(0.5 * body.width, -self.bodies.floor[s])
         column = ti.cast(place[0] * (grid.columns / body.width), ti.i32)
         row = ti.cast(place[1] * (grid.rows / body.height), ti.i32)
@@ -197,14 +197,14 @@ class CellList:
     @ti.func
     def _list_near(self, s, i, column, row, start):
         """List the spheres of higher index near i before ``start``; returns the new start."""
-        position, grid = self.bodies.position[i], self.grid[None]
-        reach = 2.0 * self.bodies.body[None].radius + grid.skin
+        position, grid = self.bodies.position[i], self.grid[s]
+        reach = 2.0 * self.bodies.body[s].radius + grid.skin
         row_end = start
         for r in range(ti.max(row - 1, 0), ti.min(row + 2, grid.rows)):
             for c in range(ti.max(column - 1, 0), ti.min(column + 2, grid.columns)):
                 j = self.cell_first[s * self.cell_stride + r * grid.columns + c]
                 while j >= 0:
-                    near = reach - self.bodies.short_of_reach(i, j)
+                    near = reach - self.bodies.short_of_reach(s, i, j)
                     if (self.bodies.position[j] - position).norm_sqr() < near * near:
                         start = self._insert(s, i, j, start, row_end)
                     j = self.next[j]
@@ -231,10 +231,12 @@ def skin_of(options: Any) -> float:
     return min(options.radii) / 3.0
 
 
-def grid_of(options: Any) -> tuple[int, int]:
-    """Columns and rows of the cells."""
+def grid_of(options: Any) -> dict[str, Any]:
+    """Members of a Grid."""
     size = options.diameter + skin_of(options)
-    return max(1, int(options.width / size)), max(1, int(options.height / size))
+    columns, rows = (max(1, int(length / size)) for length in (options.width, options.height))
+    pairs = listed_pairs(options.capacity)
+    return {"skin": skin_of(options), "columns": columns, "rows": rows, "pairs": pairs}
 
 
 def listed_pairs(capacity: int) -> int:

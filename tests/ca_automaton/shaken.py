@@ -14,16 +14,17 @@ class Shaken(Driven):
     """Scenes of one automaton in containers that move as x = A sin(w t), all at once."""
 
     def __init__(self, filling, particles, seed=1, dt=1e-4, amplitude=0.0, frequency=6.0, traced=0):
-        key = (type(filling), filling.structure.key)
+        one = filling[0] if isinstance(filling, list) else filling
+        key = (type(one), one.structure.key)
         if key not in _with_room:
             _with_room.add(key)
-            Driven(filling, np.resize(particles, SCENES), 1, dt, 0.0, frequency, TRACED)
+            Driven(one, np.resize(particles, SCENES), 1, dt, 0.0, frequency, TRACED)
         super().__init__(filling, particles, seed, dt, amplitude, frequency, traced)
 
     @property
     def geometry(self):
         """Of the lattice."""
-        return self.device.lattice.geometry
+        return self.device.lattice.geometry(0)
 
     def state(self):
         """Kind, speed, way, and speed across, in all cells and the one beyond, to compare bits."""

@@ -8,7 +8,6 @@ from ca_damper.automaton.collisions import deflected, speed_after_pair, speed_af
 from ca_damper.automaton.lattice import (
     DIRECTIONS,
     DOWN,
-    EMPTY,
     UP,
     Geometry,
     alignments,
@@ -62,7 +61,7 @@ BOX, WIDTH = Geometry(10, 16), 6e-3
 def test_inner_cells_have_six_neighbours_where_the_triangles_put_them():
     """Vertical neighbours one width away, oblique ones one column aside and half a width up."""
     ahead, centres = BOX.neighbours(), BOX.centres(WIDTH)
-    inner = np.flatnonzero(BOX.blank()[:-1] == EMPTY)
+    inner = np.flatnonzero(BOX.inside(*BOX.column_and_row(np.arange(BOX.cells))))
     assert len(inner) == 160
     for cell in inner:
         way = (centres[ahead[cell, :DIRECTIONS]] - centres[cell]) / WIDTH

@@ -1,13 +1,14 @@
 """The best damper: boxes that are tried, the winner, and input that has no answer."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ca_damper import Automaton, Oscillator, best_damper, excitation
 from ca_damper.errors import InputError
-from ca_damper.runs.best_damper import Value
+from ca_damper.runs.best_damper import Value, _searched
 from ca_damper.runs.grains import DENSITY, boxes_of, shifted
 
 BOX = (60e-3, 96e-3)
@@ -53,6 +54,13 @@ def test_the_winner_has_the_lowest_upper_end_and_damps():
     assert all(made.value.mean + made.value.error <= end for end in ends)
     assert len(made.table()) == 2 and made.search_seconds > 0.0
     assert "30 grains of 6 mm" in str(made)
+
+
+def test_a_box_whose_scenes_diverge_is_no_winner():
+    boxes = boxes_of(6e-3, (10, 30), BOX, DENSITY, 3)
+    height = {box: np.nan if k % 2 == 0 else 1.0 + k for k, box in enumerate(boxes)}
+    case = SimpleNamespace(values=lambda _, box, seeds, brief=False: np.full(seeds, height[box]))
+    assert _searched(case, None, boxes, 2)["grains"] == boxes[1]
 
 
 def test_a_signal_is_judged_on_the_base():

@@ -10,7 +10,7 @@ from tests.driven import Driven
 def put(device, places, velocities, s=0):
     """Give the spheres of a scene that has not begun places [m] and velocities [m/s]."""
     bodies = device.bodies
-    corner = np.array([0.5 * bodies.body[None].width, 0.0])
+    corner = np.array([0.5 * bodies.body[s].width, 0.0])
     for k, (place, velocity) in enumerate(zip(np.atleast_2d(places), np.atleast_2d(velocities))):
         bodies.position[s * bodies.stride + k] = place - corner
         bodies.velocity[s * bodies.stride + k] = velocity
@@ -42,7 +42,7 @@ class Rig(Driven):
         position, velocity = map(self._of_all, (bodies.position, bodies.velocity))
         ahead = self.in_use(bodies.lead)[:, None, None]
         shift = np.zeros((self.count, 1, 2))
-        shift[:, 0, 0] = 0.5 * bodies.body[None].width
+        shift[:, 0, 0] = 0.5 * self.in_use(bodies.body.get_member_field("width"))
         shift[:, 0, 1] = -self.in_use(bodies.floor)
         return position - ahead * velocity + shift, velocity
 

@@ -28,7 +28,7 @@ LAYERS = {
         | result | simulate needed_effects | goals
         | accuracy | solve | demo | __init__ | __main__""",
     "ca_damper": """
-        errors report | oscillator structure excitation | theory | scenes | filling
+        errors report | oscillator excitation | theory | scenes | filling structure
         | engine | fixed_mass automaton spheres | combined | batch | plot
         | runs | goals | accuracy | solve_response
         | demo_pictures | demo | __init__ | __main__""",

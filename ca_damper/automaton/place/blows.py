@@ -76,7 +76,7 @@ class Collisions(Part):
         """
         line = ti.Vector([0.0, 1.0])
         if kind == OBLIQUE:
-            width = self.parameters.width[None]
+            width = self.parameters.width[s]
             rise = (self.cells.height(s, other) - self.cells.height(s, cell)) / width
             line = ti.Vector([chord(rise), rise])
         else:
@@ -89,7 +89,7 @@ class Collisions(Part):
         self.resting.free(s, other, carried)
         relative = self.cells.velocity(s, cell) - self.cells.velocity(s, other)
         change = speed_change(
-            relative, line, self.parameters.particle[None], self.parameters.friction[None]
+            relative, line, self.parameters.particle[s], self.parameters.friction[s]
         )
         if kind == LINE:
             # They cannot pass each other within their column: what is left of the approach is lost.
@@ -113,17 +113,17 @@ class Collisions(Part):
     @ti.func
     def blows(self, s):
         """Blows on the container."""
-        mass, sides = self.parameters.mass[None], self.count[s] - self.ends[s]
+        mass, sides = self.parameters.mass[s], self.count[s] - self.ends[s]
         approaches = QUANTUM * ti.cast(self.approaches[s], ti.f64)
-        impulse = mass * (1.0 + self.parameters.wall[None]) * approaches
+        impulse = mass * (1.0 + self.parameters.wall[s]) * approaches
         return Blows(impulse, mass * self.ends[s], mass * sides, mass * self.resting.held[s])
 
     @ti.func
     def recoil(self, s):
         """Recoil of a container on its own."""
-        recoil = self.parameters.mass[None] * self.table.recoil[s]
+        recoil = self.parameters.mass[s] * self.table.recoil[s]
         recoil = recoil / (1.0 + recoil * self.resting.held[s])
-        total, share = QUANTUM * ti.cast(self.approaches[s], ti.f64), self.parameters.wall[None]
+        total, share = QUANTUM * ti.cast(self.approaches[s], ti.f64), self.parameters.wall[s]
         after = common_velocity(self.cells.container[s], total, self.ends[s], recoil, share)
         return Recoil(after, (self.count[s] - self.ends[s]) * recoil)
 
@@ -167,9 +167,9 @@ class Collisions(Part):
         The grain has been on its way back since the time of the blow, and so is its place.
         """
         approach, since = self.approach(s, cell), self.since(s, cell)
-        share = self.parameters.wall[None]
+        share = self.parameters.wall[s]
         gain = after - self.cells.container[s] - (1.0 + share) * approach
-        friction = self.parameters.wall_friction[None] * ti.abs(gain)
+        friction = self.parameters.wall_friction[s] * ti.abs(gain)
         self.cells.accelerate(
             s, cell, ti.Vector([-dragged(self.cells.across[s, cell], friction), gain])
         )
@@ -189,9 +189,9 @@ class Collisions(Part):
         """Leave a side wall, which drags the grain towards the velocity of the container."""
         velocity = self.cells.across[s, cell]
         slip = self.cells.speed[s, cell] - recoil.velocity
-        push = (1.0 + self.parameters.wall[None]) * velocity
+        push = (1.0 + self.parameters.wall[s]) * velocity
         most = ti.min(
-            self.parameters.wall_friction[None] * ti.abs(push), most_drag(slip, recoil.share)
+            self.parameters.wall_friction[s] * ti.abs(push), most_drag(slip, recoil.share)
         )
         gain = -dragged(slip, most)
         self.cells.accelerate(s, cell, ti.Vector([-push, gain]))

@@ -124,8 +124,8 @@ class Contacts(Part):
         count, traversal = 0, self.cells.traversal
         self.shared[s] = shared
         # A bound of the probability to meet, by the relative speed.
-        steep = _MOST_RATE * self.table.dt[s] / self.parameters.width[None]
-        for k in range(traversal.begin(), traversal.end(s)):
+        steep = _MOST_RATE * self.table.dt[s] / self.parameters.width[s]
+        for k in range(traversal.begin(s), traversal.end(s)):
             cell = traversal.cell(s, k)
             kind = self.cells.at(s, cell)
             if kind == UP:
@@ -175,7 +175,7 @@ class Contacts(Part):
         over = self.cells.travelled[s, cell] - self.cells.offset[s]
         approach = self.cells.container[s] - self.cells.speed[s, cell]
         if over <= 0.0 and approach > 0.0 and self.cells.at(s, cell - 1) == WALL:
-            if self.resting.takes(approach, pull, pressed):
+            if self.resting.takes(s, approach, pull, pressed):
                 result = self.note(s, step, count, cell, _AT_END, cell, 0, JOIN)
             else:
                 result = self.note(s, step, count, cell, _AT_END, cell, 0, END)
@@ -190,8 +190,8 @@ class Contacts(Part):
         velocity = self.cells.across[s, cell]
         if velocity != 0.0:
             way = 1 if velocity > 0.0 else -1
-            if self.lattice.in_side_wall(cell + way * self.lattice.size[None].height):
-                share = ti.abs(velocity) * self.table.dt[s] / self.parameters.width[None]
+            if self.lattice.in_side_wall(s, cell + way * self.lattice.size.height[s]):
+                share = ti.abs(velocity) * self.table.dt[s] / self.parameters.width[s]
                 if unit(bits(shared, cell, SIDE)) < share:
                     result = self.note(s, step, count, cell, _AT_SIDE, cell, 0, BRUSH)
         return result
@@ -204,7 +204,7 @@ class Contacts(Part):
         if self.cells.is_grain(s, upper) and not (held and self.cells.at(s, upper) == HELD):
             approach = self.cells.velocity(s, cell)[1] - self.cells.velocity(s, upper)[1]
             if approach > 0.0 and self.cells.overlap(s, cell) >= 0.0:
-                if held and self.resting.takes(approach, pull, pressed):
+                if held and self.resting.takes(s, approach, pull, pressed):
                     result = self.note(s, step, count, cell, _ABOVE, upper, 0, JOIN)
                 elif held:
                     result = self.note(s, step, count, cell, _ABOVE, upper, 0, END)
@@ -218,11 +218,11 @@ class Contacts(Part):
 
         steep: bound of the probability of a blow in this step, by the relative speed [s/m].
         """
-        result, height = count, self.lattice.size[None].height
-        if not self.lattice.in_side_wall(self.lattice.column_beside(cell, 1)):
+        result, height = count, self.lattice.size.height[s]
+        if not self.lattice.in_side_wall(s, self.lattice.column_beside(s, cell, 1)):
             # The columns stand half a cell apart, so that one of five rows is too far; beyond floor
             # and ceiling of that column there are walls alone.
-            lowest = cell + height - 2 + ti.cast(self.lattice.raised[cell], ti.i32)
+            lowest = cell + height - 2 + self.lattice.raised(s, cell)
             left = self.partners(s, lowest, self.cells.at(s, cell))
             while left != 0:
                 # Number of the lowest bit, and the others.
@@ -254,7 +254,7 @@ class Contacts(Part):
 
         rows: by how many cells the second cell is higher. steep: as of ``beside``.
         """
-        width, result = self.parameters.width[None], False
+        width, result = self.parameters.width[s], False
         way = self.cells.way(s, other) - self.cells.way(s, cell)
         # Most pairs are told apart without a division or a root.
         if ti.abs(rows * width + way) < _NEAR * width:
@@ -271,7 +271,7 @@ class Contacts(Part):
 
         relative: velocity [m/s]. rise: of the second over the first [diameters].
         """
-        width, result = self.parameters.width[None], False
+        width, result = self.parameters.width[s], False
         approach = relative.dot(ti.Vector([chord(rise), rise]))
         # Most draws say no whatever stands beside the two, which takes long to find.
         if (
@@ -289,11 +289,11 @@ class Contacts(Part):
 
         A side wall takes as much as a grain at the same height.
         """
-        result, base = 1.0, self.lattice.column_beside(cell, way)
-        if not self.lattice.in_side_wall(base):
-            result, width = 0.0, self.parameters.width[None]
+        result, base = 1.0, self.lattice.column_beside(s, cell, way)
+        if not self.lattice.in_side_wall(s, base):
+            result, width = 0.0, self.parameters.width[s]
             own = self.cells.height(s, cell) / width
-            nearest = base + 1 + self.lattice.nearest_row(base, own)
+            nearest = base + 1 + self.lattice.nearest_row(s, base, own)
             for near in range(nearest - 1, nearest + 2):
                 if self.cells.is_grain(s, near):
                     result = ti.max(result, chord(self.cells.height(s, near) / width - own))

@@ -22,7 +22,7 @@ class PlaceAutomaton(LatticeDevice):
     """
 
     def __init__(self, options: Any, table: SceneFields):
-        super().__init__(table)
+        super().__init__(table, looks_ahead=False)
         self.tilted = gravity_across(options) != 0.0
         grains = Grains(self, options.traversal == "list")
         self._fill(options, grains, Heap(self, grains, None, options.particles_rest), UP)
@@ -37,14 +37,14 @@ class PlaceAutomaton(LatticeDevice):
     @ti.func
     def energy(self, s):
         """Kinetic and potential energy [J]; held grains move as the container did last."""
-        total, sideways = 0.0, self.parameters.sideways[None] * self.parameters.width[None]
-        for cell in range(self.lattice.size[None].cells):
+        total, sideways = 0.0, self.parameters.sideways[s] * self.parameters.width[s]
+        for cell in range(self.lattice.size.cells[s]):
             if self.cells.is_grain(s, cell):
                 velocity = self.cells.velocity(s, cell)
                 height = self.cells.height(s, cell) - self.cells.offset[s]
-                total += 0.5 * velocity.dot(velocity) + self.parameters.gravity[None] * height
-                total -= sideways * self.lattice.column_of(cell)
-        return self.parameters.mass[None] * total
+                total += 0.5 * velocity.dot(velocity) + self.parameters.gravity[s] * height
+                total -= sideways * self.lattice.column_of(s, cell)
+        return self.parameters.mass[s] * total
 
     @ti.func
     def divergence_code(self, s):
@@ -53,8 +53,8 @@ class PlaceAutomaton(LatticeDevice):
         2 when one is more than a diameter outside the box: pushed beyond floor or ceiling by others
         more often than it could turn over there.
         """
-        fastest, farthest, width = 0.0, 0.0, self.parameters.width[None]
-        for cell in range(self.lattice.size[None].cells):
+        fastest, farthest, width = 0.0, 0.0, self.parameters.width[s]
+        for cell in range(self.lattice.size.cells[s]):
             across = ti.abs(self.cells.across[s, cell])
             fastest = ti.max(fastest, ti.abs(self.cells.speed[s, cell]), across)
             if self.cells.is_grain(s, cell):
@@ -65,7 +65,7 @@ class PlaceAutomaton(LatticeDevice):
     @ti.func
     def outside(self, s, cell):
         """By how much a grain is farther out than those at floor and ceiling can be [m]."""
-        most = ti.cast(self.lattice.size[None].rows, ti.f64) * self.parameters.width[None]
+        most = ti.cast(self.lattice.size.rows[s], ti.f64) * self.parameters.width[s]
         height = self.cells.height(s, cell) - self.cells.offset[s]
         return ti.max(-height, height - most)
 

@@ -29,8 +29,8 @@ class Grains(Cells):
     @ti.func
     def clear(self, s):
         """Walls and nothing else."""
-        for cell in range(self.lattice.size[None].cells + 1):
-            self.put(s, cell, ti.cast(self.lattice.blank[cell], ti.i32), 0.0, 0.0)
+        for cell in range(self.lattice.size.cells[s] + 1):
+            self.put(s, cell, self.lattice.blank(s, cell), 0.0, 0.0)
             self.across[s, cell] = 0.0
         self.container[s], self.closing[s] = 0.0, 0.0
 
@@ -57,7 +57,7 @@ class Grains(Cells):
     @ti.func
     def height(self, s, cell):
         """Height of a grain [m] over the lower cells of the lattice."""
-        return self.lattice.height_of(cell) * self.parameters.width[None] + self.way(s, cell)
+        return self.lattice.height_of(s, cell) * self.parameters.width[s] + self.way(s, cell)
 
     @ti.func
     def overlap(self, s, lower):
@@ -84,11 +84,11 @@ class Heap(StaticContact):
     """Grains at rest on the floor, or on a grain that rests: those that the container carries."""
 
     @ti.func
-    def takes(self, approach, pull, pressed):
+    def takes(self, s, approach, pull, pressed):
         """Whether a grain that meets floor or heap at a speed [m/s] stays; pull: g dt [m/s]."""
         result = False
         if ti.static(self.rests):
-            result = pressed and approach < self.parameters.threshold[None] * pull
+            result = pressed and approach < self.parameters.threshold[s] * pull
         return result
 
     @ti.func
@@ -108,5 +108,5 @@ class Heap(StaticContact):
     def release(self, s, velocity):
         """Release the heap where it is, with the velocity of the container [m/s]."""
         if self.held[s] > 0:
-            for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
+            for k in range(self.cells.traversal.begin(s), self.cells.traversal.end(s)):
                 self.free(s, self.cells.traversal.cell(s, k), velocity)

@@ -40,12 +40,12 @@ class Transport(Part):
         by the wall or by the unbroken run of grains on it, a grain keeps its cell and stands
         further off its centre.
         """
-        width = self.parameters.width[None]
+        width = self.parameters.width[s]
         way = self.cells.step_along(s, step, motion, width)
         if way != 0:
-            for column in range(self.lattice.size[None].columns):
-                for k in range(self.lattice.size[None].rows):
-                    cell = self.lattice.cell_from(column, k, way)
+            for column in range(self.lattice.size.columns[s]):
+                for k in range(self.lattice.size.rows[s]):
+                    cell = self.lattice.cell_from(s, column, k, way)
                     if self.cells.at(s, cell) == UP:
                         travelled = self.cells.travelled[s, cell]
                         if self.cells.at(s, cell - way) == EMPTY:
@@ -60,7 +60,7 @@ class Transport(Part):
         """One step of all grains under way and of the container, exact for constant gravity."""
         dt, gained = self.table.dt[s], ti.cast(0, ti.i64)
         after = motion.v + motion.a * dt
-        for k in range(self.traversal.begin(), self.traversal.end(s)):
+        for k in range(self.traversal.begin(s), self.traversal.end(s)):
             cell = self.traversal.cell(s, k)
             if self.cells.at(s, cell) == UP:
                 speed = self.cells.speed[s, cell] - pull
@@ -74,7 +74,7 @@ class Transport(Part):
                 )
         self.cells.offset[s] = self.cells.offset[s] + (motion.v + 0.5 * motion.a * dt) * dt
         self.cells.container[s] = after
-        self.cells.closing[s] = motion.a + self.parameters.gravity[None]
+        self.cells.closing[s] = motion.a + self.parameters.gravity[s]
         return gained
 
     @ti.func
@@ -84,15 +84,15 @@ class Transport(Part):
         A grain that has no room and fell less than a diameter lies, and presses by its weight
         on the bed that the container carries: all layers together are dragged as one body is.
         """
-        result, sideways = 0.0, self.parameters.sideways[None]
+        result, sideways = 0.0, self.parameters.sideways[s]
         across, pull = self.cells.across[s, cell], ti.abs(sideways)
         way = 1 if sideways > 0.0 else -1
-        slow = across * way >= 0.0 and across * across < 2.0 * pull * self.parameters.width[None]
+        slow = across * way >= 0.0 and across * across < 2.0 * pull * self.parameters.width[s]
         if slow and self.free_place(s, cell, way) == _NOWHERE:
             self.cells.across[s, cell] = 0.0
             push = pull * self.table.dt[s] + ti.abs(across)
-            share = self.parameters.mass[None] * self.table.recoil[s] * self.table.particles[s]
-            most = ti.min(self.parameters.wall_friction[None] * push, most_drag(slip, share))
+            share = self.parameters.mass[s] * self.table.recoil[s] * self.table.particles[s]
+            most = ti.min(self.parameters.wall_friction[s] * push, most_drag(slip, share))
             result = dragged(slip, most)
         else:
             self.cells.across[s, cell] = across + sideways * self.table.dt[s]
@@ -112,11 +112,11 @@ class Transport(Part):
         with the probability |u| dt / d. It keeps its height, at which there must be room for it.
         """
         count = 0
-        for k in range(self.traversal.begin(), self.traversal.end(s)):
+        for k in range(self.traversal.begin(s), self.traversal.end(s)):
             cell = self.traversal.cell(s, k)
             velocity = self.cells.across[s, cell]
             if velocity != 0.0:
-                share = ti.abs(velocity) * dt / self.parameters.width[None]
+                share = ti.abs(velocity) * dt / self.parameters.width[s]
                 if unit(bits(shared, cell, HOP)) < share:
                     target = self.free_place(s, cell, 1 if velocity > 0.0 else -1)
                     if target != _NOWHERE:
@@ -131,8 +131,8 @@ class Transport(Part):
             for near in range(target - 1, target + 2):
                 alone = alone and self.conflict_resolution.holds(s, near, ranked)
             if alone:
-                width = self.parameters.width[None]
-                centre = self.lattice.height_of(target) * width
+                width = self.parameters.width[s]
+                centre = self.lattice.height_of(s, target) * width
                 self.cells.relocate(s, cell, target, self.cells.height(s, cell) - centre)
 
     @ti.func
@@ -145,29 +145,29 @@ class Transport(Part):
     @ti.func
     def free_place(self, s, cell, way):
         """Cell at a grain's height in the next column (way 1: right), if there is room."""
-        width, result = self.parameters.width[None], _NOWHERE
-        base = self.lattice.column_beside(cell, way)
-        if not self.lattice.in_side_wall(base):
+        width, result = self.parameters.width[s], _NOWHERE
+        base = self.lattice.column_beside(s, cell, way)
+        if not self.lattice.in_side_wall(s, base):
             height = self.cells.height(s, cell)
-            row = self.lattice.nearest_row(base, height / width)
+            row = self.lattice.nearest_row(s, base, height / width)
             target = base + 1 + row
             room = self.cells.at(s, target) == EMPTY
             for near in range(target - 1, target + 2):
                 if self.cells.is_grain(s, near):
                     room = room and ti.abs(self.cells.height(s, near) - height) >= width
             # Over the floor of that column, and below its ceiling.
-            over = height - self.lattice.height_of(base + 1) * width - self.cells.offset[s]
-            if room and 0.0 <= over <= (self.lattice.size[None].rows - 1) * width:
+            over = height - self.lattice.height_of(s, base + 1) * width - self.cells.offset[s]
+            if room and 0.0 <= over <= (self.lattice.size.rows[s] - 1) * width:
                 result = target
         return result
 
     @ti.func
     def climb_all(self, s, step, shared):
         """Move grains that are nearer to the next cell of their column into it."""
-        count = 0
-        for k in range(self.traversal.begin(), self.traversal.end(s)):
+        count, width = 0, self.parameters.width[s]
+        for k in range(self.traversal.begin(s), self.traversal.end(s)):
             cell = self.traversal.cell(s, k)
-            away, width = self.cells.travelled[s, cell], self.parameters.width[None]
+            away = self.cells.travelled[s, cell]
             # A product first: a division of every grain takes longer than the rest.
             if ti.abs(away) > 0.5 * width and ti.abs(away / width) > 0.5:
                 target = cell + (1 if away > 0.0 else -1)
@@ -179,5 +179,5 @@ class Transport(Part):
             cell, target = ti.cast(self.movers[s, k], ti.i32), ti.cast(self.targets[s, k], ti.i32)
             ranked = rank_in_phase(step, shared, _ALONG, cell, 0)
             if self.conflict_resolution.holds(s, target, ranked):
-                way = self.parameters.width[None] * (target - cell)
+                way = width * (target - cell)
                 self.cells.relocate(s, cell, target, self.cells.travelled[s, cell] - way)

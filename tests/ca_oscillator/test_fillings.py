@@ -1,0 +1,129 @@
+"""A batch of fillings of several sizes: each scene is as in a batch of its own."""
+
+import re
+
+import numpy as np
+import pytest
+
+from ca_damper import Automaton, Batch, Combined, RigidMass, SceneTable, Spheres, film
+from ca_damper.errors import InputError
+from tests.paper import paper
+
+DT = {"Spheres": 2e-5}
+SMALL = {"columns": 6, "rows": 9, "width": 4e-3, "particle_mass": 0.08e-3, "restitution": 0.5}
+LARGE = {"columns": 13, "rows": 30, "particle_mass": 0.5e-3, "gravity": 9.0, "static_threshold": 2}
+FLAT = {"width": 0.05, "height": 0.03, "diameter": 4e-3, "particle_mass": 0.1e-3, "young": 2e8}
+HIGH = {"width": 0.07, "height": 0.2, "gravity": 7.0, "restitution": 0.9, "wall_friction": 0.1}
+#: Three fillings, and the particles of each.
+THREE = {
+    "place": ([Automaton(**SMALL, friction=0.1), Automaton(), Automaton(**LARGE)], [11, 50, 90]),
+    "paper": ([paper(**SMALL), paper(), paper(**LARGE)], [11, 50, 90]),
+    "named cells": (
+        [
+            Automaton(**SMALL, start=((0, 0), (3, 8))),
+            Automaton(start=((5, 2),)),
+            Automaton(**LARGE, start=((12, 29), (0, 3), (7, 7))),
+        ],
+        [2, 1, 3],
+    ),
+    "spheres": ([Spheres(**FLAT), Spheres(), Spheres(**HIGH)], [9, 30, 50]),
+    "sizes": (
+        [
+            Spheres(**FLAT, sizes=((5, 4e-3), (4, 3e-3)), rotation=True),
+            Spheres(sizes=((10, 5e-3), (20, 6e-3)), rotation=True),
+            Spheres(**HIGH, sizes=((30, 4e-3), (20, 7e-3)), rotation=True),
+        ],
+        [9, 30, 50],
+    ),
+    "placed spheres": (
+        [
+            Spheres(**FLAT, start=((0.01, 0.01), (0.03, 0.02))),
+            Spheres(start=((0.03, 0.02),)),
+            Spheres(**HIGH, start=((0.01, 0.1), (0.02, 0.05), (0.05, 0.01))),
+        ],
+        [2, 1, 3],
+    ),
+    "combined": ([Combined(**FLAT, substeps=3), Combined(), Combined(**HIGH)], [9, 30, 50]),
+    "rigid": ([RigidMass(), RigidMass(1e-3, gravity=3.0), RigidMass(1e-5)], [3, 20, 90]),
+}
+
+
+def run(fillings, particles, rows):
+    """What scenes of these rows, shaken by three cycles, measure and end with, a list a scene."""
+    number, amplitude = [particles[k] for k in rows], [(3e-3, 8e-3, 12e-3)[k] for k in rows]
+    filling = fillings[rows[0]] if len(rows) == 1 else [fillings[k] for k in rows]
+    dt = DT.get(type(fillings[0]).__name__, 1e-4)
+    batch = Batch(filling, SceneTable(number, rows, dt, 6.0, amplitude), measured_cycles=1)
+    batch.start("rigid")
+    cycles, now, error = batch.run(2, 1), batch.sample(), batch.report().momentum_error
+    of_all = [cycles.record, batch.attempts(), *(now[name] for name in sorted(now))]
+    shots = [batch.snapshot(s) for s in range(len(rows))]
+    found = [[*(one[s] for one in of_all), *shots[s].values()] for s in range(len(rows))]
+    return found, error
+
+
+@pytest.mark.parametrize("name", THREE)
+def test_each_scene_is_as_in_a_batch_of_its_filling_and_momentum_closes(name):
+    fillings, particles = THREE[name]
+    together, error = run(fillings, particles, [2, 0, 1])
+    alone = [run(fillings, particles, [k])[0][0] for k in (2, 0, 1)]
+    for mine, same in zip(together, alone):
+        assert all(np.array_equal(a, b) for a, b in zip(mine, same, strict=True))
+    assert error < 1e-9
+
+
+def test_a_report_names_the_scene_nearest_to_its_bound_and_all_that_is_outside():
+    fillings = [Automaton(), Automaton(width=2e-3, restitution=0.95, columns=60, rows=7)]
+    batch = Batch(fillings, SceneTable([5, 60], 1, 1e-4, 6.0, 20e-3), mount="base")
+    report = batch.report()
+    assert report.step_bound == fillings[1].step_bound
+    assert report.bound_taken == pytest.approx(1e-4 / 4e-4, rel=0.05)
+    found = report.checked.outside
+    assert any("60 grains" in one for one in found) and any("0.95" in one for one in found)
+
+
+def table(count):
+    return SceneTable(3, [*range(count)], 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("fillings", "count", "words"),
+    [
+        ([Automaton()] * 2, 3, "filling must be one, or one for each of 3 scenes, got 2 fillings"),
+        ([Automaton(), Spheres()], 2, "filling must be of one class, with the same rules and"),
+        ([Automaton(), paper()], 2, "filling must be of one class, with the same rules and"),
+        ([RigidMass(), 3], 2, "filling must be one such as Automaton()"),
+        ([Automaton(), Automaton(columns=1, rows=2)], 2, "particles must .* from 0 to 2, got 3"),
+    ],
+)
+def test_fillings_that_cannot_run_together_are_refused_in_a_sentence(fillings, count, words):
+    with pytest.raises(InputError, match="^" + words.replace("()", re.escape("()"))):
+        Batch(fillings, table(count))
+
+
+def test_a_film_of_several_fillings_is_refused_before_it_runs():
+    batch = Batch([RigidMass(), RigidMass(gravity=0.0)], table(2))
+    batch.start()
+    with pytest.raises(InputError, match=r"^filling must be the same in .* got 2 different ones"):
+        film(batch, 3)
+    assert batch.scene_steps == 0
+
+
+def test_a_state_of_several_fillings_goes_on_to_the_same_bits():
+    """Put aside while a batch of the same fillings in another order uses the engine."""
+    fillings, particles = THREE["place"]
+
+    def batch(order):
+        number, of = [particles[k] for k in order], [fillings[k] for k in order]
+        made = Batch(of, SceneTable(number, 1, 1e-4, 6.0, 8e-3), measured_cycles=1)
+        made.start()
+        made.run(0, 1)
+        return made
+
+    first = batch([0, 1, 2])
+    aside, straight = first.aside(), first.run(0, 1).record
+    del first
+    batch([2, 1, 0])
+    again = batch([0, 1, 2])
+    again.take_up(aside)
+    assert np.array_equal(again.run(0, 1).record, straight)
