@@ -57,7 +57,8 @@ class Batch(LoadedScenes):
     ----------
     filling : Filling or sequence of Filling
         Filling of the containers, such as ``Automaton()`` or ``Spheres()``; or one for each scene,
-        all of one class with the same rules and effects, which differ in numbers and sizes.
+        all of one class with the same rules and effects, friction, starts and gravity sideways in
+        all or none, which differ in numbers and sizes.
     table : SceneTable
         Parameters of the scenes; the batch copies them. ``table.dt`` holds the largest step of each
         scene [s], which is shortened so that a whole number of steps makes a cycle of the base.
@@ -517,9 +518,7 @@ class Batch(LoadedScenes):
 
     def _bound_of_step(self) -> dict[str, Any]:
         """Fields of a Report: the bound of which a scene takes the largest share, and that."""
-        if self.fillings.kinds[0].step_bound is None:
-            return {"step_bound": None}
-        bound = self.fillings.of_scenes(lambda one: one.step_bound[0])
+        bound = self.fillings.of_scenes(lambda one: (one.step_bound or (np.inf,))[0])
         shares = self.table.column("dt") / bound
         worst = int(shares.argmax())
         return {

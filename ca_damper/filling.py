@@ -11,12 +11,15 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import taichi as ti
+from taichi.lang.util import to_numpy_type
 
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.checkpoint import identity_of
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.field_memory import shape_of
 from taichi_dem.kit.validation import shown
 
 
@@ -104,21 +107,23 @@ class Fillings:
 
     def __init__(self, given: Any, scenes: int):
         """Of one filling for all scenes, or a sequence with one for each; InputError."""
-        listed = given if isinstance(given, (list, tuple)) else [given]
-        if listed is given and len(given) != scenes:
+        each = given if isinstance(given, (list, tuple)) else [given]
+        if each is given and len(given) != scenes:
             raise InputError(
                 f"filling must be one, or one for each of {counted(scenes, 'scene')}, got "
                 f"{counted(len(given), 'filling')}"
             )
-        numbers: dict[Any, int] = {}
-        which = [numbers.setdefault(check_filling(one), len(numbers)) for one in listed]
-        self.kinds, self.which = tuple(numbers), np.resize(which, scenes)
+        # By their words, as those of a user may be without a hash.
+        words = [f"{type(one)} {identity_of(check_filling(one))}" for one in each]
+        kinds = dict(zip(words, each))
+        self.kinds, places = tuple(kinds.values()), {word: k for k, word in enumerate(kinds)}
+        self.which = np.resize([places[word] for word in words], scenes)
         first = self.kinds[0]
         for one in self.kinds:
             if (type(one), one.structure.key) != (type(first), first.structure.key):
                 raise InputError(
                     "filling must be of one class, with the same rules and effects, in all scenes "
-                    f"of a batch, got {shown(first)} and {shown(one)}"
+                    f"of a batch, got {_difference(first, one)}"
                 )
 
     @property
@@ -156,18 +161,28 @@ class Fillings:
 
         Zeros follow where it finds fewer numbers than there is room for.
         """
+        found = [value(one) for one in self.kinds]
         if hasattr(field, "field_dict"):
-            found = {one: value(one) for one in self.kinds}
-            for name in found[self.kinds[0]]:
-                self.write(field.get_member_field(name), lambda one, name=name: found[one][name])
-            return
-        room = values(field, 0)
-        rows = np.zeros((len(self.kinds), *room.shape), room.dtype)
-        for k, one in enumerate(self.kinds):
-            part = np.asarray(value(one))
+            for name in found[0]:
+                self._write(field.get_member_field(name), [one[name] for one in found])
+        else:
+            self._write(field, found)
+
+    def _write(self, field, found):
+        parts = [np.asarray(one) for one in found]
+        rows = np.zeros((len(parts), *shape_of(field)[1:]), to_numpy_type(field.dtype))
+        for k, part in enumerate(parts):
             place: tuple[Any, ...] = (k, *map(slice, part.shape))
             rows[place] = part
         assign(field, rows[self.which])
+
+
+def _difference(one, other):
+    """Two fillings in words, those of one class by the options in which they differ."""
+    if type(one) is not type(other):
+        return f"{type(one).__name__} and {type(other).__name__}"
+    names = [name for name in vars(one) if shown(vars(one)[name]) != shown(vars(other)[name])]
+    return f"some that differ in {', '.join(names)}"
 
 
 @runtime_checkable

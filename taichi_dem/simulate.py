@@ -153,7 +153,8 @@ def run_simulation(
 ) -> Result:
     """Run a Simulation, whose motion may have been set, to a time; otherwise as ``simulate``.
 
-    brief: whether the report leaves out missing effects, and frames the stress.
+    brief: whether the report leaves out missing effects and, where no contact keeps all faces
+    apart, shared volume, and frames the stress.
     """
     instance("simulation", simulation, Simulation)
     scene, method = simulation.scene, simulation.method

@@ -232,7 +232,7 @@ class Simulation:
         Parameters
         ----------
         brief : bool, default False
-            Whether to leave out the first sample.
+            Whether the first sample is brief, see ``sample``.
 
         Raises
         ------
@@ -240,6 +240,7 @@ class Simulation:
             The simulation was interrupted before.
         """
         opened = self.energy_balance is not None
+        flag("brief", brief)
         if self.cut_short:
             raise InputError(
                 f"this simulation was interrupted while {self.cut_short}, and cannot "
@@ -253,8 +254,7 @@ class Simulation:
             self._start()
             with self.readings.held():
                 self._open_balance()
-                if not brief:
-                    self.sample()
+                self.sample(brief)
                 self.divergence_check.check()
         self.compile_seconds += time.perf_counter() - started
 
@@ -319,7 +319,7 @@ class Simulation:
         brief : bool, default False
             Whether to look only for what ends a run, or makes it depend on chance.
         """
-        if not brief:
+        if not flag("brief", brief):
             self.missing_effects.sample(self.time_s)
         elif self.divergence_check.sees_shared_volume:
             self.shared_volume.sample(self.time_s)
@@ -466,7 +466,7 @@ class Simulation:
                 *shared_volume.findings(),
                 *open_account(account, self.divergence_check.round_off()),
             ),
-            interpenetration=shared_volume.worst,
+            interpenetration=shared_volume.worst if shared_volume.has_looked else None,
             bound_by={name: n for name, n in zip(CRITERIA, bound.tolist()) if n},
             bond_slip=self.step_resolution.bond_slip(),
             round_off_J=self.divergence_check.round_off(),

@@ -16,6 +16,7 @@ from ca_damper.report.measures import Cycles
 from ca_damper.report.steady_state import period
 from taichi_dem.kit.certificate import Estimate
 from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.errors import InputError
 
 #: Difference of cycles up to which they are alike, as a share of the first harmonic.
 ALIKE = 1e-3
@@ -29,6 +30,11 @@ def activated(
         return fillings, ()
     most = _most_particles(table)
     chosen, estimates = zip(*(one.activated(most) for one in fillings.kinds))
+    if len({one.structure.key for one in chosen}) > 1:
+        raise InputError(
+            'effects must be "listed" where "auto" finds other effects in some fillings of a batch '
+            "than in others, got 'auto'"
+        )
     return Fillings([chosen[k] for k in fillings.which], table.count), _largest(estimates)
 
 

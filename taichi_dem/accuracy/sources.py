@@ -1,5 +1,6 @@
 """Sources of error beside the step: resolution of the contact law, mesh, effects left out."""
 
+import contextlib
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -8,6 +9,7 @@ from typing import Any
 from taichi_dem.accuracy.runs import Job, Runs
 from taichi_dem.kit.bars.budget import Source
 from taichi_dem.kit.bars.chance import mean_and_deviation, t_quantile
+from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.laws.body_contact import MOST_PARTS, BodyContact
 from taichi_dem.laws.roles import LISTED
 from taichi_dem.laws.sphere_contact import SphereContact
@@ -86,7 +88,9 @@ class Beside:
         self.runs.release()
         for scene in scenes:
             made = Runs(replace(self.job, scene=scene), self.runs.listen)
-            values.append(made.value(self.level))
+            # A scene that cannot begin raises instead.
+            with contextlib.suppress(SimulationDiverged):
+                values.append(made.value(self.level))
             seconds += made.seconds
             made.release()
         return [value for value in values if value is not None], seconds

@@ -78,7 +78,7 @@ class FieldMemory:
     def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
         """Name of a field that the arrays of ``read`` lack or do not fit; else ""."""
         for name, field in self.fields.items():
-            shape, array = _shape(field), arrays.get(name)
+            shape, array = shape_of(field), arrays.get(name)
             if array is None or array.dtype != to_numpy_type(field.dtype):
                 return name
             if array.shape[1:] != shape[1:] or array.shape[:1] > shape[:1]:
@@ -88,7 +88,7 @@ class FieldMemory:
     def write(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Restore all fields from arrays that ``read`` returned and ``misfit`` accepts."""
         for name, field in self.fields.items():
-            whole = np.zeros(_shape(field), arrays[name].dtype)
+            whole = np.zeros(shape_of(field), arrays[name].dtype)
             whole[slice(len(arrays[name])) if whole.ndim else ()] = arrays[name]
             assign(field, whole)
 
@@ -102,7 +102,7 @@ def without_end(array: np.ndarray) -> np.ndarray:
     return array[: len(array) - int(rows[::-1].argmax()) if rows.any() else 0]
 
 
-def _shape(field):
+def shape_of(field):
     """Shape of a field as an array."""
     entry: tuple[int, ...] = ()
     if isinstance(field, MatrixField):

@@ -82,6 +82,11 @@ class SharedVolume(Kept):
         self.pairs, self.share = np.zeros((0, 2), dtype=np.int32), np.zeros(0)
 
     @property
+    def has_looked(self) -> bool:
+        """Whether bodies have been compared."""
+        return bool(np.isfinite(self.place).all())
+
+    @property
     def worst(self) -> Interpenetration:
         """The worst pair so far."""
         return _told(self.figures)

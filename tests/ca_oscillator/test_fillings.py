@@ -1,6 +1,7 @@
 """A batch of fillings of several sizes: each scene is as in a batch of its own."""
 
 import re
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -90,8 +91,8 @@ def table(count):
     ("fillings", "count", "words"),
     [
         ([Automaton()] * 2, 3, "filling must be one, or one for each of 3 scenes, got 2 fillings"),
-        ([Automaton(), Spheres()], 2, "filling must be of one class, with the same rules and"),
-        ([Automaton(), paper()], 2, "filling must be of one class, with the same rules and"),
+        ([Automaton(), Spheres()], 2, "filling must be of one class, .* got Automaton and Spheres"),
+        ([Automaton(), Automaton(gravity=(1.0, 9.8))], 2, "filling must .* that differ in gravity"),
         ([RigidMass(), 3], 2, "filling must be one such as Automaton()"),
         ([Automaton(), Automaton(columns=1, rows=2)], 2, "particles must .* from 0 to 2, got 3"),
     ],
@@ -99,6 +100,29 @@ def table(count):
 def test_fillings_that_cannot_run_together_are_refused_in_a_sentence(fillings, count, words):
     with pytest.raises(InputError, match="^" + words.replace("()", re.escape("()"))):
         Batch(fillings, table(count))
+
+
+def test_effects_that_are_negligible_in_some_scenes_alone_are_refused_in_a_sentence():
+    some = [Spheres(), Spheres(friction=1e-7, wall_friction=1e-7)]
+    with pytest.raises(InputError, match=r'^effects must be "listed" where "auto" finds other'):
+        Batch(some, table(2), effects="auto")
+
+
+@dataclass(frozen=True)
+class Bounded(RigidMass):
+    """A mass with an option that has no hash, and a bound of the step of its own."""
+
+    option: object = field(default_factory=lambda: np.zeros(3))
+    step_bound: object = None
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_bound_that_one_of_the_fillings_has_is_told(place):
+    fillings = [Bounded(), Bounded()]
+    fillings[place] = Bounded(step_bound=(1e-3, "it says so"))
+    batch = Batch(fillings, table(2))
+    batch.start()
+    assert batch.report().step_bound == (1e-3, "it says so")
 
 
 def test_a_film_of_several_fillings_is_refused_before_it_runs():
