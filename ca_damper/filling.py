@@ -114,7 +114,9 @@ class Fillings:
                 f"{counted(len(given), 'filling')}"
             )
         # By their words, as those of a user may be without a hash.
-        words = [f"{type(one)} {identity_of(check_filling(one))}" for one in each]
+        own = {id(one): one for one in each}
+        own_words = {k: f"{type(one)} {identity_of(check_filling(one))}" for k, one in own.items()}
+        words = [own_words[id(one)] for one in each]
         kinds = dict(zip(words, each))
         self.kinds, places = tuple(kinds.values()), {word: k for k, word in enumerate(kinds)}
         self.which = np.resize([places[word] for word in words], scenes)
@@ -181,7 +183,8 @@ def _difference(one, other):
     """Two fillings in words, those of one class by the options in which they differ."""
     if type(one) is not type(other):
         return f"{type(one).__name__} and {type(other).__name__}"
-    names = [name for name in vars(one) if shown(vars(one)[name]) != shown(vars(other)[name])]
+    mine, others = vars(one), vars(other)
+    names = [name for name in mine if identity_of(mine[name]) != identity_of(others[name])]
     return f"some that differ in {', '.join(names)}"
 
 

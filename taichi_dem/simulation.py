@@ -251,14 +251,10 @@ class Simulation:
         started = time.perf_counter()
         compiling("time step", 2, PARTS)
         with self._undivided("it was started"):
-            self._start()
-            with self.readings.held():
-                self._open_balance()
-                self.sample(brief)
-                self.divergence_check.check()
+            self._start(brief)
         self.compile_seconds += time.perf_counter() - started
 
-    def _start(self):
+    def _start(self, brief):
         motion = self.state.motion()
         names = ("position", "orientation", "velocity", "spin")
         self.first_motion = {name: motion[name] for name in names}
@@ -272,6 +268,10 @@ class Simulation:
         self._check_capacity()
         compiling("energy balance", 4, PARTS)
         self.readings.step_back()
+        with self.readings.held():
+            self._open_balance()
+            self.sample(brief)
+            self.divergence_check.check()
 
     def _open_balance(self):
         """Begin the energy balance and all else that is followed."""
@@ -321,7 +321,7 @@ class Simulation:
         """
         if not flag("brief", brief):
             self.missing_effects.sample(self.time_s)
-        elif self.divergence_check.sees_shared_volume:
+        elif self.divergence_check.keeps_bodies_apart:
             self.shared_volume.sample(self.time_s)
         self.divergence_check.check_shared(self.shared_volume)
         self.step_resolution.sample(self.time_s)

@@ -21,6 +21,7 @@ UP, UP_RIGHT, DOWN_RIGHT, DOWN, DOWN_LEFT, UP_LEFT = range(6)
 EMPTY, WALL, HELD = 6, 7, 8
 KINDS = 9
 DIRECTIONS = 6
+
 _ANGLE = np.deg2rad(60.0) * np.arange(DIRECTIONS)
 
 

@@ -266,12 +266,6 @@ def assign(field: ti.Field, array: ArrayLike) -> None:
     place[slice(len(array)) if array.ndim else ()] = array
 
 
-def assign_members(field: ti.StructField, **members: ArrayLike) -> None:
-    """Write members of a field of structs by name, as ``assign`` does."""
-    for name, value in members.items():
-        assign(field.get_member_field(name), value)
-
-
 def available_bytes() -> float:
     """Memory available to a new allocation; infinite where the system does not report it."""
     found = [_free_memory()]

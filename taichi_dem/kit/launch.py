@@ -62,9 +62,9 @@ class Launch:
         return None
 
     def _prepared(self, values):
-        """Taichi's program, the compiled kernel, what makes a context, and whether it returns.
+        """Taichi's program, the compiled kernel, and what makes a context of it.
 
-        Before the last, the axes that an entry of each array has.
+        Then the axes that an entry of each array has, and whether the kernel returns something.
         """
         kernel = self._kernel._primal
         owner = [self._kernel._kernel_owner] if hasattr(self._kernel, "_kernel_owner") else []

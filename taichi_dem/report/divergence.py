@@ -108,14 +108,14 @@ class DivergenceCheck:
             raise self._too_deep(body, f"has a contact sphere inside one of body {other} ({share})")
 
     @property
-    def sees_shared_volume(self) -> bool:
+    def keeps_bodies_apart(self) -> bool:
         """Whether contact of all faces is to keep bodies apart."""
         contact = self.run.model.contact
         return contact is not None and bool(contact.outer_faces)
 
     def check_shared(self, volume: SharedVolume) -> None:
         """Raise SimulationDiverged where contact of all faces has not kept two bodies apart."""
-        if not self.sees_shared_volume or not len(volume.share):
+        if not self.keeps_bodies_apart or not len(volume.share):
             return
         place = int(volume.share.argmax())
         if volume.share[place] > DEEPEST_SHARE:

@@ -84,7 +84,7 @@ class SharedVolume(Kept):
     @property
     def has_looked(self) -> bool:
         """Whether bodies have been compared."""
-        return bool(np.isfinite(self.place).all())
+        return not np.isinf(self.place).all()
 
     @property
     def worst(self) -> Interpenetration:
