@@ -5,6 +5,7 @@ import taichi as ti
 
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation
 from taichi_dem.kit.allocation import assign, values
+from taichi_dem.step.bond import motion_of
 
 #: Step by which the probes divide impulses; a power of two loses no bit.
 STEP = 2.0**-20
@@ -102,7 +103,7 @@ class BondProbe:
 
     @ti.kernel
     def _stored(self) -> ti.f64:
-        return self.advance.bond_energy(0)
+        return self.advance.bond_energy(0, motion_of(self.advance, 0))
 
     @ti.kernel
     def _spent(self, spent: ti.types.ndarray(dtype=ti.f64, ndim=1)):

@@ -105,6 +105,8 @@ class FieldTree:
             address = _address(self._anchor) - _offset(self._anchor.snode.ptr)[1]
             _base(self._builder.root.ptr)
             _bases[self._builder.root.ptr.id] = address
+            # Taichi has written zeros to every page.
+            self.clear()
 
     def clear(self) -> None:
         """Set all bytes to zero; on a CPU only."""
@@ -128,15 +130,19 @@ class FieldTree:
 def _given_back(address, memory):
     """Bytes from one number to another that are zero, as their pages were given back to the system.
 
-    Most lists are long and hardly used: only the pages in use are made anew when they are written.
+    Most lists are long and hardly used: only the pages in use are made anew when they are written,
+    as large ones where the system has such: a step of many bodies looks up their addresses.
     """
     page = mmap.PAGESIZE
     first, end = -address % page, (address + len(memory)) // page * page - address
     if len(memory) < _LARGE or not hasattr(mmap, "MADV_DONTNEED"):
         return 0, 0
     memory[first] = 1
-    words = map(ctypes.c_size_t, (address + first, end - first))
-    refused = ctypes.CDLL(None).madvise(*words, mmap.MADV_DONTNEED)
+    words = [*map(ctypes.c_size_t, (address + first, end - first))]
+    advise = ctypes.CDLL(None).madvise
+    refused = advise(*words, mmap.MADV_DONTNEED)
+    if hasattr(mmap, "MADV_HUGEPAGE"):
+        advise(*words, mmap.MADV_HUGEPAGE)
     # Of memory that is shared with others, the system keeps what is in it.
     return (0, 0) if refused or memory[first] else (first, end)
 

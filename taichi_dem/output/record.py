@@ -129,25 +129,24 @@ class Recorder:
     def sample(self) -> None:
         """Add a row to the time series."""
         sim: Any = self.simulation
-        motion = sim.motion()
+        here = slice(self.model.body_count)
+        position, velocity = values(sim.state.position, here), sim.readings.motion()[:, :3]
         account = sim.energy_balance.account()
         account["gas_work"] = sum(map(sim.energy_balance.load_work, self.gas))
         row = {"time_s": sim.time_s}
         for group, hole in self.holes.items():
             name, body = ("hole", "") if len(self.holes) == 1 else (group, f"{group}_")
-            row[f"{name}_radial_displacement_mm"] = 1e3 * hole.radial_displacement(
-                motion["position"]
-            )
-            way = hole.monitored_displacement(motion["position"])
+            row[f"{name}_radial_displacement_mm"] = 1e3 * hole.radial_displacement(position)
+            way = hole.monitored_displacement(position)
             row[f"{body}monitor_displacement_mm"] = 1e3 * way
         row["broken_faces"] = int(sim.state.broken().sum())
         row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})
         if self.model.ground:
             row["ground_dashpot_J"] = account["ground_dashpot"]
             row.update(self._ground_work())
-        row["smallest_step_s"] = sim.method.dt0 / 2.0 ** int(motion["level"].max())
+        row["smallest_step_s"] = sim.method.dt0 / 2.0 ** int(values(sim.state.level, here).max())
         row["load_work_J"], row["support_work_J"] = account["load_work"], account["support_work"]
-        speed = np.linalg.norm(motion["velocity"], axis=1)
+        speed = np.linalg.norm(velocity, axis=1)
         row["largest_speed_m_s"] = float(speed.max())
         for name, force in zip(self.forces, sim.forces.sums()):
             row.update({f"{name}_{axis}_N": float(force[k]) for k, axis in enumerate("xyz")})

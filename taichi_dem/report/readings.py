@@ -17,6 +17,7 @@ from taichi_dem.state.model import Model, sums
 from taichi_dem.state.state import PARTS, State
 from taichi_dem.state.tables import Tables
 from taichi_dem.step.advance import Advance
+from taichi_dem.step.bond import motion_of
 from taichi_dem.step.multirate.half_step import HalfStep
 from taichi_dem.step.multirate.schedule import Schedule
 
@@ -127,17 +128,21 @@ class Readings:
         ti.loop_config(serialize=ti.static(self.small))
         for i in range(self.tables.body_count[None]):
             # In the order of the pairs, so that no thread changes a bit.
-            for a in range(self.contacts.store.first_of[i], self.contacts.store.first_of[i + 1]):
-                for k in range(6):
-                    pushed[i, k] = pushed[i, k] + table[a, k]
-            start, end = (
-                self.contacts.store.second_start[i],
-                self.contacts.store.second_start[i + 1],
-            )
-            for s in range(start, end):
-                a = self.contacts.store.place_of(self.contacts.store.second_slot[s])
-                for k in range(6):
-                    pushed[i, k] = pushed[i, k] + table[a, 6 + k]
+            found = self._sum_of_pairs(self.contacts.store, table, i)
+            for k in ti.static(range(6)):
+                pushed[i, k] = found[k]
+
+    @ti.func
+    def _sum_of_pairs(self, store: ti.template(), table: ti.template(), i):
+        """Impulse and moment of the contacts of body i with all others."""
+        found = ti.Vector.zero(ti.f64, 6)
+        for a in range(store.first_of[i], store.first_of[i + 1]):
+            for k in ti.static(range(6)):
+                found[k] += table[a, k]
+        for s in range(store.second_start[i], store.second_start[i + 1]):
+            for k in ti.static(range(6)):
+                found[k] += table[store.place_of(store.second_slot[s]), 6 + k]
+        return found
 
     def bodies(self) -> np.ndarray:
         """Kinetic energy, work of loads, supports, contact heats, ground's heat [J], (n, 7)."""
@@ -227,33 +232,32 @@ class Readings:
 
     @ti.func
     def _visit_bond(self, table: ti.template(), b):
-        table[b, 0] = self.advance.bond_energy(b)
+        # Added up apart from the table, whose places take longer to find than numbers to add.
+        drag, spent, damage, slip = 0.0, 0.0, 1.0, 0.0
+        acted = ti.cast(0, ti.i32)
         if ti.static(self.advance.has_dashpot):
-            table[b, 1] = self.state.bond_drag[b] + self.half_step.bond_drag(b)
+            drag = self.state.bond_drag[b]
+        for q in range(3):
+            u = 3 * b + q
+            spent += self.tables.unit_area[b] * self.tables.bond.spent(b, u)
+            acted |= ti.cast(self.tables.bond.acted(b, u), ti.i32)
+        if self.state.broken_tick[b] < 0:
+            motion = motion_of(self.advance, b)
+            table[b, 0] = self.advance.bond_energy(b, motion)
+            if ti.static(self.advance.has_dashpot and self.advance.staggered):
+                drag += self.half_step.bond_drag(b, motion)
+            damage = 0.0
+            for q in range(3):
+                u = 3 * b + q
+                damage += self.tables.bond.damage(b, u) / 3.0
+                if ti.static(self.tables.bond.remembers_slip):
+                    slip = ti.max(slip, norm(self.tables.bond.residual_slip(u)))
         if ti.static(not self.tables.bond.is_null):
             for k in ti.static(range(2)):
                 table[b, 2 + k] = self.state.bond_heat[b][k]
-        holds = self.state.broken_tick[b] < 0
-        for q in range(3):
-            u = 3 * b + q
-            spent = self.tables.bond.spent(b, u)
-            table[b, 4] = table[b, 4] + self.tables.unit_area[b] * spent
-            if holds:
-                table[b, 5] = table[b, 5] + self.tables.bond.damage(b, u) / 3.0
-            self._note_laws(table, b, u, holds)
-        if not holds:
-            table[b, 5] = 1.0
-
-    @ti.func
-    def _note_laws(self, table: ti.template(), b, u, holds):
-        """Note whether unit u of bond b has softened or slipped, and how far it has slipped."""
-        bits = self.tables.bond.acted(b, u)
+        table[b, 1], table[b, 4], table[b, 5], table[b, 8] = drag, spent, damage, slip
         for part in ti.static(range(PARTS)):
-            if bits & (1 << part) != 0:
-                table[b, 6 + part] = 1.0
-        if ti.static(self.tables.bond.remembers_slip):
-            if holds:
-                table[b, 8] = ti.max(table[b, 8], norm(self.tables.bond.residual_slip(u)))
+            table[b, 6 + part] = ti.cast((acted >> part) & 1, ti.f64)
 
     def pairs(self) -> np.ndarray:
         """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""

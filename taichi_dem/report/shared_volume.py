@@ -4,6 +4,7 @@ Bodies are rigid, so two bodies without a bond share volume only where nothing k
 without contact, at faces that it leaves out, or where it is too soft or too sparse.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.tetrahedra import points_of_parts
@@ -26,6 +28,8 @@ NOTABLE = 0.25
 MOVED = 0.25
 #: Pairs that there is room for at first.
 _ROOM = 1024
+#: Depth below which nothing is within a body, over its height above that face.
+_ROUNDING = 1e-12
 #: Halvings of a body's edges, for a first look and for the figure: each part stands for its volume
 #: by a point.
 _HALVINGS = 2, 3
@@ -69,7 +73,7 @@ class SharedVolume(Kept):
     figures: those of ``worst`` so far; first: those at the start.
     """
 
-    kept = "place", "turn", "figures", "first"
+    kept = "place", "orientation", "figures", "first"
 
     def __init__(self, run: Run):
         self.run, model = run, run.model
@@ -77,7 +81,7 @@ class SharedVolume(Kept):
         self.points = [points_of_parts(halvings) for halvings in _HALVINGS]
         # From nowhere: the first look is never left out.
         self.place = np.full_like(model.centre, np.inf)
-        self.turn = np.tile(np.eye(3), (model.body_count, 1, 1))
+        self.orientation = np.zeros((model.body_count, 4))
         self.figures = self.first = np.array([0.0, -1.0, -1.0, 0.0, 0.0])
         self.pairs, self.share = np.zeros((0, 2), dtype=np.int32), np.zeros(0)
 
@@ -95,7 +99,7 @@ class SharedVolume(Kept):
         """Compare the bodies where one has moved, or at the end."""
         if self._way() <= (0.0 if finished else MOVED):
             return
-        self.place, self.turn = self._now()
+        self.place, self.orientation = self._now()
         self._compare(self.corners())
         share = self.share.max(initial=0.0)
         figures = self.figures.copy()
@@ -108,24 +112,24 @@ class SharedVolume(Kept):
 
     def _way(self):
         """Longest way of a body since the last look, as a share of its radius."""
-        place, turn = self._now()
+        place, orientation = self._now()
         # A motion whose square is no number is that of a runaway, which the divergence check names.
         with np.errstate(over="ignore"):
-            way = np.linalg.norm(place - self.place, axis=1) / self.run.model.body_radius
-            return float((way + np.linalg.norm(turn - self.turn, axis=(1, 2))).max())
+            way = length(place - self.place) / self.run.model.body_radius
+            # The norm of the difference of both rotation matrices.
+            turn = length(orientation - self.orientation) * length(orientation + self.orientation)
+            return float((way + math.sqrt(2.0) * turn).max())
 
     def _now(self):
-        """Positions [m] and rotations of the bodies."""
-        return self.run.readings.once("places", self._places)
-
-    def _places(self):
+        """Positions [m] and orientations of the bodies."""
         state, here = self.run.state, slice(self.run.model.body_count)
-        return values(state.position, here), rotations(values(state.orientation, here))
+        return values(state.position, here), values(state.orientation, here)
 
     def corners(self, bodies: Any = slice(None)) -> np.ndarray:
         """Corners of some bodies at present [m], (n, 4, 3)."""
-        place, turn = self._now()
-        return place[bodies, None] + np.einsum("nij,ncj->nci", turn[bodies], self.arms[bodies])
+        place, orientation = self._now()
+        turn = rotations(orientation[bodies])
+        return place[bodies, None] + np.einsum("nij,ncj->nci", turn, self.arms[bodies])
 
     def findings(self) -> tuple[str, ...]:
         """Sentences where bodies are within each other although contact is listed; or none."""
@@ -210,39 +214,51 @@ def _find_pairs(
                 small, large = i, j
                 if mass[i] > mass[j]:
                     small, large = j, i
-                planes = _planes(corners, large)
-                if _share(planes, corners, small, few) > 0.0:
-                    share = _share(planes, corners, small, many)
-                    if share > 0.0:
-                        a = ti.atomic_add(count[0], 1)
-                        if a < found.shape[0]:
-                            found[a, 0], found[a, 1], found[a, 2] = i, j, share
+                share, depths = 0.0, _depths(corners, large, small)
+                if _reaches(depths):
+                    if _share(depths, few) > 0.0:
+                        share = _share(depths, many)
+                if share > 0.0:
+                    a = ti.atomic_add(count[0], 1)
+                    if a < found.shape[0]:
+                        found[a, 0], found[a, 1], found[a, 2] = i, j, share
 
 
 _launch_pairs = Launch(_find_pairs)
 
 
 @ti.func
-def _planes(corners: ti.template(), i):
-    """Planes of the faces, each opposite a corner: inward normal, 1 at the corner, and offset."""
-    planes = ti.Matrix.zero(ti.f64, 4, 4)
+def _depths(corners: ti.template(), i, j):
+    """Of each corner of body j below each face of body i, over the height of i above it, (4, 4)."""
+    depths = ti.Matrix.zero(ti.f64, 4, 4)
     for f in ti.static(range(4)):
         base = corners[i, (f + 1) % 4]
         normal = (corners[i, (f + 2) % 4] - base).cross(corners[i, (f + 3) % 4] - base)
         normal /= normal.dot(corners[i, f] - base)
-        planes[f, :3], planes[f, 3] = normal, -normal.dot(base)
-    return planes
+        for c in ti.static(range(4)):
+            depths[f, c] = normal.dot(corners[j, c] - base)
+    return depths
 
 
 @ti.func
-def _share(planes: ti.template(), corners: ti.template(), i, points: ti.template()):
-    """Share of the points of body i that lie within all planes."""
+def _reaches(depths):
+    """Whether a corner lies below each face by more than rounding."""
+    least = 1.0
+    for f in ti.static(range(4)):
+        least = ti.min(least, depths[f, :].max())
+    return least > _ROUNDING
+
+
+@ti.func
+def _share(depths, points: ti.template()):
+    """Share of the points of a body that lie below all faces of the other."""
     count = 0
     for m in range(points.shape[0]):
-        point, inside = vec3(0.0), 1
-        for c in ti.static(range(4)):
-            point += points[m, c] * corners[i, c]
+        inside = 1
         for f in ti.static(range(4)):
-            inside &= ti.cast(planes[f, :3].dot(point) + planes[f, 3] > 0.0, ti.i32)
+            depth = 0.0
+            for c in ti.static(range(4)):
+                depth += points[m, c] * depths[f, c]
+            inside &= ti.cast(depth > 0.0, ti.i32)
         count += inside
     return count / ti.cast(points.shape[0], ti.f64)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from taichi_dem.kit.allocation import values
-from taichi_dem.kit.fixed_order import dot, length, product, transposed
+from taichi_dem.kit.fixed_order import cross, dot, length, members_last, product, transposed
 from taichi_dem.loads.pressure import FacePressure
 from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.tetrahedra import area_vectors
@@ -45,11 +45,12 @@ def _outer(a, b):
 def _of_bonds(run, position, rotation):
     """Bodies and forces times arms of both sides of every bond."""
     model, top = run.model, run.model.topology
-    branch = position[top.slave] - position[top.master]
-    force, moment = _wrenches(run, branch)
-    arms = product(model.bonds["on_slave"], transposed(rotation[top.slave]))
+    branch = members_last(position[top.slave] - position[top.master])
+    force, moment = map(members_last, _wrenches(run, branch))
+    on_slave, rotation = map(members_last, (model.bonds["on_slave"], rotation[top.slave]))
+    arms = product(on_slave, transposed(rotation))
     middle = arms.mean(axis=1)
-    own = _outer(force, middle) + _spread(arms - middle[:, None], moment - np.cross(middle, force))
+    own = _outer(force, middle) + _spread(arms - middle[:, None], moment - cross(middle, force))
     yield top.slave, own
     yield top.master, -own - _outer(force, branch)
 
@@ -66,7 +67,7 @@ def _wrenches(run, branch):
     step = values(run.schedule.step_seconds)[np.maximum(master, slave)][:, None]
     on_master, on_slave = values(state.slot, slice(4 * model.body_count))[model.bonds["slots"].T]
     pull = on_master[:, :3]
-    back = np.hstack([-pull, np.cross(branch, pull) - on_master[:, 3:]])
+    back = np.hstack([-pull, cross(branch, pull) - on_master[:, 3:]])
     wrench = np.where((master > slave)[:, None], back, on_slave) / step
     return wrench[:, :3], wrench[:, 3:]
 
@@ -79,12 +80,12 @@ def _spread(arms, moment):
     part along n, as springs and dashpots of rigid bodies have them, to the angle by which the two
     have turned against each other; after slip, the part that cancels within the face is left out.
     """
-    normal = np.cross(arms[:, 1] - arms[:, 0], arms[:, 2] - arms[:, 0])
+    normal = cross(arms[:, 1] - arms[:, 0], arms[:, 2] - arms[:, 0])
     normal = normal / length(normal)[:, None]
     twist = dot(moment, normal) / dot(arms, arms).sum(axis=1)
-    across = np.cross(normal[:, None], arms)
+    across = cross(normal[:, None], arms)
     turned = twist[:, None, None] * product(transposed(across), arms)
-    return _outer(normal, np.cross(normal, moment)) + turned
+    return _outer(normal, cross(normal, moment)) + turned
 
 
 def _of_contacts(run, position):

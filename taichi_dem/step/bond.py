@@ -157,17 +157,14 @@ class BondStep:
         return energy
 
     @ti.func
-    def bond_energy(self, b):
-        """Elastic energy stored in a bond now [J]; zero once it is released."""
-        energy = 0.0
-        if self.state.broken_tick[b] < 0:
-            energy = self.tables.unit_area[b] * self._stored(b, motion_of(self, b))
-        return energy
+    def bond_energy(self, b, motion):
+        """Elastic energy stored in an intact bond at a motion [J]."""
+        return self.tables.unit_area[b] * self._stored(b, motion)
 
     @ti.func
-    def bond_power(self, b):
-        """Power that the dashpots of an intact bond take now [W]."""
-        power, scale, motion = 0.0, self.bond_share(b), motion_of(self, b)
+    def bond_power(self, b, motion):
+        """Power that the dashpots of an intact bond take at a motion [W]."""
+        power, scale = 0.0, self.bond_share(b)
         if ti.static(self.solves_bonds):
             motion = self.solver.bonds.mean(b, motion)
         for q in range(3):

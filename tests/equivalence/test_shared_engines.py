@@ -1,5 +1,7 @@
 """Engines: a structure is compiled once; a scene in one has the bits of a scene alone."""
 
+import mmap
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -158,6 +160,24 @@ def test_cleared_memory_is_zero_to_the_last_byte():
             tree.clear()
             assert not values(first).any() and not values(last).any()
         tree.destroy()
+
+
+@pytest.mark.skipif(arch.chosen() != "cpu", reason="another device has memory of its own")
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="the system does not tell")
+def test_a_long_list_takes_memory_only_where_it_is_written():
+    """An eighth of a tree that is written takes an eighth, in pages of 2 MB or less."""
+
+    def taken():
+        with open("/proc/self/statm") as numbers:
+            return int(numbers.read().split()[1]) * mmap.PAGESIZE
+
+    begun, tree = taken(), FieldTree()
+    with tree:
+        long = ti.field(ti.f64, shape=2**24)
+    assign(long, np.ones(2**21))
+    # Beside the 16 MB written: their copy, a page at either end, and the kernel of the address.
+    assert taken() - begun < 2**26 < tree.bytes
+    tree.destroy()
 
 
 @ti.data_oriented

@@ -101,17 +101,13 @@ class HalfStep:
         return velocity, momentum, account
 
     @ti.func
-    def bond_drag(self, b):
+    def bond_drag(self, b, motion):
         """Energy [J] by which the booked heat of a bond's dashpots is behind the present."""
-        heat = 0.0
-        if ti.static(self.advance.has_dashpot and self.staggered):
-            if self.state.broken_tick[b] < 0:
-                slots = self.tables.bond_slots[b]
-                step = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)
-                # A solved dashpot is booked a step late, an explicit one ahead of its step.
-                sign = ti.static(0.5 if self.advance.solves_bonds else -0.5)
-                heat = sign * step * self.advance.bond_power(b)
-        return heat
+        slots = self.tables.bond_slots[b]
+        step = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)
+        # A solved dashpot is booked a step late, an explicit one ahead of its step.
+        sign = ti.static(0.5 if self.advance.solves_bonds else -0.5)
+        return sign * step * self.advance.bond_power(b, motion)
 
     @ti.func
     def pair_step(self, p):
