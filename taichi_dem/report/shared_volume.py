@@ -14,8 +14,10 @@ import taichi as ti
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.launch import Launch
-from taichi_dem.kit.types import vec3
+from taichi_dem.kit.products import matvec
+from taichi_dem.kit.types import vec3, vec4
 from taichi_dem.mesh.tetrahedra import points_of_parts
+from taichi_dem.physics.body_overlap import smallest
 from taichi_dem.physics.rotation_arrays import rotations
 from taichi_dem.report.readings import Kept, Run
 from taichi_dem.scene import remedy
@@ -202,8 +204,8 @@ def _find_pairs(
     box: ti.types.ndarray(dtype=vec3, ndim=2),
     corners: ti.types.ndarray(dtype=vec3, ndim=2),
     mass: ti.types.ndarray(dtype=ti.f64, ndim=1),
-    few: ti.types.ndarray(dtype=ti.f64, ndim=2),
-    many: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    few: ti.types.ndarray(dtype=vec4, ndim=1),
+    many: ti.types.ndarray(dtype=vec4, ndim=1),
     found: ti.types.ndarray(dtype=ti.f64, ndim=2),
     count: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
@@ -243,10 +245,10 @@ def _depths(corners: ti.template(), i, j):
 @ti.func
 def _reaches(depths):
     """Whether a corner lies below each face by more than rounding."""
-    least = 1.0
-    for f in ti.static(range(4)):
-        least = ti.min(least, depths[f, :].max())
-    return least > _ROUNDING
+    highest = depths[:, 0]
+    for c in ti.static(range(1, 4)):
+        highest = ti.max(highest, depths[:, c])
+    return smallest(highest) > _ROUNDING
 
 
 @ti.func
@@ -254,11 +256,5 @@ def _share(depths, points: ti.template()):
     """Share of the points of a body that lie below all faces of the other."""
     count = 0
     for m in range(points.shape[0]):
-        inside = 1
-        for f in ti.static(range(4)):
-            depth = 0.0
-            for c in ti.static(range(4)):
-                depth += points[m, c] * depths[f, c]
-            inside &= ti.cast(depth > 0.0, ti.i32)
-        count += inside
+        count += ti.cast(smallest(matvec(depths, points[m])) > 0.0, ti.i32)
     return count / ti.cast(points.shape[0], ti.f64)
