@@ -6,6 +6,7 @@ without contact, at faces that it leaves out, or where it is too soft or too spa
 
 import math
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ import taichi as ti
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.launch import Launch
-from taichi_dem.kit.products import matvec
+from taichi_dem.kit.products import entry, expression, matvec
 from taichi_dem.kit.types import vec3, vec4
 from taichi_dem.mesh.tetrahedra import points_of_parts
 from taichi_dem.physics.body_overlap import smallest
@@ -217,7 +218,7 @@ def _find_pairs(
                 if mass[i] > mass[j]:
                     small, large = j, i
                 share, depths = 0.0, _depths(corners, large, small)
-                if _reaches(depths):
+                if _reach(depths) > _ROUNDING:
                     if _share(depths, few) > 0.0:
                         share = _share(depths, many)
                 if share > 0.0:
@@ -242,13 +243,11 @@ def _depths(corners: ti.template(), i, j):
     return depths
 
 
-@ti.func
-def _reaches(depths):
-    """Whether a corner lies below each face by more than rounding."""
-    highest = depths[:, 0]
-    for c in ti.static(range(1, 4)):
-        highest = ti.max(highest, depths[:, c])
-    return smallest(highest) > _ROUNDING
+@expression
+def _reach(depths):
+    """Least of the four depths that the corners reach below a face."""
+    highest = (reduce(ti.max, (entry(depths, f, c) for c in range(4))) for f in range(4))
+    return reduce(ti.min, highest)
 
 
 @ti.func
