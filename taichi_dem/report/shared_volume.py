@@ -15,10 +15,10 @@ import taichi as ti
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.launch import Launch
-from taichi_dem.kit.products import entry, expression, matvec
+from taichi_dem.kit.products import cross, dot, entry, expression, matvec
 from taichi_dem.kit.types import vec3, vec4
 from taichi_dem.mesh.tetrahedra import points_of_parts
-from taichi_dem.physics.body_overlap import smallest
+from taichi_dem.physics.body_overlap import mat4, mat43, raised, smallest
 from taichi_dem.physics.rotation_arrays import rotations
 from taichi_dem.report.readings import Kept, Run
 from taichi_dem.scene import remedy
@@ -203,7 +203,7 @@ def _in_rows(corners):
 def _find_pairs(
     last: ti.types.ndarray(dtype=ti.i32, ndim=1),
     box: ti.types.ndarray(dtype=vec3, ndim=2),
-    corners: ti.types.ndarray(dtype=vec3, ndim=2),
+    corners: ti.types.ndarray(dtype=mat43, ndim=1),
     mass: ti.types.ndarray(dtype=ti.f64, ndim=1),
     few: ti.types.ndarray(dtype=vec4, ndim=1),
     many: ti.types.ndarray(dtype=vec4, ndim=1),
@@ -217,7 +217,7 @@ def _find_pairs(
                 small, large = i, j
                 if mass[i] > mass[j]:
                     small, large = j, i
-                share, depths = 0.0, _depths(corners, large, small)
+                share, depths = 0.0, _depths(corners[large], corners[small])
                 if _reach(depths) > _ROUNDING:
                     if _share(depths, few) > 0.0:
                         share = _share(depths, many)
@@ -231,15 +231,17 @@ _launch_pairs = Launch(_find_pairs)
 
 
 @ti.func
-def _depths(corners: ti.template(), i, j):
-    """Of each corner of body j below each face of body i, over the height of i above it, (4, 4)."""
-    depths = ti.Matrix.zero(ti.f64, 4, 4)
+def _depths(first, second):
+    """Of each corner of the second body below each face of the first, over its height, (4, 4).
+
+    First, second: their corners, (4, 3) [m].
+    """
+    depths = mat4(0.0)
     for f in ti.static(range(4)):
-        base = corners[i, (f + 1) % 4]
-        normal = (corners[i, (f + 2) % 4] - base).cross(corners[i, (f + 3) % 4] - base)
-        normal /= normal.dot(corners[i, f] - base)
-        for c in ti.static(range(4)):
-            depths[f, c] = normal.dot(corners[j, c] - base)
+        base = first[(f + 1) % 4, :]
+        normal = cross(first[(f + 2) % 4, :] - base, first[(f + 3) % 4, :] - base)
+        normal /= dot(normal, first[f, :] - base)
+        depths[f, :] = matvec(raised(second, -base), normal)
     return depths
 
 
