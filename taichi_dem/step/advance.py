@@ -158,8 +158,8 @@ class Advance(BondStep, ContactForce, BodyLoads):
         self.schedule, self.tables, self.state = schedule, schedule.tables, schedule.state
         tables = self.tables
         self.on_demand = tables.on_demand and not tables.bond.is_null
-        # Where all laws act on demand, none is missing and none is to be watched for.
-        self.notes_limits = not (self.on_demand and tables.bond.is_whole)
+        # Where no law is missing, no limit is to be watched for.
+        self.notes_limits = not tables.bond.is_whole
         self.has_ground = bool(tables.ground)
         self.solver, self.solves = solver, solver is not None
         self.solves_bonds = self.solves and solver.has_bonds
