@@ -278,10 +278,12 @@ def whole_runs():
     for words, runs in found.items():
         yield timed(f"paper's problem, {words}", runs, RUNS[words][2])
     controlled = found["controlled"]
-    yield Figure("controlled, ideal gain", "1", [controlled[0].gain])
     gain = median(one.seconds for one in uniform) / median(one.seconds for one in controlled)
     yield Figure("controlled, realised gain", "1", [gain])
-    yield Figure("controlled, realised over ideal", "1", [gain / controlled[0].gain], ">= 0.9")
+    ideals = {"ideal gain": controlled[0].gain, "gain in evaluations": controlled[0].fewer}
+    for words, ideal in ideals.items():
+        yield Figure(f"controlled, {words}", "1", [ideal])
+        yield Figure(f"controlled, realised over {words}", "1", [gain / ideal], ">= 0.9")
     yield from finest_run(finest)
 
 
@@ -305,13 +307,17 @@ def run_of(name, until, repeats, step=None):
 
 
 def paper_run(method, until):
-    """Seconds of a run of the paper's problem without compiling, its least work and ideal gain."""
+    """Seconds of a run of the paper's problem without compiling, its least work, and what it saves.
+
+    gain: of bodies advanced; fewer: of bonds and pairs, which step as the finer of two bodies.
+    """
     simulation = Simulation(paper_scene(), method, driver())
     simulation.advance_to(macro_steps(until, method.dt0))
     report = simulation.report()
     seconds = report.run_seconds if on_device() else report.run_cpu_seconds
-    made = {"seconds": seconds, "gain": report.ideal_gain, "work": work_since(simulation)}
-    return SimpleNamespace(**made, evaluations=simulation.evaluations())
+    made = {"seconds": seconds, "gain": report.ideal_gain, "fewer": report.boundary_gain}
+    counted = {"work": work_since(simulation), "evaluations": simulation.evaluations()}
+    return SimpleNamespace(**made, **counted)
 
 
 def timed(name, runs, bound=""):
