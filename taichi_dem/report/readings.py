@@ -12,7 +12,7 @@ from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.products import norm
-from taichi_dem.kit.types import vec3
+from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.state.model import Model, sums
 from taichi_dem.state.state import PARTS, State
 from taichi_dem.state.tables import Tables
@@ -232,30 +232,30 @@ class Readings:
 
     @ti.func
     def _visit_bond(self, table: ti.template(), b):
-        # Added up apart from the table, whose places take longer to find than numbers to add.
-        drag, spent, damage, slip = 0.0, 0.0, 1.0, 0.0
-        acted = ti.cast(0, ti.i32)
+        # Each place is written once: to add to it takes longer, and what a kernel does not write
+        # into an array that it does not read is not zero on a card.
+        energy, drag, spent, damage, slip = 0.0, 0.0, 0.0, 1.0, 0.0
+        heat, acted = vec2(0.0), ti.cast(0, ti.i32)
         if ti.static(self.advance.has_dashpot):
             drag = self.state.bond_drag[b]
+        if ti.static(not self.tables.bond.is_null):
+            heat = self.state.bond_heat[b]
         for q in range(3):
             u = 3 * b + q
             spent += self.tables.unit_area[b] * self.tables.bond.spent(b, u)
             acted |= ti.cast(self.tables.bond.acted(b, u), ti.i32)
         if self.state.broken_tick[b] < 0:
             motion = motion_of(self.advance, b)
-            table[b, 0] = self.advance.bond_energy(b, motion)
+            energy, damage = self.advance.bond_energy(b, motion), 0.0
             if ti.static(self.advance.has_dashpot and self.advance.staggered):
                 drag += self.half_step.bond_drag(b, motion)
-            damage = 0.0
             for q in range(3):
                 u = 3 * b + q
                 damage += self.tables.bond.damage(b, u) / 3.0
                 if ti.static(self.tables.bond.remembers_slip):
                     slip = ti.max(slip, norm(self.tables.bond.residual_slip(u)))
-        if ti.static(not self.tables.bond.is_null):
-            for k in ti.static(range(2)):
-                table[b, 2 + k] = self.state.bond_heat[b][k]
-        table[b, 1], table[b, 4], table[b, 5], table[b, 8] = drag, spent, damage, slip
+        table[b, 0], table[b, 1], table[b, 2], table[b, 3] = energy, drag, heat[0], heat[1]
+        table[b, 4], table[b, 5], table[b, 8] = spent, damage, slip
         for part in ti.static(range(PARTS)):
             table[b, 6 + part] = ti.cast((acted >> part) & 1, ti.f64)
 
