@@ -206,8 +206,11 @@ def bonded_phase(repeats):
     simulation = Simulation(paper_scene(), Uniform(BONDED), driver())
     simulation.advance_to(STEPS)
     bonds = simulation.model.bond_count
+    moved = [size / bonds for size in bytes_a_step(simulation.engine)]
+    for words, size, bound in zip(("read", "written"), moved, ("<= 260", "<= 100")):
+        yield Figure(f"bonded phase, bytes {words} for a bond, with its bodies", "B", [size], bound)
     # Three units a bond.
-    work = Work(bytes_a_step(simulation.engine) / (3 * bonds))
+    work = Work(sum(moved) / 3)
     ends = [(k + 2) * STEPS for k in range(repeats)]
     seconds = [seconds_of(simulation.advance_to, end) for end in ends]
     values = [3e-6 * bonds * STEPS / one for one in seconds]

@@ -20,6 +20,13 @@ from taichi_dem.mesh.shapes import bar, in_space_order
 ROUNDS = 2
 #: Edge of the boxes of the bar that stands for a block [m]: more bodies make it larger.
 BOX = 0.05
+#: State that every step writes; all else changes where something happens.
+WRITTEN = "slot position orientation velocity spin angular_momentum bond_drag".split()
+#: Tables and state that are read only where bodies touch or are loaded, or where a law is missing.
+SELDOM = (
+    *("sphere", "cluster", "extent", "exposed_tick", "contact_heat", "injected_tick"),
+    *("load_work", "load_impulse", "impulse_sizes", "passed"),
+)
 #: The visit of a bond, in f64 and without regard to how things are stored. It reads two numbers of
 #: bodies (8 bytes), the symmetric 6x6 block (21 numbers), the branch (3), the twist of the last
 #: visit (6), and of both bodies twist (6), symmetric inverse inertia (6) and inverse mass (1). It
@@ -31,10 +38,11 @@ VISIT = Work(bytes=8 + 8 * 74, flops=173)
 
 
 def bytes_a_step(engine):
-    """Bytes that a step of all bodies must move at least: the model read, the state written too."""
+    """Bytes that a step of all bodies and bonds must read, and those that it must write."""
     kept = FieldMemory(engine.tables, "constant"), FieldMemory(engine.state, "saved")
-    read, written = (sum(array.nbytes for array in part.read().values()) for part in kept)
-    return read + 2 * written
+    sizes = {name: array.nbytes for part in kept for name, array in part.read().items()}
+    read = sum(size for name, size in sizes.items() if name not in SELDOM)
+    return read, sum(sizes.get(name, 0) for name in WRITTEN)
 
 
 def counts_of(simulation):
@@ -51,7 +59,7 @@ def work_since(simulation, before=(0, 0), store=CACHE):
     comes to that. Contacts, searches and changes of lists are left out.
     """
     evaluated, visits = (now - then for now, then in zip(counts_of(simulation), before))
-    share = bytes_a_step(simulation.engine) / simulation.model.bond_count
+    share = sum(bytes_a_step(simulation.engine)) / simulation.model.bond_count
     return Work(share * evaluated, store=store) + VISIT * visits
 
 
