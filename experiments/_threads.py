@@ -20,12 +20,12 @@ from taichi_dem.mesh.shapes import bar, in_space_order
 ROUNDS = 2
 #: Edge of the boxes of the bar that stands for a block [m]: more bodies make it larger.
 BOX = 0.05
-#: State that every step writes; all else changes where something happens.
+#: What every step writes of bodies and bonds, and what it reads besides; also the laws of bonds.
 WRITTEN = "slot position orientation velocity spin angular_momentum bond_drag".split()
-#: Tables and state that are read only where bodies touch or are loaded, or where a law is missing.
-SELDOM = (
-    *("sphere", "cluster", "extent", "exposed_tick", "contact_heat", "injected_tick"),
-    *("load_work", "load_impulse", "impulse_sizes", "passed"),
+READ = (
+    *("bond_frame", "vertex_master", "vertex_slave", "bond_stiffness", "bond_slots", "bond_pair"),
+    *("unit_area", "tables.dashpot.coefficient", "broken_tick"),
+    *("mass_inverse", "inertia_inverse", "level", "last_tick"),
 )
 #: The visit of a bond, in f64 and without regard to how things are stored. It reads two numbers of
 #: bodies (8 bytes), the symmetric 6x6 block (21 numbers), the branch (3), the twist of the last
@@ -39,10 +39,14 @@ VISIT = Work(bytes=8 + 8 * 74, flops=173)
 
 def bytes_a_step(engine):
     """Bytes that a step of all bodies and bonds must read, and those that it must write."""
-    kept = FieldMemory(engine.tables, "constant"), FieldMemory(engine.state, "saved")
-    sizes = {name: array.nbytes for part in kept for name, array in part.read().items()}
-    read = sum(size for name, size in sizes.items() if name not in SELDOM)
-    return read, sum(sizes.get(name, 0) for name in WRITTEN)
+    parts = FieldMemory(engine.tables, "constant"), FieldMemory(engine.state, "saved")
+    fields = {name: field for part in parts for name, field in part.fields.items()}
+    laws = [name for name in fields if name.startswith("tables.bond.")]
+
+    def size(names):
+        return sum(engine.values(fields[name]).nbytes for name in names if name in fields)
+
+    return size([*WRITTEN, *READ, *laws]), size(WRITTEN)
 
 
 def counts_of(simulation):

@@ -234,7 +234,7 @@ _launch_pairs = Launch(_find_pairs)
 def _depths(first, second):
     """Of each corner of the second body below each face of the first, over its height, (4, 4).
 
-    First, second: their corners, (4, 3) [m].
+    first, second: their corners, (4, 3) [m].
     """
     depths = mat4(0.0)
     for f in ti.static(range(4)):
