@@ -311,7 +311,7 @@ def _initialise(wanted):
             log_level=ti.ERROR,
             offline_cache=keeps,
             offline_cache_file_path=folder,
-            # By default 100 MB, less than a day with a few structures or one run of the tests writes.
+            # By default 100 MB, less than one run of the tests writes.
             offline_cache_max_size_of_files=2**31 - 1,
             random_seed=0,
             # Loops over phases are unrolled; Taichi warns of more than 32.
