@@ -1,6 +1,6 @@
 """Scene: mesh, material and the effects that act in it."""
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -188,11 +188,6 @@ class Scene(Pictured):
         roles = {effect.role for effect in self.effects if effect.name}
         bonds = "dashpot" in roles and self.body_materials.has_bond_damping
         return bonds or (touching and "contact" in roles and any(_drags(self)))
-
-
-def kind_of(scene: Scene) -> Hashable:
-    """Kind of a scene: classes of its effects, and number of its bodies."""
-    return tuple(type(effect) for effect in scene.effects), scene.mesh.body_count
 
 
 def _effects_of(scene):

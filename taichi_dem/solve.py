@@ -7,7 +7,7 @@ from taichi_dem.accuracy.runs import Job
 from taichi_dem.accuracy.search import Search
 from taichi_dem.accuracy.sources import MEASURED
 from taichi_dem.goals import Goal
-from taichi_dem.kit.bars.answer import Answer, Plan, known_partings
+from taichi_dem.kit.bars.answer import Answer, Plan
 from taichi_dem.kit.bars.budget import named_sources
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress import Listener
@@ -22,7 +22,7 @@ from taichi_dem.kit.validation import (
     whole,
 )
 from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.scene import Scene, kind_of
+from taichi_dem.scene import Scene
 
 
 def solve(
@@ -100,10 +100,7 @@ def solve(
         )
     job = Job(scene, until, goal, tolerance, confidence, named, others)
     with reporting(progress, goal.name) as report_progress:
-        answer = Search(job, budget, report_progress, first).answer()
-    if math.isfinite(answer.plan.parting_s):
-        known_partings[kind_of(scene)] = answer.plan.parting
-    return answer
+        return Search(job, budget, report_progress, first).answer()
 
 
 def _mesh(name, given):

@@ -4,14 +4,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from taichi_dem.kit.bars.answer import known_partings
 from taichi_dem.kit.display import BRIEF, counted, in_brief, in_lines
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.methods import order_of
 from taichi_dem.report.effects import Certificate
 from taichi_dem.report.energy_balance import injected_words
 from taichi_dem.report.shared_volume import Interpenetration
-from taichi_dem.scene import Scene, kind_of
+from taichi_dem.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -280,8 +279,7 @@ class Report:
 def known_error(report: Report, scene: Scene, method: Any) -> str:
     """Known error of a run without a requested accuracy, at no extra cost.
 
-    Step and order of the method, closure of the energy balance, and a plan, in words. There is a
-    plan if the session has answered a question on a scene of this kind.
+    Step and order of the method, and closure of the energy balance, in words.
     """
     if not report.substeps:
         return ""
@@ -295,6 +293,4 @@ def known_error(report: Report, scene: Scene, method: Any) -> str:
     closes = f"energy balance: {report.unexplained.replace('; ', ', ')}"
     if "%" in closes:
         closes = f"energy balance closes to {report.unexplained.replace(' of it', '')}"
-    plan = known_partings.get(kind_of(scene))
-    parts = f"{'steps up to' if varying else 'step'} {method.dt0:.3g} s, {words}", closes
-    return "; ".join([*parts, f"in such scenes {plan}"] if plan else parts)
+    return f"{'steps up to' if varying else 'step'} {method.dt0:.3g} s, {words}; {closes}"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from taichi_dem import CONCRETE, Scene, effects, goals, solve
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, effects, goals, simulate, solve
 from taichi_dem.accuracy.runs import Job, Runs
 from tests.accuracy.small_bar import BROKEN_UNTIL, UNTIL, broken_bar, struck_bar
 from tests.scenes import apart
@@ -50,6 +50,20 @@ def test_the_same_question_has_the_same_bits_also_after_another(broken):
         broken.error,
         broken.plan.runs,
     )
+
+
+def test_a_run_has_the_same_report_whatever_was_asked_before(monkeypatch):
+    """Also after an answer whose twins separate: its plan says so, no report of another run."""
+
+    def known():
+        method, until = ImplicitDashpots(1e-6), BROKEN_UNTIL
+        return simulate(broken_bar(), method=method, until=until, progress=None).report.known_error
+
+    before = known()
+    monkeypatch.setattr(Runs, "parting", lambda self, level: 1e-5)
+    answer = solve(broken_bar(), until=BROKEN_UNTIL, goal=ENERGY, progress=None)
+    assert answer.plan.parting_s == 1e-5 and "1e-05 s" in str(answer)
+    assert known() == before
 
 
 def test_bodies_that_fall_freely_have_an_answer_to_rounding():

@@ -1,7 +1,7 @@
 """Answer to a question with a tolerance: value, error bar and cost."""
 
 import math
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import reduce
 from typing import TYPE_CHECKING, Any
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 #: Tolerances of which an answer tells the cost.
 TOLERANCES = (0.1, 0.03, 0.01, 0.003)
-#: Sentences about runs that differ by one rounding, by the kind of their scenes (``kind_of``).
-known_partings: dict[Hashable, str] = {}
 #: A number, or one for each place of a curve.
 Values = float | np.ndarray
 
@@ -128,12 +126,8 @@ class Plan:
 
     def __str__(self):
         words = f"{self.method}; {self.seconds:.2g} s, of which pilot {self.pilot_s:.2g} s"
-        return words if math.isinf(self.parting_s) else f"{words}; {self.parting}"
-
-    @property
-    def parting(self) -> str:
-        """When runs that differ by one rounding separate, in words."""
-        return f"runs that differ by one rounding separate from {self.parting_s:.2g} s on"
+        parting = f"runs that differ by one rounding separate from {self.parting_s:.2g} s on"
+        return words if math.isinf(self.parting_s) else f"{words}; {parting}"
 
 
 @dataclass(frozen=True)
