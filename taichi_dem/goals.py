@@ -17,7 +17,7 @@ from taichi_dem.kit.validation import choice, finite, flag, instance, shown, who
 from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.output.fragments import fragment_of_body
 from taichi_dem.output.hole_monitor import hole_of
-from taichi_dem.report.energy_balance import TERMS
+from taichi_dem.report.energy_balance import TERMS, energy_put_in
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 
@@ -222,7 +222,7 @@ def peak_speed(body: int) -> Goal:
 
 
 def energy_share(term: str) -> Goal:
-    """Term of the energy balance as a share of the work put in.
+    """Term of the energy balance as a share of the energy put in.
 
     Parameters
     ----------
@@ -243,13 +243,13 @@ def energy_share(term: str) -> Goal:
 
     def found(result):
         account = result.report.energy_balance
-        work = account["load_work"] + account["support_work"]
-        if work <= 0.0:
+        given = energy_put_in(account)
+        if given <= 0.0:
             raise InputError(
-                f"an energy share must refer to work put in above 0 J, got {work:.3g} J by "
+                f"an energy share must refer to energy put in above 0 J, got {given:.3g} J by "
                 f"{result.report.until_s:.3g} s"
             )
-        return account[term] / work
+        return account[term] / given
 
     return Goal(f"energy share of {term}", "1", found)
 

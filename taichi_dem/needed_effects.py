@@ -51,7 +51,7 @@ def needed_effects(result: Result, tolerance: float = ROUNDING) -> Advice:
     """
     report, tolerance = instance("result", result, Result).report, fraction("tolerance", tolerance)
     uses = report.effect_activity
-    tried = [use.effect for use in uses if use.idle or use.negligible(tolerance)]
+    tried = [use.effect for use in uses if use.minor(tolerance)]
     if tried and not result.diverged:
         return report.advice(tolerance, _differences(result, tried, tolerance))
     return report.advice(tolerance)

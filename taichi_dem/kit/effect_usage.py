@@ -5,11 +5,17 @@ from dataclasses import dataclass
 from math import inf, nan
 from typing import Any
 
+from numpy import nan_to_num
+
 from taichi_dem.kit.data_table import data_frame
 
+#: Influence below which an effect may be worth a try without it.
+SMALL = 0.01
+#: Advice on such an effect.
+TRY = "try without"
 #: Columns of ``Advice.table`` with what stands in a row that has nothing to say there.
 _COLUMNS = {
-    **{"effect": "", "listed": False, "events": 0, "since_s": nan, "where": ""},
+    **{"effect": "", "listed": False, "influence": nan, "events": 0, "since_s": nan, "where": ""},
     **{"energy_J": nan, "energy_share": nan, "evaluations": 0, "skipped": 0},
     **{"left_out": nan, "advice": "", "reason": ""},
 }
@@ -76,6 +82,17 @@ class EffectUse:
     def idle(self) -> bool:
         """Whether it is known that it did not change the run, not even its rounding."""
         return not (self.is_active or self.kept or self.rounding)
+
+    @property
+    def influence(self) -> float | None:
+        """Its share, 0 where it never acted beyond round-off; None where no energy tells it."""
+        if self.idle or self.rounding:
+            return 0.0
+        return None if self.kept and self.steers else self.share
+
+    def minor(self, most: float) -> bool:
+        """Whether it may be left out for a try: its influence is at most a share."""
+        return not self.kept and self.influence is not None and self.influence <= most
 
     def negligible(self, tolerance: float) -> bool:
         """Whether it acted, but with less than a share of the energy, or only round-off.
@@ -151,21 +168,37 @@ class Advice:
     @property
     def droppable(self) -> tuple[str, ...]:
         """Names of the effects that the scene could do without."""
-        names = self.inactive + self.negligible
         if self.shown is None:
-            return names
-        return tuple(name for name in names if self.shown.get(name, inf) <= self.tolerance)
+            return self.inactive + self.negligible
+        return tuple(name for name, found in self.shown.items() if found <= self.tolerance)
 
-    def _shown(self, use):
-        """What a run without an effect has shown, in words."""
-        if self.shown is None or not (use.idle or use.negligible(self.tolerance)):
-            return ""
-        if use.effect not in self.shown:
-            return "; no run without it was made"
-        if self.shown[use.effect] == 0.0:
+    @property
+    def in_order(self) -> tuple[EffectUse, ...]:
+        """Activity of each effect by its influence: not known first, then the largest."""
+
+        def size(use):
+            return nan_to_num(self._influence(use), nan=inf), use.events
+
+        return tuple(sorted(self.uses, key=size, reverse=True))
+
+    def _influence(self, use):
+        """Difference of a run without an effect, else its own influence; NaN if not known."""
+        own = nan if use.influence is None else use.influence
+        return (self.shown or {}).get(use.effect, own)
+
+    def _lost(self, use):
+        """What an answer would lose without an effect, in words."""
+        found = (self.shown or {}).get(use.effect)
+        if found == 0.0:
             same = "the same up to rounding" if use.rounding else "the same"
             return f"; a run without it is {same}"
-        return f"; a run without it differs by {100.0 * self.shown[use.effect]:.2g} %"
+        if found is not None:
+            differs = f"differs by {100.0 * found:.2g} %"
+            return f"; a run without it {differs if found < inf else 'breaks elsewhere or fails'}"
+        if self._advice(use) != TRY:
+            return ""
+        more = "" if use.idle or not use.steers else ", and may change more than its energy"
+        return f"; no run without it was made{more}"
 
     def verdict(self, name: str, kind: str) -> tuple[str, str]:
         """What an effect did, and advice in words.
@@ -198,33 +231,39 @@ class Advice:
         pandas.DataFrame
             Name, whether listed, number and first time and place of its events, energy [J] and its
             share, evaluations made and skipped, estimated size of what was left out, as a share of
-            what it acts beside; advice and its reason.
+            what it acts beside; advice and its reason. ``influence``: what an answer would lose
+            without the effect, the difference of a run without it where one was made, else its
+            share of the energy; NaN where neither tells. Rows are in its order, the largest first.
         """
-        rows = [self._row(use) for use in self.uses]
+        rows = [self._row(use) for use in self.in_order]
         rows += [finding.row for finding in (*self.missing, *self.left_out)]
         known = [{n: value for n, value in row.items() if value is not None} for row in rows]
         return data_frame({n: [row.get(n, e) for row in known] for n, e in _COLUMNS.items()})
 
     def _row(self, use) -> dict[str, Any]:
         return {
-            **{"effect": use.effect, "listed": True, "events": use.events, "since_s": use.since_s},
+            **{"effect": use.effect, "listed": True, "influence": self._influence(use)},
+            **{"events": use.events, "since_s": use.since_s},
             **{"where": use.where, "energy_J": use.energy_J, "energy_share": use.share},
             **{"evaluations": use.evaluations, "skipped": use.skipped},
             **{"advice": self._advice(use), "reason": f"{use}{self._reason(use)}"},
         }
 
     def _advice(self, use):
-        return "drop" if use.effect in self.droppable else "keep"
+        if use.effect in self.droppable:
+            return "drop"
+        untried = use.effect not in (self.shown or {})
+        return TRY if untried and use.minor(max(SMALL, self.tolerance)) else "keep"
 
     def _reason(self, use):
-        return f"; {use.kept}" if use.kept else self._shown(use)
+        return f"; {use.kept}" if use.kept else self._lost(use)
 
     def __str__(self):
-        """A line for every effect, then one for every missing effect."""
+        """A line for every effect in order, then one for every missing effect."""
         lines = [
-            f"{self._advice(use):10s} {use.effect:16s} {use}{self._reason(use)}"
-            for use in self.uses
+            f"{self._advice(use):11s} {use.effect:16s} {use}{self._reason(use)}"
+            for use in self.in_order
         ]
-        return "\n".join([*lines, *(f"missed     {finding}" for finding in self.missing)])
+        return "\n".join([*lines, *(f"{'missed':11s} {finding}" for finding in self.missing)])
 
     __repr__ = __str__

@@ -15,7 +15,7 @@ from taichi_dem.kit.certificate import Audit, BaseCertificate
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.mesh.topology import parts_of
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
-from taichi_dem.report.energy_balance import EnergyBalance
+from taichi_dem.report.energy_balance import EnergyBalance, energy_put_in
 from taichi_dem.report.estimates import AIR, BENDS, WEIGHT, PartScales
 from taichi_dem.report.missing_effects import MissingEffect, bond_rounding
 from taichi_dem.report.readings import Run
@@ -85,7 +85,7 @@ class _Uses:
 
     def __init__(self, run, balance, account):
         self.run, self.account, self.works = run, account, balance.works()
-        self.given = abs(account["load_work"]) + abs(account["support_work"]) + balance.start_energy
+        self.given = energy_put_in(account)
         self.bits = values(run.state.active_effects, slice(run.model.body_count))
         self.since, self.evaluated, self.skipped = on_demand(run)
         marks = run.readings.active_bonds()

@@ -43,14 +43,38 @@ def unexplained_share(account: Mapping[str, float], round_off: float = 0.0) -> f
     return abs(account["residual"]) / max(through, 100.0 * round_off, 1e-300)
 
 
+def energy_at_start(account: Mapping[str, float]) -> float:
+    """Energy [J] that the bodies had at the start, which the residual leaves."""
+    return abs(sum(-value if name in GIVEN else value for name, value in account.items()))
+
+
+def energy_put_in(account: Mapping[str, float]) -> float:
+    """Energy at the start, and work of loads and of supports where they gave more than took [J].
+
+    That of a weight is among it as it falls.
+    """
+    return energy_at_start(account) + sum(max(0.0, account[name]) for name in GIVEN[:2])
+
+
+def put_in_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
+    """Energy put in and its parts; also what loads or supports took. round_off: as above."""
+    start = {"at the start": energy_at_start(account)}
+    parts = {**start, "by loads": account["load_work"], "by supports": account["support_work"]}
+    given = [f"{value:.6g} J {how}" for how, value in parts.items() if value > round_off]
+    taken = [f"{-value:.6g} J taken {how}" for how, value in parts.items() if -value > round_off]
+    return f"{energy_put_in(account):.6g} J{_listed(given)}{_listed(taken)}"
+
+
+def _listed(words):
+    return f" ({', '.join(words)})" if words else ""
+
+
 def injected_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
     """Energy that releases injected, in words, from ``NOTED`` of the energy put in on; else "".
 
-    Put in: work of loads and supports, and the energy at the start, which the residual leaves.
     round_off: energy [J] up to which all may be rounding.
     """
-    start = sum(-value if name in GIVEN else value for name, value in account.items())
-    put_in = abs(account["load_work"]) + abs(account["support_work"]) + abs(start)
+    put_in = energy_put_in(account)
     if account["injected"] < NOTED * put_in or account["injected"] <= round_off:
         return ""
     share = 100.0 * account["injected"] / max(put_in, 1e-300)

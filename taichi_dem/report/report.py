@@ -8,7 +8,7 @@ from taichi_dem.kit.display import BRIEF, counted, in_brief, in_lines
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.methods import order_of
 from taichi_dem.report.effects import Certificate
-from taichi_dem.report.energy_balance import injected_words
+from taichi_dem.report.energy_balance import HELD, energy_put_in, injected_words, put_in_words
 from taichi_dem.report.shared_volume import Interpenetration
 from taichi_dem.scene import Scene
 
@@ -152,21 +152,20 @@ class Report:
 
     @property
     def energy_residual_fraction(self) -> float:
-        """Unexplained energy as a share of the work put in or of the energy held."""
+        """Unexplained energy as a share of the energy put in, or of that held if more."""
         return abs(self.energy_balance["residual"]) / max(*self._given_and_held(), 1e-300)
 
     def _given_and_held(self):
-        """Work put in, and energy held at the end [J]."""
-        given = abs(self.energy_balance["load_work"]) + abs(self.energy_balance["support_work"])
-        return given, self.energy_balance["kinetic"] + self.energy_balance["bond_strain"]
+        """Energy put in, and energy held at the end [J]."""
+        return energy_put_in(self.energy_balance), sum(self.energy_balance[name] for name in HELD)
 
     @property
     def unexplained(self) -> str:
-        """The residual in words: a share of the work put in, unless all energies are round-off."""
+        """The residual in words, a share of the energy put in unless all energies are round-off."""
         given, held = self._given_and_held()
         if max(given, held) <= self.round_off_J:
             return f"{abs(self.energy_balance['residual']):.2g} J; all energies are round-off"
-        whole = "the energy held" if held > given else "it"
+        whole = "the energy held" if held > given + self.round_off_J else "the energy put in"
         return f"{100.0 * self.energy_residual_fraction:.3g} % of {whole}"
 
     def advice(self, tolerance: float = 0.0, shown: Mapping[str, float] | None = None) -> Advice:
@@ -216,7 +215,6 @@ class Report:
         momentum = f"{self.linear_momentum_error:.1e} linear, {self.angular_momentum_error:.1e}"
         run = f"{self.run_seconds:.1f} s run ({self.run_cpu_seconds:.1f} s of CPU)"
         left_out = self.certificate.left_out_lines() if self.certificate else ()
-        work_J = self.energy_balance["load_work"] + self.energy_balance["support_work"]
         return {
             "method": f"{self.method}, {self.driver} driver",
             "effects": "\n".join(f"{use.effect}: {use}" for use in self.effect_activity) or "none",
@@ -230,7 +228,7 @@ class Report:
             "sweeps": f"{swept}, {unconverged}" if self.sweeps else "",
             "contact searches": f"{self.searches:,}",
             "interpenetration": str(self.interpenetration or "not looked for"),
-            "work put in": f"{work_J:.6g} J",
+            "energy put in": put_in_words(self.energy_balance, self.round_off_J),
             "energy residual": self.unexplained,
             "injected": injected_words(self.energy_balance, self.round_off_J),
             "known of the error": self.known_error.replace("; ", "\n"),
@@ -261,7 +259,7 @@ class Report:
             "time": rows["time"],
             "method": f"{self.method}, smallest step {rows['smallest step']}",
             "effects": self._acted() or "none",
-            "work put in": rows["work put in"],
+            "energy put in": rows["energy put in"],
             "injected": rows["injected"],
             "certificate": self.certificate.verdict if self.certificate else "",
         }
@@ -292,5 +290,5 @@ def known_error(report: Report, scene: Scene, method: Any) -> str:
     words += f" between {between}" if between and order is not None else ""
     closes = f"energy balance: {report.unexplained.replace('; ', ', ')}"
     if "%" in closes:
-        closes = f"energy balance closes to {report.unexplained.replace(' of it', '')}"
+        closes = closes.replace(":", " closes to").removesuffix(" of the energy put in")
     return f"{'steps up to' if varying else 'step'} {method.dt0:.3g} s, {words}; {closes}"

@@ -4,6 +4,7 @@ An effect is called droppable only where a run without it has been made and is e
 Estimates before a run judge each connected part by its own stress and motion.
 """
 
+import re
 import sys
 from dataclasses import replace
 from types import SimpleNamespace
@@ -18,6 +19,7 @@ from taichi_dem import (
     Uniform,
     effects,
     estimated_effects,
+    goals,
     join,
     needed_effects,
     shapes,
@@ -26,9 +28,10 @@ from taichi_dem import (
 from taichi_dem.engine import ENGINES
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.certificate import NEEDED
+from taichi_dem.kit.effect_usage import SMALL, TRY, Advice, EffectUse
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.report.effects import effect_uses
-from taichi_dem.report.energy_balance import TERMS
+from taichi_dem.report.energy_balance import TERMS, energy_put_in
 from taichi_dem.report.readings import Run
 from taichi_dem.state.model import Model
 from tests.probe import BondProbe
@@ -94,6 +97,50 @@ def used(listed, bits=0, marked=0, heat=0.0, **account):
     return {use.effect: use for use in effect_uses(run, balance, filled)}
 
 
+def test_energy_that_bodies_have_at_the_start_is_put_in():
+    """Thrown up at v, they have m v^2 / 2, of which their weight takes a part and gives none."""
+    speed, mass = 2.0, Model(pair(), CONCRETE, ()).body_mass.sum()
+    listed = [make() for make in GENTLE]
+    thrown = Scene(pair(), CONCRETE, listed, velocity=(0.0, speed, 0.0))
+    result = simulate(thrown, method=Uniform(STEP), until=UNTIL, samples=4, progress=None)
+    held, account = 0.5 * mass * speed**2, result.report.energy_balance
+    assert account["load_work"] < 0.0
+    assert energy_put_in(account) == pytest.approx(held, rel=1e-12)
+    share = 1.0 + account["load_work"] / held
+    assert goals.energy_share("kinetic").value(result) == pytest.approx(share, rel=1e-9)
+    (weight,) = (use for use in result.report.effect_activity if use.effect == "gravity")
+    assert weight.share == pytest.approx(-account["load_work"] / held, rel=1e-9)
+    words = result.report.rows()["energy put in"]
+    told = [float(number) for number in re.findall(r"[-+.\de]+(?= J)", words)]
+    assert told == pytest.approx([held, held, -account["load_work"]], rel=1e-5)
+
+
+def made_up(**members):
+    """Advice on six effects, in no order."""
+    shares = {"rub": 6e-3, "touch": 0.3, "drag": 1e-5, "gas": 0.9}
+    uses = [
+        EffectUse(name, "events", 1, share=share, steers=name in ("rub", "touch"))
+        for name, share in shares.items()
+    ]
+    hold = EffectUse(
+        "hold", "bodies held", 1, share=0.0, steers=True, kept="it defines the problem"
+    )
+    return Advice((EffectUse("break", "bonds broken", 0), *uses, hold), (), 0.0, **members)
+
+
+def test_effects_stand_in_the_order_of_their_influence():
+    """What holds bodies has none that its energy tells, and stands first."""
+    table = made_up(shown={}).table()
+    assert list(table["effect"]) == ["hold", "gas", "touch", "rub", "drag", "break"]
+    assert list(table["influence"][1:]) == [0.9, 0.3, 6e-3, 1e-5, 0.0]
+    small = list(table["influence"] < SMALL)
+    assert [word == TRY for word in table["advice"]] == small == [False] * 3 + [True] * 3
+    # What a run has shown stands in place of the energy.
+    measured = made_up(shown={"rub": 0.5, "drag": 0.0}).table().set_index("effect")
+    assert list(measured.index)[:4] == ["hold", "gas", "rub", "touch"]
+    assert list(measured["advice"][["rub", "drag", "break"]]) == ["keep", "drop", TRY]
+
+
 @pytest.mark.parametrize("place", range(3))
 def test_every_load_and_support_has_a_bit_of_its_own(place):
     """Loads first, in the order of the list, then supports."""
@@ -129,6 +176,15 @@ def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(scene
         assert frame.position.tobytes() == other.position.tobytes()
     assert silent.report.effects == without.report.effects
     assert silent.report.energy_balance == without.report.energy_balance
+
+
+def test_what_steers_is_judged_by_a_run_without_it(scene):
+    """Softening takes a share of the energy, and without it nothing breaks."""
+    result = result_of(scene)
+    (use,) = (one for one in result.report.effect_activity if one.effect == "softening")
+    assert result.report.broken_faces > 0 and use.share < 0.9
+    advice = needed_effects(result, 0.9)
+    assert advice.shown["softening"] == np.inf and "softening" not in advice.droppable
 
 
 EDGE = 0.05
