@@ -219,7 +219,7 @@ def measured(design, result):
     distance, speed, behind, beside = peaks(result, middle_of(design))
     work, shares = parts_of_work(result)
     volume, out, depth = pieces(result)
-    side = {f"radiated_{one}_J": result.series[f"ground_{one}_J"][-1] for one in QUIET}
+    side = {f"radiated_{one}_J": result.series[f"quiet_boundary_{one}_J"][-1] for one in QUIET}
     return {
         "tetrahedra": result.model.body_count,
         "beside_m_s": power_law(distance, speed, beside)[1],

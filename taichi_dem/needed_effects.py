@@ -15,6 +15,7 @@ from taichi_dem.mesh.topology import parts_of
 from taichi_dem.result import Result
 from taichi_dem.simulate import run_simulation
 from taichi_dem.simulation import Simulation
+from taichi_dem.state.model import names_of
 
 #: Largest difference of two runs that rounding explains, as a share of what is recorded.
 ROUNDING = 1e-9
@@ -66,7 +67,8 @@ def _differences(result, names, tolerance):
     together = _difference(result, names)
     if together <= tolerance or len(names) == 1:
         return dict.fromkeys(names, together)
-    roles = {effect.name: effect.role for effect in result.scene.effects}
+    effects = result.scene.effects
+    roles = {name: effect.role for name, effect in zip(names_of(effects), effects)}
     found: dict[str, float] = {}
     left_out: list[str] = []
     # Friction first: contact can be left out only with it.
@@ -100,8 +102,8 @@ def _without(effects, names, may_be_silent):
     nothing is compiled anew.
     """
     kept = []
-    for effect in effects:
-        if effect.name not in names:
+    for name, effect in zip(names_of(effects), effects):
+        if name not in names:
             kept.append(effect)
         elif may_be_silent and vars(type(effect)).get("may_be_silent"):
             kept.append(effect.silent())

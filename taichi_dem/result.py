@@ -440,10 +440,12 @@ def picture_of(thing: Mesh | Scene) -> bytes:
     from taichi_dem.plot.view import picture_of_groups
 
     acting: dict[str, list[str]] = {}
-    for effect in getattr(thing, "effects", ()):
-        if hasattr(effect, "group"):
-            acting.setdefault(effect.group, []).append(effect.name.replace("_", " "))
-    return picture_of_groups(thing.mesh if isinstance(thing, Scene) else thing, acting)
+    grouped = [effect for effect in getattr(thing, "effects", ()) if hasattr(effect, "group")]
+    for effect in grouped:
+        acting.setdefault(effect.group, []).append(effect.name.replace("_", " "))
+    mesh = thing.mesh if isinstance(thing, Scene) else thing
+    held = [effect.group for effect in grouped if effect.role == "support"]
+    return picture_of_groups(mesh, acting, held)
 
 
 Pictured.png = picture_of

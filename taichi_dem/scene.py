@@ -29,7 +29,7 @@ from taichi_dem.materials.body_materials import BodyMaterials, body_materials
 from taichi_dem.materials.bond_rules import typical_of
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.topology import check_free, may_meet, parts_of
-from taichi_dem.state.model import MANY
+from taichi_dem.state.model import MANY, names_of
 
 #: Share of an opening at which a law begins, and of a mean speed, at which no body wakes others.
 SLEEP = 1e-6
@@ -146,7 +146,8 @@ class Scene(Pictured):
         return state
 
     def __repr__(self):
-        effects = ", ".join(effect.name or type(effect).__name__ for effect in self.effects)
+        named = zip(names_of(self.effects), self.effects)
+        effects = ", ".join(name or type(effect).__name__ for name, effect in named)
         words = f"effects {effects}" if effects else "no effects"
         return in_brief(self, counted(self.mesh.body_count, "body"), words)
 

@@ -29,7 +29,7 @@ from taichi_dem.report.resolution import StepResolution
 from taichi_dem.report.shared_volume import SharedVolume
 from taichi_dem.scene import Scene
 from taichi_dem.state.capacity import capacity_of
-from taichi_dem.state.model import Model
+from taichi_dem.state.model import Model, names_of
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS
@@ -442,7 +442,7 @@ class Simulation:
         report = Report(
             method=self.method.name,
             driver=self.driver.name,
-            effects=tuple(effect.name for effect in self.model.effects if effect.name),
+            effects=tuple(filter(None, names_of(self.model.effects))),
             until_s=self.time_s,
             body_count=self.model.body_count,
             bond_count=self.model.bond_count,

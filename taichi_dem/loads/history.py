@@ -10,6 +10,7 @@ from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import real
 from taichi_dem.kit.validation import real_numbers, shown
+from taichi_dem.state.model import names_of
 
 #: Points that a history may have.
 MOST_POINTS = 4096
@@ -41,13 +42,14 @@ def shortest_piece(times: tuple[float, ...], values: tuple[float, ...]) -> float
 
 def unresolved_histories(effects: Any, step: float) -> tuple[str, ...]:
     """A sentence about each load or support that changes within less than a step [s]."""
-    times = ((effect, effect.change_time()) for effect in effects)
+    listed = tuple(effects)
+    times = ((name, one.change_time()) for name, one in zip(names_of(listed), listed))
     return tuple(
-        f"{effect.name} ({getattr(effect, 'group', 'all bodies')}) changes within {time:.3g} s, "
+        f"{name} changes within {time:.3g} s, "
         f"less than the largest step, {step:.3g} s: its shape over time may be lost, though loads "
         "keep their whole impulse and ramps their whole displacement; steps of at most "
         f"{time:.3g} s resolve it"
-        for effect, time in times
+        for name, time in times
         if time < step
     )
 

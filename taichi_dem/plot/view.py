@@ -5,6 +5,7 @@ world positions (body_count, 4, 3) [m], as ``record.body_corners`` gives.
 """
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Any
 
 import matplotlib
@@ -42,6 +43,9 @@ _DARKEST, _SQUARE = 0.7, 2.0**0.5
 _TRIAD, _ARROW = (-30.0, 24.0), 18.0
 #: Most lines of the legend.
 _MOST = 24
+#: Strokes over the faces of groups that are held, one after the other, and their colour.
+_STROKES = ("////", r"\\\\", "----", "||||", "++++", "xxxx")
+_STROKE = "#000000"
 
 
 class View:
@@ -217,41 +221,55 @@ def move_bodies(
     drawn.set_array(values[body])
 
 
-def picture_of_groups(mesh: Mesh, acting: Mapping[str, Sequence[str]]) -> bytes:
+def picture_of_groups(
+    mesh: Mesh, acting: Mapping[str, Sequence[str]], held: Sequence[str] = ()
+) -> bytes:
     """The outer faces of a mesh as PNG, from the front and from behind, coloured by group.
 
-    A face in several groups has the colour of the smallest. Without groups of faces, colours are
-    those of the groups of bodies.
+    A face in several groups has the colour of the smallest that something acts on, else of the
+    smallest. Strokes cover all faces of a group that is held, whatever their colour. Without groups
+    of faces, colours are those of the groups of bodies.
 
     Parameters
     ----------
     mesh : Mesh
     acting : dict
         Group to what acts on it, words for the legend.
+    held : sequence of str, default ()
+        Groups among them that a support holds.
     """
     faces = geometry.all_faces(mesh.tetrahedra)
     rows = geometry.outer_rows(faces)
     outer = faces[rows]
-    names, member = _members(mesh, outer, rows // 4)
+    masks = _masks(mesh, outer, rows // 4)
+    names, member = _coloured(masks, acting)
+    strokes = dict(zip((name for name in names if name in held), cycle(_STROKES)))
     with styled(1, 2, size=(9.6, 4.8), sharey=True) as (figure, panels):
         for axes, axis, title in zip(panels, _AXES, ("from the front", "from behind and below")):
             view = ObliqueView(axis)
             _draw(axes, mesh, outer, member, view)
+            for name, hatch in strokes.items():
+                _draw_strokes(axes, mesh.points[outer[masks[name]]], view, hatch)
             _draw_axes(axes, view)
             axes.set_title(title, fontsize=9)
         panels[0].set_ylabel("in the picture [m]")
-        keys = _keys(mesh, names, member, acting)
+        keys = _keys(masks, names, member, acting, strokes)
         figure.legend(handles=keys, loc="outside lower center", ncols=3, fontsize=8)
         return png_of(figure)
 
 
-def _keys(mesh, names, member, acting):
+def _keys(masks, names, member, acting, strokes):
     """Lines of the legend."""
-    counts = [(member == k).sum() for k in range(len(names))]
     keys = [
-        area_key(_label(name, counts[k], acting), facecolor=_COLOURS[k % len(_COLOURS)])
+        area_key(
+            _label(name, masks[name].sum(), acting),
+            facecolor=_COLOURS[k % len(_COLOURS)],
+            **({"hatch": strokes[name], "edgecolor": _STROKE} if name in strokes else {}),
+        )
         for k, name in enumerate(names[:_MOST])
     ]
+    inside = (", ".join([f"{name}: inside", *acting[name]]) for name in acting if name not in masks)
+    keys += [area_key(words, facecolor="white") for words in inside]
     if len(names) > _MOST:
         keys.append(area_key(f"and {len(names) - _MOST} more groups", facecolor="white"))
     if (member < 0).any():
@@ -259,25 +277,28 @@ def _keys(mesh, names, member, acting):
     return keys
 
 
-def _members(mesh, outer, bodies):
-    """Names of groups, and the place of that of each outer face, -1 for none, (n,)."""
-    sizes = {name: len(faces) for name, faces in mesh.groups.items()}
-    names = [name for name in sizes if name not in mesh.inner_groups]
-    member = np.full(len(outer), -1)
-    if names:
-        number, *members = geometry.numbers_in(outer, *(mesh.groups[name] for name in names))
-        chosen = np.full(max(map(np.max, (number, *members))) + 1, -1)
-        for k in sorted(range(len(names)), key=lambda k: -sizes[names[k]]):
-            chosen[members[k]] = k
-        member = chosen[number]
-    else:
-        names = list(mesh.body_groups)
-        for k, name in enumerate(names):
-            member[np.isin(bodies, mesh.body_groups[name])] = k
-    shown = [k for k in range(len(names)) if (member == k).any()]
-    places = np.full(len(names) + 1, -1)
-    places[shown] = np.arange(len(shown))
-    return [names[k] for k in shown], places[member]
+def _masks(mesh, outer, bodies):
+    """Whether each outer face is in each group of faces, or of bodies where there are none."""
+    names = [name for name in mesh.groups if name not in mesh.inner_groups]
+    if not names:
+        return {name: np.isin(bodies, rows) for name, rows in mesh.body_groups.items()}
+    number, *members = geometry.numbers_in(outer, *(mesh.groups[name] for name in names))
+    return {name: np.isin(number, found) for name, found in zip(names, members)}
+
+
+def _coloured(masks, acting):
+    """Names of the groups for the legend, and the place of that of each outer face, -1 for none.
+
+    Groups that something acts on come first, so that the legend has all of them.
+    """
+    order = sorted(masks, key=lambda name: (name in acting, -masks[name].sum()))
+    last = np.full(len(next(iter(masks.values()), ())), -1)
+    for k, name in enumerate(order):
+        last[masks[name]] = k
+    shown = [name for name in masks if name in acting or order.index(name) in last]
+    names = sorted(shown, key=lambda name: name not in acting)
+    places = np.array([*(names.index(name) if name in names else -1 for name in order), -1])
+    return names, places[last]
 
 
 class ObliqueView(View):
@@ -305,6 +326,13 @@ def _draw(axes, mesh, outer, member, view):
     axes.grid(False)
     axes.autoscale_view()
     axes.margins(0.08)
+
+
+def _draw_strokes(axes, triangles, view, hatch):
+    """Strokes over triangles (n, 3, 3) that are seen, in front of all faces."""
+    seen = view.project(triangles[view.facing(triangles)])
+    look = {"facecolors": "none", "edgecolors": _STROKE, "linewidths": 0.0, "hatch": hatch}
+    axes.add_collection(PolyCollection(seen, **look))
 
 
 def _draw_axes(axes, view):

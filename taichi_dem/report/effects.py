@@ -19,6 +19,7 @@ from taichi_dem.report.energy_balance import EnergyBalance, energy_put_in
 from taichi_dem.report.estimates import AIR, BENDS, WEIGHT, PartScales
 from taichi_dem.report.missing_effects import MissingEffect, bond_rounding
 from taichi_dem.report.readings import Run
+from taichi_dem.state.model import names_of
 from taichi_dem.state.state import LATER
 from taichi_dem.state.timeline import MACRO_TICKS, NEVER
 
@@ -77,7 +78,8 @@ def effect_uses(
     like those of the package; they are never called idle where only their own code could tell.
     """
     uses = _Uses(run, balance, account)
-    return tuple(uses.of(effect) for effect in run.model.effects if effect.name)
+    named = zip(names_of(run.model.effects), run.model.effects)
+    return tuple(uses.of(effect, name) for name, effect in named if name)
 
 
 class _Uses:
@@ -98,8 +100,8 @@ class _Uses:
             "friction": self.bits & np.int64(RUBBED),
         }
 
-    def of(self, effect):
-        """The use of one effect."""
+    def of(self, effect, name):
+        """The use of one effect, by its name among all."""
         find = self._law if effect.role in _LAWS else self._drive
         what, marks, energy, kept = find(effect)
         whole, total, events = "the energy put in", self.given, int(np.count_nonzero(marks))
@@ -108,7 +110,7 @@ class _Uses:
             whole, total = "what bonds took and hold", self._sum(_THROUGH_BONDS)
         of = {"bonds": self.run.model.bond_count, "bodies": self.run.model.body_count}
         return EffectUse(
-            effect=effect.name,
+            effect=name,
             what=what,
             events=events,
             of=of[what.split()[0]],

@@ -1,7 +1,5 @@
 """Forces that loads, ground and supports exert on the bodies at the present time."""
 
-from collections import Counter
-
 import numpy as np
 import taichi as ti
 
@@ -9,7 +7,7 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.types import vec3
 from taichi_dem.report.readings import Readings
-from taichi_dem.state.model import Model
+from taichi_dem.state.model import Model, column_of, names_of
 
 #: Roles of what acts on single bodies, in the order of all arrays here.
 _ROLES = ("load", "ground", "support")
@@ -19,27 +17,12 @@ _F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 def force_names(model: Model) -> list[str]:
     """Name of the force of each load, each ground and each support, in this order.
 
-    Such as ``support_force`` where the scene has one support, else ``support_left_force`` with the
-    group that it holds, and ``support_left_roller_force`` where several hold one group; what has no
-    group is called by its kind. Those of equal names are numbered.
+    Such as ``fixed_left_force``, of the support that reports name ``fixed left``.
     """
-    words = [word for role in _ROLES for word in _words(role, model.by_role[role])]
-    seen: Counter[str] = Counter()
-    names = []
-    for word in words:
-        seen[word] += 1
-        number = f"_{seen[word]}" if words.count(word) > 1 else ""
-        names.append(f"{word}{number}_force")
-    return names
-
-
-def _words(role, effects):
-    if len(effects) == 1:
-        return [role]
-    places = [getattr(effect, "group", effect.name) for effect in effects]
-    twice = [places.count(place) > 1 and place != e.name for place, e in zip(places, effects)]
-    words = [f"{p}_{e.name}" if more else p for p, e, more in zip(places, effects, twice)]
-    return [f"{role}_{word}" for word in words]
+    named = list(zip(names_of(model.effects), model.effects))
+    return [
+        f"{column_of(name)}_force" for role in _ROLES for name, one in named if one.role == role
+    ]
 
 
 @ti.data_oriented

@@ -26,6 +26,30 @@ MANY = ("load", "support", "ground")
 ROLES = (*SINGLE, *MANY)
 
 
+def names_of(effects: Iterable[Any]) -> list[str]:
+    """Name of each effect in reports, tables and pictures: its kind, and the group it acts on.
+
+    Such as ``gas_pressure hole``; "" for one that reports do not list. No two are alike, also as
+    columns: a later one of the same kind and group is numbered.
+    """
+    names: list[str] = []
+    taken = {""}
+    for effect in effects:
+        word = name = f"{effect.name} {getattr(effect, 'group', '')}".rstrip() * bool(effect.name)
+        number = 1
+        while name and column_of(name) in taken:
+            number += 1
+            name = f"{word} {number}"
+        names.append(name)
+        taken.add(column_of(name))
+    return names
+
+
+def column_of(name: str) -> str:
+    """Name of an effect as the first part of that of a column."""
+    return name.replace(" ", "_")
+
+
 class Model:
     """Constant arrays of a scene and its effects by role; NumPy only.
 

@@ -127,7 +127,7 @@ def test_gas_falls_with_the_volume():
     # The base faces along x, the body flies to lower x, away from the gas.
     moved = np.array([-frame.displacement[0, 0] for frame in result.frames])
     exact = load.pressure_at(result.series["time_s"]) * area * (1.0 + moved / 1e-3) ** -2.8
-    force = -result.series["load_force_x_N"]
+    force = -result.series["expanding_gas_base_force_x_N"]
     assert moved[-1] > 0.3e-3
     assert np.abs(force - exact).max() < 1e-3 * exact.max()
 
@@ -157,8 +157,12 @@ def test_energy_that_sides_take():
     push = effects.Pressure.triangle("left", peak=1e6, rise=5e-5, fall=5e-5)
     quiet = [effects.QuietBoundary(side) for side in ("right", "left")]
     scene = Scene(bar(1.0, 0.1, (20, 2, 2)), still, [push, *quiet])
-    history = simulate(scene, method=Uniform(2e-7), until=1.5e-3, samples=3).series
-    right, left = history["ground_right_J"], history["ground_left_J"]
+    result = simulate(scene, method=Uniform(2e-7), until=1.5e-3, samples=3)
+    history = result.series
+    names = ["pressure left", "quiet_boundary right", "quiet_boundary left"]
+    assert list(result.report.effects) == [use.effect for use in result.report.effect_activity]
+    assert list(result.report.effects) == names and {*result.effects["effect"]} == {*names}
+    right, left = (history[f"quiet_boundary_{side}_J"] for side in ("right", "left"))
     assert right + left == pytest.approx(history["ground_dashpot_J"], rel=1e-12, abs=1e-12)
     # The left end takes its part while it is pushed, the right one what the wave brings later.
     work = history["load_work_J"][-1]

@@ -5,6 +5,7 @@ A scene that begins in motion runs as one whose bodies were set in motion by han
 
 import pickle
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -149,3 +150,17 @@ def test_a_number_in_the_likely_unit_is_warned_about_and_in_its_own_is_not(name)
             pass  # a wrong unit may lie out of the range of another option too
     assert any(one.category is UnitWarning and name in str(one.message) for one in told)
     build(value * factor)
+
+
+def test_a_picture_shows_what_is_held_where_other_groups_cover_it(tmp_path):
+    """Two smaller groups, which are pressed, have all faces of the one that is held."""
+    mesh = bar(1.0, 0.4, (5, 2, 2))
+    foot = mesh.groups["bottom"]
+    mesh = replace(mesh, groups={**mesh.groups, "foot": foot, "heel": foot[:10], "toe": foot[10:]})
+    listed = [effects.Pressure("heel", 1e5), effects.Pressure("toe", 1e5)]
+    held = [[], [effects.Fixed("foot")]]
+    seen = []
+    for supports in held:
+        Scene(mesh, CONCRETE, [*listed, *supports]).picture(tmp_path / "scene.png")
+        seen.append((tmp_path / "scene.png").read_bytes())
+    assert seen[0] != seen[1]

@@ -26,7 +26,7 @@ from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
 from taichi_dem.output.record import Recorder
 from taichi_dem.report.forces import force_names
-from taichi_dem.state.model import Model
+from taichi_dem.state.model import Model, column_of, names_of
 from tests.made_result import made_result
 from tests.scenes import paper_effects
 from tests.turns import matrix, quaternion
@@ -103,9 +103,20 @@ def test_names_tell_sources_apart():
         effects.Fixed("right"),
         effects.Gravity(),
     ]
-    names = "load support_left_roller_1 support_left_roller_2 support_left_fixed support_right"
+    names = "gravity roller_left roller_left_2 fixed_left fixed_right"
     model = Model(bar(1.0, 1.0, (1, 1, 1)), CONCRETE, listed)
     assert force_names(model) == [f"{name}_force" for name in names.split()]
+
+
+def test_no_two_names_are_alike_whatever_groups_are_called():
+    """A number, a space or the kind of another effect in the name of a group."""
+    groups = "a", "a", "a 2", "a_2", "a", "pressure a"
+    listed = [*map(effects.Fixed, groups), effects.Pressure("a", 1.0), effects.Gravity()]
+    listed += [effects.Gravity(), effects.Softening().silent(), effects.ShearSlip().silent()]
+    names = names_of(listed)
+    assert names[-2:] == ["", ""] and names[0] == "fixed a" and names[6] == "pressure a"
+    columns = [column_of(name) for name in names[:-2]]
+    assert len({*columns}) == len(columns) == 9
 
 
 def damped(seconds):
@@ -144,7 +155,7 @@ def test_a_support_bears_the_load_and_both_make_the_stress(name):
     simulation, recorder = settled(mesh, listed, damped(1e-3), 7e-2)
     loads, held = (
         np.array([recorder.rows[0][f"{one}_force_{k}_N"] for k in "xyz"])
-        for one in ("load", "support")
+        for one in (f"pressure_{load.group}", "fixed_left")
     )
     assert np.abs(loads + held).max() < STATIC * abs(force)
     # The pressure turns with the faces, by less than 1e-4: a cosine of 1 - 5e-9.
@@ -180,7 +191,7 @@ def test_a_pressed_block_has_the_stress_of_what_presses_it():
     ]
     mesh = placed_together(parts, keep_coincident=True)
     simulation, recorder = settled(mesh, listed, damped(2e-4), 3e-2)
-    borne = recorder.rows[0]["support_force_x_N"]
+    borne = recorder.rows[0]["fixed_first_right_force_x_N"]
     assert borne == pytest.approx(1e6 / 16.0, rel=STATIC)
     stress = virial(simulation.model, recorder.frame().stress, slice(6, 12)) / 0.25**3
     assert stress[0, 0] == pytest.approx(-1e6, rel=1e-4)
