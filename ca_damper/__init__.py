@@ -28,6 +28,7 @@ from ca_damper.theory.collect_and_collide import CollectAndCollide, collect_and_
 from ca_damper.theory.decay import logarithmic_decrement
 from ca_damper.theory.impact_damper import ImpactDamper
 from taichi_dem.kit.bars.answer import Answer, Branch
+from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.progress import Progress
 from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.kit.sweeps.sweep import sweep
@@ -43,6 +44,7 @@ __all__ = [
     "Box",
     "Branch",
     "Certificate",
+    "Checkpoint",
     "CollectAndCollide",
     "Combined",
     "DamperMap",

@@ -21,7 +21,7 @@ its kind: surface_contact has spheres on all free faces.
 Softening, slip and contact are evaluated only where and when they act; bodies that no wave has
 reached sleep. The certificate in the report says what acted, since when, and what was left out.
 
-A run saves itself in checkpoint.npz at its end, on Ctrl-C, and as often as --checkpoint-every says.
+A run saves itself in run.checkpoint at its end, on Ctrl-C, and as often as --checkpoint-every says.
 The same command with --resume continues it, also with a larger --until.
 
 With --accuracy, the program finds the displacement of the hole to this share of its value; for a

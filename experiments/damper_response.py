@@ -85,7 +85,7 @@ def run(options):
             raise ca.InputError(f"fillings must be some of {', '.join(FILLINGS)}, got {label!r}")
     if options.accuracy is not None:
         return run_to_accuracy(options)
-    if options.resume and not any(Path(options.out).glob("checkpoint_*.npz")):
+    if options.resume and not any(Path(options.out).glob("*.checkpoint")):
         raise ca.InputError(f"resume must be left out: there is no checkpoint in {options.out}")
     jobs = {label: jobs_of(FILLINGS[label], options) for label in options.fillings}
     folder = study.begin(options)
@@ -162,7 +162,7 @@ def jobs_of(filling, options):
 
 def made(work, arguments, name, options):
     """What work(**arguments) gives, under a progress bar, with a checkpoint of its own."""
-    kept = study.checkpoint_of(options, f"checkpoint_{name}", may_be_new=True)
+    kept = study.checkpoint_of(options, name, may_be_new=True)
     with ca.ProgressBar(name.replace("_", " ")) as bar:
         return work(**arguments, **kept, progress=bar)
 

@@ -9,7 +9,7 @@ import numpy as np
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.checkpoint import Checkpoint, digest, identity_of, version_text
 from taichi_dem.kit.display import prefixed
-from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.errors import InputError, SimulationDiverged, carry, carrying
 from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress import Listener, Pace, Progress, compiling
@@ -78,7 +78,7 @@ def simulate(
         Title of the progress bar.
     output : path, optional
         Folder for the result; it is written at the end, up to the last good sample if the run
-        diverges.
+        diverges, and up to the failure of an observer or a checkpoint.
     checkpoint : Checkpoint, optional
         Where and when the run saves itself; it also does so at its end and on Ctrl-C, SIGTERM,
         SIGHUP, SIGXCPU and SIGUSR1.
@@ -96,9 +96,11 @@ def simulate(
     Raises
     ------
     InputError
-        An argument is out of its range.
+        An argument is out of its range, or a file cannot be written, as on a full disk; then
+        ``result`` of the exception is the result.
     SimulationDiverged
-        The run diverged; ``result`` of the exception has the data before that.
+        The run diverged; ``result`` of the exception has the data before that. So has that of
+        whatever an observer raises.
     Interrupted
         A signal ended the run, which has been saved.
 
@@ -130,13 +132,15 @@ def simulate(
         if error is None:
             # Observers may keep their view of it.
             simulation.close()
-    if output is not None:
-        try:
-            result.write(output)
-        except InputError as unwritten:
-            raise InputError(f"{unwritten}{writer.last_good()}") from None
-    if error is not None:
-        raise error
+    with carrying(result):
+        if output is not None:
+            try:
+                result.write(output)
+            except InputError as unwritten:
+                ended = "" if error is None else f"; the run ended before: {error}"
+                raise InputError(f"{unwritten}{writer.last_good()}{ended}") from error
+        if error is not None:
+            raise error
     return result
 
 
@@ -284,16 +288,19 @@ def _started(simulation, brief=False):
 
 
 def _result(simulation, recorder, writer, plan, tell, start=None):
-    """Run to the end, or as far as the run stays within its bounds.
+    """Run to the end, or as far as the run stays within its bounds and nothing fails beside it.
 
-    Returns the result, and the SimulationDiverged that holds it or None.
+    Returns the result, and the exception that ended the run and holds it, or None.
     """
     calls, error = plan.calls(simulation, recorder, tell), None
     try:
         with writer:
             _run(simulation, recorder, writer, plan, calls)
-    except SimulationDiverged as diverged:
-        error = diverged
+    except Exception as raised:
+        # Within a step there is no state to report.
+        if simulation.cut_short:
+            raise
+        error = raised
     received = [one.received() for one in plan.receivers]
     result = Result(
         scene=simulation.scene,
@@ -304,13 +311,13 @@ def _result(simulation, recorder, writer, plan, tell, start=None):
         broken_time=recorder.broken_time(),
         peak_speed=recorder.peak_speed,
         report=simulation.report(plan.brief),
-        diverged=str(error) if error else "",
+        diverged=str(error) if isinstance(error, SimulationDiverged) else "",
         start=start,
         acting_since=simulation.acting_since(),
         receivers={name: part for parts in received for name, part in parts.items()},
     )
     if error is not None:
-        error.result = result
+        carry(error, result)
     return result, error
 
 
@@ -354,7 +361,9 @@ def arrays_of(
         # Refuses too many of them, before anything is done.
         checkpoint.marks(last, method.dt0)
     arrays = opened(checkpoint, resume, lambda: run_identity(scene, method))
-    begin = int(np.asarray(arrays.get("field/state.tick", 0)).max(initial=0)) if arrays else 0
+    tick = np.asarray(arrays.get("field/state.tick", 0) if arrays else 0)
+    # What is no tick at all is refused where the fields are restored.
+    begin = int(tick.max(initial=0)) if tick.dtype.kind == "i" else 0
     if begin > last * MACRO_TICKS:
         got, least = told_apart(last * method.dt0, begin * (method.dt0 / MACRO_TICKS))
         raise InputError(f"until must be at least {least} s, where {resume} begins, got {got}")

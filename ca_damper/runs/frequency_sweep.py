@@ -185,9 +185,10 @@ def sweep_up_and_down(
                 if not batch.going_on:
                     batch.drive(grid.ratios[k] * grid.oscillator.natural_frequency)
                 ways.record(batch, batch.run(transient_cycles, measured_cycles, tell))
-            writer.save()
-    responses = ways.response(0), ways.response(1)
-    return Sweep(*responses, batch.report(), *ways.values[_ERROR])
+            responses = ways.response(0), ways.response(1)
+            found = Sweep(*responses, batch.report(), *ways.values[_ERROR])
+            writer.save(found)
+    return found
 
 
 class _Ways:

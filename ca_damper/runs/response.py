@@ -366,10 +366,11 @@ def frequency_response(
         batch.start(start)
         with batch.checkpointed(checkpoint, resume, {"job": job}) as writer:
             cycles = batch.run(transient_cycles, measured_cycles, report_progress)
-            writer.save()
-    report = replace(batch.report(), **_sampling(cycles))
-    made = tuple(replace(one, report=report) for one in grid.responses(batch, cycles))
-    return AmplitudeResponse(grid.amplitudes, made) if grid.is_several else made[0]
+            report = replace(batch.report(), **_sampling(cycles))
+            made = tuple(replace(one, report=report) for one in grid.responses(batch, cycles))
+            found = AmplitudeResponse(grid.amplitudes, made) if grid.is_several else made[0]
+            writer.save(found)
+    return found
 
 
 def _sampling(cycles):

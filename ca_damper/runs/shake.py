@@ -1,5 +1,6 @@
 """Shake an oscillator, or a structure of several modes with boxes, by any motion or force."""
 
+import contextlib
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -124,12 +125,15 @@ def shake(
     start = {"displacement": displacement, "velocity": velocity}
     job = f"shaken {identity_of((counts, numbered, window, own, mount, start))}"
     options = {"excitation": excitation, "mount": mount, "effects": effects}
-    common, motion = _recorded(
-        (filling, table), options, window, start, progress, (job, checkpoint, resume)
-    )
     shape = len(counts), len(numbered)
-    over_axes = {name: one.reshape(*one.shape[:-1], *shape) for name, one in motion.items()}
-    return TimeHistory(oscillator=own, particles=counts, seeds=numbered, **common, **over_axes)
+    with _recorded(
+        (filling, table), options, window, start, progress, (job, checkpoint, resume)
+    ) as (common, motion, writer):
+        over_axes = {name: one.reshape(*one.shape[:-1], *shape) for name, one in motion.items()}
+        axes: dict[str, Any] = {"oscillator": own, "particles": counts, "seeds": numbered}
+        found = TimeHistory(**axes, **common, **over_axes)
+        writer.save(found)
+    return found
 
 
 def shake_structure(
@@ -227,18 +231,21 @@ def shake_structure(
     many = structure, boxed, numbered, window, force_place, start
     job = f"shaken structure {identity_of(many)}"
     options = {"excitation": excitation, "structure": modal, "effects": effects}
-    common, motion = _recorded(
-        (fillings, table), options, window, start, progress, (job, checkpoint, resume)
-    )
     # A place is that of the first scene there.
     places = [modal.scene_places.index(i) for i in range(structure.place_count)]
-    taken = {**dict.fromkeys(motion, places), "force": slice(len(boxed))}
     groups = len(numbered), modal.group
-    over_axes = {
-        name: np.swapaxes(one.reshape(*one.shape[:-1], *groups), -1, -2)[..., taken[name], :]
-        for name, one in motion.items()
-    }
-    return StructureHistory(structure=structure, boxes=boxed, seeds=numbered, **common, **over_axes)
+    with _recorded(
+        (fillings, table), options, window, start, progress, (job, checkpoint, resume)
+    ) as (common, motion, writer):
+        taken = {**dict.fromkeys(motion, places), "force": slice(len(boxed))}
+        over_axes = {
+            name: np.swapaxes(one.reshape(*one.shape[:-1], *groups), -1, -2)[..., taken[name], :]
+            for name, one in motion.items()
+        }
+        axes: dict[str, Any] = {"structure": structure, "boxes": boxed, "seeds": numbered}
+        found = StructureHistory(**axes, **common, **over_axes)
+        writer.save(found)
+    return found
 
 
 class Window(NamedTuple):
@@ -275,9 +282,11 @@ def _excitation(value: Any) -> Excitation:
     return excitation_of(value)
 
 
+@contextlib.contextmanager
 def _recorded(scenes, options, window, start, progress, saving):
-    """Run a batch over its window: fields that all scenes share, and those over scenes at the end.
+    """Run a batch over its window; for its block what all scenes share, and what each has.
 
+    Both are fields of a result by name; the third is the writer of the last checkpoint.
     scenes: filling, or one for each, and table. saving: words for the job, and both options of
     checkpoints.
     """
@@ -287,14 +296,16 @@ def _recorded(scenes, options, window, start, progress, saving):
         batch.start(**start)
         with batch.checkpointed(checkpoint, resume, {"job": job}) as writer:
             cycles = batch.run(0, 1, tell, record_every=window.every)
-            writer.save()
-    series, sound = batch.time_series(), int(np.argmin(batch.diverged))
-    common: dict[str, Any] = {"time_s": series["time_s"][:, sound], "base": series["y"][:, sound]}
-    common.update(excitation=batch.excitation, report=batch.report())
-    common["label"] = common["report"].method
-    highest = np.maximum(cycles.mean_of("x_max"), -cycles.mean_of("x_min"))
-    motion = {name: series[name] for name in ("x", "v", "force")}
-    return common, {**motion, "rms": cycles.rms, "peak": highest}
+            series, sound = batch.time_series(), int(np.argmin(batch.diverged))
+            common: dict[str, Any] = {
+                "time_s": series["time_s"][:, sound],
+                "base": series["y"][:, sound],
+            }
+            common.update(excitation=batch.excitation, report=batch.report())
+            common["label"] = common["report"].method
+            highest = np.maximum(cycles.mean_of("x_max"), -cycles.mean_of("x_min"))
+            motion = {name: series[name] for name in ("x", "v", "force")}
+            yield common, {**motion, "rms": cycles.rms, "peak": highest}, writer
 
 
 def _longest_step(fillings, structure, dt):

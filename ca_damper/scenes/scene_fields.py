@@ -4,6 +4,7 @@ Fields are allocated once, with a capacity. How many scenes are in use, and how 
 read from fields at run time, so that a batch of another size compiles nothing.
 """
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +14,7 @@ import taichi as ti
 
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.allocation import assign, values
-from taichi_dem.kit.field_memory import fields_of
+from taichi_dem.kit.field_memory import fields_of, lying
 
 #: Length of an axis of a field: a number, or the name of one of the sizes.
 Length = int | str
@@ -125,8 +126,9 @@ class SceneMemory:
 
     def read(self) -> dict[str, np.ndarray]:
         """Copies of all that changes in a run, by name."""
+        ti.sync()
         scenes = {f"scenes/{k}": self._cut(one) for k, one in enumerate(self.engine.table.made)}
-        return {**scenes, **{name: values(field) for name, field in self._others().items()}}
+        return {**scenes, **{name: values(field) for name, field in self._others.items()}}
 
     def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
         """Name of a field that the arrays of ``read`` lack or do not fit; else ""."""
@@ -142,9 +144,10 @@ class SceneMemory:
             whole = values(one.field)
             self._window(one, whole)[...] = arrays[f"scenes/{k}"]
             assign(one.field, whole)
-        for name, field in self._others().items():
+        for name, field in self._others.items():
             assign(field, arrays[name])
 
+    @functools.cached_property
     def _others(self) -> dict[str, ti.Field]:
         """Fields that are not of the scenes: those of fillings that declare them by themselves."""
         scenes = {id(one.field) for one in self.engine.table.made}
@@ -152,7 +155,7 @@ class SceneMemory:
         return {f"others/{one.name}": one.field for one in found if id(one.field) not in scenes}
 
     def _cut(self, one: SceneField) -> np.ndarray:
-        return self._window(one, values(one.field)).copy()
+        return self._window(one, lying(one.field)).copy()
 
     def _window(self, one: SceneField, whole: np.ndarray) -> np.ndarray:
         """Part of an array of a field that the batch uses."""

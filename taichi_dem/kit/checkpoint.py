@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError, Portable
-from taichi_dem.kit.files import renamed_when_done
+from taichi_dem.kit.files import remove_dead_parts, renamed_when_done
 from taichi_dem.kit.validation import (
     FileName,
     is_real,
@@ -31,7 +31,6 @@ from taichi_dem.kit.validation import (
 )
 from taichi_dem.kit.version import __version__, taichi_version
 
-_ABOUT = "about"
 #: Letters of the digest at the end of a file.
 _DIGITS = 64
 _MOST_STEPS = 2**53
@@ -62,7 +61,7 @@ class Checkpoint:
 
     Examples
     --------
-    >>> Checkpoint("run.npz", every_wall_s=600).every_wall_s
+    >>> Checkpoint("run.checkpoint", every_wall_s=600).every_wall_s
     600
     """
 
@@ -206,50 +205,65 @@ def write_checkpoint(
 ) -> None:
     """Write arrays by name under an identity, a dict of words; on the disk before it appears.
 
-    The file is a NumPy archive (``np.load`` reads it) with the digest of its bytes at the end.
-    Raises InputError when the file cannot be written; one that was there stays as it was.
+    A line of JSON tells the identity, and the name, type and shape of each array; the bytes of the
+    arrays follow, one after the other, then the digest of all. Raises InputError when the file
+    cannot be written; one that was there stays as it was.
     """
-    about = np.array(json.dumps(dict(identity)))
-    with renamed_when_done(path) as temporary, open(temporary, "w+b") as file:
-        np.savez(file, allow_pickle=False, **{_ABOUT: about}, **arrays)
-        file.seek(0)
-        sealed = hashlib.file_digest(file, "sha256").hexdigest()
-        file.write(sealed.encode())
+    listed = [(name, _plain(array.dtype).str, array.shape) for name, array in arrays.items()]
+    head, sealed = json.dumps({"identity": dict(identity), "arrays": listed}), hashlib.sha256()
+    with renamed_when_done(path) as temporary, open(temporary, "wb") as file:
+        remove_dead_parts(os.path.dirname(temporary), os.fstat(file.fileno()).st_mtime)
+        for piece in (f"{head}\n".encode(), *(array.tobytes() for array in arrays.values())):
+            sealed.update(piece)
+            file.write(piece)
+        file.write(sealed.hexdigest().encode())
         file.flush()
         os.fsync(file.fileno())
 
 
 def read_checkpoint(path: FileName, identity: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """Arrays by name from a checkpoint of the same identity.
+    """Arrays by name from a checkpoint of the same identity; they take no more than its size.
 
     Raises InputError for a file that is absent, none of ours or not to the last bit as it was
     written, and for one of another identity, naming what differs.
     """
     path = path_name("checkpoint", path)
     try:
-        arrays = _sealed_arrays(path)
-        about = json.loads(str(arrays.pop(_ABOUT)))
+        about, arrays = _sealed(path)
     except OSError as error:
         raise InputError(f"cannot read checkpoint {path}: {error.strerror or error}") from None
-    except (ValueError, KeyError):
+    except (ValueError, TypeError, LookupError, ArithmeticError, RecursionError):
         raise InputError(
             f"{path} must be a complete checkpoint: it is damaged, none, or of an earlier version"
         ) from None
     for name, mine in identity.items():
-        theirs = about.get(name, "nothing")
+        theirs = str(about.get(name, "nothing"))
         if theirs != mine:
-            raise InputError(f"checkpoint {path} is of another {name}: {theirs[:200]}, not {mine}")
+            said = " ".join(theirs.split())[:200]
+            raise InputError(f"checkpoint {path} is of another {name}: {said}, not {mine}")
     return arrays
 
 
-def _sealed_arrays(path):
-    """Arrays of a file; ValueError unless it ends with the digest of all bytes before."""
+def _plain(kind):
+    """A type of numbers; TypeError for any other, as objects are saved by address."""
+    if kind.kind not in "biuf":
+        raise TypeError(f"arrays of a checkpoint must hold numbers, got {kind}")
+    return kind
+
+
+def _sealed(path):
+    """Identity and arrays of a file; an error unless it is as ``write_checkpoint`` makes it."""
     with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-        end = len(content) - _DIGITS
-        if (
-            end <= 0
-            or content[end:] != hashlib.sha256(memoryview(content)[:end]).hexdigest().encode()
-        ):
+        end, place = max(0, len(content) - _DIGITS), content.find(b"\n") + 1
+        if content[end:] != hashlib.sha256(memoryview(content)[:end]).hexdigest().encode():
             raise ValueError("its digest does not match")
-        with np.load(file, allow_pickle=False) as archive:
-            return dict(archive)
+        head, arrays = json.loads(content[:place]), {}
+        for name, kind, shape in head["arrays"]:
+            dtype = _plain(np.dtype(kind))
+            first, place = place, place + math.prod(shape) * dtype.itemsize
+            if min(shape, default=0) < 0 or place > end:
+                raise ValueError(f"its array {name} does not fit")
+            arrays[str(name)] = np.ndarray(shape, dtype, bytearray(content[first:place]))
+        if place != end:
+            raise ValueError("its arrays do not fill it")
+        return dict(head["identity"]), arrays

@@ -74,11 +74,10 @@ def _remove_own_folder():
 
 def _is_usable(folder):
     """Whether files can be made in a folder, and those that are there be read and replaced."""
-    probe = folder / f".write-test-{os.getpid()}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        probe.write_bytes(bytes(4096))
-        probe.unlink()
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            probe.write(bytes(4096))
         own = [folder / "ticache.tcb", *folder.glob("*.tic")]
         mine = all(os.access(file, os.R_OK | os.W_OK) for file in own if file.exists())
         return mine and shutil.disk_usage(folder).free >= _LEAST_SPACE

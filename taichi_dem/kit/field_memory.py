@@ -2,7 +2,7 @@
 
 import types
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import taichi as ti
@@ -10,10 +10,12 @@ from taichi.lang.matrix import MatrixField
 from taichi.lang.struct import StructField
 from taichi.lang.util import to_numpy_type
 
-from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.allocation import array_of, assign
 
 #: Libraries whose objects are not searched for fields.
 _FOREIGN = ("taichi", "numpy", "builtins")
+#: Bytes of a field that are looked at together for its last entry in use.
+_BLOCK = 4096
 
 
 class FieldOf(NamedTuple):
@@ -73,7 +75,8 @@ class FieldMemory:
 
     def read(self) -> dict[str, np.ndarray]:
         """Copies of all fields as arrays by name, without the zeros at their ends."""
-        return {name: without_end(values(field)).copy() for name, field in self.fields.items()}
+        ti.sync()
+        return {name: without_end(lying(field)).copy() for name, field in self.fields.items()}
 
     def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
         """Name of a field that the arrays of ``read`` lack or do not fit; else ""."""
@@ -93,13 +96,24 @@ class FieldMemory:
             assign(field, whole)
 
 
+def lying(field):
+    """Array of a field where it lies, or a copy on a device; for ``ti.sync`` before."""
+    array = array_of(field)
+    return field.to_numpy() if array is None else array
+
+
 def without_end(array: np.ndarray) -> np.ndarray:
     """The array without trailing entries that are zero in all bits; lists have spare room."""
     if array.ndim == 0 or array.size == 0:
         return array
-    in_bytes = np.ascontiguousarray(array).view(np.uint8).reshape(len(array), -1)
-    rows: Any = in_bytes.any(axis=1)
-    return array[: len(array) - int(rows[::-1].argmax()) if rows.any() else 0]
+    in_bytes = np.ascontiguousarray(array).reshape(-1).view(np.uint8)
+    # By blocks: the room of a list is thousands of times longer than what is in use.
+    blocks = np.flatnonzero(np.bitwise_or.reduceat(in_bytes, np.arange(0, len(in_bytes), _BLOCK)))
+    if len(blocks) == 0:
+        return array[:0]
+    begin = int(blocks[-1]) * _BLOCK
+    last = begin + int(np.flatnonzero(in_bytes[begin : begin + _BLOCK])[-1])
+    return array[: last * len(array) // len(in_bytes) + 1]
 
 
 def shape_of(field):

@@ -2,7 +2,10 @@
 
 import contextlib
 import csv
+import functools
+import hashlib
 import os
+import platform
 import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -14,7 +17,15 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, path_name
 
 #: Endings of what experiments write.
-_WRITTEN = tuple(".csv .gif .glb .html .json .msh .npz .png .pvd .txt .vtkhdf .vtu .xyz".split())
+_WRITTEN = tuple(
+    ".checkpoint .csv .gif .glb .html .json .msh .png .pvd .txt .vtkhdf .vtu .xyz".split()
+)
+#: Name of a part: the process that writes it, and where such numbers name processes.
+_PART = re.compile(r"\..+\.(\d+)-([0-9a-f]*)\.part(\.[^.]*)?")
+#: Age at which a part whose process cannot be asked for is taken for dead [s].
+_DEAD_S = 86_400.0
+#: Letters with which a spreadsheet begins a formula, and their wide forms.
+_FORMULA = tuple("=+-@\uff1d\uff0b\uff0d\uff20")
 
 
 def output_folder(path: FileName) -> str:
@@ -27,6 +38,8 @@ def output_folder(path: FileName) -> str:
         os.makedirs(path, exist_ok=True)
         with tempfile.TemporaryFile(dir=path) as probe:
             probe.write(b"x")
+            now = os.stat(probe.fileno()).st_mtime
+        remove_dead_parts(path, now)
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"output folder {path} must be writable: {reason}") from None
@@ -39,7 +52,7 @@ def renamed_when_done(path: FileName) -> Iterator[str]:
     path = path_name("file", path)
     folder, name = os.path.split(path)
     root, ending = os.path.splitext(name)  # kept, since some writers derive the format from it
-    temporary = os.path.join(folder, f".{root}.{os.getpid()}.part{ending}")
+    temporary = os.path.join(folder, f".{root}.{os.getpid()}-{_here()}.part{ending}")
     try:
         yield temporary
         os.replace(temporary, path)
@@ -49,6 +62,44 @@ def renamed_when_done(path: FileName) -> Iterator[str]:
     finally:
         if os.path.exists(temporary):
             os.remove(temporary)
+
+
+def remove_dead_parts(folder: str, now: float) -> None:
+    """Remove from a folder what killed processes have left of the files that they wrote.
+
+    now: as the disk has it, of a file just written there. A part is dead once its process has
+    ended; one of another machine or container, or from before the last boot, after a day unchanged.
+    """
+    with contextlib.suppress(OSError), os.scandir(folder or os.curdir) as entries:
+        for entry in entries:
+            part = _PART.fullmatch(entry.name)
+            with contextlib.suppress(OSError):
+                if part and _is_dead(part[1], part[2], now - entry.stat().st_mtime):
+                    os.remove(entry.path)
+
+
+def _is_dead(number, place, age_s):
+    if not place or place != _here():
+        return age_s > _DEAD_S
+    try:
+        os.kill(int(number), 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        # It is another user's.
+        return False
+    return False
+
+
+@functools.cache
+def _here() -> str:
+    """Where a number means the same process: one boot of one machine, one container; or ""."""
+    try:
+        with open("/proc/sys/kernel/random/boot_id", encoding="utf-8") as file:
+            words = file.read(), os.readlink("/proc/self/ns/pid"), platform.node()
+    except OSError:
+        return ""
+    return hashlib.sha256(repr(words).encode()).hexdigest()[:8]
 
 
 def remove_files(folder: FileName, pattern: str) -> None:
@@ -106,10 +157,23 @@ def write_bytes(path: FileName, content: bytes) -> None:
 def write_csv(path: FileName, columns: Mapping[str, ArrayLike]) -> None:
     """Write columns of equal length, a dict of name to sequence, as a CSV file.
 
-    Raises InputError when it cannot be written.
+    A spreadsheet would compute text that begins as a formula, such as a group called "=1+1": it
+    gets an apostrophe in front. Raises InputError when the file cannot be written.
     """
+    arrays = map(np.asarray, columns.values())
+    cells = (a.tolist() if a.dtype.kind in "biuf" else map(_as_text, a.tolist()) for a in arrays)
     with renamed_when_done(path) as temporary:
         with open(temporary, "w", encoding="utf-8", newline="") as file:
             rows = csv.writer(file, lineterminator="\n")
-            rows.writerow(columns)
-            rows.writerows(zip(*(np.asarray(values).tolist() for values in columns.values())))
+            rows.writerow(map(_as_text, columns))
+            rows.writerows(zip(*cells))
+
+
+def _as_text(cell):
+    """A cell whose text is no formula; numbers stay, also those given as text."""
+    if isinstance(cell, str) and cell.replace("\ufeff", "").lstrip().startswith(_FORMULA):
+        try:
+            float(cell)
+        except ValueError:
+            return f"'{cell}"
+    return cell

@@ -14,7 +14,7 @@ from taichi_dem.kit.checkpoint import (
     read_checkpoint,
     write_checkpoint,
 )
-from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.errors import InputError, carrying
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.validation import FileName
 
@@ -24,7 +24,8 @@ class RunSnapshot:
 
     identity: what two runs must share for one to go on from the other, words by name. memory: of
     the fields, as ``FieldMemory``. owners: by name; each gives its arrays by ``saved()`` and takes
-    them by ``resume(arrays)``.
+    such by ``resume(arrays)``. They are like those of its ``example()``, if it has one; those whose
+    names begin with one of its ``grows`` have any length, or are all absent.
     """
 
     def __init__(self, identity: Mapping[str, str], memory: Any, owners: Mapping[str, Any]):
@@ -48,8 +49,10 @@ class RunSnapshot:
         self.memory.write(_under("field", arrays))
         for part, owner in self.owners.items():
             try:
-                owner.resume(_under(part, arrays))
-            except (KeyError, IndexError, ValueError, TypeError):
+                saved = _under(part, arrays)
+                _check_like(saved, owner)
+                owner.resume(saved)
+            except (LookupError, ValueError, TypeError, ArithmeticError):
                 raise InputError(
                     f"checkpoint {path} is of another version: its data of the {part} differ"
                 ) from None
@@ -57,6 +60,19 @@ class RunSnapshot:
 
 def _under(part, arrays):
     return {k[len(part) + 1 :]: array for k, array in arrays.items() if k.startswith(f"{part}/")}
+
+
+def _check_like(saved, owner):
+    """Raise KeyError or ValueError unless arrays are like those that an owner would save now."""
+    for name, own in getattr(owner, "example", owner.saved)().items():
+        grows = tuple(one for one in getattr(owner, "grows", ()) if name.startswith(one))
+        if grows and not any(other.startswith(grows) for other in saved):
+            continue
+        shape, first = saved[name].shape, 1 if grows else 0
+        if saved[name].dtype != own.dtype or len(shape) != own.ndim:
+            raise ValueError(f"{name} must be like {own!r}")
+        if shape[first:] != own.shape[first:]:
+            raise ValueError(f"{name} must have entries of {own.shape[first:]}")
 
 
 class CheckpointWriter:
@@ -107,14 +123,18 @@ class CheckpointWriter:
             for distance, present, last in passed
         )
 
-    def save(self) -> None:
-        """Save the run. Raises InputError that names the last good checkpoint."""
+    def save(self, result: Any = None) -> None:
+        """Save the run. Raises InputError that names the last good checkpoint.
+
+        result: of a run that has ended, which the error carries.
+        """
         if self.checkpoint is None:
             return
-        try:
-            self.snapshot.write(self.checkpoint.path)
-        except InputError as error:
-            raise InputError(f"{error}{self.last_good()}") from None
+        with carrying(result):
+            try:
+                self.snapshot.write(self.checkpoint.path)
+            except InputError as error:
+                raise InputError(f"{error}{self.last_good()}") from None
         self._last = (*self.now(), time.perf_counter())
         self.saved_s = self._last[1]
 

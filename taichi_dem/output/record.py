@@ -103,6 +103,8 @@ class Recorder:
     so far [m/s], (body_count,). brief: whether frames are without stress, which nobody reads.
     """
 
+    grows = "row.", "frame."
+
     def __init__(self, simulation: Simulation, *groups: str, brief: bool = False):
         self.simulation, self.model, self.brief = simulation, simulation.model, brief
         self.holes = {group: hole_of(self.model, group) for group in groups}
@@ -185,6 +187,13 @@ class Recorder:
             return np.full((self.model.body_count, 3, 3), np.nan)
         return body_stress(self.simulation.parts, self.simulation.forces)
 
+    def example(self) -> dict[str, np.ndarray]:
+        """Data for a checkpoint of one sample and one frame; forgets all of before."""
+        self.rows, self.frames = [], []
+        self.sample()
+        self.snapshot()
+        return self.saved()
+
     def saved(self) -> dict[str, np.ndarray]:
         """Data for a checkpoint, arrays by name: columns of rows, stacks of frames."""
         rows = {f"row.{name}": column for name, column in self.history().items()}
@@ -197,7 +206,7 @@ class Recorder:
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
         """Restore the data that ``saved`` returned."""
-        self.peak_speed = saved.get("peak_speed", self.peak_speed)
+        self.peak_speed = saved["peak_speed"]
         rows = {k[4:]: column.tolist() for k, column in saved.items() if k.startswith("row.")}
         self.rows = [dict(zip(rows, values)) for values in zip(*rows.values())]
         stacks = {k[6:]: stack for k, stack in saved.items() if k.startswith("frame.")}

@@ -42,6 +42,7 @@ class Creep(Kept):
     """
 
     kept = "time_s", "speed", "share", "code", "table"
+    grows = "code", "table"
 
     def __init__(self, run: Run):
         self.run, self.time_s, self.speed, self.share = run, 0.0, 0.0, 0.0

@@ -52,7 +52,7 @@ def test_bodies_of_a_broken_bond_have_softened_before_it_broke(result):
 
 def test_a_resumed_run_has_the_bits_and_the_certificate_of_a_straight_one(result, tmp_path):
     """Stopped when the wave has gone through half of the bar, and the rest still sleeps."""
-    path, job = tmp_path / "run.npz", {"method": METHOD, "samples": 4, "frames": 4}
+    path, job = tmp_path / "run.checkpoint", {"method": METHOD, "samples": 4, "frames": 4}
     half = simulate(pulled(), until=1e-4, checkpoint=Checkpoint(path), **job)
     assert np.isnan(half.acting_since["awake"]).any() and half.certificate.acting
     rest = simulate(pulled(), until=UNTIL, resume=path, **job)

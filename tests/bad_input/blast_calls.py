@@ -60,7 +60,7 @@ def _scenes():
     every = {"time_s": 1.0, "steps": 2, "samples": 3, "wall_s": 1.0}
     yield from ((f"Every#{name}", td.Every, {name: value}) for name, value in every.items())
     yield "At", td.At, {"times_s": [0.0, 1.0]}
-    yield "Checkpoint", td.Checkpoint, {"path": "run.npz"}
+    yield "Checkpoint", td.Checkpoint, {"path": "run.checkpoint"}
     yield "Collector", td.Collector, {"when": td.Every(steps=2), "read": len}
     yield "ImplicitDashpots", td.ImplicitDashpots, {}
     concrete = {field.name: getattr(td.CONCRETE, field.name) for field in fields(td.Material)}

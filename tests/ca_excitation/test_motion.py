@@ -108,7 +108,7 @@ def test_forces_between_samples_leave_none_out_and_recording_changes_no_bit():
 
 
 def test_an_interrupted_run_goes_on_to_the_same_bits(tmp_path):
-    motion, file = two_sines(0.4), tmp_path / "run.npz"
+    motion, file = two_sines(0.4), tmp_path / "run.checkpoint"
     few = {"particles": [5, 20], "seeds": 2, "interval": 2e-3}
     whole = shake(Automaton(), motion, **few)
 

@@ -35,7 +35,7 @@ def test_a_group_is_the_same_alone_and_among_others():
 
 
 def test_an_interrupted_run_goes_on_to_the_same_bits(tmp_path):
-    file, whole = tmp_path / "run.npz", shaken()
+    file, whole = tmp_path / "run.checkpoint", shaken()
 
     def stop(progress):
         if progress.phase == "stepping":

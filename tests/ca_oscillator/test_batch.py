@@ -81,7 +81,7 @@ ONE_OF_THREE = "1 of 3 scenes diverged; their results are nan.*particles = 5 and
 def test_the_end_of_a_scene_does_not_end_the_others(tmp_path):
     """They keep the bits that they have alone, also after a checkpoint; all is nan of the lost."""
     kicks = {"strength": 1e-3, "diverges_at": 340}
-    file = tmp_path / "run.npz"
+    file = tmp_path / "run.checkpoint"
     batch, resumed = diverging("nan", **kicks), diverging("nan", **kicks)
     with batch.checkpointed(Checkpoint(file), None, {}) as writer:
         with pytest.warns(UserWarning, match=ONE_OF_THREE):

@@ -1,5 +1,6 @@
 """Runs go on from a checkpoint, in the middle of a launch's way, to the same bits."""
 
+import errno
 import os
 import signal
 
@@ -9,13 +10,15 @@ import pytest
 from ca_damper import (
     Automaton,
     Batch,
+    Checkpoint,
     InputError,
     RigidMass,
     SceneTable,
+    excitation,
     frequency_response,
+    shake,
     sweep_up_and_down,
 )
-from taichi_dem import Checkpoint
 from taichi_dem.kit.checkpoint import Interrupted
 
 IDENTITY = {"job": "a test"}
@@ -46,13 +49,13 @@ def same_bits(one, other):
 
 def test_an_interrupted_batch_goes_on_to_the_same_bits(tmp_path):
     """Interrupted after its second launch of a few steps; other steps are taken in between."""
-    checkpoint = Checkpoint(tmp_path / "run.npz")
+    checkpoint = Checkpoint(tmp_path / "run.checkpoint")
     batch = Batch(Automaton(), TABLE, measured_cycles=1)
     batch.start()
     straight, steps = result(batch), batch.scene_steps
     batch.start()
     batch.launches.pace = 3.0
-    with pytest.raises(Interrupted, match=r"interrupted at t = .* s, saved in .*run.npz"):
+    with pytest.raises(Interrupted, match=r"interrupted at t = .* s, saved in .*run.checkpoint"):
         with batch.checkpointed(checkpoint, None, IDENTITY):
             result(batch, CtrlCAt(2))
     batch.start("rigid")
@@ -71,7 +74,7 @@ JOB = {"particles": 3, "ratios": [0.9, 1.0], "seeds": 2, "dt": 1e-3, "measured_c
 @pytest.mark.parametrize("work", [frequency_response, sweep_up_and_down])
 def test_responses_and_sweeps_go_on_to_the_same_bits(work, tmp_path):
     """A sweep is stopped in its third of four stages; a finished one is read, not run again."""
-    checkpoint = Checkpoint(tmp_path / "run.npz")
+    checkpoint = Checkpoint(tmp_path / "run.checkpoint")
     job = {**JOB, "transient_cycles": 20}
     straight = measures(work(RigidMass(), **job))
     calls = 3 if work is frequency_response else 2
@@ -84,7 +87,30 @@ def test_responses_and_sweeps_go_on_to_the_same_bits(work, tmp_path):
         work(RigidMass(1e-3), resume=checkpoint.path, **job)
 
 
+@pytest.mark.parametrize("work", [frequency_response, sweep_up_and_down, "shake"])
+def test_a_full_disk_at_the_end_does_not_lose_the_result(work, tmp_path, monkeypatch):
+    """The error of the last checkpoint carries what the run came to."""
+    job = {**JOB, "transient_cycles": 20}
+    if work == "shake":
+        work, job = shake, {"particles": 3, "seeds": 2, "dt": 1e-3}
+        job["excitation"] = excitation.random_vibration([2.0, 20.0], [0.1, 0.1], duration=0.5)
+    straight, opened = work(RigidMass(), **job), open
+
+    def full(name, mode="r", *rest, **options):
+        if "w" in mode:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return opened(name, mode, *rest, **options)
+
+    monkeypatch.setattr("builtins.open", full)
+    with pytest.raises(InputError, match="No space left") as refused:
+        work(RigidMass(), checkpoint=Checkpoint(tmp_path / "run.checkpoint"), **job)
+    found = measures(refused.value.result)
+    assert [a.tobytes() for a in found] == [a.tobytes() for a in measures(straight)]
+
+
 def measures(result):
-    """The measures of a response, or of both ways of a sweep."""
+    """The measures of a response, of both ways of a sweep, or of a history."""
+    if hasattr(result, "time_s"):
+        return [result.x, result.force, result.rms]
     ways = (result.up, result.down) if hasattr(result, "up") else (result,)
     return [np.asarray(getattr(way, name)) for way in ways for name in ("rms", "energy", "dt")]

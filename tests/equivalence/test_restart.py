@@ -5,12 +5,12 @@ import pytest
 
 from taichi_dem import CONCRETE, Checkpoint, InputError, Scene, Simulation, effects, simulate
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.checkpoint import read_checkpoint
+from taichi_dem.kit.checkpoint import read_checkpoint, write_checkpoint
 from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.record import Recorder
-from taichi_dem.simulate import saved_run
+from taichi_dem.simulate import run_identity, saved_run
 from taichi_dem.state.timeline import MACRO_TICKS
 from tests.bar_blast import METHODS, UNTIL, bar_scene
 
@@ -98,7 +98,7 @@ def run(case):
 def straight(run, tmp_path_factory):
     """Checkpoint on the way, what the run came to, and what its constant fields were before."""
     constant = FieldMemory(run.simulation, "constant")
-    before, path = constant.read(), tmp_path_factory.mktemp("saved") / "run.npz"
+    before, path = constant.read(), tmp_path_factory.mktemp("saved") / "run.checkpoint"
     run.simulation.advance_to(round(SHARE * run.last))
     run.recorder.sample()
     run.go_odd()
@@ -144,7 +144,7 @@ def light_scene(pulse=5e6, share=1.0):
 @pytest.fixture(scope="module")
 def light(tmp_path_factory):
     """A straight run through ``simulate``, and the checkpoint at its half."""
-    path = tmp_path_factory.mktemp("light") / "run.npz"
+    path = tmp_path_factory.mktemp("light") / "run.checkpoint"
     job = {"method": METHODS["uniform"], "samples": 5, "frames": 2}
     half = simulate(light_scene(), until=5e-6, checkpoint=Checkpoint(path), **job)
     assert half.report.substeps > 0
@@ -180,3 +180,36 @@ def test_what_does_not_belong_together_is_refused(light, scene, change, words):
     path, job = light
     with pytest.raises(InputError, match=words):
         simulate(scene, resume=path, **{"until": 1e-5, **job, **change})
+
+
+def test_every_array_of_a_checkpoint_must_be_there_and_like_its_own(light):
+    """Whatever is forged is refused where it is read, not where it is used later."""
+    path, job = light
+    simulation = Simulation(light_scene(), job["method"])
+    simulation.start()
+    run = saved_run(simulation, Recorder(simulation, "left"))
+    arrays = read_checkpoint(path, run.identity)
+    assert {name.split("/")[0] for name in arrays} == {"field", *run.owners}
+    for name, array in arrays.items():
+        other = np.float32 if array.dtype != np.float32 else np.float64
+        for forged in (None, array[None], array.astype(other), np.zeros((3, 3, 3, 3))):
+            given = {key: own for key, own in arrays.items() if key != name}
+            if forged is not None:
+                given[name] = forged
+            with pytest.raises(InputError, match="is of another version"):
+                run.restore(given, path)
+    run.restore(arrays, path)
+
+
+@pytest.mark.parametrize("tick", [None, np.array(np.nan), np.zeros(0), np.ones(2, dtype=np.int64)])
+def test_a_time_that_is_no_tick_is_refused(light, tmp_path, tick):
+    path, job = light
+    scene, forged = light_scene(), tmp_path / "forged.checkpoint"
+    identity = run_identity(scene, job["method"])
+    arrays = read_checkpoint(path, identity)
+    del arrays["field/state.tick"]
+    if tick is not None:
+        arrays["field/state.tick"] = tick
+    write_checkpoint(forged, identity, arrays)
+    with pytest.raises(InputError, match=r"field state\.tick differs"):
+        simulate(scene, resume=forged, until=1e-5, **job)

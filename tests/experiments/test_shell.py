@@ -76,7 +76,7 @@ def test_interrupted_blast_goes_on_to_the_same_files(monkeypatch, capsys, tmp_pa
     with monkeypatch.context() as patched:
         patched.setattr("taichi_dem.kit.progress_bar.ProgressBar", CtrlC)
         code, said = run("stopped")
-    path = tmp_path / "stopped" / "checkpoint.npz"
+    path = tmp_path / "stopped" / "run.checkpoint"
     assert code == 130 and os.listdir(path.parent) == [path.name]
     assert re.fullmatch(rf"interrupted at t = \S+ s, saved in {path}: continue with --resume", said)
     assert run("stopped", "--resume") == (0, "")

@@ -47,7 +47,7 @@ def test_an_observer_sees_the_run_as_its_result_tells_it_and_changes_no_bit():
 
 
 def test_a_resumed_run_calls_for_what_is_left(tmp_path):
-    path = tmp_path / "run.npz"
+    path = tmp_path / "run.checkpoint"
     run(steps=10, checkpoint=Checkpoint(path))
     left = Collector(Every(steps=5), step=lambda view: view.step)
     run(left, steps=20, resume=path)

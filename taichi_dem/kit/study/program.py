@@ -186,15 +186,13 @@ def add_checkpoints(made: ArgumentParser) -> None:
     made.add_argument("--resume", action="store_true", help=words)
 
 
-def checkpoint_of(
-    options: Namespace, name: str = "checkpoint", *, may_be_new: bool = False
-) -> dict:
-    """Arguments checkpoint and resume of a job: its file is out/name.npz.
+def checkpoint_of(options: Namespace, name: str = "run", *, may_be_new: bool = False) -> dict:
+    """Arguments checkpoint and resume of a job: its file is out/name.checkpoint.
 
     A job saves itself on Ctrl-C and at its end in any case. may_be_new: whether a job without a
     file begins anew: one of several that the interruption came before.
     """
-    path = os.path.join(options.out, f"{name}.npz")
+    path = os.path.join(options.out, f"{name}.checkpoint")
     checkpoint = Checkpoint(**{**options.checkpoint_every, "path": path})
     goes_on = options.resume and (os.path.exists(path) or not may_be_new)
     return {"checkpoint": checkpoint, "resume": path if goes_on else None}

@@ -13,7 +13,7 @@ from typing import Any
 
 from taichi_dem.kit import runtime
 from taichi_dem.kit.data_table import arrays_of
-from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.errors import InputError, carrying
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.progress import Listener, Progress
 from taichi_dem.kit.progress_bar import reporting
@@ -132,7 +132,8 @@ def swept(
     records = _run_missing(start, jobs, journal, progress)
     made = table_of(jobs, records, SEED in rows[0])
     if journal.folder:
-        write_csv(os.path.join(journal.folder, RESULTS), arrays_of(made))
+        with carrying(made):
+            write_csv(os.path.join(journal.folder, RESULTS), arrays_of(made))
     return made
 
 

@@ -1,0 +1,163 @@
+"""Files are whole, what killed processes leave of them goes, and tables are no programs."""
+
+import csv
+import os
+import subprocess
+import sys
+
+import pytest
+
+from taichi_dem import CONCRETE, Checkpoint, Collector, Every, InputError, Scene, Uniform, simulate
+from taichi_dem.kit import files
+from taichi_dem.kit.checkpoint import write_checkpoint
+from taichi_dem.kit.files import output_folder, renamed_when_done, write_csv
+from taichi_dem.mesh.shapes import pair
+from tests.scenes import ROOT
+
+DAY_S = 86_400.0
+#: Writes half of a file, says so, and waits to be killed or told to go on.
+_HALF = """
+import sys
+from taichi_dem.kit.files import renamed_when_done
+with renamed_when_done(sys.argv[1]) as name:
+    with open(name, "w") as file:
+        file.write("half")
+        file.flush()
+        print("half", flush=True)
+        sys.stdin.readline()
+        file.write("whole")
+"""
+
+
+@pytest.fixture
+def half_done(tmp_path):
+    """Start processes that have written half of a file of a name."""
+    started = []
+
+    def start(name):
+        line, ends = [sys.executable, "-c", _HALF, str(tmp_path / name)], subprocess.PIPE
+        one = subprocess.Popen(line, stdin=ends, stdout=ends, text=True, cwd=ROOT)
+        started.append(one)
+        return one
+
+    yield start
+    for one in started:
+        one.kill()
+        one.communicate()
+
+
+def parts(folder):
+    """Names of the files that are not done."""
+    return sorted(name for name in os.listdir(folder) if ".part" in name)
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/ns/pid"), reason="no /proc: a day's age counts")
+@pytest.mark.parametrize(
+    "save",
+    [lambda folder: write_checkpoint(folder / "x.checkpoint", {}, {}), output_folder],
+    ids=["checkpoint", "output"],
+)
+def test_a_save_removes_what_killed_ones_left_and_nothing_else(tmp_path, half_done, save):
+    mine = tmp_path / ".film.2019.part.txt"
+    mine.touch()
+    os.utime(mine, (0, 0))
+    dead, alive = half_done("dead.txt"), half_done("alive.txt")
+    for one in (dead, alive):
+        assert one.stdout.readline() == "half\n"
+    dead.kill()
+    dead.wait()
+    assert len(parts(tmp_path)) == 3
+    save(tmp_path)
+    assert [name.split(".")[1] for name in parts(tmp_path)] == ["alive", "film"]
+    alive.communicate("\n")
+    assert (tmp_path / "alive.txt").read_text() == "halfwhole"
+    assert parts(tmp_path) == [mine.name]
+
+
+@pytest.mark.parametrize(("age_s", "stays"), [(0.5 * DAY_S, True), (2.0 * DAY_S, False)])
+def test_a_part_of_another_machine_is_left_for_a_day(tmp_path, monkeypatch, age_s, stays):
+    """Its number may name a process here, or none, and tells nothing."""
+    with monkeypatch.context() as there:
+        there.setattr(files, "_here", lambda: "0a1b2c3d")
+        killed = renamed_when_done(tmp_path / "theirs.csv")
+        name = killed.__enter__()
+    with open(name, "w"):
+        then = os.stat(name).st_mtime - age_s
+    os.utime(name, (then, then))
+    output_folder(tmp_path)
+    assert os.path.exists(name) == stays
+
+
+def test_text_of_a_table_is_no_formula_and_numbers_stay(tmp_path):
+    """What a spreadsheet would compute begins with =, +, - or @, also after blanks."""
+    formulas = ["=1+1", "+cmd", "-x_J", "@SUM(1)", " =2", "\t=3", "\ufeff=4", "\uff1d5"]
+    harmless = ["-1.5", "+2e-3", "-inf", "a=b", "time_s", "", "'=x"]
+    table = {text: [-1.5, 2.0] for text in formulas + harmless} | {"text": ["=1", "-7"]}
+    write_csv(tmp_path / "table.csv", table)
+    with open(tmp_path / "table.csv", encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header == [f"'{text}" for text in formulas] + harmless + ["text"]
+    assert [[*map(float, row[:-1])] for row in rows] == [[-1.5] * 15, [2.0] * 15]
+    assert [row[-1] for row in rows] == ["'=1", "-7"]
+
+
+#: A short run of two bodies, and how often it is sampled.
+JOB = {"method": Uniform(1e-8), "until": 1e-6, "samples": 4, "progress": None}
+
+
+def flying():
+    return Scene(pair(), CONCRETE, [], velocity=(1, 0, 0))
+
+
+class FullDisk:
+    """Refuses files of an ending, as a full disk does, from a call on."""
+
+    def __init__(self, monkeypatch, ending, after=0):
+        self.opened, self.ending, self.left = open, ending, after
+        monkeypatch.setattr("builtins.open", self)
+
+    def __call__(self, name, mode="r", *rest, **options):
+        if "w" in mode and str(name).endswith(self.ending):
+            self.left -= 1
+            if self.left < 0:
+                raise OSError(28, os.strerror(28))
+        return self.opened(name, mode, *rest, **options)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".msh", ".json", ".vtu", ".pvd", ".checkpoint"])
+def test_a_full_disk_at_the_end_does_not_lose_the_result(tmp_path, monkeypatch, ending):
+    """Whatever file finds no room; the result is that of a run that wrote nothing."""
+    kept = {"output": tmp_path / "out", "checkpoint": Checkpoint(tmp_path / "run.checkpoint")}
+    whole = simulate(flying(), frames=2, **JOB)
+    FullDisk(monkeypatch, ending)
+    with pytest.raises(InputError, match="No space left") as refused:
+        simulate(flying(), frames=2, **kept, **JOB)
+    found = refused.value.result
+    assert found.series.keys() == whole.series.keys()
+    for name, column in whole.series.items():
+        assert column.tobytes() == found.series[name].tobytes(), name
+    assert len(found.frames) == len(whole.frames)
+    assert not found.diverged
+
+
+def test_a_checkpoint_that_finds_no_room_leaves_the_result_up_to_there(tmp_path, monkeypatch):
+    """What the run has so far is also written, where there is room for that."""
+    checkpoint = Checkpoint(tmp_path / "run.checkpoint", every_steps=25)
+    FullDisk(monkeypatch, ".checkpoint", after=2)
+    with pytest.raises(InputError, match="holds the run at t = 5e-07 s") as refused:
+        simulate(flying(), checkpoint=checkpoint, output=tmp_path / "out", **JOB)
+    times = refused.value.result.series["time_s"]
+    assert times == pytest.approx([0.0, 2.5e-7, 5e-7, 7.5e-7], rel=1e-12)
+    with open(tmp_path / "out" / "history.csv", encoding="utf-8") as file:
+        assert len([*csv.reader(file)]) == 1 + len(times)
+
+
+def test_what_an_observer_raises_carries_the_result_up_to_there():
+    def fail(view):
+        if view.time_s > 4e-7:
+            raise ZeroDivisionError("mine")
+
+    with pytest.raises(ZeroDivisionError, match="mine") as failed:
+        simulate(flying(), observers=[Collector(Every(samples=1), mine=fail)], **JOB)
+    assert failed.value.result.series["time_s"][-1] == pytest.approx(5e-7)
+    assert not failed.value.result.diverged
