@@ -24,6 +24,7 @@ from taichi.lang.util import to_numpy_type
 
 from taichi_dem.kit import backend
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.taichi_names import may_use
 
 #: Trees beyond which no new one is begun; a few more complete those begun.
 MOST_TREES = 480
@@ -33,6 +34,13 @@ _SHARE = 0.9
 _LARGE = 2**23
 #: Taichi's lists of fields without a place.
 _FIELDS = ("global_vars", "grad_vars", "dual_vars", "matrix_fields")
+
+
+#: Names of Taichi by which a field is found in its tree.
+_PLACES = (
+    "taichi._lib.core.SNode.cell_size_bytes",
+    "taichi._lib.core.SNode.offset_bytes_in_parent_cell",
+)
 
 
 class CapacityError(InputError):
@@ -101,7 +109,7 @@ class FieldTree:
                 f"this needs {self.bytes / 1e9:.3g} GB, which the device does not give "
                 f"({' '.join(str(error).split())}): {self.advice}"
             ) from None
-        if backend.is_cpu():
+        if lies_here():
             address = _address(self._anchor) - _offset(self._anchor.snode.ptr)[1]
             _base(self._builder.root.ptr)
             _bases[self._builder.root.ptr.id] = address
@@ -109,7 +117,7 @@ class FieldTree:
             self.clear()
 
     def clear(self) -> None:
-        """Set all bytes to zero; on a CPU only."""
+        """Set all bytes to zero; only where it ``lies_here``."""
         ti.sync()
         root = self._builder.root.ptr
         memory = _array_at(_base(root), np.uint8, (root.cell_size_bytes,))
@@ -125,6 +133,11 @@ class FieldTree:
             del _arrays[field]
         self._tree.destroy()
         self._tree = None
+
+
+def lies_here() -> bool:
+    """Whether memory of trees is read and written in place: on a CPU, where Taichi says where."""
+    return backend.is_cpu() and may_use(*_PLACES)
 
 
 def _given_back(address, memory):
@@ -197,8 +210,8 @@ def _forget_other_sessions() -> None:
 
 
 def in_tree(field: ti.Field) -> bool:
-    """Whether a field lies in a ``FieldTree``, on a CPU."""
-    return _base(_layout(field)[0]) != 0
+    """Whether a field lies in a ``FieldTree`` that ``lies_here``."""
+    return lies_here() and _base(_layout(field)[0]) != 0
 
 
 def array_of(field: ti.Field) -> np.ndarray | None:

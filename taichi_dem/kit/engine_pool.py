@@ -12,8 +12,8 @@ from typing import Any
 
 import taichi as ti
 
-from taichi_dem.kit import backend, runtime
-from taichi_dem.kit.allocation import CapacityError, FieldTree
+from taichi_dem.kit import runtime
+from taichi_dem.kit.allocation import CapacityError, FieldTree, lies_here
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.field_memory import fields_of
 
@@ -67,7 +67,7 @@ class Engine:
 
     def clear(self) -> None:
         """Set all fields to zero, as they are in a new engine."""
-        if self._used and not backend.is_cpu():
+        if self._used and not lies_here():
             self._fill()
         elif self._used:
             self.tree.clear()

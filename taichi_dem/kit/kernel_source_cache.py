@@ -21,12 +21,13 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-import taichi as ti
-from taichi.lang import expr, impl, kernel_impl, snode
-from taichi.lang.ast import ast_transformer_utils
+from taichi_dem.kit.taichi_names import may_use, named
 
 #: Numbers of which each range is kept; the kernels of a step have some hundred.
 _MOST = 1 << 14
+_KERNELS = "taichi.lang.kernel_impl"
+_CONTEXT = "taichi.lang.ast.ast_transformer_utils.ASTTransformerContext"
+_STATEMENTS, _BOUND = "_KERNEL_CLASS_STACKFRAME_STMT_RES", "_BoundedDifferentiableMethod"
 
 
 def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -90,7 +91,7 @@ def inside_class(level_of_class_stackframe: int) -> bool:
     except ValueError:
         return False
     line = linecache.getline(frame.f_code.co_filename, frame.f_lineno, frame.f_globals).strip()
-    return any(one.match(line) for one in kernel_impl._KERNEL_CLASS_STACKFRAME_STMT_RES)
+    return any(one.match(line) for one in named(f"{_KERNELS}.{_STATEMENTS}"))
 
 
 class BoundKernel:
@@ -103,7 +104,7 @@ class BoundKernel:
     def __get__(self, owner: Any, kind: type | None = None) -> Any:
         if owner is None:
             return self.kernel
-        bound = kernel_impl._BoundedDifferentiableMethod(owner, self.kernel)
+        bound = named(f"{_KERNELS}.{_BOUND}")(owner, self.kernel)
         bound.__name__ = self.kernel.__name__
         return bound
 
@@ -119,20 +120,27 @@ def data_oriented(kind: Any) -> Any:
     return kind
 
 
+#: What is replaced in Taichi: where, by what made of its own, and names that this uses besides.
+_REPLACED: tuple[tuple[str, str, Callable[[Any], Any], str], ...] = (
+    (_KERNELS, "getsourcelines", remembering, ""),
+    (_KERNELS, "getsourcefile", remembering, ""),
+    (_KERNELS, "textwrap", lambda own: SimpleNamespace(fill=filled, dedent=own.dedent), ""),
+    (_KERNELS, "transform_tree", undisturbed, ""),
+    (_KERNELS, "_inside_class", lambda own: inside_class, f"{_KERNELS}.{_STATEMENTS}"),
+    (_KERNELS, "data_oriented", lambda own: data_oriented, f"{_KERNELS}.{_BOUND}"),
+    ("taichi", "data_oriented", lambda own: data_oriented, f"{_KERNELS}.{_BOUND}"),
+    (_CONTEXT, "get_pos_info", lambda own: position, ""),
+    ("taichi.lang.impl", "get_traceback", lambda own: declared_at, ""),
+    ("taichi.lang.snode", "get_traceback", lambda own: declared_at, ""),
+    ("taichi.lang.expr", "_check_in_range", functools.lru_cache(_MOST), ""),
+    ("taichi.lang.expr", "_clamp_unsigned_to_range", functools.lru_cache(_MOST), ""),
+)
+
+
+@functools.cache
 def remember() -> None:
-    """Install all of it, where Taichi has the names of Taichi 1.7."""
-    find = getattr(kernel_impl, "getsourcelines", None)
-    if find is None or hasattr(find, "cached"):
-        return
-    kernel_impl.getsourcelines = remembering(find)
-    kernel_impl.getsourcefile = remembering(kernel_impl.getsourcefile)
-    kernel_impl.textwrap = SimpleNamespace(fill=filled, dedent=textwrap.dedent)
-    kernel_impl.transform_tree = undisturbed(kernel_impl.transform_tree)
-    ast_transformer_utils.ASTTransformerContext.get_pos_info = position
-    impl.get_traceback = snode.get_traceback = declared_at
-    for name in ("_check_in_range", "_clamp_unsigned_to_range"):
-        setattr(expr, name, functools.lru_cache(_MOST)(getattr(expr, name)))
-    if hasattr(kernel_impl, "_KERNEL_CLASS_STACKFRAME_STMT_RES"):
-        kernel_impl._inside_class = inside_class
-    if hasattr(kernel_impl, "_BoundedDifferentiableMethod"):
-        ti.data_oriented = kernel_impl.data_oriented = data_oriented
+    """Install all of it that the names of this Taichi allow."""
+    for place, name, made, more in _REPLACED:
+        if may_use(f"{place}.{name}", *more.split()):
+            owner = named(place)
+            setattr(owner, name, made(getattr(owner, name)))

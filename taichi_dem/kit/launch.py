@@ -4,10 +4,26 @@ from typing import Any
 
 import numpy as np
 from taichi.lang import impl
-from taichi.lang.exception import handle_exception_from_cpp
 
 from taichi_dem.kit import backend
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.taichi_names import may_use, named
+
+#: Names of Taichi by which a kernel is launched; without them each call is one of Taichi's own.
+_ERRORS = "taichi.lang.exception.handle_exception_from_cpp"
+_LAUNCHING = (
+    _ERRORS,
+    "taichi.lang.kernel_impl.Kernel.ensure_compiled",
+    *(
+        f"taichi._lib.core.{name}"
+        for name in (
+            *("Program.compile_kernel", "Program.config", "Program.get_device_caps"),
+            *("Program.launch_kernel", "Kernel.make_launch_context"),
+            *("KernelLaunchContext.set_arg_external_array_with_shape",),
+            *("KernelLaunchContext.get_struct_ret_int", "KernelLaunchContext.set_arg_int"),
+        )
+    ),
+)
 
 
 class Launch:
@@ -25,7 +41,8 @@ class Launch:
         """Run it with these values; what it returns."""
         if not self._is_ready():
             found = self._kernel(*self._templates, *values)
-            self._ready = self._prepared(values)
+            if may_use(*_LAUNCHING):
+                self._ready = self._prepared(values)
             return found
         return self._launched(values, waits=self._ready[-1])
 
@@ -79,7 +96,7 @@ class Launch:
 def _failed(error):
     """What to raise for an error of a launch: a device can be lost, or taken by another program."""
     if backend.is_cpu():
-        return handle_exception_from_cpp(error)
+        return named(_ERRORS)(error)
     words = " ".join(str(error).split())
     return InputError(
         f"the device no longer answers ({words}): resume from the last checkpoint, or start "
