@@ -28,6 +28,7 @@ from _bench_others import OTHERS
 from _bench_waits import waits
 from taichi_dem.kit import runtime, study
 from taichi_dem.kit.files import output_folder, write_text
+from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.kit.provenance import commit, git
 from taichi_dem.kit.study.floors import MULTIPLY_ADD, Floors
 
@@ -78,9 +79,11 @@ def measured(quick):
 
     measure_floors()
     for measure in PARTS:
-        for one in measure(quick):
-            print(f"  {one.name}: {one.middle:.3g} {one.unit}", flush=True)
-            figures.append(one)
+        with ProgressBar(measure.__name__) as bar:
+            bar.at(0.0)
+            for one in measure(quick):
+                print(f"  {one.name}: {one.middle:.3g} {one.unit}", flush=True)
+                figures.append(one)
         measure_floors()
     units = {MULTIPLY_ADD: "GFlop/s"}
     return [Figure(name, units.get(name, "GB/s"), one) for name, one in rates.items()] + figures

@@ -71,8 +71,8 @@ def simulate(
     frames : int, default 0
         Number of evenly spaced snapshots after the one at the start.
     progress : callable or str or None, default "auto"
-        ``"auto"``: a bar on a terminal and in Jupyter. None: silence. A function is called with a
-        Progress, also while kernels are compiled, about five times a second;
+        ``"auto"``: a bar on a terminal and in Jupyter, elsewhere lines. None: silence. A function
+        is called with a Progress, also while kernels are compiled, about five times a second;
         ``print`` prints percent and time left.
     title : str, default "simulating"
         Title of the progress bar.

@@ -13,8 +13,8 @@ from tests.processes import users_environment
 
 #: What a terminal obeys instead of showing: colours, moves of the cursor, lines erased.
 _ORDERS = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-#: What a program writes to a pipe as a phase of a job begins.
-_PHASE = re.compile(r".+: (compiling|stepping|running|drawing)")
+#: What a program writes to a pipe as a phase of a job begins, and while a long one goes on.
+_PHASE = re.compile(r".+: (compiling|stepping|running|drawing)( .+)?")
 
 
 class Seen(NamedTuple):

@@ -332,8 +332,8 @@ def frequency_response(
         ``"listed"`` or ``"auto"``, see ``Batch``; ``report.certificate`` tells which effects acted
         and which were left out.
     progress : callable or str or None, default "auto"
-        ``"auto"``: a bar on a terminal and in Jupyter. None: silence. A function is called with a
-        Progress while kernels are compiled, and then six times a second.
+        ``"auto"``: a bar on a terminal and in Jupyter, elsewhere lines. None: silence. A function
+        is called with a Progress while kernels are compiled, and then six times a second.
     checkpoint : Checkpoint, optional
         Where and when the run saves itself; it also does so at its end and on Ctrl-C.
     resume : path, optional

@@ -1,7 +1,8 @@
-"""A progress bar on a terminal and in Jupyter; elsewhere a line a phase, or nothing."""
+"""A progress bar on a terminal and in Jupyter; elsewhere a line a phase."""
 
 import contextlib
 import html
+import math
 import os
 import sys
 import time
@@ -17,19 +18,20 @@ _NOTEBOOK_SECONDS = 0.2
 _NARROW = 70
 #: Bars that are shown now; a second one below the first would garble both.
 _open_bars: list["ProgressBar"] = []
-#: How progress is shown, the innermost block last: "bars", "lines" or "nothing".
-_modes = ["bars"]
-#: Titles and phases that have had their line.
-_said: set[tuple[str, str]] = set()
+#: Silence after which there is another line: of a phase that begins again, and of one that goes
+#: on [s]; and its least share of the time since the first line, so that long jobs have few.
+_BEGINS, _GOES_ON, _SHARE = 0.5, 30.0, 0.1
+#: Most titles and phases that have a line as they begin, however short the silence.
+_MOST_SAID = 100
 
 
 class ProgressBar:
     """Bar with percent, time left and speed, from entering to leaving its block.
 
     It is drawn on stderr where that is a terminal, and in the cell of a Jupyter notebook; it leaves
-    nothing behind. A program of the experiments has a line a phase instead where stderr is a pipe
-    or a file. Call it with a Progress; while kernels are compiled and pictures are drawn in its
-    block it says so by itself.
+    nothing behind. Where stderr is a pipe or a file, a line is written as a phase begins, and now
+    and then while a long one goes on. Call it with a Progress; while kernels are compiled and
+    pictures are drawn in its block it says so by itself. Bars in the block are not shown.
 
     Parameters
     ----------
@@ -53,9 +55,9 @@ class ProgressBar:
 
     def __enter__(self) -> "ProgressBar":
         self._started = time.perf_counter()
-        display = _nothing if _open_bars else _display()
-        self._show = self._opened.enter_context(display(self.title))
-        self._opened.enter_context(listening(self))
+        if not _open_bars:
+            self._show = self._opened.enter_context(_display()(self.title))
+            self._opened.enter_context(listening(self))
         _open_bars.append(self)
         return self
 
@@ -97,20 +99,44 @@ class ProgressBar:
         self._show = _ignore
 
 
+class _Lines:
+    """What has been written on stderr: titles and phases, and since when and when last [s]."""
+
+    def __init__(self, shown: bool = True):
+        self.shown, self._said = shown, set[tuple[str, str]]()
+        self._first, self._last = math.inf, -math.inf
+
+    def write(self, title: str, progress: Progress, begins: bool) -> None:
+        """Write a line unless there was one of late; begins: whether the phase does so now."""
+        phase, now = (title, progress.phase), time.perf_counter()
+        new = phase not in self._said and len(self._said) < _MOST_SAID
+        least = max(_BEGINS if begins else _GOES_ON, _SHARE * (now - self._first))
+        if new or now - self._last >= least:
+            self._said.add(phase)
+            self._first, self._last = min(self._first, now), now
+            with contextlib.suppress(OSError, ValueError):
+                # A run does not end because nobody reads its lines.
+                words = progress.phase if new else progress
+                print(f"{title}: {words}", file=sys.stderr, flush=True)
+
+
+#: The innermost block of ``showing`` last.
+_lines_of = [_Lines()]
+
+
 @contextlib.contextmanager
-def showing(mode: str) -> Iterator[None]:
-    """Show progress in the block as "bars", as "lines" where there can be no bars, or "nothing"."""
-    _modes.append(mode)
-    _said.clear()
+def showing(shown: bool) -> Iterator[None]:
+    """Show progress in the block, as a program that has not written a line yet, or none at all."""
+    _lines_of.append(_Lines(shown))
     try:
         yield
     finally:
-        _modes.pop()
+        _lines_of.pop()
 
 
 def hide_bars() -> None:
     """Show no further bar in this process, which works for another one and shares its terminal."""
-    _modes.append("nothing")
+    _lines_of[-1].shown = False
 
 
 @contextlib.contextmanager
@@ -131,15 +157,13 @@ def reporting(progress: Listener | str | None, title: str) -> Iterator[Listener 
 
 def _display():
     """How progress is shown here: a context that gives a function of a Progress, by its title."""
-    if _modes[-1] == "nothing" or sys.stderr is None:
+    if not _lines_of[-1].shown or getattr(sys.stderr, "closed", True):
         return _nothing
     python = sys.modules.get("IPython")
     if python is not None and hasattr(python.get_ipython(), "kernel"):
         return _notebook
-    if sys.stderr.isatty():
-        # A dumb one cannot move its cursor.
-        return _lines if os.environ.get("TERM") == "dumb" else _terminal
-    return _lines if _modes[-1] == "lines" else _nothing
+    # A dumb terminal cannot move its cursor.
+    return _terminal if sys.stderr.isatty() and os.environ.get("TERM") != "dumb" else _lines
 
 
 def _ignore(progress):
@@ -153,13 +177,13 @@ def _nothing(title):
 
 @contextlib.contextmanager
 def _lines(title):
-    """A line on stderr for each phase of each title."""
+    """Lines on stderr, see ``_Lines``."""
+    lines, last = _lines_of[-1], ""
 
     def show(progress):
-        phase = title, progress.phase
-        if phase not in _said:
-            _said.add(phase)
-            print(": ".join(phase), file=sys.stderr, flush=True)
+        nonlocal last
+        begins, last = progress.phase != last, progress.phase
+        lines.write(title, progress, begins)
 
     yield show
 

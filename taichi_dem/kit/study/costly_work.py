@@ -15,7 +15,8 @@ import importlib, json, sys
 folder, module, function, arch, threads, arguments = json.loads(sys.argv[1])
 sys.path.insert(0, folder)
 work = getattr(importlib.import_module(module), function)
-from taichi_dem.kit import runtime
+from taichi_dem.kit import progress_bar, runtime
+progress_bar.hide_bars()
 runtime.start(arch, threads)
 print(json.dumps(work(**arguments)))
 """

@@ -292,7 +292,7 @@ def _loudness(options):
             stack.enter_context(contextlib.redirect_stdout(nowhere))
         if options.quiet:
             warnings.simplefilter("ignore")
-        stack.enter_context(showing("nothing" if options.quiet else "lines"))
+        stack.enter_context(showing(not options.quiet))
         yield
 
 

@@ -85,7 +85,8 @@ def sweep(
     seed : int
         Seed from which those of the rows follow, a whole number from 0 to 2^63.
     progress : "auto", function or None
-        "auto" for a bar on a terminal and in Jupyter, None, or a function of a ``Progress``.
+        "auto" for a bar on a terminal and in Jupyter, elsewhere lines, None, or a function of a
+        ``Progress``.
 
     Returns
     -------
@@ -152,13 +153,17 @@ def _run_missing(
             reporting(progress, "sweeping") as listen,
             contextlib.closing(start(missing)) as ended,
         ):
-            for done, (job, record) in enumerate(ended):
+
+            def tell(done):
+                if listen is not None:
+                    share, seconds = done / len(missing), time.perf_counter() - started
+                    listen(Progress(share, seconds, words=f"{done} of {len(missing)} runs"))
+
+            tell(0)
+            for done, (job, record) in enumerate(ended, 1):
                 records[job.digest] = record
                 journal.write(job, record)
-                if listen is not None:
-                    words = f"{done + 1} of {len(missing)} runs"
-                    share, seconds = (done + 1) / len(missing), time.perf_counter() - started
-                    listen(Progress(share, seconds, words=words))
+                tell(done)
     return [records[job.digest] for job in jobs]
 
 
