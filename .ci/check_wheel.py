@@ -25,7 +25,7 @@ PROGRAMS = (
     ),
     (
         ("python", "-m", "ca_damper", "demo", "--quick"),
-        ("results/damper_demo/damper.gif", "results/damper_demo/summary.json"),
+        ("results/quick/damper_demo/damper.gif", "results/quick/damper_demo/summary.json"),
     ),
 )
 

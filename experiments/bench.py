@@ -42,7 +42,9 @@ HEADER += ["others'", "times", "by"]
 
 def options_parser():
     """Options of this script."""
-    return study.parser(NAME, __doc__, out="results", threads=1, summary="bench.json")
+    made = study.parser(NAME, __doc__, threads=1, summary="bench.json")
+    made.folder = ""
+    return made
 
 
 def run(options):

@@ -1,14 +1,15 @@
 """Run every experiment, each in a process of its own, and show all of them on one static page.
 
-    make gallery                                       # about 40 minutes on two cores
-    make gallery GALLERY_OPTIONS=--quick               # about six
+    make gallery                                       # hours: the sum of docs/experiments.md
+    make gallery GALLERY_OPTIONS=--quick               # half an hour of CPU the first time
     python experiments/gallery.py --reuse              # the page from present results
     python experiments/gallery.py --only demo_damper   # one again, others as they are
 
-Open results/index.html: it needs no server. The exit code is 1, with a list, if an experiment
-failed or is missing from the page. A new experiment gets an entry in _gallery_pages.txt; --readme
-then updates the table of docs/experiments.md. --pictures copies small pictures and figures of full
-runs into docs; --readme writes these figures into the pages.
+Open results/index.html, or with --quick results/quick/index.html: it needs no server. The exit code
+is 1, with a list, if an experiment failed or is missing from the page. A new experiment gets an
+entry in _gallery_pages.txt; --readme then updates the table of docs/experiments.md. --pictures
+copies small pictures and figures of full runs into docs, and CPU times of runs with --cold, full
+and quick ones, into _gallery_pages.txt; --readme writes these into the pages.
 """
 
 import json
@@ -20,9 +21,10 @@ from types import SimpleNamespace
 
 from taichi_dem import InputError
 from taichi_dem.kit.files import output_folder, write_text
-from taichi_dem.kit.study import bare_parser, main_of_tool, several
-from taichi_dem.kit.study.entries import ENTRIES, read_entries
+from taichi_dem.kit.study import add_out, bare_parser, main_of_tool, several
+from taichi_dem.kit.study.entries import ENTRIES, read_entries, with_time
 from taichi_dem.kit.study.results_page import (
+    RUN,
     markdown_table,
     read_json,
     run_entries,
@@ -48,6 +50,7 @@ _TABLE = re.compile(r"(<!-- table: (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 FLAGS = {
     "quick": "run smaller jobs of under a minute",
     "reuse": "run only experiments without a result",
+    "cold": "compile all kernels in each: its CPU time is that of a first run",
     "readme": "update the table of experiments and the figures in all pages, run nothing",
     "pictures": f"update {SMALL_PICTURES} and the figures for the pages, run nothing",
 }
@@ -56,8 +59,7 @@ FLAGS = {
 def main(arguments=None):
     """Run the gallery; returns the exit code: as an experiment's, or 1 with a list on stderr."""
     made = bare_parser("gallery", __doc__)
-    out = {"type": os.path.expanduser, "default": "results"}
-    made.add_argument("--out", help="folder for page and results", **out)
+    add_out(made, "")
     made.add_argument("--only", type=several(str), default=None, help="names with commas")
     for name, words in FLAGS.items():
         made.add_argument(f"--{name}", action="store_true", help=words)
@@ -69,6 +71,7 @@ def _work(options):
         return renew_readme(HERE.parent)
     if options.pictures:
         keep_figures(options.out, HERE.parent, [page.name for page in pages()])
+        keep_times(options.out, HERE / ENTRIES)
         return print("\n".join(shrink_pictures(options.out, HERE.parent / SMALL_PICTURES)))
     amiss = build(options)
     if amiss:
@@ -89,7 +92,8 @@ def build(options):
             raise InputError(f"only must name experiments out of {', '.join(known)}, got {name!r}")
     out = output_folder(options.out)
     wanted = [known[name] for name in options.only or known]
-    failed = run_entries(HERE, wanted, out, quick=options.quick, reuse=options.reuse)
+    asked = {name: getattr(options, name) for name in ("quick", "reuse", "cold")}
+    failed = run_entries(HERE, wanted, out, **asked)
     items = write_page(out, pages(), failed)
     print(f"The page is {os.path.join(out, 'index.html')}: open it in any browser.")
     return [
@@ -119,6 +123,17 @@ def keep_figures(out, root, names):
                 made_by["table"] = page.read_text(encoding="utf-8").splitlines()
             kept[name] = {"figures": values, **made_by}
     write_text(path, json.dumps(kept, indent=1, sort_keys=True) + "\n")
+
+
+def keep_times(out, path):
+    """Write CPU times of first runs, full ones in out and quick ones in out/quick, to entries."""
+    text = path.read_text(encoding="utf-8")
+    for field, folder in (("time", Path(out)), ("quick", Path(out, "quick"))):
+        for page in pages():
+            note = read_json(folder / page.name / RUN)
+            if note.get("cold") and (folder / page.name / "summary.json").is_file():
+                text = with_time(text, page.name, field, note["cpu_s"])
+    write_text(path, text)
 
 
 def fill_figures(text, root):

@@ -7,6 +7,7 @@ from taichi_dem.kit.study.program import (
     accuracy_sources,
     add_accuracy,
     add_checkpoints,
+    add_out,
     add_pictures,
     bare_parser,
     begin,

@@ -23,11 +23,11 @@ class Entry:
     """Description of one study.
 
     name: of the script. part: heading under which it stands. question: that it answers. look:
-    what to read off its pictures. time, quick: of the full run and of the smaller job on two cores,
-    in words. pictures: names of its pictures and films, the most telling first; what else it writes
-    is linked. figures: patterns of the key figures in summary.json; figures with a paper's value
-    are always shown. paper: what the paper says of it, empty where it does not ask this. options:
-    of the command.
+    what to read off its pictures. time, quick: of the full run and of the smaller job, CPU seconds
+    that include compiling, or until these are measured words on the time on two cores. pictures:
+    names of its pictures and films, the most telling first; what else it writes is linked. figures:
+    patterns of the key figures in summary.json; figures with a paper's value are always shown.
+    paper: what the paper says of it, empty where it does not ask this. options: of the command.
     """
 
     name: str
@@ -47,8 +47,10 @@ class Entry:
         return " ".join(filter(None, [f"{PYTHON} experiments/{self.name}.py", self.options]))
 
     def expected_time(self, quick: bool) -> str:
-        """Time in words, such as "20 s on two cores" or "5 min on one core"."""
+        """Time in words, such as "34 s of CPU", "20 s on two cores" or "5 min on one core"."""
         words = (self.quick if quick else self.time).removeprefix("about ")
+        if words.isdecimal():
+            return f"{words} s of CPU"
         return f"{words} core" if words.endswith(" on one") else f"{words} on two cores"
 
 
@@ -91,6 +93,13 @@ def show_opening(description: str | None, entry: Entry | None, quick: bool = Fal
     """Print what a program does, and how long it is expected to take where that is known."""
     show_heading(entry.question if entry else (description or "").strip().partition("\n")[0])
     if entry:
-        smaller = "" if quick else f"; with --quick {entry.quick}"
+        smaller = "" if quick else f"; with --quick {entry.expected_time(quick=True)}"
         # A pipe or a file shows it before the work, too.
         print(f"Takes about {entry.expected_time(quick)}{smaller}.\n", flush=True)
+
+
+def with_time(text: str, name: str, field: str, seconds: float) -> str:
+    """Text of entries with the CPU time [s] of one, in its field time or quick, to two digits."""
+    rounded = f"{float(f'{seconds:.2g}'):.0f}"
+    mark = rf"(^## {name}\n(?:(?!## ).*\n)*?{field}: ).*"
+    return re.sub(mark, rf"\g<1>{rounded}", text, count=1, flags=re.MULTILINE)

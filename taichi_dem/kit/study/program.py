@@ -36,8 +36,10 @@ class Parser(ArgumentParser):
     """An argument parser whose complaints are one sentence.
 
     settings: of the study, for ``main``. entry: its texts, where no script has an entry for them.
+    folder: of the output below results, or below results/quick for the smaller job.
     """
 
+    folder = ""
     settings: Settings = MappingProxyType({})
     entry: Entry | None = None
 
@@ -126,8 +128,7 @@ def parser(
     made = bare_parser(name, description)
     made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
     made.add_argument("--json", action="store_true", help="print summary.json and nothing else")
-    place: Any = {"type": os.path.expanduser, "default": os.path.join("results", name)}
-    made.add_argument("--out", help="folder for the output", **place)
+    add_out(made, name)
     made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
     if drivers:
         made.add_argument("--driver", default=drivers[0], choices=drivers)
@@ -150,6 +151,14 @@ def bare_parser(name: str, description: str | None) -> Parser:
     made.add_argument("--quiet", action="store_true", help="print nothing but errors")
     made.add_argument("--verbose", action="store_true", help="print all figures of a run")
     return made
+
+
+def add_out(made: Parser, folder: str) -> None:
+    """Add the option --out; folder: by default, below results, or results/quick with --quick."""
+    made.folder = folder
+    place, smaller = Path("results", folder), Path("results", "quick", folder)
+    words = f"folder for the output; default {place}, with --quick {smaller}"
+    made.add_argument("--out", type=os.path.expanduser, help=words)
 
 
 def _take_settings(options: Namespace, settings: Settings) -> None:
@@ -272,6 +281,9 @@ def main_of_tool(
     def heard():
         options = made.parse_args(arguments)
         options.began = time.time()
+        if options.out is None:
+            # A smaller job leaves the results of the full one as they are.
+            options.out = str(Path("results", "quick" if options.quick else "", made.folder))
         with _loudness(options):
             code = work(options)
         if getattr(options, "json", False):

@@ -7,6 +7,7 @@ import json
 import os
 import re
 import sys
+import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,7 +20,8 @@ from taichi_dem.kit.files import output_folder, write_text, write_whole
 from taichi_dem.kit.study.entries import PYTHON, Entry, key_figures
 from taichi_dem.kit.study.summary import value_in_words
 
-#: Notes of the program that ran a study, beside its output: seconds, and what it printed.
+#: Notes of the program that ran a study, beside its output: seconds, CPU seconds, whether nothing
+#: was compiled before, and what it printed.
 RUN = "gallery.json"
 #: Words of a run about its own pictures, where there are any.
 CAPTION = "caption.txt"
@@ -30,11 +32,12 @@ def markdown_table(entries: Sequence[Entry], root: str | Path, pictures: str) ->
 
     pictures: folder of theirs, as NAME.png, from root.
     """
-    lines = ["| question | command | time on two cores | picture |", "|---|---|---|---|"]
+    lines = ["| question | command | time | with `--quick` | picture |", "|---|---|---|---|---|"]
     for entry in entries:
         small = f"{pictures}/{entry.name}.png"
         link = f"[picture]({small})" if Path(root, small).is_file() else ""
-        lines.append(f"| {entry.question} | `{entry.command}` | {entry.time} | {link} |")
+        times = " | ".join(entry.expected_time(quick) for quick in (False, True))
+        lines.append(f"| {entry.question} | `{entry.command}` | {times} | {link} |")
     return "\n".join(lines) + "\n"
 
 
@@ -45,11 +48,12 @@ def run_entries(
     *,
     quick: bool = False,
     reuse: bool = False,
+    cold: bool = False,
 ) -> dict[str, str]:
     """Run studies into root/NAME, and print how each ended; name -> why it failed, or "".
 
     scripts: folder of them. quick: whether as smaller jobs. reuse: whether to leave out those that
-    have a result.
+    have a result. cold: whether each compiles all of its kernels.
     """
     failed = {}
     for number, entry in enumerate(entries, 1):
@@ -57,27 +61,41 @@ def run_entries(
             continue
         print(f"{number:2d}/{len(entries)} {entry.name} ... ", end="", flush=True)
         started = time.perf_counter()
-        failed[entry.name] = run_entry(scripts, entry, root, quick)
+        failed[entry.name] = run_entry(scripts, entry, root, quick, cold)
         print(failed[entry.name] or f"{time.perf_counter() - started:.0f} s", flush=True)
     return failed
 
 
-def run_entry(scripts: str | Path, entry: Entry, root: str, quick: bool = False) -> str:
-    """Run a study and note what it printed, for its page; returns why it failed, or ""."""
+def run_entry(
+    scripts: str | Path, entry: Entry, root: str, quick: bool = False, cold: bool = False
+) -> str:
+    """Run a study and note what it printed, for its page; returns why it failed, or "".
+
+    cold: whether it compiles all of its kernels.
+    """
     folder = output_folder(os.path.join(root, entry.name))
     # None of an earlier run shall pass for this one's.
     for name in ("summary.json", RUN, CAPTION, *entry.pictures):
         Path(folder, name).unlink(missing_ok=True)
     line = [sys.executable, os.path.join(scripts, f"{entry.name}.py"), *entry.options.split()]
     line += ["--out", folder, *(["--quick"] if quick else [])]
-    started = time.perf_counter()
-    done = children.run(line)
-    note = {"seconds": time.perf_counter() - started, "output": done.stdout}
+    started, cpu = time.perf_counter(), _children_cpu()
+    with tempfile.TemporaryDirectory() as empty:
+        own = {"TI_OFFLINE_CACHE_FILE_PATH": empty} if cold else {}
+        done = children.run(line, env={**os.environ, **own})
+    spent = {"seconds": time.perf_counter() - started, "cpu_s": _children_cpu() - cpu}
+    note = {**spent, "cold": cold, "output": done.stdout}
     write_text(os.path.join(folder, RUN), json.dumps(note, indent=1))
     if done.returncode == 0:
         return ""
     said = done.stderr.strip().splitlines() or ["it printed nothing"]
     return f"exit code {done.returncode}: {said[-1]}"
+
+
+def _children_cpu():
+    """CPU time of all processes that this one has started and seen end [s]."""
+    times = os.times()
+    return times.children_user + times.children_system
 
 
 def write_page(root: str, entries: Sequence[Entry], failed: Mapping[str, str]) -> list:
