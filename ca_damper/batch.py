@@ -6,6 +6,7 @@ numbers (see ``engine/damper_engine.py``).
 
 import contextlib
 import time
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -30,6 +31,7 @@ from ca_damper.scenes.checks import (
     check_within,
     checked_excitation,
     for_all,
+    sampling_found,
     starts_of,
 )
 from ca_damper.scenes.scene_numbers import SceneNumbers
@@ -137,8 +139,8 @@ class Batch(LoadedScenes):
         self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
         tolerances = positive("rtol", rtol, zero_allowed=True), positive("atol", atol)
         has_box = None if self.modal is None else self.modal.has_box(self.count)
-        self.numbers = self._checked(SceneNumbers(self.fillings, table, has_box))
         self.excitation = checked_excitation(excitation, mount)
+        self.numbers = self._checked(SceneNumbers(self.fillings, table, has_box))
         self.recorded_samples = whole("recorded_samples", recorded_samples, 0, MOST_CYCLES)
         self.time_origin = np.zeros(self.count)
         self.periods: Periods | None = None
@@ -166,9 +168,16 @@ class Batch(LoadedScenes):
             self.launches.most_steps = max(1, backend.most_rounds() // rounds)
 
     def _checked(self, numbers: SceneNumbers) -> SceneNumbers:
-        """The numbers; InputError where they do not fit the structure."""
+        """The numbers; InputError where they do not fit the structure, or the excitation neither."""
+        self.too_few: tuple[str, ...] = ()
         if self.modal is not None:
             self.modal.check(numbers.table)
+            modes = self.modal.structure.frequencies
+            self.too_few = sampling_found(self.excitation, modes, float(modes.min()))
+        elif self.mount == "spring":
+            stiffness, mass = map(numbers.table.column, ("stiffness", "mass"))
+            natural = np.sqrt(stiffness / mass) / (2.0 * np.pi)
+            self.too_few = sampling_found(self.excitation, natural, float(natural.max()))
         return numbers
 
     def __repr__(self) -> str:
@@ -206,7 +215,8 @@ class Batch(LoadedScenes):
 
         Notes
         -----
-        A UserWarning says where the filling is known to fail on a scene.
+        A UserWarning says where the filling is known to fail on a scene, and where samples of the
+        excitation are too few for the structure.
         """
         coupling = self.engine.coupling
         choice("start", start, starts_of(self.excitation, self.mount))
@@ -214,6 +224,8 @@ class Batch(LoadedScenes):
         initial = self.numbers.initial(start)
         initial += np.column_stack([more, for_all("velocity", velocity, self.count)])
         warn_outside(self)
+        for words in self.too_few:
+            warnings.warn(words, stacklevel=2)
         self._tell_compiling("placing", 2)
         coupling.start(np.ascontiguousarray(initial))
         self._started, self._told = True, 0
@@ -512,7 +524,7 @@ class Batch(LoadedScenes):
             order=getattr(kind, "order", None),
             certificate=self.certificate,
             diverged=tuple(map(str, self.divergences())),
-            excitation=self.excitation.in_words(),
+            excitation=(*self.excitation.in_words(), *self.too_few),
             checked=checked_range(self),
         )
 

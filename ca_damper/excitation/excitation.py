@@ -88,20 +88,20 @@ class Excitation:
         return ExcitationKind(base, "none" if self.force is None else "signal")
 
     @property
-    def _signals(self) -> dict[str, Signal]:
-        """Those there are, by what they move."""
+    def signals(self) -> dict[str, Signal]:
+        """Signals that there are, by "base" and "force"."""
         both = {"base": self.base, "force": self.force}
         return {role: one for role, one in both.items() if isinstance(one, Signal)}
 
     @property
     def sizes(self) -> dict[str, int]:
         """Number of nodes of each Signal, by the name of a place in an engine."""
-        return {f"{role}_nodes": len(one.value) for role, one in self._signals.items()}
+        return {f"{role}_nodes": len(one.value) for role, one in self.signals.items()}
 
     @property
     def duration(self) -> float:
         """Time up to which it acts [s]; infinite for sines."""
-        return min((one.duration for one in self._signals.values()), default=math.inf)
+        return min((one.duration for one in self.signals.values()), default=math.inf)
 
     def identity(self) -> str:
         """Words that are the same for equal excitations, whatever their labels.
@@ -111,7 +111,7 @@ class Excitation:
         str
             Digest of base and force.
         """
-        signals = {role: (one.step, one.value, one.bend) for role, one in self._signals.items()}
+        signals = {role: (one.step, one.value, one.bend) for role, one in self.signals.items()}
         return identity_of({"base": self.base, "force": self.force, **signals})
 
     def in_words(self) -> tuple[str, ...]:

@@ -6,12 +6,12 @@ with u = (t - t0) / h, w = 1 - u, values y and second derivatives m,
 
     y(t) = w y0 + u y1 + h^2 / 6 ((w^3 - w) m0 + (u^3 - u) m1).
 
-The second derivative is then linear between the nodes. Samples of an acceleration are the m
-themselves, and their double integral is exact; for samples of the function the m follow from its
+The second derivative is then linear between the nodes. Where an acceleration gives the m
+themselves, their double integral is exact; for samples of the function the m follow from its
 continuity (de Boor, A Practical Guide to Splines, chapter IV, with the condition "not a knot").
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,6 +52,10 @@ class Signal:
         Description in words.
     treated : str, default ""
         Treatment of samples before the signal was made, in words.
+    apart : float, default 0.0
+        Mean time between the samples that it was made of [s]; 0 for a formula.
+    gap : float, default 0.0
+        Longest time between two of these samples [s].
 
     Raises
     ------
@@ -68,6 +72,8 @@ class Signal:
     bend: np.ndarray
     label: str = "signal"
     treated: str = ""
+    apart: float = 0.0
+    gap: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "step", positive("step", self.step))
@@ -130,7 +136,7 @@ class Signal:
         """
         between("factor", factor, -LARGEST, LARGEST)
         label, times = f"{factor:g} times {self.label}", float(factor)
-        return Signal(self.step, times * self.value, times * self.bend, label, self.treated)
+        return replace(self, value=times * self.value, bend=times * self.bend, label=label)
 
     def in_words(self, unit: str) -> str:
         """Origin, length, treatment of samples, and both ends of the signal.

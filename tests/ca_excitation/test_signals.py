@@ -85,7 +85,9 @@ def test_a_file_is_read_by_the_units_of_its_columns(tmp_path):
     head = "time_ms,displacement_m,acceleration_g\n"
     both = written(tmp_path / "b.csv", [(1e3 * t, y, y) for t, y in GOOD], head)
     pull = excitation.from_csv(both, "acceleration_g")
-    assert pull.bend == pytest.approx([9.80665 * y for _, y in GOOD])
+    time, wanted = np.array(GOOD).T
+    # h^2 / 12 of the second derivative at nodes an eighth apart is added: (0.1 / 8)^2 / 12.
+    assert pull.at(time)[2] == pytest.approx(9.80665 * wanted, rel=1e-4, abs=1e-6)
     with pytest.raises(InputError, match="column must say which"):
         excitation.from_csv(both)
 
@@ -145,8 +147,17 @@ def test_a_velocity_is_integrated_with_the_order_of_its_spline():
     for count in (80, 160):
         time = np.linspace(0.0, 1.0, count + 1)
         made = excitation.from_samples(time, np.cos(OMEGA * time), of="velocity")
-        errors.append(np.abs(made.value - np.sin(OMEGA * time) / OMEGA).max())
+        errors.append(np.abs(made.at(time)[0] - np.sin(OMEGA * time) / OMEGA).max())
     assert errors[0] / errors[1] == pytest.approx(32.0, rel=0.1)
+
+
+def test_resampling_hides_no_samples_that_are_too_few():
+    """Power at 20 Hz: too much for samples 20 ms apart, and for a new step as long."""
+    for rate, step in ((50.0, 2e-3), (500.0, 0.02)):
+        time = np.arange(0.0, 4.0, 1.0 / rate)
+        fast = np.sin(2.0 * np.pi * 20.0 * time)
+        with pytest.raises(InputError, match="step of the samples must be at most .* got 0.02"):
+            excitation.from_samples(time, fast, of="acceleration", resample=step)
 
 
 def test_uneven_times_are_resampled_on_request():
