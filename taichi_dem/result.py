@@ -20,7 +20,6 @@ from taichi_dem.mesh.files import write_mesh
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.observers import Received, write_receivers
 from taichi_dem.output.cracks import apertures_of, cracks_of, rose_of
-from taichi_dem.output.export import write_gltf, write_particles, write_vtkhdf
 from taichi_dem.output.fragments import fragment_of_body, fragments_of
 from taichi_dem.output.hole_monitor import Attenuation, attenuation_of, watched_groups
 from taichi_dem.output.record import Frame, remove_series, series_name, write_bonds, write_paraview
@@ -307,61 +306,6 @@ class Result:
                 "group must name the wall of a hole, as this scene has no gas pressure"
             )
         return attenuation_of(self.model, self.peak_speed, group, radius)
-
-    def write_vtkhdf(self, path: FileName) -> None:
-        """Write all frames as one VTKHDF file for ParaView, with the data of the PVD series.
-
-        Parameters
-        ----------
-        path : str or path
-            Such as ``"run.vtkhdf"``.
-
-        Raises
-        ------
-        InputError
-            Where there are no frames, h5py is not installed, or the file cannot be written.
-        """
-        self.frame()
-        write_vtkhdf(path, self)
-
-    def write_xyz(self, path: FileName, of: str = "bodies") -> None:
-        """Write all frames as an extended XYZ file for OVITO.
-
-        Parameters
-        ----------
-        path : str or path
-            Such as ``"run.xyz"``.
-        of : {"bodies", "fragments"}
-            What a particle is (``taichi_dem.output.export``).
-
-        Raises
-        ------
-        InputError
-            Where there are no frames, or the file cannot be written.
-        """
-        self.frame()
-        write_particles(path, self, of)
-
-    def write_gltf(self, path: FileName, colour: str = "peak_speed", seconds: float = 10.0) -> None:
-        """Write an animation for browsers and Blender; every fragment moves as a rigid piece.
-
-        Parameters
-        ----------
-        path : str or path
-            Such as ``"run.glb"``.
-        colour : str
-            One of ``taichi_dem.output.fragments.COLOURS``, in the last frame: violet is 0, yellow
-            the value that 2 % of the bodies exceed.
-        seconds : float
-            How long the animation lasts [s].
-
-        Raises
-        ------
-        InputError
-            Where there are no frames, or the file cannot be written.
-        """
-        self.frame()
-        write_gltf(path, self, colour, seconds)
 
     def write(self, folder: FileName) -> None:
         """Write history.csv, bonds.csv, mesh.msh, report.json and a ParaView series to a folder.

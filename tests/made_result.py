@@ -68,7 +68,7 @@ def made_result(seed=1, mesh=None, frames=4, share=0.5):
 def moved_rigidly(result, of_body, rng):
     """The result, every fragment of its last frame moved and moving as a rigid piece.
 
-    Returns it, the rotations (n, 3, 3), velocities (n, 3) and spins (n, 3) of the fragments.
+    Returns it, the velocities (n, 3) and spins (n, 3) of the fragments.
     """
     model, count = result.model, of_body.max() + 1
     rotation = turned(rng.normal(size=(count, 3)), rng.uniform(0.0, 3.0, count))
@@ -87,4 +87,4 @@ def moved_rigidly(result, of_body, rng):
         angular_momentum=np.einsum("nij,nj->ni", inertia, spin[of_body]),
     )
     moved = dataclasses.replace(result, frames=(*result.frames[:-1], last))
-    return moved, rotation, velocity, spin
+    return moved, velocity, spin

@@ -9,11 +9,10 @@ import numpy as np
 from ca_damper.engine.recorder import ROOM
 from ca_damper.report.measures import SAMPLE_UNITS
 from ca_damper.report.progress import Stages
-from ca_damper.report.record import Frame, frames_of, inner_size
+from ca_damper.report.record import Frame, frames_of
 from taichi_dem.kit.data_table import dataset
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.extended_xyz import XyzFrame, write_extended_xyz
 from taichi_dem.kit.progress import Listener
 from taichi_dem.kit.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, FileName, several, shown, whole
@@ -106,46 +105,6 @@ class Film:
         units = {"time_s": "s", **SAMPLE_UNITS}
         found = {name: (dims, array, units[name]) for name, array in self.history.items()}
         return dataset(found, {})
-
-    def write_xyz(self, path: FileName, scene: int = 0) -> None:
-        """Write the frames of a scene as an extended XYZ file for OVITO.
-
-        Parameters
-        ----------
-        path : str or path
-            Such as ``"grains.xyz"``.
-        scene : int
-            Number of the scene, from 0 on.
-
-        Raises
-        ------
-        InputError
-            Where the film has no frames or no such scene, the filling has no box, or the file
-            cannot be written.
-
-        Notes
-        -----
-        Columns: pos [m] and velo [m/s], across, up, and 0; radius [m]. The cell is the box, which
-        moves with its container.
-        """
-        if not self.frames:
-            raise InputError("a film must have frames for this: film(..., frame_every=1) keeps all")
-        shots = self.frames[whole("scene", scene, 0, len(self.frames) - 1)]
-        width, height, diameter = inner_size(self.filling)
-        size = (width, height, diameter)
-        write_extended_xyz(path, [_particles(shot, size) for shot in shots])
-
-
-def _particles(shot, size):
-    """Particles of a frame in the room, in which the container has moved by x."""
-    flat, count = np.zeros((len(shot.position), 1)), len(shot.position)
-    diameter = np.full(count, size[2]) if shot.diameter is None else shot.diameter
-    columns = {
-        "pos": np.hstack([shot.position + np.array([0.0, shot.x]), flat]),
-        "radius": 0.5 * diameter,
-        "velo": np.hstack([shot.velocity, flat]),
-    }
-    return XyzFrame(shot.time_s, columns, (0.0, shot.x, -0.5 * size[2]), size)
 
 
 def film(

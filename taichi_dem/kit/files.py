@@ -17,9 +17,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, path_name
 
 #: Endings of what experiments write.
-_WRITTEN = tuple(
-    ".checkpoint .csv .gif .glb .html .json .msh .png .pvd .txt .vtkhdf .vtu .xyz".split()
-)
+_WRITTEN = tuple(".checkpoint .csv .gif .html .json .msh .png .pvd .txt .vtu".split())
 #: Name of a part: the process that writes it, and where such numbers name processes.
 _PART = re.compile(r"\..+\.(\d+)-([0-9a-f]*)\.part(\.[^.]*)?")
 #: Age at which a part whose process cannot be asked for is taken for dead [s].

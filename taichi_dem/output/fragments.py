@@ -13,8 +13,6 @@ from taichi_dem.output.record import Frame
 from taichi_dem.state.model import Model, centres, sums
 
 _AXES = "xyz"
-#: Multiples of the golden ratio, less whole numbers, lie far apart.
-_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 #: Unit and words of what bodies can be coloured by.
 COLOURS = {
     "speed": ("m/s", "speed"),
@@ -24,12 +22,6 @@ COLOURS = {
     "level": ("1", "level of the step"),
     "fragment": ("1", "fragment, by falling mass"),
 }
-
-
-def vectors_of(fragments: Any, name: str) -> np.ndarray:
-    """Three columns of a table as vectors, (n, 3); name: "centre", "velocity" or "spin"."""
-    endings = {"centre": "m", "velocity": "m_s", "spin": "rad_s"}
-    return np.stack([fragments[f"{name}_{axis}_{endings[name]}"] for axis in _AXES], axis=1)
 
 
 def fragment_of_body(model: Model, broken: np.ndarray) -> np.ndarray:
@@ -141,41 +133,6 @@ def _steiner(mass, arm):
     return mass[:, None, None] * (square - arm[:, :, None] * arm[:, None, :])
 
 
-def rigid_motion(model: Model, frame: Frame, of_body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Place and rotation of fragments in a frame.
-
-    Parameters
-    ----------
-    model : Model
-    frame : Frame
-    of_body : ndarray of int, shape (body_count,)
-        Fragment of each body.
-
-    Returns
-    -------
-    centre : ndarray, shape (fragments, 3)
-        Of mass [m].
-    rotation : ndarray, shape (fragments, 3, 3)
-        From the shape at rest; of least squares over all points of the bodies, weighted by mass.
-
-    Notes
-    -----
-    The rotation nearest to the moment matrix of places now and at rest (W. Kabsch, Acta Cryst. A32,
-    1976, 922-923); each body adds its own second moment, so that one alone has its own rotation.
-    """
-    mass = model.body_mass
-    rest = model.centre - centres(of_body, mass, model.centre)[of_body]
-    centre = centres(of_body, mass, frame.position)
-    arm = frame.position - centre[of_body]
-    trace = np.trace(model.body_inertia, axis1=1, axis2=2)
-    second = 0.5 * trace[:, None, None] * np.eye(3) - model.body_inertia
-    moved = mass[:, None, None] * arm[:, :, None] * rest[:, None, :]
-    left, _, right = np.linalg.svd(sums(of_body, moved + frame.rotation @ second))
-    # A reflection that fits better is no rotation: its weakest axis is turned round.
-    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    return centre, left @ right
-
-
 def quaternions_of(rotation: np.ndarray) -> np.ndarray:
     """Unit quaternions x, y, z, w of rotation matrices (n, 3, 3); (n, 4).
 
@@ -212,16 +169,3 @@ def body_values(result: Any, frame: Frame, colour: str) -> np.ndarray:
 def scale_end(values: np.ndarray) -> float:
     """Value that a fiftieth of the bodies exceed, or the largest where that is 0."""
     return float(np.percentile(values, 98.0) or values.max())
-
-
-def shares_of_scale(result: Any, frame: Frame, colour: str) -> np.ndarray:
-    """Values of bodies as shares of a scale from 0 to 1, (body_count,).
-
-    1 is what a fiftieth of the bodies exceed. Fragments are spread over the scale, so that
-    neighbours differ.
-    """
-    values = body_values(result, frame, colour)
-    if colour == "fragment":
-        return values * _GOLDEN % 1.0
-    top = scale_end(values)
-    return np.clip(values / top, 0.0, 1.0) if top > 0.0 else np.zeros(len(values))

@@ -150,8 +150,6 @@ def _results():
     yield f"{where}.write", run().write, {"folder": path("o")}
     page = {"path": path("v.html"), "open_browser": False}
     yield f"{where}.show", run(frames=1).show, page
-    yield f"{where}.write_xyz", done.write_xyz, {"path": path("v.xyz")}
-    yield f"{where}.write_gltf", done.write_gltf, {"path": path("v.glb")}
     for name in ("frame", "fragments", "fragment_of_body"):
         key = "number" if name == "frame" else "frame"
         yield f"{where}.{name}", getattr(done, name), {key: 1}

@@ -99,7 +99,6 @@ def _batches():
     yield "film", ca.film, {"batch": started(), "steps": 4, "frame_every": 2, **SILENT}
     page = {"path": path("f.html"), "scenes": [0], "open_browser": False}
     yield "runs.film.Film.show", made_film().show, page
-    yield "runs.film.Film.write_xyz", made_film().write_xyz, {"path": path("f.xyz"), "scene": 0}
     for name in ("mean_of", "per_step", "harmonic", "harmonic_by_cycle"):
         yield f"report.measures.Cycles.{name}", getattr(cycles(), name), {"name": "x"}
     powers = {"base_amplitude": 1e-3, "stiffness": 100.0, "damping": 0.1}
