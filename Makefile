@@ -7,7 +7,7 @@ DEMO_OPTIONS ?=
 # One worker a core; tests of a group share what they compile (tests/conftest.py). A worker that dies is a failure.
 TEST := -m pytest -q -n 2 --dist loadscope --no-loadscope-reorder --max-worker-restart 0
 # Folders of tests of physics: verification, invariance, digests, both packages. The rest is all else.
-PHYSICS := $(addprefix tests/,verification boundaries equivalence material ca_automaton ca_spheres ca_combined ca_modes \
+PHYSICS := $(addprefix tests/,verification boundaries equivalence material ca_automaton ca_spheres ca_modes \
   ca_excitation ca_maps)
 REST = $(filter-out $(PHYSICS) tests/__pycache__,$(patsubst %/,%,$(wildcard tests/*/)))
 TEST_OPTIONS ?=

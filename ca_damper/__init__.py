@@ -6,7 +6,6 @@ from taichi_dem.kit import runtime  # isort: skip
 from ca_damper import excitation, goals
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
-from ca_damper.combined import Combined
 from ca_damper.errors import InputError, SimulationDiverged
 from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
@@ -46,7 +45,6 @@ __all__ = [
     "Certificate",
     "Checkpoint",
     "CollectAndCollide",
-    "Combined",
     "DamperMap",
     "Empty",
     "Goal",

@@ -3,12 +3,11 @@
     python experiments/damper_cost.py          # about a minute
     python experiments/damper_cost.py --quick
 
-Spheres run with all pairs, as in the paper, and with cells, at 2e-5 s, and combined with flights in
-steps of 1e-4 s. The automaton runs with a scan of all cells, as in the paper, and with a list of
-particles, at the paper's 1e-4 s and at the spheres' 2e-5 s. Times are CPU seconds of one core for a
-cycle of 6 Hz on the spring, median of repeats, without compiling. Then every filling is run at
-longer and longer steps until it refuses or diverges. A quick run leaves out variants that need
-further programs, such as all pairs and the combination.
+Spheres run with all pairs, as in the paper, and with cells, at 2e-5 s. The automaton runs with a
+scan of all cells, as in the paper, and with a list of particles, at the paper's 1e-4 s and at the
+spheres' 2e-5 s. Times are CPU seconds of one core for a cycle of 6 Hz on the spring, median of
+repeats, without compiling. Then every filling is run at longer and longer steps until it refuses or
+diverges. A quick run leaves out variants that need further programs, such as all pairs.
 """
 
 import sys
@@ -19,7 +18,7 @@ from statistics import median
 import pandas as pd
 
 import ca_damper
-from ca_damper import Automaton, Batch, Combined, InputError, SceneTable, Spheres
+from ca_damper import Automaton, Batch, InputError, SceneTable, Spheres
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
 from taichi_dem.kit.study import several, whole
@@ -38,7 +37,6 @@ SCAN = replace(PAPER, traversal="scan")
 VARIANTS = {
     "dem_pairs": (PAIRS, 2e-5, "all pairs, 20 µs", "^", "--"),
     "dem_cells": (Spheres(), 2e-5, "cells, 20 µs", "^", "-"),
-    "combined": (Combined(), 1e-4, "20 and 100 µs", "v", "-"),
     "ca_scan_1e-4": (SCAN, 1e-4, "scan, 100 µs", "o", "--"),
     "ca_list_1e-4": (PAPER, 1e-4, "list, 100 µs", "o", "-"),
     "ca_scan_2e-5": (SCAN, 2e-5, "scan, 20 µs", "s", "--"),

@@ -109,7 +109,7 @@ class DeviceSpheres:
         if self.bodies.lead[s] != 0.5 * dt:
             self.bodies.advance_lead(s, 0.5 * dt)
             self.search.forget(s)
-        return Action(self.step(s, (step, step), dt, since, motion), 0.0)
+        return Action(self.step(s, step, dt, since, motion), 0.0)
 
     @ti.func
     def board(self, s, motion):
@@ -118,21 +118,20 @@ class DeviceSpheres:
         self.lost[s] = -ti.math.inf
 
     @ti.func
-    def step(self, s, numbers: ti.template(), dt, since, motion):
+    def step(self, s, step, dt, since, motion):
         """Take spheres whose positions run half a step ahead over it; returns their impulse [N s].
 
-        numbers: of the container's step, and of the spheres' own. since: time that positions have
-        moved on since the last step [s].
+        since: time that positions have moved on since the last step [s].
         """
         floor = motion.x + 0.5 * dt * (motion.v + 0.25 * dt * motion.a)
         low, high = self.bodies.reach_of_walls(s, floor)
         # Seen from spheres that fall freely, as all that is foreseen of them is their fall.
         pull = self.bodies.body[s].pull
         speed = vec2(0.5 * dt * pull[0], motion.v + 0.5 * dt * (motion.a + pull[1]))
-        self.search.refresh(s, low, high, vec2(0.0))
+        self.search.refresh(s, low, high)
         if ti.static(self.history.remembers):
-            self.history.step[s], self.history.speed[s] = numbers[1], motion.v
-        self.effect_activity.step[s] = numbers[0]
+            self.history.step[s], self.history.speed[s] = step, motion.v
+        self.effect_activity.step[s] = step
         force = self._push(s, dt, since, low, high, speed)
         self.move(s, dt)
         # The container recoils by dt force / M over the step; half of it on the way.

@@ -26,15 +26,13 @@ from taichi_dem.kit.effect_usage import EffectUse
 
 vec2 = ti.types.vector(2, ti.f64)
 
-#: What is noted when it happens first: two spheres touch, one touches a wall, friction acts; and
-#: how often all of them fly through a whole step.
-PAIRS, WALLS, FRICTION, FLIGHTS = range(4)
+#: What is noted when it happens first: two spheres touch, one touches a wall, friction acts.
+PAIRS, WALLS, FRICTION = range(3)
 #: Those by which each effect acts.
 _BY = {
     "normal contact": (PAIRS, WALLS),
     "friction": (FRICTION,),
     "rotation": (FRICTION,),
-    "long flights": (FLIGHTS,),
 }
 
 #: Reason why an unseen effect may have acted: an impact is shorter than the time between checks.
@@ -99,7 +97,6 @@ class EffectActivity(EventCounts):
                 whole="the energy of motion",
                 kept=unseen if turn else "",
             ),
-            EffectUse("long flights", "flights", self.total(FLIGHTS)),
         )
         return tuple(use for name in effects for use in found if use.effect == name)
 

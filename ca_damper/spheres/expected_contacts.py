@@ -94,50 +94,19 @@ class ExpectedContacts:
         self.least[s], self.most[s] = least, most
 
     @ti.func
-    def shifted(self, s, share):
-        """Note that all spheres have gone on by a share of their last way, or back if negative."""
-        one, other = share * self.least[s], share * self.most[s]
-        self.note_motion(s, ti.min(one, other), ti.max(one, other))
-
-    @ti.func
-    def is_clear(self, s, time, low, high, fall):
-        """Whether nothing touches within a time [s] in which all spheres fall freely.
-
-        Asked after a ``refresh`` whose lists serve as long. low, high: where spheres begin to touch
-        walls [m]; fall: most that walls gain on a sphere beside the sphere's own way [m]. Two
-        spheres go straight, as seen from each other.
-        """
-        clear, reach = True, (2.0 + _ROUNDING) * self.bodies.body[s].radius
-        for k in range(self.pair_count[s]):
-            i, j = self.pair[s, EXPECTED, k][0], self.pair[s, EXPECTED, k][1]
-            branch = self.bodies.position[j] - self.bodies.position[i]
-            relative = self.bodies.velocity[j] - self.bodies.velocity[i]
-            clear = clear and nearest(branch, relative, time) > reach * reach
-        for k in range(self.sphere_count[s]):
-            i = self.sphere[s, k]
-            way = time * self.bodies.velocity[i]
-            place, slack = self.bodies.position[i], fall + _ROUNDING * reach
-            least, most = place + ti.min(way, 0.0) - slack, place + ti.max(way, 0.0) + slack
-            clear = clear and not ((least < low).any() or (most > high).any())
-        return clear
-
-    @ti.func
-    def refresh(self, s, low, high, ahead):
-        """Renew the lists if they may lack a contact; low, high: where spheres touch walls [m].
-
-        ahead: further ways that they are to serve, of two spheres, and of a sphere and a wall [m].
-        """
+    def refresh(self, s, low, high):
+        """Renew the lists if they may lack a contact; low, high: where spheres touch walls [m]."""
         drift = vec2(0.0, low[1] - self.floor[s])
         least, most = self.least[s], self.most[s]
         way = vec2((most - least).norm(), ti.max(drift - least, most - drift).max())
         nearer, margin = self.nearer[s] + way, self.margin[s]
         self.cells.moved(s, way[0])
-        if self.cells.refresh(s, ahead[0]) or not (nearer[0] + ahead[0] < margin[0]):
-            margin[0], nearer[0] = self._margin(s, way[0], ahead[0]), 0.0
+        if self.cells.refresh(s) or not (nearer[0] < margin[0]):
+            margin[0], nearer[0] = self._margin(s, way[0]), 0.0
             self._list_pairs(s, margin[0])
             self._count_unlisted(s)
-        if not (nearer[1] + ahead[1] < margin[1]):
-            margin[1], nearer[1] = self._margin(s, way[1], ahead[1]), 0.0
+        if not (nearer[1] < margin[1]):
+            margin[1], nearer[1] = self._margin(s, way[1]), 0.0
             self._list_spheres(s, low + self._reach(s, margin[1]), high - self._reach(s, margin[1]))
             self._count_unlisted(s)
         self.margin[s] = margin
@@ -150,10 +119,10 @@ class ExpectedContacts:
         self.unlisted[s] = tests - self.pair_count[s] - self.sphere_count[s]
 
     @ti.func
-    def _margin(self, s, way, ahead):
-        """How far apart to list [m], for a way in a step and a further way [m]."""
+    def _margin(self, s, way):
+        """How far apart to list [m], for a way in a step [m]."""
         skin = self.cells.grid[s].skin
-        return ti.max(_NARROWEST * skin, ti.min(ti.max(_STEPS * way, 4.0 * ahead), skin))
+        return ti.max(_NARROWEST * skin, ti.min(_STEPS * way, skin))
 
     @ti.func
     def _reach(self, s, margin):
@@ -264,16 +233,6 @@ class ExpectedContacts:
             int(self.table.in_use(one).sum()) for one in (self.skipped, self.audited, self.misses)
         )
         return Audit(skipped, audited, misses, "contact tests")
-
-
-@ti.func
-def nearest(branch, relative, time):
-    """Square of the least distance [m^2] within a time [s], from a branch that changes evenly."""
-    speed, closing = relative.norm_sqr(), -branch.dot(relative)
-    when = 0.0
-    if closing > 0.0:
-        when = ti.min(time, closing / speed)
-    return (branch + when * relative).norm_sqr()
 
 
 #: What is tested for contact, by the name of the search.

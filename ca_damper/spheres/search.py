@@ -66,7 +66,7 @@ class AllPairs:
         """Nothing to note."""
 
     @ti.func
-    def refresh(self, s, low, high, ahead):
+    def refresh(self, s, low, high):
         """Nothing to refresh."""
 
     @ti.func
@@ -156,12 +156,12 @@ class CellList:
             visit(s, near[0], near[1], contact, count)
 
     @ti.func
-    def refresh(self, s, ahead):
-        """Renew the list if spheres may cross the skin in a way ahead [m]; returns whether it did.
+    def refresh(self, s):
+        """Renew the list if spheres may have crossed the skin; returns whether it did.
 
         "not" includes NaN.
         """
-        used_up = not (self.travel[s] + ahead < self.grid[s].skin)
+        used_up = not (self.travel[s] < self.grid[s].skin)
         if used_up:
             self._search(s)
             self.travel[s] = 0.0

@@ -45,7 +45,7 @@ PNG_DPI, _FILE_DPI = 110, 150
 BLUE, RED, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#222222", "#8A8A8A"
 BROWN, VIOLET, NAVY = "#8C6D31", "#6A51A3", "#0B2545"
-WINE, OLIVE, LIGHT_GREY = "#882255", "#999933", "#ADADAD"
+WINE, LIGHT_GREY = "#882255", "#ADADAD"
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,6 @@ STYLES = {
     "dem": MethodStyle("spheres", RED, "^", "--"),
     "dem_printed": MethodStyle("spheres, damping as printed", PURPLE, "v", _LONG_DASHES),
     "dem_soft": MethodStyle("spheres, modulus / 100", SKY, "P"),
-    "combined": MethodStyle("spheres and long flights", OLIVE, "v"),
     "empty": MethodStyle("empty container", LIGHT_GREY, "X", ":"),
     "rk45_tolerance": MethodStyle("RK45 in the kernel, tolerance swept", BROWN, "o"),
     "rk45_step": MethodStyle("RK45 in the kernel, longest step swept", VIOLET, "s"),

@@ -70,7 +70,6 @@ def _fillings():
     yield "Automaton", functools.partial(ca.Automaton, rules="paper"), {}
     placed = functools.partial(ca.Automaton, rules="place")
     yield "Automaton#place", placed, {"friction": 0.3, "wall_friction": 0.3}
-    yield "Combined", ca.Combined, {}
     yield "Spheres", ca.Spheres, {}
     placed = {"start": [[0.01, 0.01], [0.03, 0.03]], "start_velocity": [[0.0, 0.0], [0.0, 0.0]]}
     yield "Spheres#start", ca.Spheres, placed

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from ca_damper import Automaton, Batch, Combined, RigidMass, SceneTable, Spheres, film
+from ca_damper import Automaton, Batch, RigidMass, SceneTable, Spheres, film
 from ca_damper.errors import InputError
 from tests.paper import paper
 
@@ -44,7 +44,6 @@ THREE = {
         ],
         [2, 1, 3],
     ),
-    "combined": ([Combined(**FLAT, substeps=3), Combined(), Combined(**HIGH)], [9, 30, 50]),
     "rigid": ([RigidMass(), RigidMass(1e-3, gravity=3.0), RigidMass(1e-5)], [3, 20, 90]),
 }
 

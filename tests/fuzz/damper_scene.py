@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from ca_damper import Automaton, Combined, RigidMass, SceneTable, Spheres
+from ca_damper import Automaton, RigidMass, SceneTable, Spheres
 from tests.fuzz.draws import Draws
 
 
@@ -21,7 +21,6 @@ KINDS = (
     Kind(Spheres, {}, "spring"),
     Kind(Spheres, {"friction_law": "history", "rotation": True}, "base"),
     Kind(Spheres, {"damping": "printed", "search": "all_pairs"}, "floor"),
-    Kind(Combined, {}, "spring"),
     Kind(RigidMass, {}, "base"),
 )
 

@@ -110,7 +110,6 @@ IDENTIFYING = (
     taichi_dem.ImplicitDashpots(),
     ca_damper.Automaton(),
     ca_damper.Spheres(),
-    ca_damper.Combined(),
     ca_damper.Oscillator(),
 )
 

@@ -29,7 +29,7 @@ LAYERS = {
         | accuracy | solve | demo | __init__ | __main__""",
     "ca_damper": """
         errors report | oscillator excitation | theory | scenes | filling structure
-        | engine | fixed_mass automaton spheres | combined | batch | plot
+        | engine | fixed_mass automaton spheres | batch | plot
         | runs | goals | accuracy | solve_response
         | demo_pictures | demo | __init__ | __main__""",
 }
