@@ -14,8 +14,8 @@ from tests.experiments.contract import FOLDER, NAMES, rows_of, start
 from tests.terminal import phases_of
 
 ENTRY = {entry.name: entry for entry in read_entries(FOLDER / ENTRIES)}
-#: Those that the fast suite runs: a blast, a damper, a study.
-FAST = ("demo_sleeping", "damper_patterns", "stable_or_not")
+#: Those that the fast suite runs: a damper, a struck bar.
+FAST = ("damper_patterns", "stable_or_not")
 #: Line on standard error of what is known to be outside the range of the paper's rules.
 KNOWN = "rules 'paper' of the automaton are known to fail"
 #: Lines of bars.txt by experiment, without its comments.
