@@ -16,7 +16,6 @@ ATTACK_OPTIONS ?=
 FUZZ_OPTIONS ?=
 MESH_OPTIONS ?=
 GALLERY_OPTIONS ?=
-LESSONS_OPTIONS ?=
 # Pythons in which the wheel is installed and run; by default that of .venv.
 PYTHONS ?=
 
@@ -26,9 +25,6 @@ QUADRANTS := $(subst .venv,.venv-quadrants,$(BIN))
 QUADRANTS_STAMP := .venv-quadrants/stamp
 MESH_STAMP := .venv/stamp-mesh
 DOCS_STAMP := .venv/stamp-docs
-LESSONS_STAMP := .venv/stamp-lessons
-LESSONS := $(addprefix experiments/lessons/,$(addsuffix .py,what_a_time_step_costs what_an_answer_costs \
-  why_a_box_of_grains_damps which_effects_a_scene_needs))
 VULKAN_PACKAGES := mesa-vulkan-drivers libvulkan1
 GMSH_PACKAGES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
 
@@ -38,7 +34,7 @@ export HOME := $(CURDIR)/.venv/home
 endif
 
 .PHONY: help venv demo test test-physics test-rest test-experiments test-slow test-quadrants test-gpu attack fuzz lint bench coverage \
-  gallery lessons lessons-static docs mesh wheel release-check clean
+  gallery docs mesh wheel release-check clean
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-16s %s\n", $$1, $$2}' Makefile
@@ -105,12 +101,6 @@ coverage: $(STAMP) ## ask 120 questions, and count the error bars that hold the 
 gallery: $(STAMP) ## run all experiments and show them on one page (GALLERY_OPTIONS=--quick: minutes)
 	$(BIN)/python experiments/gallery.py $(GALLERY_OPTIONS)
 
-lessons: $(LESSONS_STAMP) ## serve four interactive lessons to this machine's browser (installs marimo)
-	$(BIN)/python -m marimo run $(LESSONS) --host 127.0.0.1 $(LESSONS_OPTIONS)
-
-lessons-static: $(STAMP) ## write the lessons as four HTML files that need no server, in results/lessons
-	$(BIN)/python experiments/lessons/_static.py $(LESSONS_OPTIONS)
-
 docs: $(DOCS_STAMP) ## build these pages with API, gallery and search as a site, in results/docs
 	$(BIN)/python -m sphinx -q -W --keep-going -c docs/site . results/docs
 	@echo "The first page is results/docs/index.html"
@@ -135,11 +125,6 @@ $(MESH_STAMP): $(STAMP)
 $(DOCS_STAMP): $(STAMP)
 	@echo "Installing what builds the pages (a few seconds)."
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[docs]"
-	@touch $@
-
-$(LESSONS_STAMP): $(STAMP)
-	@echo "Installing marimo (about 15 seconds)."
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[lessons]"
 	@touch $@
 
 $(QUADRANTS_STAMP): $(STAMP) tests/quadrants/alias/taichi.py
