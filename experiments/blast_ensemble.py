@@ -19,6 +19,7 @@ face), displacement.csv, members.csv (each blast) and summary.json to results/bl
 import sys
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
@@ -168,7 +169,9 @@ def run(options):
     rows = [{name: getattr(options, name) for name in names} for _ in range(options.members)]
     # A second process would compile as well, which takes longer than four blasts.
     workers = 1 if options.quick else options.threads
-    table = dem.sweep(blast, rows, out=at("members"), workers=workers, seed=options.seed)
+    version = Path(options.mesh).read_text(errors="replace")
+    where = {"out": at("members"), "workers": workers}
+    table = dem.sweep(blast, rows, seed=options.seed, version=version, **where)
     table.to_csv(at("members.csv"), index=False)
     ended = table["error"] == ""
     if ended.sum() < 2:

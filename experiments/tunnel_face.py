@@ -24,6 +24,7 @@ designs.csv, receivers.csv and summary.json to results/tunnel_face/.
 
 import itertools
 import sys
+from pathlib import Path
 
 import pandas as pd
 
@@ -102,8 +103,10 @@ def runs_of(options):
     drawn, others = rows[:count], rows[count:]
     found = []
     if others:
-        folder = study.begin(options) / "runs"
-        found.append(dem.sweep(shot, others, out=folder, workers=options.threads))
+        files = filter(None, (_tunnel.__file__, options.holes))
+        version = "".join(Path(file).read_text() for file in files)
+        where = {"out": study.begin(options) / "runs", "workers": options.threads}
+        found.append(dem.sweep(shot, others, version=version, **where))
         for sentence in found[0]["error"][found[0]["error"] != ""]:
             raise dem.InputError(sentence)
     first = {row["design"]: fired(row) for row in drawn}

@@ -24,8 +24,6 @@ LATER = ("--only", "--fillings")
 LINES = {
     "output in a file": ("--out", "{file}/below"),
     "no such option": ("--nonsense",),
-    "workers without a sweep": ("--workers", "2"),
-    "no such table": ("--sweep", "none.csv"),
     "mesh that is no file": ("--mesh", "{folder}"),
     "effect that is not there": ("--with", "dust"),
     "answer to an accuracy by a step": ("--accuracy", "1%", "--dt0", "1e-7"),

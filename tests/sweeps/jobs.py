@@ -83,7 +83,7 @@ def by_loop(function, table, seed=0):
     """The table of a sweep by a plain loop in this process."""
     rows = checked_rows(table)
     each = jobs_of(function, rows, seed)
-    return table_of(each, [run_job(function, job.row) for job in each], "seed" in rows[0])
+    return table_of(each, [run_job(function, job.row) for job in each], list(rows[0]))
 
 
 def assert_same_bits(one, other):

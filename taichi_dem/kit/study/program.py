@@ -22,7 +22,6 @@ from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import older_files, output_folder
 from taichi_dem.kit.progress_bar import showing
 from taichi_dem.kit.study.entries import Entry, entry_of, show_opening
-from taichi_dem.kit.study.sweep_option import add_sweep, run_sweep
 from taichi_dem.kit.terminal import lasting_output
 from taichi_dem.kit.validation import shown
 
@@ -133,7 +132,6 @@ def parser(
     if drivers:
         made.add_argument("--driver", default=drivers[0], choices=drivers)
     made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
-    add_sweep(made, whole(1, 1024))
     made.settings = settings
     for name, (_, _, *option) in settings.items():
         if option:
@@ -244,16 +242,11 @@ def main(
 
     The settings of its parser have their values of the full or of the quick job in options, which
     also hold started and began, when, on ``time.perf_counter`` and ``time.time``; entry, the texts
-    on the study; and command, its words after "python". With --sweep each row of a table is run
-    instead, in a process of its own.
+    on the study; and command, its words after "python".
     """
     given = sys.argv[1:] if arguments is None else arguments
 
     def work(options):
-        if options.sweep is not None:
-            return run_sweep(run, made, options, given)
-        if options.workers is not None:
-            raise InputError(f"workers must be left out without --sweep, got {options.workers}")
         if getattr(options, "budget", None) and options.accuracy is None:
             raise InputError(f"budget must be left out without --accuracy, got {options.budget}")
         _take_settings(options, made.settings)

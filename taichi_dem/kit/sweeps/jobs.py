@@ -16,13 +16,14 @@ from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import output_folder, write_text
 from taichi_dem.kit.progress_bar import hide_bars
 from taichi_dem.kit.provenance import commit, machine
-from taichi_dem.kit.sweeps.dependencies import digest_of_sources, named_file
-from taichi_dem.kit.sweeps.table import ADDED, SEED, Row, Value, column_of, plain_value
+from taichi_dem.kit.sweeps.table import ADDED, Row, Value, plain_value
 from taichi_dem.kit.validation import FileName, shown
 from taichi_dem.kit.version import __version__
 
 #: What is run: a row in, numbers and text by name out.
 Work = Callable[[Row], Mapping[str, Any]]
+#: Column of the seeds of rows.
+SEED = "seed"
 
 
 class Record(NamedTuple):
@@ -33,20 +34,19 @@ class Record(NamedTuple):
     """
 
     values: dict[str, Value]
-    error: str
-    final: bool
-    seconds: float
+    error: str = ""
+    final: bool = True
+    seconds: float = 0.0
     version: str = __version__
     commit: str = ""
     machine: str = ""
 
 
 class Job(NamedTuple):
-    """row: with its seed. digest: of the sources and the row. files: named there, by digest."""
+    """row: with its seed. digest: of the row and of what its result depends on."""
 
     row: Row
     digest: str
-    files: dict[str, str]
 
 
 def identity_of(work: Any) -> str:
@@ -67,26 +67,22 @@ def identity_of(work: Any) -> str:
     return f"{module}:{name}"
 
 
-def jobs_of(work: Any, rows: Sequence[Row], seed: int | None) -> list[Job]:
-    """A job for each row; one without a seed gets it from the sweep's, if any, and its number."""
-    depends = [identity_of(work), digest_of_sources(work), __version__]
-    known: dict[str, str] = {}
-    jobs = []
-    for number, given in enumerate(rows):
-        row = dict(given)
-        if seed is not None:
-            row.setdefault(SEED, seed_of(seed, number))
-        own: dict[str, str] = {}
-        for value in row.values():
-            own.update(named_file(value, known) if isinstance(value, str) else {})
-        known.update(own)
-        jobs.append(Job(row, _digest([*depends, row]), own))
-    return jobs
+def jobs_of(work: Any, rows: Sequence[Row], seed: int, version: str = "") -> list[Job]:
+    """A job for each row; one without a seed gets it from the sweep's and its number."""
+    file: Any = sys.modules[work.__module__].__file__
+    with open(file, encoding="utf-8") as source:
+        depends = [identity_of(work), source.read(), __version__, version]
+    seeded = [{SEED: _seed_of(seed, number), **row} for number, row in enumerate(rows)]
+    return [Job(row, _digest([*depends, row])) for row in seeded]
 
 
-def seed_of(seed: int, number: int) -> int:
+def _seed_of(seed, number):
     """Seed of row ``number`` of a sweep, a whole number below 2^31."""
     return int.from_bytes(hashlib.sha256(f"{seed} {number}".encode()).digest()[:4], "big") >> 1
+
+
+def _digest(content):
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
 
 
 def run_job(work: Work, row: Row) -> Record:
@@ -118,23 +114,22 @@ def run_in_worker(work: Work | str, row: Row, arch: str) -> Record:
     return run_job(function, row)
 
 
-def failed(error: str) -> Record:
-    """Record of a job that never came to its end."""
-    return Record({}, error, False, 0.0)
-
-
-def table_of(jobs: Sequence[Job], records: Sequence[Record], seeded: bool) -> Any:
-    """DataFrame of jobs and what running them left; seeded: whether the input has seeds."""
-    given = [name for name in jobs[0].row if name != SEED or seeded]
+def table_of(jobs: Sequence[Job], records: Sequence[Record], given: Sequence[str]) -> Any:
+    """DataFrame of jobs and what running them left; given: columns of the input."""
     columns: dict[str, list] = {name: [job.row[name] for job in jobs] for name in given}
     for name in dict.fromkeys(name for record in records for name in record.values):
         columns[name] = [record.values.get(name) for record in records]
     columns["error"] = [record.error for record in records]
-    if SEED in jobs[0].row:
-        columns.setdefault(SEED, [job.row[SEED] for job in jobs])
+    columns.setdefault(SEED, [job.row[SEED] for job in jobs])
     for name in ADDED[1:]:
         columns[name] = [getattr(record, name) for record in records]
-    return data_frame({name: column_of(values) for name, values in columns.items()})
+    made = data_frame(columns)
+    # A row that failed has no text.
+    return made.fillna({name: "" for name in made if _holds_text(columns[name])})
+
+
+def _holds_text(values):
+    return any(isinstance(value, str) for value in values)
 
 
 def _checked_values(values, row):
@@ -162,10 +157,6 @@ def _in_one_line(failure):
         return f"its text cannot be read: {type(broken).__name__}"
 
 
-def _digest(content):
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
-
-
 class Journal:
     """Records of finished jobs in a folder, a small file each: whole or not there.
 
@@ -180,29 +171,20 @@ class Journal:
             output_folder(os.path.join(self.folder, "jobs"))
 
     def read(self, jobs: Iterable[Job]) -> dict[str, Record]:
-        """Records of those jobs that are finished, by digest.
-
-        Damaged files do not count, nor those of a job that names a file which has changed or whose
-        results name one that is gone.
-        """
+        """Records of those jobs that are finished, by digest; damaged files do not count."""
         found = {}
         for job in jobs if self.folder else ():
             with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
                 with open(self._path(job), encoding="utf-8") as file:
                     kept = json.load(file)
-                record, files, made = Record(**kept["record"]), kept["files"], kept["made"]
-                sound = kept["check"] == _digest([kept["record"], files, made])
-                if sound and _is_current(record, files, job) and all(map(os.path.isfile, made)):
-                    found[job.digest] = record
+                if kept["check"] == _digest(kept["record"]):
+                    found[job.digest] = Record(**kept["record"])
         return found
 
     def write(self, job: Job, record: Record) -> None:
         """Keep the record of a job that is final. Raises InputError where there is no space."""
         if self.folder and record.final:
-            texts = (value for value in record.values.values() if isinstance(value, str))
-            made = [path for text in texts for path in named_file(text, {})]
-            kept = {"record": record._asdict(), "files": job.files, "made": made}
-            kept["check"] = _digest([*kept.values()])
+            kept = {"record": record._asdict(), "check": _digest(record._asdict())}
             write_text(self._path(job), json.dumps(kept))
 
     def _path(self, job):
@@ -219,13 +201,3 @@ class Journal:
                 f"holds one of {there}"
             )
         write_text(path, json.dumps({"function": identity}))
-
-
-def _is_current(record, files, job):
-    """Whether files are as they were: what has come since may be what the job wrote.
-
-    Where the job failed it may be what it lacked.
-    """
-    if record.error:
-        return files == job.files
-    return all(job.files.get(path) == digest for path, digest in files.items())

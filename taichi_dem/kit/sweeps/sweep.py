@@ -7,8 +7,7 @@ import os
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from taichi_dem.kit import runtime
@@ -22,18 +21,14 @@ from taichi_dem.kit.sweeps.jobs import (
     Journal,
     Record,
     Work,
-    failed,
     identity_of,
     jobs_of,
     run_in_worker,
     table_of,
 )
-from taichi_dem.kit.sweeps.table import SEED, TableLike, checked_rows
-from taichi_dem.kit.validation import AUTO, FileName, whole
+from taichi_dem.kit.sweeps.table import TableLike, checked_rows
+from taichi_dem.kit.validation import AUTO, FileName, instance, whole
 
-#: Jobs and their records as they end, and what runs jobs.
-Ended = Generator[tuple[Job, Record], None, None]
-Start = Callable[[Sequence[Job]], Ended]
 #: File of the whole table in the folder of a sweep.
 RESULTS = "results.csv"
 _GUARD = 'if __name__ == "__main__"'
@@ -56,6 +51,7 @@ def sweep(
     client: Any = None,
     out: FileName | None = None,
     seed: int = 0,
+    version: str = "",
     progress: Listener | str | None = AUTO,
 ) -> Any:
     """Run a function on each row of a table, many rows at a time.
@@ -78,12 +74,13 @@ def sweep(
         A ``dask.distributed.Client``, or the address of a Dask scheduler, whose workers run the
         rows instead; each has one thread.
     out : path, optional
-        Folder that keeps each finished row. The same call later runs only rows that are missing
-        or changed, or for which the function's file has changed, one of the user's files that it
-        imports, a file that the row names, or the version of the package; and those whose results
-        name a file that is gone.
+        Folder that keeps each finished row. The same call later runs only rows that are missing,
+        or for which the row, the text of the function's file, the version of the package or
+        ``version`` has changed.
     seed : int
         Seed from which those of the rows follow, a whole number from 0 to 2^63.
+    version : str
+        Version of whatever else the results depend on, such as files that the function reads.
     progress : "auto", function or None
         "auto" for a bar on a terminal and in Jupyter, elsewhere lines, None, or a function of a
         ``Progress``.
@@ -114,64 +111,47 @@ def sweep(
     ... # doctest: +SKIP
     """
     count = runtime.usable_cores() if workers is None else whole("workers", workers, 1, 1024)
-    start = partial(_run, function, client=client, count=count)
-    return swept(function, table, start, out, whole("seed", seed, 0, 2**63), progress)
-
-
-def swept(
-    function: Work,
-    table: TableLike,
-    start: Start,
-    out: FileName | None = None,
-    seed: int | None = None,
-    progress: Listener | str | None = AUTO,
-) -> Any:
-    """As ``sweep``, for whatever runs jobs; rows get no seeds where there is none."""
-    rows = checked_rows(table)
-    journal = Journal(out, identity_of(function))
-    jobs = jobs_of(function, rows, seed)
-    records = _run_missing(start, jobs, journal, progress)
-    made = table_of(jobs, records, SEED in rows[0])
+    rows, journal = checked_rows(table), Journal(out, identity_of(function))
+    jobs = jobs_of(function, rows, whole("seed", seed, 0, 2**63), instance("version", version, str))
+    records = journal.read(jobs)
+    missing = [*{job.digest: job for job in jobs if job.digest not in records}.values()]
+    ended = _run(function, missing, client, count)
+    for job, record in _watched(ended, len(missing), progress):
+        records[job.digest] = record
+        journal.write(job, record)
+    made = table_of(jobs, [records[job.digest] for job in jobs], list(rows[0]))
     if journal.folder:
         with carrying(made):
             write_csv(os.path.join(journal.folder, RESULTS), arrays_of(made))
     return made
 
 
-def _run_missing(
-    start: Start, jobs: Sequence[Job], journal: Journal, progress: Listener | str | None
-) -> list[Record]:
-    """Records of jobs, of which those that the journal lacks are run."""
+def _watched(ended, count, progress) -> Iterator[tuple[Job, Record]]:
+    """Jobs and their records as they end, while progress is shown; closes what runs them."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         # A worker imports the main script, which starts the sweep again.
         sys.exit(1)
-    records = journal.read(jobs)
-    missing = [*{job.digest: job for job in jobs if job.digest not in records}.values()]
     started = time.perf_counter()
-    if missing:
-        with (
-            reporting(progress, "sweeping") as listen,
-            contextlib.closing(start(missing)) as ended,
-        ):
 
-            def tell(done):
-                if listen is not None:
-                    share, seconds = done / len(missing), time.perf_counter() - started
-                    listen(Progress(share, seconds, words=f"{done} of {len(missing)} runs"))
+    def tell(listen, done):
+        if listen is not None and count:
+            words, seconds = f"{done} of {count} runs", time.perf_counter() - started
+            listen(Progress(done / count, seconds, words=words))
 
-            tell(0)
-            for done, (job, record) in enumerate(ended, 1):
-                records[job.digest] = record
-                journal.write(job, record)
-                tell(done)
-    return [records[job.digest] for job in jobs]
+    with reporting(progress if count else None, "sweeping") as listen, contextlib.closing(ended):
+        tell(listen, 0)
+        for done, pair in enumerate(ended, 1):
+            yield pair
+            tell(listen, done)
 
 
-def _run(work, jobs, client, count) -> Ended:
+def _run(work, jobs: Sequence[Job], client, count) -> Iterator[tuple[Job, Record]]:
     """Jobs and their records by Dask; count: of processes here, where there is no client.
 
     Raises InputError where no more can be run.
     """
+    if not jobs:
+        return
     try:
         import distributed
     except ImportError:
@@ -253,6 +233,6 @@ def _record_of(future) -> Record:
         return future.result()
     except distributed.KilledWorker as error:
         # Dask allows a number of failures, 3 unless it is told otherwise.
-        return failed(f"its process was lost {error.allowed_failures + 1} times")
+        return Record({}, f"its process was lost {error.allowed_failures + 1} times", final=False)
     except (ImportError, AttributeError) as error:
         raise InputError(f"workers cannot import the function: {error}") from None

@@ -1,9 +1,8 @@
-"""The table of a sweep: rows that go in, checked before any run, and columns that come out.
+"""The table of a sweep: rows that go in, checked before any run.
 
 A row is a dict of column name to number or text.
 """
 
-import csv
 import itertools
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,8 +19,6 @@ Value = bool | int | float | str
 Row = dict[str, Value]
 #: What a sweep takes for a table.
 TableLike = Iterable[Mapping[str, Any]] | Mapping[str, Sequence] | FileName
-#: Column of the seeds of rows.
-SEED = "seed"
 #: Names of columns that a sweep adds to its result.
 ADDED = ("error", "version", "commit", "machine", "seconds")
 
@@ -67,26 +64,9 @@ def checked_rows(table: TableLike) -> list[Row]:
                 f"got {shown(name)}"
             )
     return [
-        {name: plain_value(f"{name} of row {k}", row[name]) for name in rows[0]}
+        {name: plain_value(f"{name} of row {k}", value) for name, value in row.items()}
         for k, row in enumerate(rows)
     ]
-
-
-def _read_rows(path):
-    """Rows of a CSV file with a header; cells that read as numbers become numbers."""
-    name = path_name("table", path)
-    try:
-        with open(name, encoding="utf-8-sig", newline="") as file:
-            lines = [[cell.strip() for cell in line] for line in csv.reader(file) if line]
-    except (OSError, UnicodeError, csv.Error) as error:
-        raise InputError(f"table {name} cannot be read: {error}") from None
-    header, *cells = lines or [[]]
-    if len({*header}) < len(header) or not cells:
-        raise InputError(f"table {name} must have a header that names each column once, and rows")
-    for k, line in enumerate(cells):
-        if len(line) != len(header) or "" in line:
-            raise InputError(f"row {k} of table {name} must have {len(header)} cells, none empty")
-    return [{column: _number_or_text(cell) for column, cell in zip(header, line)} for line in cells]
 
 
 def plain_value(name: str, value: Any) -> Value:
@@ -102,30 +82,20 @@ def plain_value(name: str, value: Any) -> Value:
 def _rows(table):
     import pandas
 
-    if isinstance(table, (str, os.PathLike)):
-        return _read_rows(table)
     try:
-        return pandas.DataFrame(table).to_dict("records")
+        if not isinstance(table, (str, os.PathLike)):
+            return pandas.DataFrame(table).to_dict("records")
     except (TypeError, ValueError):
         raise InputError(
             f"a table must be rows, columns or the name of a CSV file, got {shown(table)}"
         ) from None
-
-
-def _number_or_text(cell):
-    # Python would read 2024_01 as 202401.
-    for kind in () if "_" in cell else (int, float):
-        try:
-            return kind(cell)
-        except ValueError:
-            continue
-    return cell
-
-
-def column_of(values: Sequence[Any]) -> np.ndarray:
-    """Values as an array: of text where one is text, of floats where one is missing."""
-    if any(isinstance(value, str) for value in values):
-        return np.array(["" if value is None else str(value) for value in values])
-    if None in values:
-        return np.array([np.nan if value is None else float(value) for value in values])
-    return np.array(values)
+    name, options = path_name("table", table), {"keep_default_na": False, "skipinitialspace": True}
+    try:
+        # As a row of text: pandas renames a column that is named twice.
+        header = pandas.read_csv(name, header=None, dtype=str, **options).iloc[0]
+        rows = pandas.read_csv(name, index_col=False, **options)
+    except (OSError, ValueError) as error:
+        raise InputError(f"table {name} cannot be read: {error}") from None
+    if header.duplicated().any() or "" in [*header] or rows.empty:
+        raise InputError(f"table {name} must have a header that names each column once, and rows")
+    return rows.to_dict("records")
