@@ -14,13 +14,13 @@ import sys
 from collections.abc import Sequence
 
 import numpy as np
-import taichi as ti
+
+from taichi_dem.kit.taichi_names import may_use
 
 #: Of the ELF format: an entry of a table of symbols, and the kind of section that is one.
 _SYMBOL = np.dtype([("name", "<u4"), ("kind", "<u4"), ("value", "<u8"), ("size", "<u8")])
 _TABLE = 2
 #: Options of LLVM 15, which ends the process on one that it does not know.
-_VERSION = (1, 7, 4)
 _OPTIONS = (
     b"-unroll-runtime=false",
     b"-disable-lsr",
@@ -36,7 +36,7 @@ _PARSE, _KNOWN = b"LLVMParseCommandLineOptions", b"PyInit_taichi_python"
 def switch_off() -> bool:
     """Switch them off for all kernels to come; whether that could be done."""
     path = getattr(sys.modules.get(_LIBRARY), "__file__", None)
-    if path is None or sys.platform != "linux" or ti.__version__ != _VERSION:
+    if path is None or sys.platform != "linux" or not may_use():
         return False
     found = addresses(path, (_PARSE, _KNOWN))
     if len(found) < 2:

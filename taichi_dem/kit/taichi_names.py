@@ -62,5 +62,5 @@ _warned: list[str] = []
 def _warn_once(lacking: str) -> None:
     if not _warned:
         _warned.append(lacking)
-        sentence = f"{_wanted(lacking)}: runs start more slowly, and give the same bits"
+        sentence = f"{_wanted(lacking)}: runs take longer, with the same bits"
         warnings.warn(sentence, stacklevel=3)
