@@ -168,7 +168,7 @@ class Batch(LoadedScenes):
             self.launches.most_steps = max(1, backend.most_rounds() // rounds)
 
     def _checked(self, numbers: SceneNumbers) -> SceneNumbers:
-        """The numbers; InputError where they do not fit the structure, or the excitation neither."""
+        """The numbers; InputError where structure, excitation and they do not fit each other."""
         self.too_few: tuple[str, ...] = ()
         if self.modal is not None:
             self.modal.check(numbers.table)

@@ -116,8 +116,12 @@ class Oscillator:
         """The same, no finite number where there is no steady state."""
         omega = 2.0 * np.pi * real_numbers("frequency", frequency)
         held = self.stiffness + 1j * omega * self.damping
+        free = held - (self.mass + real_numbers("added_mass", added_mass)) * omega**2
+        if np.ndim(free) == 0 and free == 0.0:
+            # Python divides plain numbers, and refuses.
+            return complex(np.inf)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return held / (held - (self.mass + real_numbers("added_mass", added_mass)) * omega**2)
+            return held / free
 
     def scaled(self, mass: float, base_amplitude: float) -> "Oscillator":
         """Return an oscillator of the same frequency and damping ratio.

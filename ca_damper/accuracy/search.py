@@ -15,9 +15,9 @@ from ca_damper.accuracy.estimate import (
     size_of,
 )
 from ca_damper.accuracy.job import Job
-from ca_damper.accuracy.peak_search import Lattice, PeakSearch
 from ca_damper.accuracy.runs import BudgetSpent, SceneKey, SceneRuns, SteadyRuns
 from ca_damper.goals import Goal
+from ca_damper.report.peak_search import Lattice, PeakSearch
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import told_apart

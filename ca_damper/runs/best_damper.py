@@ -15,7 +15,7 @@ from ca_damper.fixed_mass import RigidMass
 from ca_damper.oscillator import Oscillator
 from ca_damper.report.progress import OpenEnded
 from ca_damper.runs.grains import DENSITY, Grains, boxes_of, pair_of, shifted
-from ca_damper.runs.response import frequency_response
+from ca_damper.runs.settled import SteadyPeak
 from ca_damper.runs.shake import shake
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.spheres import Spheres
@@ -31,14 +31,15 @@ from taichi_dem.kit.validation import (
     is_real,
     positive,
     several,
+    told_apart,
     whole,
 )
 
 #: Numbers of grains that are tried.
 NUMBERS = (5, 10, 20, 30, 50)
-#: Frequencies f/f0 from this far below the peak with fixed grains to above that of the empty
-#: container, and their number in a first look and later.
-_BELOW, _ABOVE, _FIRST, _RATIOS = 0.03, 1.02, 7, 13
+#: Frequencies f/f0 to begin with: from this far below the peak with fixed grains to above that of
+#: the empty container.
+_BELOW, _ABOVE = 0.03, 1.02
 #: Boxes that the first look leaves, and its share of the cycles.
 _LEFT, _BRIEF = 4, 0.4
 #: Steps of the automaton in the longest one it bears. Its peaks of 30 grains are then 0.14 % off.
@@ -50,18 +51,21 @@ _KINDS = (Automaton, Spheres)
 
 @dataclass(frozen=True)
 class Value:
-    """Mean over seeds [m] and half-width of its bar of 95 % [m], infinite of one seed."""
+    """Mean over seeds [m] and half-width of its bar of 95 % [m], infinite of one seed.
+
+    The bar holds chance, what has not settled and the spacing of frequencies.
+    """
 
     mean: float
     error: float
 
     @classmethod
-    def of(cls, values: np.ndarray) -> "Value":
-        """Of a value a seed."""
+    def of(cls, values: np.ndarray, beside: float = 0.0) -> "Value":
+        """Of a value a seed, and a half-width beside chance."""
         count = len(values)
         mean, deviation = mean_and_deviation(values)
         half = t_quantile(_CONFIDENCE, count - 1) * deviation / math.sqrt(count)
-        return cls(mean, half if count > 1 else math.inf)
+        return cls(mean, math.hypot(half, beside) if count > 1 else math.inf)
 
     def __str__(self) -> str:
         return f"{1e3 * self.mean:.3g} +- {1e3 * self.error:.2g} mm"
@@ -183,6 +187,7 @@ def best_damper(
         Heights of the box that are tried for each number, at most.
     cycles : tuple of (int, int), default (120, 20)
         Cycles of sines before those that are measured, and these; a first look takes 0.4 of them.
+        Runs that have not settled by then go on, up to eight times as long.
     filling : Automaton or Spheres, optional
         Filling that searches, whose grains and box are replaced; ``Automaton()`` if None.
     confirm : Automaton or Spheres, optional
@@ -199,7 +204,7 @@ def best_damper(
     ------
     InputError
         A number is out of its range, the grains weigh more than the structure, or no box holds
-        them.
+        them; the structure has no damping, and the motion is a sine.
 
     Examples
     --------
@@ -229,9 +234,9 @@ def best_damper(
 def _searched(case, filling, boxes, seeds):
     """The winner among boxes and what was seen on the way: fields of a BestDamper."""
     begun = time.process_time()
-    tried = [(one, float(case.values(filling, one, 1, brief=True)[0])) for one in boxes]
+    tried = [(one, float(case.values(filling, one, 1, brief=True)[0][0])) for one in boxes]
     left = [one for one, _ in sorted(tried, key=lambda pair: _rank(pair[1]))[:_LEFT]]
-    judged = [(one, Value.of(case.values(filling, one, seeds))) for one in left]
+    judged = [(one, Value.of(*case.values(filling, one, seeds))) for one in left]
     # By the upper end of the bar: a box whose motion nobody can tell is no good box.
     (best, value), *others = sorted(judged, key=lambda pair: _rank(pair[1].mean + pair[1].error))
     equals = ((one, v) for one, v in others if v.mean - v.error < value.mean + value.error)
@@ -248,9 +253,9 @@ def _confirmed(case, filling, best, seeds, tolerance):
     """The winner by another filling, and after errors of manufacture: fields of a BestDamper."""
     begun, confirmed, errors = time.process_time(), None, {}
     if filling is not None:
-        confirmed = Value.of(case.values(filling, best, seeds))
+        confirmed = Value.of(*case.values(filling, best, seeds))
         for name, one in shifted(best, tolerance):
-            errors[name] = Value.of(case.values(filling, one, seeds))
+            errors[name] = Value.of(*case.values(filling, one, seeds))
     spent = time.process_time() - begun
     return {"confirmed": confirmed, "errors": errors, "confirmation_seconds": spent}
 
@@ -268,31 +273,35 @@ class _Case:
         self.cycles = pair_of("cycles", cycles, words, lambda name, n: whole(name, n, 1, 100_000))
         self.mass, self.tell = positive("mass", mass), OpenEnded(None)
         if self.mass > self.structure.mass:
-            raise InputError(
-                f"mass must be at most that of the structure, {structure.mass:g} kg, got {mass:g}"
-            )
+            got, most = told_apart(self.mass, structure.mass)
+            raise InputError(f"mass must be at most that of the structure, {most} kg, got {got}")
         self.signal = None if is_real(motion) else excitation_of(motion)
         if self.signal is None:
             self.structure = replace(structure, base_amplitude=positive("motion", motion))
+            if structure.damping == 0.0:
+                raise InputError(
+                    "damping of the structure must be positive where its base moves as a sine, as "
+                    "no steady state bounds it while grains lie still, got 0"
+                )
 
-    def values(self, filling: Any, grains: Grains, seeds: Any, brief: bool = False) -> np.ndarray:
-        """What is to be small [m] of a box, a value a seed; brief: in a first look."""
+    def values(
+        self, filling: Any, grains: Grains, seeds: Any, brief: bool = False
+    ) -> tuple[np.ndarray, float]:
+        """What is to be small [m] of a box, a value a seed, and a half-width beside chance [m].
+
+        brief: in a first look.
+        """
         made = grains.put_into(filling)
-        job = {"particles": grains.particles, "seeds": seeds, "progress": self.tell}
+        job = {"particles": grains.particles, "seeds": seeds, "oscillator": self.structure}
         if self.signal is not None:
-            run = shake(made, self.signal, oscillator=self.structure, dt=_step(made), **job)
-            return self._of_record(run)
+            run = shake(made, self.signal, dt=_step(made), progress=self.tell, **job)
+            return self._of_record(run), 0.0
         low = self.structure.peak(grains.particles * grains.mass)[0] - _BELOW
-        ratios = np.linspace(low, _ABOVE, _FIRST if brief else _RATIOS)
         share = _BRIEF if brief else 1.0
         transient, measured = (math.ceil(share * one) for one in self.cycles)
-        highest = _ABOVE * self.structure.natural_frequency
-        job |= {"ratios": ratios, "dt": automatic_dt(_step(made), highest)}
-        job |= {"transient_cycles": transient, "measured_cycles": measured}
-        run = frequency_response(made, oscillator=self.structure, **job)
-        peaks = run.peaks()[1][0]
-        # At an end of the ratios there is no vertex.
-        return np.where(np.isnan(peaks), run.rms[0].max(axis=0), peaks)
+        job["dt"] = automatic_dt(_step(made), _ABOVE * self.structure.natural_frequency)
+        search = SteadyPeak(made, (transient, measured), self.tell, **job)
+        return search.run(low, _ABOVE, *((0,) if brief else ()))
 
     def fixed(self) -> float:
         """The same with all grains fixed [m]."""

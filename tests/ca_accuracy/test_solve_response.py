@@ -16,9 +16,9 @@ from ca_damper import (
     goals,
     solve_response,
 )
-from ca_damper.accuracy.peak_search import PeakSearch
 from ca_damper.accuracy.runs import SceneKey, SceneRuns
 from ca_damper.report.certificate import Certificate
+from ca_damper.report.peak_search import PeakSearch
 from taichi_dem.kit.certificate import Audit
 from tests.paper import paper
 

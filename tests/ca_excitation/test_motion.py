@@ -235,7 +235,7 @@ def test_gaps_that_resampling_bridges_are_named_and_refused_from_a_quarter_perio
     gap = (lost + 1) * 5e-3
     assert motion.gap == pytest.approx(gap) and f"gaps of up to {gap:.3g} s" in motion.in_words("m")
     if told == "refused":
-        with pytest.raises(InputError, match="base must have no gap .* of more than 0.0416 s"):
+        with pytest.raises(InputError, match=r"base must have no gap .* of more than 0.0416 s"):
             at_resonance(motion, own)
     elif told:
         with pytest.warns(UserWarning, match=told):

@@ -156,7 +156,7 @@ def test_resampling_hides_no_samples_that_are_too_few():
     for rate, step in ((50.0, 2e-3), (500.0, 0.02)):
         time = np.arange(0.0, 4.0, 1.0 / rate)
         fast = np.sin(2.0 * np.pi * 20.0 * time)
-        with pytest.raises(InputError, match="step of the samples must be at most .* got 0.02"):
+        with pytest.raises(InputError, match=r"step of the samples must be at most .* got 0.02"):
             excitation.from_samples(time, fast, of="acceleration", resample=step)
 
 

@@ -10,8 +10,10 @@ from ca_damper import Automaton, Oscillator, best_damper, excitation
 from ca_damper.errors import InputError
 from ca_damper.runs.best_damper import Value, _searched
 from ca_damper.runs.grains import DENSITY, boxes_of, shifted
+from ca_damper.runs.settled import limit_of
 
 BOX = (60e-3, 96e-3)
+ONE = {"heights": 1}
 JOB = {"mass": 6e-3, "box": BOX, "particles": 30, "seeds": 2, "heights": 2, "cycles": (10, 4)}
 
 
@@ -34,10 +36,30 @@ def test_errors_of_manufacture_change_one_number_each():
     best = boxes_of(6e-3, (30,), BOX, DENSITY, 1)[0]
     changed = dict(shifted(best, 0.1))
     assert changed["clearance +10 %"].clearance == pytest.approx(1.1 * best.clearance)
-    assert changed["number -10 %"].particles == 27
-    larger = changed["size +10 %"]
+    assert changed["number -10 %, mass -10 %"].particles == 27
+    larger = changed["size +10 %, mass +33.1 %"]
     assert larger.mass / larger.diameter**3 == pytest.approx(best.mass / best.diameter**3)
     assert larger.height == best.height
+
+
+@pytest.mark.parametrize("count", [1, 4, 5, 30])
+@pytest.mark.parametrize("share", [0.1, 0.25])
+def test_the_name_of_an_error_says_what_it_changes(count, share):
+    """Number, size and clearance to 3 digits, also where whole grains are not the share."""
+    best = boxes_of(6e-3, (count,), BOX, DENSITY, 1)[0]
+    for name, one in shifted(best, share):
+        told = {words[0]: float(words[1]) for words in map(str.split, name.split(", "))}
+        mass = one.particles * one.mass / (best.particles * best.mass)
+        found = {
+            "clearance": one.clearance / best.clearance,
+            "number": one.particles / best.particles,
+            "size": one.diameter / best.diameter,
+            "mass": mass,
+        }
+        assert all(
+            found[what] == pytest.approx(1.0 + 0.01 * x, abs=5e-4) for what, x in told.items()
+        )
+        assert "mass" in told or mass == pytest.approx(1.0)
 
 
 def test_a_bar_is_that_of_students_t():
@@ -59,8 +81,38 @@ def test_the_winner_has_the_lowest_upper_end_and_damps():
 def test_a_box_whose_scenes_diverge_is_no_winner():
     boxes = boxes_of(6e-3, (10, 30), BOX, DENSITY, 3)
     height = {box: np.nan if k % 2 == 0 else 1.0 + k for k, box in enumerate(boxes)}
-    case = SimpleNamespace(values=lambda _, box, seeds, brief=False: np.full(seeds, height[box]))
+    case = SimpleNamespace(
+        values=lambda _, box, seeds, brief=False: (np.full(seeds, height[box]), 0.0)
+    )
     assert _searched(case, None, boxes, 2)["grains"] == boxes[1]
+
+
+@pytest.mark.parametrize("damping", [0.002, 0.0005])
+def test_grains_at_rest_leave_the_peak_of_a_fixed_mass_however_light_the_damping(damping):
+    """At 0.9 g. The parabola of the peak is exact to (2 zeta)^2, the motion to RK45's 1e-9."""
+    size = 2e-3 * damping
+    made = best_damper(
+        Oscillator(damping=damping), size, confirm=Automaton(), tolerance=0.0, **{**JOB, **ONE}
+    )
+    assert made.value.mean == pytest.approx(made.fixed, rel=1e-4)
+    assert made.value.error < 1e-3 * made.fixed and made.tried[0][1] == pytest.approx(made.fixed)
+
+
+def test_structures_without_damping_are_refused_where_the_base_is_a_sine():
+    with pytest.raises(InputError, match=r"^damping of the structure must be positive"):
+        best_damper(Oscillator(damping=0.0), 0.6e-3, **JOB)
+    still = excitation.random_vibration([4.0, 12.0], [2.0, 2.0], duration=0.5, seed=1)
+    job = {**JOB, **ONE, "confirm": Automaton(), "tolerance": 0.0}
+    assert best_damper(Oscillator(damping=0.0), still, **job).value.mean > 0.0
+
+
+def test_an_approach_shows_its_limit_and_numbers_that_go_away_none():
+    """X = 3 + i + 2 q^n: three of them tell the limit, as the factor is one."""
+    n, near, away = np.arange(6), 0.999 * np.exp(0.05j), 1.01 * np.exp(0.05j)
+    rows = np.array([3.0 + 1j + 2.0 * q**n for q in (near, away)] + [np.full(6, 2.0 + 0j)])
+    limit, error = limit_of(rows)
+    assert limit[[0, 2]] == pytest.approx(np.array([3.0 + 1j, 2.0]), rel=1e-10)
+    assert np.isinf(limit[1]) and np.isinf(error[1]) and error[0] < 1e-10
 
 
 def test_a_signal_is_judged_on_the_base():

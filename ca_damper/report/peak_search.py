@@ -55,7 +55,7 @@ class PeakSearch:
     """Search of a peak in [lowest, highest] f/f0.
 
     rms_at: gives the RMS [m] at each of some ratios. may_extend: whether the range may grow.
-    found: RMS by ratio.
+    finest: spacing that resolves every peak there can be, 0 if unknown. found: RMS by ratio.
     """
 
     def __init__(
@@ -64,8 +64,9 @@ class PeakSearch:
         lowest: float,
         highest: float,
         may_extend: bool,
+        finest: float = 0.0,
     ):
-        self.rms_at, self.may_extend = rms_at, may_extend
+        self.rms_at, self.may_extend, self.finest = rms_at, may_extend, finest
         self.lowest, self.highest = lowest, highest
         self.lattice, self.level = Lattice(lowest, (highest - lowest) / FIRST), 0
         self.found: dict[float, float] = {}
@@ -81,7 +82,7 @@ class PeakSearch:
             ratio, wanted = self._peak()
             # A plateau wants no finer spacing; beside a zero or no number, none is fine enough.
             widest = self.lattice.spacing
-            wanted = min(widest, max(widest / 2.0**_DEEPEST, wanted))
+            wanted = min(widest, max(widest / 2.0**_DEEPEST, self.finest, wanted))
             level = min(math.ceil(math.log2(widest / wanted)), self.level + 3)
             self.level = max(self.level, level)
             around = self.lattice.around(ratio, self.level)
