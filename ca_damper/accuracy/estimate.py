@@ -86,8 +86,8 @@ class Estimate:
     """A goal's value (places,) with its error parts. levels: the values at each step, fine first.
 
     step: what they say of the step. grid: half-width by the frequencies between which a peak lies,
-    and rounding: of the machine, by which a value that is truly zero is off; both are part of the
-    sampling.
+    and rounding: of the machine, by which a value that is truly zero is off at most; both are part
+    of the sampling, rounding as far as runs show it.
     """
 
     goal: Goal
@@ -158,7 +158,9 @@ def estimate(
     errors = np.array([np.maximum(one.sampling, one.apart) for one in levels])
     step = step_part(steps, means, errors, STEP_ORDER, confidence)
     sampling, chance = levels[0].bars(confidence)
-    sampling = np.hypot(np.hypot(sampling, grid), rounding)
+    # A value that is zero is off by what its runs show of rounding, which may be nothing.
+    shown = np.minimum(rounding, np.abs(means).max(axis=0))
+    sampling = np.hypot(np.hypot(sampling, grid), shown)
     shift = np.where(step.regular, _shift(step.error, np.hypot(sampling, chance), confidence), 0.0)
     parts = ErrorParts(step=np.maximum(step.error, shift), chance=chance, sampling=sampling)
     return Estimate(goal, parts, tuple(levels), step, grid, rounding)

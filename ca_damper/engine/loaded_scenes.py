@@ -22,7 +22,7 @@ from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit import backend
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress import compiling
-from taichi_dem.kit.validation import whole
+from taichi_dem.kit.validation import told_apart, whole
 
 #: Parts in which the kernels of a batch are compiled.
 _PARTS = 3
@@ -286,10 +286,11 @@ def divergence(
     if code == LOST:
         # The longest step of the filling is still the best advice.
         words, allowed = _LOST_IN_WORDS, min(allowed, 0.5 * dt)
+    was, most = told_apart(dt, allowed)
     return SimulationDiverged(
         f"the scene of particles = {row['particles']} and seed {row['seed']} at "
         f"{row['frequency']:.5g} Hz diverged by step {step}, t = {time_s:.4g} s: it {words}; "
-        f"dt must be at most {allowed:.3g} s, was {dt:.3g} s",
+        f"dt must be at most {most} s, was {was} s",
         scene=row,
         step=step,
         time_s=time_s,

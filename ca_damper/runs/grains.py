@@ -77,13 +77,23 @@ def boxes_of(
 
 
 def shifted(best: Grains, share: float) -> Iterator[tuple[str, Grains]]:
-    """Boxes with an error of manufacture, and its name, where the grains still fit."""
+    """Boxes with an error of manufacture, and its name, where the grains still fit.
+
+    The name says what becomes of number, size or clearance, and of the mass of all grains: balls of
+    one density weigh by the cube of their size.
+    """
     for sign in (1.0, -1.0):
-        by, words = 1.0 + sign * share, f"{100.0 * sign * share:+.3g} %"
-        count = round(by * best.particles)
+        by = 1.0 + sign * share
         taller = best.height + sign * share * best.clearance
-        yield f"clearance {words}", best._replace(height=taller)
-        yield f"number {words}", best._replace(particles=max(1, count))
+        yield f"clearance {_change(by)}", best._replace(height=taller)
+        count = max(1, round(by * best.particles))
+        more = _change(count / best.particles)
+        yield f"number {more}, mass {more}", best._replace(particles=count)
         other = best._replace(diameter=by * best.diameter, mass=by**3 * best.mass)
         if other.clearance > 0.0:
-            yield f"size {words}", other
+            yield f"size {_change(by)}, mass {_change(by**3)}", other
+
+
+def _change(factor):
+    """A factor as a change in words."""
+    return f"{100.0 * (factor - 1.0):+.3g} %"

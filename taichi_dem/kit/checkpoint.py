@@ -27,6 +27,7 @@ from taichi_dem.kit.validation import (
     path_name,
     plain_fields,
     positive,
+    told_apart,
     whole,
 )
 from taichi_dem.kit.version import __version__, taichi_version
@@ -104,9 +105,10 @@ class Checkpoint:
             every.append(max(1, math.ceil(self.every_s / dt - 1e-9)))
         if every and last > _MOST_MARKS * min(every):
             least = math.ceil(last / _MOST_MARKS)
+            bound = told_apart(self.every_s or 0.0, least * dt)[1]
             raise InputError(
-                f"every_steps must be at least {least} and every_s {least * dt:.3g} s in a run of "
-                f"{last} steps, got {self.every_steps} and {self.every_s}"
+                f"every_steps must be at least {least} and every_s {bound} s in a run of {last} "
+                f"steps, got {self.every_steps} and {self.every_s}"
             )
         return {step for distance in every for step in range(0, last + 1, distance)}
 

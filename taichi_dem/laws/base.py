@@ -21,7 +21,7 @@ from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.products import dot
 from taichi_dem.kit.types import real, vec3
-from taichi_dem.kit.validation import shown
+from taichi_dem.kit.validation import shown, told_apart
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.materials.body_materials import MOST, BodyMaterials
 from taichi_dem.state.capacity import Capacity
@@ -332,9 +332,10 @@ def check_sliding_energy(effect: Effect, option: str, material: Material) -> Non
     energy = getattr(effect, option)
     least = material.cohesion**2 / (2.0 * float(material.shear_stiffness))
     if not energy > least:
+        got, bound = told_apart(energy, least, 6)
         raise InputError(
             f"{option} of {effect.name} must be larger than cohesion^2 / (2 shear_stiffness) = "
-            f"{least:.6g} J/m2, or a bond would fail at once, got {energy}"
+            f"{bound} J/m2, or a bond would fail at once, got {got}"
         )
 
 

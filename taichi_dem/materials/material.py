@@ -25,7 +25,7 @@ import numpy as np
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import ANGLE, DENSITY, MODULUS, STRENGTH, in_unit
-from taichi_dem.kit.validation import between, plain_fields, positive
+from taichi_dem.kit.validation import between, plain_fields, positive, told_apart
 from taichi_dem.materials.bond_rules import (
     BondRule,
     Constant,
@@ -295,10 +295,10 @@ def check_energy(material: Material, where: str = "") -> None:
     """
     if material.failure_opening <= material.onset_opening:
         least = material.tensile_strength**2 / (2.0 * float(material.normal_stiffness))
+        got, bound = told_apart(material.fracture_energy, least, 6)
         raise InputError(
             f"fracture_energy must be larger than tensile_strength^2 / (2 normal_stiffness) = "
-            f"{least:.6g} J/m2{where}, or the bond would fail before it reaches its strength, "
-            f"got {material.fracture_energy}"
+            f"{bound} J/m2{where}, or the bond would fail before it reaches its strength, got {got}"
         )
 
 

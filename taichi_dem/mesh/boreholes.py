@@ -14,7 +14,7 @@ import numpy as np
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.kit.sweeps.table import checked_rows
-from taichi_dem.kit.validation import FileName, between, plain_fields, positive, whole
+from taichi_dem.kit.validation import FileName, between, plain_fields, positive, told_apart, whole
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.gmsh import places_and_rows, prism, session
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
@@ -193,9 +193,9 @@ def drilled_rock(
     near, far = positive("near", near), positive("far", far)
     thinnest = min((one.length_m for one in holes), default=2.0 * far)
     if not near <= min(far, 0.5 * thinnest):
+        got, most = told_apart(near, min(far, 0.5 * thinnest))
         raise InputError(
-            f"near must be at most far and half of the shortest hole, "
-            f"{min(far, 0.5 * thinnest):g} m, got {near:g}"
+            f"near must be at most far and half of the shortest hole, {most} m, got {got}"
         )
     draw = np.random.default_rng(whole("seed", seed, 0, 2**31 - 1))
     turn, scale = draw.uniform(size=2) if seed else (0.0, 0.5)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import finite, shown, word
+from taichi_dem.kit.validation import finite, shown, told_apart, word
 from taichi_dem.mesh import tetrahedra as geometry
 
 #: Share of (longest edge)^3 below which a volume counts as zero, as it may be round-off.
@@ -91,9 +91,10 @@ def weld_labels(
     lengths = geometry.edge_lengths(points, tetrahedra)
     shortest = lengths[lengths > COINCIDENT * np.ptp(points, axis=0).max()].min(initial=np.inf)
     if not (finite(tolerance) and 0.0 <= tolerance < shortest):
+        above = finite(tolerance) and tolerance > 0.0
+        bound = told_apart(tolerance, shortest, 6)[1] if above else f"{shortest:.6g}"
         raise InputError(
-            f"weld_tolerance must lie in [0, {shortest:.6g}) m, the shortest edge, "
-            f"got {shown(tolerance)}"
+            f"weld_tolerance must lie in [0, {bound}) m, the shortest edge, got {shown(tolerance)}"
         )
     if tolerance == 0.0:
         return np.arange(len(points), dtype=np.int32)
