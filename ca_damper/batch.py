@@ -169,15 +169,16 @@ class Batch(LoadedScenes):
 
     def _checked(self, numbers: SceneNumbers) -> SceneNumbers:
         """The numbers; InputError where structure, excitation and they do not fit each other."""
-        self.too_few: tuple[str, ...] = ()
+        too_few: tuple[str, ...] = ()
         if self.modal is not None:
             self.modal.check(numbers.table)
             modes = self.modal.structure.frequencies
-            self.too_few = sampling_found(self.excitation, modes, float(modes.min()))
+            too_few = sampling_found(self.excitation, modes, float(modes.min()))
         elif self.mount == "spring":
             stiffness, mass = map(numbers.table.column, ("stiffness", "mass"))
             natural = np.sqrt(stiffness / mass) / (2.0 * np.pi)
-            self.too_few = sampling_found(self.excitation, natural, float(natural.max()))
+            too_few = sampling_found(self.excitation, natural, float(natural.max()))
+        self.too_few = too_few
         return numbers
 
     def __repr__(self) -> str:

@@ -33,6 +33,8 @@ OUTSIDE = "outside"
 DIVERGED = "diverged"
 #: Of the sampling error in a report.
 _CONFIDENCE = 0.95
+# Share of a start that may be left in the middle of the measured cycles.
+_LEFT = 0.1
 
 
 _PEAK_COLUMNS = (
@@ -366,22 +368,25 @@ def frequency_response(
         batch.start(start)
         with batch.checkpointed(checkpoint, resume, {"job": job}) as writer:
             cycles = batch.run(transient_cycles, measured_cycles, report_progress)
-            report = replace(batch.report(), **_sampling(cycles))
+            sampled = _sampling(cycles, grid.oscillator, transient_cycles)
+            report = replace(batch.report(), **sampled)
             made = tuple(replace(one, report=report) for one in grid.responses(batch, cycles))
             found = AmplitudeResponse(grid.amplitudes, made) if grid.is_several else made[0]
             writer.save(found)
     return found
 
 
-def _sampling(cycles):
+def _sampling(cycles, oscillator, transient):
     """What is known of the mean RMS in the scene where it is highest, by name for a Report.
 
     sampling: number of cycles, and half-width as a share. transient: why that is not known. None
-    of them of a single cycle, or of a container at rest.
+    of them of a single cycle, or of a container at rest. transient, the argument: cycles before
+    those that were measured.
     """
     highest = int(np.nanargmax(cycles.rms))
     one = slice(highest, highest + 1)
-    series = Cycles(cycles.frequency[one], cycles.steps[one], cycles.record[one]).rms_by_cycle[0]
+    scene = Cycles(cycles.frequency[one], cycles.steps[one], cycles.record[one])
+    series = scene.rms_by_cycle[0]
     mean = float(series.mean())
     if not mean > 0.0 or len(series) < 2:
         return {}
@@ -393,6 +398,13 @@ def _sampling(cycles):
         way = "grows" if change > 0.0 else "falls"
         share, all_of_them = f"{100.0 * abs(change):.2g} %", counted(len(series), "cycle")
         return {"transient": f"it {way} by {share} from half to half of {all_of_them}"}
+    own = oscillator.mass, oscillator.stiffness, oscillator.damping
+    ratio = float(scene.damping_ratio(*own)[0])
+    left = math.exp(-2.0 * math.pi * ratio * (transient + 0.5 * len(series)))
+    if left > _LEFT:
+        # Beats of a light structure look steady at their extremes.
+        by = f"by then, with a damping ratio of {ratio:.2g}"
+        return {"transient": f"{100.0 * left:.2g} % of its start is left {by}"}
     return {"sampling": (len(series), half_width(series, _CONFIDENCE) / mean)}
 
 

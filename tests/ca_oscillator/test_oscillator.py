@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ca_damper import Oscillator
+from ca_damper import InputError, Oscillator
 from ca_damper.oscillator import sine_and_cosine
 from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE
 
@@ -39,6 +39,15 @@ def test_steady_state_repeats_after_a_cycle(frequency):
     bounds = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14}
     end = solve_ivp(motion, (0.0, 1.0 / frequency), start, **bounds).y[:, -1]
     assert end == pytest.approx(start, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("form", [float, np.float64, lambda f: np.array([f, 3.0])])
+def test_a_resonance_without_damping_has_no_steady_state(form):
+    free = Oscillator(damping=0.0)
+    with pytest.raises(InputError, match=r"no steady state at its natural frequency, got 6.02877"):
+        free.transfer(form(free.natural_frequency))
+    assert np.isinf(np.atleast_1d(free.rms(form(free.natural_frequency)))[0])
+    assert np.isfinite(free.transfer(3.0))
 
 
 def test_series_of_sine_and_cosine_reach_round_off():
