@@ -16,6 +16,7 @@ from ca_damper import (
     goals,
     solve_response,
 )
+from ca_damper.accuracy.estimate import SeedValues, estimate
 from ca_damper.accuracy.runs import SceneKey, SceneRuns
 from ca_damper.report.certificate import Certificate
 from ca_damper.report.peak_search import PeakSearch
@@ -44,6 +45,16 @@ def test_a_light_container_peaks_where_it_must():
         assert answer.reached and answer.share <= 0.01
         assert abs(answer.value - wanted) <= answer.error
         assert answer.value == pytest.approx(wanted, rel=0.01)
+
+
+@pytest.mark.parametrize("noise", [0.0, 3e-15])
+def test_a_quantity_that_is_zero_has_the_bar_of_its_noise(noise):
+    """Beside 1e-12 of the unit, which rounding is at most: values of noise come to twice of it."""
+    freedom, none = 8, np.zeros(1)
+    levels = [SeedValues(np.full((1, 1), noise * k), none, freedom, none) for k in (1.0, -2.0, 1.5)]
+    found = estimate(goals.loss_factor_at(1.0), (1.0, 2.0, 4.0), levels, none, 0.95, 1e-12)
+    total = float(found.parts.total[0])
+    assert 2.0 * noise <= total <= 20.0 * noise and found.shortfall(0.01, "") == ""
 
 
 def test_a_curve_of_a_rigid_mass():
