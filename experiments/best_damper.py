@@ -63,16 +63,18 @@ def draw(path, found):
         axes[-1].set_yticks(rows, list(values))
         axes[-1].axvline(1e3 * first.fixed, color=BLACK, lw=2.0, label="fixed grains")
         axes[-1].set(title="the automaton's winner, by spheres", xlabel="largest RMS [mm]")
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=7)
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=8)
 
 
 def draw_search(axis, best, title):
-    """Boxes of a first look, a line a number of grains, and the winner with its bar."""
+    """Boxes of a first look, a line a number of grains; the winner on it, and its value by more."""
     for count, rows in best.table().groupby("particles"):
         axis.plot(1e3 * rows.clearance_m, 1e3 * rows.value_m, "o-", ms=4, label=f"{count} grains")
-    place, bar = 1e3 * best.grains.clearance, 1e3 * np.array([best.value.mean, best.value.error])
-    look = {"fmt": "*", "ms": 13, "color": BLACK, "capsize": 9, "zorder": 5, "label": "the best"}
-    axis.errorbar(place, bar[0], bar[1], **look)
+    place, looked = 1e3 * best.grains.clearance, 1e3 * dict(best.tried)[best.grains]
+    bar = 1e3 * np.array([best.value.mean, best.value.error])
+    look = {"color": BLACK, "zorder": 5}
+    axis.plot(place, looked, "*", ms=13, label="the best", **look)
+    axis.errorbar(place, *bar, fmt="s", ms=4, capsize=9, label="by more seeds and cycles", **look)
     axis.axhline(1e3 * best.fixed, color=BLACK, lw=2.0, label="fixed")
     axis.set(title=title, xlabel="clearance [mm]", ylim=(0.0, None))
 

@@ -58,7 +58,8 @@ class Automaton:
         ``"both"``: both particles of a pair change and momentum along its line is conserved;
         ``"one_sided"``: as printed in the paper, each particle that looks at another changes alone.
     accumulator : str, default "signed"
-        Effect of a turn on the distance travelled, one of ``accumulator.READINGS``.
+        Effect of a turn on the distance travelled: ``"signed"``, ``"signed_through_walls"``,
+        ``"reset"`` or ``"kept"``.
     static_threshold : float, default 5.0
         Relative speed, as a factor of g dt, below which a particle rests on the heap.
     width : float, default 0.006

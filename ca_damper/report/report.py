@@ -98,10 +98,11 @@ class Report:
     bound_taken: float = 0.0
 
     def __repr__(self):
-        particles = f"{_range(self.particles)} particles"
         times = f"{self.simulated_s:.4g} s simulated", f"{self.run_seconds:.3g} s run"
-        scenes = f"{counted(self.scenes, 'scene')} with {particles}"
-        return in_brief(self, self.method, scenes, *times, "print it for all figures")
+        return in_brief(self, self.method, self._scenes(), *times, "print it for all figures")
+
+    def _scenes(self):
+        return f"{counted(self.scenes, 'scene')} with {_range(self.particles)} particles"
 
     @property
     def particle_steps_per_second(self) -> float:
@@ -175,7 +176,7 @@ class Report:
             "method": f"{self.method}, container on the {self.mount}",
             "excitation": "\n".join(self.excitation),
             "effects": "\n".join([", ".join(self.effects) or "none", *acted, *self._certified()]),
-            "scenes": f"{self.scenes:,} with {_range(self.particles)} particles",
+            "scenes": self._scenes(),
             "simulated": f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s",
             "diverged": f"{gone}\n{self.diverged[0]}" if self.diverged else "",
             "step bound by": self._bound(),

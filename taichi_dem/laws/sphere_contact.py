@@ -202,7 +202,7 @@ class SphereContact(Effect):
 
     @ti.func
     def damping(self, m):
-        """Damping coefficient of a contact [N s/m]; friction shares it (spec, section 2)."""
+        """Damping coefficient of a contact [N s/m]; friction shares it."""
         return self.law[m, 1]
 
     @ti.func

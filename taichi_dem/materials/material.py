@@ -203,7 +203,7 @@ class Material:
         """Make a material from measured values; shorter bonds are stiffer.
 
         Young's modulus and Poisson's ratio of a block then do not depend on the size of its
-        elements: a bond has the stiffness modulus / distance per area (``materials.moduli``).
+        elements: a bond has the stiffness modulus / distance per area (``bond_moduli``).
         Contact spheres are as stiff as the bond that they replace
         (``materials.bond_rules.FaceStiffness``).
 

@@ -56,7 +56,7 @@ def spheres_of_faces(mesh: Mesh, centre: np.ndarray, divisions: int = 5) -> Cont
 
     centre: centres of the bodies (body_count, 3) [m]. The radius is the smallest of
     d_g / (1 - m_f . m_g) over the other faces g, with d_g the distance of the touching point from
-    face g and m the inward unit normals (spec, section 2).
+    face g and m the inward unit normals.
     """
     faces = all_faces(mesh.tetrahedra).reshape(-1, 4, 3)
     corners = mesh.points[faces] - centre[:, None, None, :]

@@ -175,27 +175,30 @@ def _read_raw(path):
     if not os.path.isfile(path):
         raise InputError(f"mesh file {path} does not exist, or is not a file")
     said = io.StringIO()
-    try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            return _meshio_read(path), said.getvalue()
-    except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
-        reason = " ".join(f"{type(error).__name__} {error} {said.getvalue()}".split())
-        raise InputError(f"mesh file {path} cannot be read: {reason}") from None
+    with tempfile.TemporaryDirectory() as folder:
+        copy = os.path.join(folder, "keyed.msh")
+        try:
+            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+                return _meshio_read(path, copy), said.getvalue()
+        except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
+            reason = f"{type(error).__name__} {error} {said.getvalue()}".replace(copy, path)
+            words = " ".join(reason.split())
+            raise InputError(f"mesh file {path} cannot be read: {words}") from None
 
 
-def _meshio_read(path):
+def _meshio_read(path, copy):
     import meshio
 
     with np.errstate(over="ignore"):  # an STL's text, tried as if it were binary
         if path.lower().endswith(".msh"):
-            return _read_gmsh(path)
+            return _read_gmsh(path, copy)
         return _keyed_by_dimension(meshio.read(path), [])
 
 
-def _read_gmsh(path):
+def _read_gmsh(path, place):
     """A Gmsh file of meshio's with groups by PhysicalName; InputError for a bad one.
 
-    Meshio reads a copy in which each physical group has a name of its own: of faces and bodies in
+    Meshio reads a copy, at a place, in which each physical group has a name of its own: of faces and bodies in
     groups of one name it loses the faces, and it takes some letters for escapes.
     """
     import meshio
@@ -210,11 +213,9 @@ def _read_gmsh(path):
         return row[1] + str(len(names) - 1).encode()
 
     copy = _NAMES.sub(lambda section: _NAME.sub(keyed, section[0]), content, count=1)
-    with tempfile.TemporaryDirectory() as folder:
-        place = os.path.join(folder, "keyed.msh")
-        with open(place, "wb") as other:
-            other.write(copy)
-        return _keyed_by_dimension(meshio.read(place), names)
+    with open(place, "wb") as other:
+        other.write(copy)
+    return _keyed_by_dimension(meshio.read(place), names)
 
 
 def _refuse_bad_gmsh(content):

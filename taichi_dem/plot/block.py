@@ -194,10 +194,9 @@ def plot_acting(
         f"{TITLES[name]}\n{np.isfinite(acting_since[name]).sum():,} of {model.body_count:,} bodies"
         for name in names
     ]
-    colours = shades("plasma", 0.0, 0.92)
-    colours.set_bad(STONE)
+    colours = shades("plasma", 0.0, 0.92).with_extremes(bad=STONE)
     look = {"cmap": colours, "clim": (0.0, 1e3 * until), "edgecolor": _EDGE, "axis": axis}
-    with _panels(path, view, model, columns, (0.5, 1.4, 0.7), titles) as (figure, panels):
+    with _panels(path, view, model, columns, (0.6, 1.4, 0.8), titles) as (figure, panels):
         for axes, name in zip(panels.flat, names):
             times = np.ma.masked_invalid(1e3 * acting_since[name])
             drawn = draw_bodies(axes, model, None, times, **look)

@@ -1,4 +1,4 @@
-"""Energy and momentum account of a run, term by term (spec, section 6).
+"""Energy and momentum account of a run, term by term.
 
 work of loads and supports + energy at the start = kinetic + bond strain + contact strain
 + bond dashpots + slip + softening + release + friction + contact dashpots + ground dashpots

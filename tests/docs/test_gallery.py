@@ -2,11 +2,14 @@
 
 import json
 import re
+from pathlib import Path
 
 import pytest
 
 import gallery
-from taichi_dem.kit.study.results_page import Entry
+from taichi_dem.kit import runtime, study
+from taichi_dem.kit.study.entries import ENTRIES
+from taichi_dem.kit.study.results_page import RUN, Entry
 
 #: A stand-in for an experiment: writes what one writes, or fails as one fails.
 SCRIPT = """
@@ -53,3 +56,49 @@ def test_a_failed_experiment_is_named_and_leaves_no_old_figures(stand_ins, capsy
     assert "bad: exit code 1: diverged at t = 1 s" in said and "good" not in said
     assert "No result: exit code 1" in card(out, "bad") and "&lt;it&gt;" in card(out, "bad")
     assert "1.93" in card(out, "good") and not (out / "bad" / "summary.json").exists()
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_quick_gallery_leaves_the_results_of_the_full_one(stand_ins, tmp_path, monkeypatch):
+    out = stand_ins("good")
+    monkeypatch.chdir(tmp_path)
+    assert gallery.main([]) == 0
+    before = contents(out)
+    assert gallery.main(["--quick"]) == 0
+    after = contents(out)
+    assert {path: after[path] for path in before} == before
+    assert json.loads(after[out / "quick" / "good" / "summary.json"])["quick"] is True
+    assert out / "quick" / "index.html" in after
+
+
+def test_a_quick_study_leaves_the_results_of_the_full_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(runtime, "start", lambda *_: None)
+
+    def run(options):
+        Path(study.output_paths(options.out)("kind")).write_text(str(options.quick))
+
+    for quick in ([], ["--quick"], ["--out", "mine", "--quick"]):
+        assert study.main(run, study.parser("tiny", "Tiny."), quick) == 0
+    kinds = {path.parent.as_posix(): path.read_text() for path in Path().rglob("kind")}
+    assert kinds == {"results/tiny": "False", "results/quick/tiny": "True", "mine": "True"}
+
+
+def test_cpu_times_of_first_runs_become_those_of_the_entries(stand_ins, tmp_path):
+    out, path = stand_ins("good", "fine", "bad"), tmp_path / ENTRIES
+    texts = "\n\n".join(
+        f"## {name}\nquestion: Why?\nlook: Look.\ntime: 3 min\nquick: 15 s\npictures: a.png"
+        for name in ("fine", "good", "bad")
+    )
+    path.write_text(f"# Part\n\n{texts}\n")
+    gallery.main(["--out", str(out), "--only", "good,bad", "--cold"])
+    gallery.main(["--out", str(out / "quick"), "--only", "fine", "--quick"])
+    gallery.keep_times(out, path)
+    made, cpu_s = gallery.read_entries(path), json.loads((out / "good" / RUN).read_text())["cpu_s"]
+    assert [one.time.isdecimal() for one in made] == [False, True, False]
+    # To two digits, in whole seconds.
+    assert float(made[1].time) == pytest.approx(cpu_s, abs=0.5 + 0.05 * cpu_s)
+    assert {one.quick for one in made} == {"15 s"}

@@ -1,6 +1,8 @@
 """Pages keep their word: links lead on, names, files, commands and figures are those there are."""
 
+import ast
 import importlib
+import itertools
 import re
 import shlex
 import subprocess
@@ -55,6 +57,40 @@ def test_names_and_files_exist(page):
         path = re.match(rf"(?:python )?((?:{roots})/[\w/.]+)", word)
         if path and "NAME" not in word:
             assert (FOLDER / path[1]).exists(), f"{page} names {path[1]}"
+
+
+#: Names of other libraries in docstrings.
+OTHERS = re.compile(r"(dask|scipy|Axes|Figure|Artist)\.")
+
+
+def docstrings():
+    """(Source file, docstring) of every module, class and function of both packages."""
+    for path in sorted(path for name in PACKAGES for path in (FOLDER / name[:-1]).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                yield path, ast.get_docstring(node) or ""
+
+
+def test_dotted_names_in_docstrings_stand_for_something():
+    """Each is written so in some source, or is that of a member of a class, an object or a module."""
+    sources = {path: path.read_text(encoding="utf-8") for path, _ in docstrings()}
+    used = re.sub(r'""".*?"""', "", "\n".join(sources.values()), flags=re.DOTALL)
+    defined = {(path.parent.name, path.stem) for path in sources}
+    for path, text in sources.items():
+        package = path.stem == "__init__"
+        words = re.findall(r"\w+" if package else r"^(?:def |class )?(\w+)", text, re.MULTILINE)
+        defined |= {(path.parent.name if package else path.stem, name) for name in words}
+    for node in (node for text in sources.values() for node in ast.walk(ast.parse(text))):
+        if isinstance(node, ast.ClassDef):
+            members = re.findall(r"\w+", ast.unparse(node))
+            defined |= {(k, name) for k in (node.name, node.name.lower()) for name in members}
+    files = {path.name for path in FOLDER.rglob("*.py")}
+    for path, text in docstrings():
+        for name in re.findall(r"``([a-zA-Z_]\w*(?:\.\w+)+)``", text):
+            if name in files or OTHERS.match(name):
+                continue
+            for pair in itertools.pairwise(name.split(".")):
+                assert pair in defined or ".".join(pair) in used, f"{path} names {name}"
 
 
 def commands():

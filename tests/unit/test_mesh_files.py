@@ -97,6 +97,19 @@ def test_a_file_that_is_cut_off_is_refused(tmp_path):
     assert_refused(lambda: read_mesh(path), f"mesh file {path} ")
 
 
+def test_a_file_that_meshio_cannot_read_is_named_as_the_user_named_it(tmp_path):
+    """It reads a copy of a Gmsh file, of whose place a user knows nothing."""
+    with open(PAPER_BLOCK, encoding="utf-8") as file:
+        text = file.read()
+    path = tmp_path / "mine.msh"
+    for wrong in (text.replace("$MeshFormat", "$Meshformat"), text.replace(" 0 8\n", " 1 8\n", 1)):
+        path.write_text(wrong)
+        with pytest.raises(InputError) as refused:
+            read_mesh(path)
+        named = [word for word in str(refused.value).split() if word.endswith(".msh")]
+        assert len(named) == 2 and {*named} == {str(path)}
+
+
 @NEEDS_GMSH
 def test_the_papers_block_is_what_gmsh_makes_of_it(tmp_path):
     write(tmp_path)

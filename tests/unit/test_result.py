@@ -7,11 +7,14 @@ import re
 import meshio
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, Uniform, read_mesh, simulate, write_paraview
 from taichi_dem.kit.display import BRIEF
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.mesh.shapes import bar
+from taichi_dem.plot.block import TITLES
+from tests.figures import clipped_words
 from tests.made_result import made_result
 
 NAN = float("nan")
@@ -40,6 +43,18 @@ def test_times_of_breaking_are_written(flown, tmp_path):
     a, b, c = points[top.vertices].transpose(1, 0, 2)
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     assert [float(row["area_m2"]) for row in rows] == pytest.approx(area, rel=1e-14)
+
+
+@pytest.mark.parametrize("height", [0.02, 0.25, 0.31, 0.4, 1.0, 4.0])
+@pytest.mark.parametrize("panels", [1, 4, 6])
+def test_no_word_on_since_when_effects_act_is_cut_off(height, panels):
+    """Of flat scenes and high ones, whatever the number of effects."""
+    made = made_result(mesh=bar(1.0, height, (4, 1, 1)))
+    since = np.linspace(0.0, 2e-5, made.model.body_count)
+    made = dataclasses.replace(made, acting_since=dict.fromkeys(list(TITLES)[:panels], since))
+    figure = made.plot.acting()
+    FigureCanvasAgg(figure).draw()
+    assert [*clipped_words(figure)] == []
 
 
 def files_in(folder):

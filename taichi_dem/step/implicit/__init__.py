@@ -1,1 +1,1 @@
-"""Dashpots of all bonds and contacts solved together in every step (spec, section 6)."""
+"""Dashpots of all bonds and contacts solved together in every step."""
