@@ -6,7 +6,7 @@ shifted resonance plays no part: a faster decay is damping. The particles damp a
 container's peak acceleration is above about 1 g; below it they lie on the floor, and the
 structure's own damping is left. Try other numbers of particles and other amplitudes.
 
-    python -m ca_damper demo                                   # 6 seconds
+    python -m ca_damper demo
     python -m ca_damper demo --particles 50 --amplitude 40
     python -m ca_damper demo --filling spheres  # in place of the automaton
     python -m ca_damper demo --compare          # figures of both

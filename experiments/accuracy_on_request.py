@@ -1,6 +1,6 @@
 """What does an answer with an error bar cost?
 
-    python experiments/accuracy_on_request.py          # about 15 minutes on one core
+    python experiments/accuracy_on_request.py
     python experiments/accuracy_on_request.py --quick
 
 Questions about bars under gas pressure are drawn at random. The price of an answer is the CPU time

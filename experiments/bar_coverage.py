@@ -1,7 +1,7 @@
 """Does a bar hold as often as it says? Random questions, judged by far finer runs.
 
-    make coverage                                   # 120 questions, 15 minutes on one core
-    python experiments/bar_coverage.py --battery 7  # others of the same kind, 40 minutes
+    make coverage                                   # 120 questions
+    python experiments/bar_coverage.py --battery 7  # others of the same kind
     python experiments/bar_coverage.py --quick
 
 A battery asks about bars, the paper's block, parts under impact, and dampers. Its number is the

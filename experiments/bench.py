@@ -1,7 +1,7 @@
 """How fast is it? Rates of both packages, the papers' problems, and the first wait.
 
-    make bench                          # about 12 minutes on two quiet cores
-    python experiments/bench.py --quick # a minute
+    make bench                          # on a quiet machine
+    python experiments/bench.py --quick # fewer figures
 
 Figures are CPU time of one core unless they say otherwise, and wall time with --arch cuda, without
 compiling. They are medians of repeats, with their spread; candidates of one part take turns.

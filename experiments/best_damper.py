@@ -5,7 +5,7 @@ automaton searches, spheres confirm its winner and shift clearance, number and s
 manufacture. Then spheres search too: expect the same optimum within the bars, for at least five
 times the CPU time, compiling left out. A quick run looks at three boxes, and spheres do not search.
 
-    python experiments/best_damper.py            # about five minutes on two cores
+    python experiments/best_damper.py
     python experiments/best_damper.py --base 3   # thrown hard: spheres cost 1.7 times as much
 
 Writes best.png, best.csv, best_spheres.csv and summary.json to results/best_damper/.

@@ -9,7 +9,7 @@ without losses) and 1.5 to 2 (measured blasts), as the dashpots take most of the
 fitted to bodies nearer to the hole than to any free side: elsewhere the wave is reflected.
 
     python experiments/blast_block.py                          # 20,000 tetrahedra
-    python experiments/blast_block.py --tetrahedra 100000      # a quarter of an hour or more
+    python experiments/blast_block.py --tetrahedra 100000      # a longer run
     python experiments/blast_block.py --resume --until 2e-3    # continue that run
 
 Gmsh makes the mesh, once a folder; ``make mesh`` installs Gmsh. Without it, 15 mirrored copies of

@@ -3,7 +3,7 @@
 The main job: the scene of Konno et al., section 4, from mesh to crack picture. Expect a crushed
 zone at the hole, cracks that run out from it, and a wedge pushed out of the free face on the right.
 
-    python experiments/blast_fracture.py                  # 7 seconds, 14 the first time
+    python experiments/blast_fracture.py
     python experiments/blast_fracture.py --all-pictures   # also energy, pressure, where effects act
     python experiments/blast_fracture.py --until 1e-3     # cracks through to the other faces
     python experiments/blast_fracture.py --method multirate --l 1e-8    # the paper's: three minutes

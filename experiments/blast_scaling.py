@@ -12,7 +12,7 @@ not enough: at many ticks few bodies are active, all in one region, so workers w
 often wait.
 
     python experiments/blast_scaling.py             # most of ten minutes
-    python experiments/blast_scaling.py --l 1e-7    # a minute for the run
+    python experiments/blast_scaling.py --l 1e-7    # a longer run
 
 Two threads are measured, not simulated: whole steps of the parallel driver on a large bar and on
 the paper's block, each in its own process, fastest of repeats. If other programs use the cores,

@@ -6,7 +6,7 @@ else to brazilian, and their cohesion to compression. If both tension and brazil
 tension is fitted and brazilian compared. Expect each misfit to fall below the tolerance within a
 few rounds, or a sentence that says why it does not.
 
-    python experiments/calibrate_material.py              # a minute
+    python experiments/calibrate_material.py
     python experiments/calibrate_material.py --mesh block.msh --young 30e9 --tension 3e6
     python experiments/calibrate_material.py --quick      # static solves alone
 

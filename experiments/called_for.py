@@ -1,6 +1,6 @@
 """What does the blast look like without contact, friction or softening, and where did each act?
 
-    python experiments/called_for.py          # a minute on one core
+    python experiments/called_for.py
     python experiments/called_for.py --quick
 
 The paper's block is blasted to 0.5 ms with all effects, and without some of them. Each frame shows

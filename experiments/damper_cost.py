@@ -1,6 +1,6 @@
 """Cost of a cycle over the number of particles, and the stable steps of fillings (Fig. 12).
 
-    python experiments/damper_cost.py          # about a minute
+    python experiments/damper_cost.py
     python experiments/damper_cost.py --quick
 
 Spheres run with all pairs, as in the paper, and with cells, at 2e-5 s. The automaton runs with a

@@ -8,7 +8,7 @@ that takes the same work as the grains, plus the structure's own. Expect 30 grai
 to reduce the RMS by a quarter; after the strong part the filled container may swing more than the
 empty one, as the resonance has shifted.
 
-    python experiments/damper_measured_motion.py                # 15 seconds
+    python experiments/damper_measured_motion.py
     python experiments/damper_measured_motion.py --record my_road.csv --scale 0.5
 
 Writes motion.png, damping.png, motion.csv, damping.csv and summary.json to

@@ -5,7 +5,7 @@ mm) at 6 Hz (Komatsuzaki et al., Figs. 9 and 10). Expect the floor to throw the 
 catch them again. Those of the automaton move further than the spheres, as its ceiling takes down a
 whole cluster when one particle touches it, and up to a tenth of a cycle earlier.
 
-    python experiments/damper_patterns.py                  # about half a minute
+    python experiments/damper_patterns.py
     python experiments/damper_patterns.py --amplitude 10 --accounting landing
 
 Writes patterns_20.png, patterns_40.png, cycle.png, patterns.gif, cycles.csv, particles.csv and

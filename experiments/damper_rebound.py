@@ -8,7 +8,7 @@ milliseconds. An impact delays the default by about two steps: it acts in the st
 particle reached its last cell. Bounces end where the particle no longer rises by a cell: the
 automaton's static contact then holds it. A quick run leaves out "signed_through_walls".
 
-    python experiments/damper_rebound.py                    # about half a minute
+    python experiments/damper_rebound.py
     python experiments/damper_rebound.py --restitution 0.5
 
 Writes rebound.png, heights.csv, impacts.csv and summary.json to results/damper_rebound/.

@@ -6,7 +6,7 @@ shifted resonance plays no part: a faster decay is damping. The particles damp a
 container's peak acceleration is above about 1 g; below it they lie on the floor, and the
 structure's own damping is left. Try other numbers of particles and other amplitudes.
 
-    python experiments/demo_damper.py                                  # 6 seconds
+    python experiments/demo_damper.py
     python experiments/demo_damper.py --particles 50 --amplitude 40
     python experiments/demo_damper.py --filling spheres                # in place of the automaton
     python experiments/demo_damper.py --compare                        # figures of both

@@ -5,7 +5,7 @@ fastest needs; the other has a step for each body, dt0 / 2^k, by the same rule: 
 further than l in a step. Short steps spread into the bar with the wave. The displacement of both
 ends is the same; only the number of evaluations differs.
 
-    python experiments/demo_multirate.py             # most of a minute
+    python experiments/demo_multirate.py
     python experiments/demo_multirate.py --speed 5
 
 Writes blow.gif, blow.png, blow.csv, levels_*.csv and summary.json to results/demo_multirate/.

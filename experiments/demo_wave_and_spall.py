@@ -5,7 +5,7 @@ as fast as the wave behind it. Then, in other bars, a compressive pulse runs to 
 steep front and a linear decay. The free end reflects it as tension, which first reaches the
 strength at depth lambda sigma_t / (2 s0): the stronger the pulse s0, the thinner the spall.
 
-    python experiments/demo_wave_and_spall.py             # a quarter of a minute
+    python experiments/demo_wave_and_spall.py
     python experiments/demo_wave_and_spall.py --cells 40
 
 The front rises over four cells of the test bar, and dashpots have a twentieth of their strength:

@@ -7,7 +7,7 @@ four times the rays measures the contact law; other meshes of the same size, wit
 measure the mesh; spheres measure the automaton. Expect the step, on which the runs are spent, to be
 the smallest source, and the mesh or the contact the largest.
 
-    python experiments/error_budget.py          # a minute
+    python experiments/error_budget.py
     python experiments/error_budget.py --quick
 
 Writes error_budget.png, error_budget.csv and summary.json to results/error_budget/.

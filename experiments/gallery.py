@@ -1,7 +1,7 @@
 """Run every experiment, each in a process of its own, and show all of them on one static page.
 
-    make gallery                                       # hours: the sum of docs/experiments.md
-    make gallery GALLERY_OPTIONS=--quick               # half an hour of CPU the first time
+    make gallery                                       # times are in docs/experiments.md
+    make gallery GALLERY_OPTIONS=--quick               # smaller jobs
     python experiments/gallery.py --reuse              # the page from present results
     python experiments/gallery.py --only demo_damper   # one again, others as they are
 
@@ -48,7 +48,7 @@ KEPT = "docs/figures.json"
 _MARK = re.compile(r"(<!-- figure: ([^>]+?), (\d) digits -->)(.*?)(<!-- end -->)", re.DOTALL)
 _TABLE = re.compile(r"(<!-- table: (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 FLAGS = {
-    "quick": "run smaller jobs of under a minute",
+    "quick": "run smaller jobs, with results and a page of their own",
     "reuse": "run only experiments without a result",
     "cold": "compile all kernels in each: its CPU time is that of a first run",
     "readme": "update the table of experiments and the figures in all pages, run nothing",

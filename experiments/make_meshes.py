@@ -9,7 +9,7 @@ Far size, growth and diagonals give the largest stable time step among 1500 mesh
 And parallel.msh and V_cut.msh into experiments/tunnel_meshes: rock with the holes of two tunnel
 rounds, some 5,000 tetrahedra, each the one with the largest stable step of six.
 
-Needs gmsh: ``make mesh`` installs it and runs this script. Takes half a minute.
+Needs gmsh: ``make mesh`` installs it and runs this script.
 """
 
 import os

@@ -5,7 +5,7 @@ they set the limit; without them the springs do, at a step about thirty times lo
 limit the energy balance closes. Above it neighbours spin against each other; the spin grows by the
 same factor every step, until the program ends the run and says where and why.
 
-    python experiments/stable_or_not.py             # half a minute
+    python experiments/stable_or_not.py
     python experiments/stable_or_not.py --quick     # dashpots only
 
 Displacements are magnified 15,000 times. The limits are those of the worst body and err on the safe

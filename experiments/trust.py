@@ -4,7 +4,7 @@ Each case has a number from a formula, another program or a test of real materia
 over random meshes, with half of their range. A miss is reported with its reason. The cases are
 tests, in tests/trust.
 
-    python experiments/trust.py                           # about an hour on one core
+    python experiments/trust.py
     python experiments/trust.py --only slope,rotation
     python experiments/trust.py --quick
 

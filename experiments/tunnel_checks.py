@@ -13,7 +13,7 @@ damaged rock shake less. Expected of ours: less behind smaller burdens, by up to
 face sends back the opposite wave, and less from damaged rock; a difference smaller than the bars,
 half of the range over the meshes, is not distinguished.
 
-    python experiments/tunnel_checks.py            # about half an hour; needs Gmsh, ``make mesh``
+    python experiments/tunnel_checks.py            # needs Gmsh, ``make mesh``
     python experiments/tunnel_checks.py --quick    # radiation alone in coarse rock, without Gmsh
 
 Damaged rock: bonds of 0.3 of the area within 0.6 m of the hole, or the cracks of an earlier shot in

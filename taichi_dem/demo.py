@@ -3,7 +3,7 @@
 The scene of Konno et al., section 4. Expect a crushed zone at the hole, cracks that run out from
 it, and a wedge pushed out of the free face on the right.
 
-    python -m taichi_dem demo                    # 7 seconds, 14 the first time
+    python -m taichi_dem demo
     python -m taichi_dem demo --out mine         # pictures and tables into ./mine
     python -m taichi_dem demo --all-pictures     # also energy, pressure, since when effects act
 

@@ -125,7 +125,7 @@ def parser(
     defaults: of options that every experiment has.
     """
     made = bare_parser(name, description)
-    made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
+    made.add_argument("--quick", action="store_true", help="a smaller job, in a folder of its own")
     made.add_argument("--json", action="store_true", help="print summary.json and nothing else")
     add_out(made, name)
     made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
