@@ -198,8 +198,8 @@ def _meshio_read(path, copy):
 def _read_gmsh(path, place):
     """A Gmsh file of meshio's with groups by PhysicalName; InputError for a bad one.
 
-    Meshio reads a copy, at a place, in which each physical group has a name of its own: of faces and bodies in
-    groups of one name it loses the faces, and it takes some letters for escapes.
+    Meshio reads a copy, at a place, in which each physical group has a name of its own: of faces
+    and bodies in groups of one name it loses the faces, and it takes some letters for escapes.
     """
     import meshio
 

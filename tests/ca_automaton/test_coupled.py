@@ -1,5 +1,7 @@
 """The automaton in a container on its spring: rigid limit, momentum, energy, effects."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -49,6 +51,8 @@ def test_momentum_is_exact_and_no_grain_is_lost():
             # Half a cell into the wall would be in a cell of the wall.
             assert min(below.min(), above.min()) > -0.5 * WIDTH
     assert batch.report().momentum_error < 2e-12
+    # A number has its noun.
+    assert re.search(r"\b\d+ scenes? ", str(batch.report()).splitlines()[0])
 
 
 @pytest.mark.filterwarnings("ignore:.*is read in .* likely")

@@ -72,7 +72,7 @@ def docstrings():
 
 
 def test_dotted_names_in_docstrings_stand_for_something():
-    """Each is written so in some source, or is that of a member of a class, an object or a module."""
+    """Each is written so in some source, or is a member of a class, an object or a module."""
     sources = {path: path.read_text(encoding="utf-8") for path, _ in docstrings()}
     used = re.sub(r'""".*?"""', "", "\n".join(sources.values()), flags=re.DOTALL)
     defined = {(path.parent.name, path.stem) for path in sources}
