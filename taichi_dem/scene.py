@@ -26,7 +26,6 @@ from taichi_dem.laws.base import PARTS_OF_BOND, Effect, check_one_material
 from taichi_dem.laws.roles import AUTO, LISTED, ChosenEffects, check_effect, chosen_effects
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials, body_materials
-from taichi_dem.materials.bond_rules import typical_of
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.topology import check_free, may_meet, parts_of
 from taichi_dem.state.model import MANY, names_of
@@ -301,18 +300,17 @@ def _friction_warnings(scene):
     if friction is None or friction.remembers or all(drags := _drags(scene, rough=True)):
         return ()
     never = "never acts on bodies of a material" if any(drags) else "never acts"
-    damping = scene.effect("contact").constants[1]
     return (
-        f"{friction.name} {never}: it is at most the dashpot of the contact, and {damping} of the "
-        "material is 0; StickingFriction acts by springs instead",
+        f"{friction.name} {never}: it is at most the dashpot of the contact, and "
+        f"{scene.effect('contact').undamped}; StickingFriction acts by springs instead",
     )
 
 
 def _drags(scene, rough=False):
     """Whether contacts of each material, or of each with friction, have dashpots."""
-    damping = scene.effect("contact").constants[1]
+    contact = scene.effect("contact")
     own = [row[k] for k, row in enumerate(scene.body_materials.pairs)]
-    return [typical_of(getattr(one, damping)) > 0.0 for one in own if one.friction or not rough]
+    return [contact.is_damped(one) for one in own if one.friction or not rough]
 
 
 def remedy(contact: Any) -> str:

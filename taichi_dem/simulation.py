@@ -22,6 +22,7 @@ from taichi_dem.report.divergence import DivergenceCheck
 from taichi_dem.report.effects import certificate_of, effect_uses, on_demand
 from taichi_dem.report.energy_balance import EnergyBalance, open_account
 from taichi_dem.report.forces import Forces
+from taichi_dem.report.hops import Hops
 from taichi_dem.report.missing_effects import MissingEffects
 from taichi_dem.report.readings import Kept, Readings, Run
 from taichi_dem.report.report import Report, known_error
@@ -279,7 +280,7 @@ class Simulation:
         self.divergence_check = DivergenceCheck(self.parts, self.energy_balance)
         self.shared_volume = SharedVolume(self.parts)
         self.missing_effects = MissingEffects(self.parts, self.shared_volume)
-        self.step_resolution = StepResolution(self.parts)
+        self.step_resolution, self.hops = StepResolution(self.parts), Hops(self.parts)
 
     @property
     def parts(self) -> Run:
@@ -296,6 +297,7 @@ class Simulation:
             "creep": self.missing_effects.creep,
             "shared volume": self.shared_volume,
             "step resolution": self.step_resolution,
+            "hops": self.hops,
         }
 
     def motion(self) -> dict[str, np.ndarray]:
@@ -321,6 +323,7 @@ class Simulation:
         """
         if not flag("brief", brief):
             self.missing_effects.sample(self.time_s)
+            self.hops.sample(self.time_s)
         elif self.divergence_check.keeps_bodies_apart:
             self.shared_volume.sample(self.time_s)
         self.divergence_check.check_shared(self.shared_volume)
@@ -463,6 +466,7 @@ class Simulation:
             missing_effects=() if brief else self.missing_effects.findings(shared_volume),
             unresolved=(
                 *self.step_resolution.findings(),
+                *self.hops.findings(),
                 *shared_volume.findings(),
                 *open_account(account, self.divergence_check.round_off()),
             ),

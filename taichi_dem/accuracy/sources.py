@@ -121,8 +121,9 @@ def finer_law(law: Any) -> tuple[BodyContact | None, float]:
         parts = min(2 * law.parts, MOST_PARTS)
         if parts == law.parts:
             return None, math.nan
+        same = law.outer_faces, law.restitution, law.stiffness
         lists = law.skin, law.neighbours_per_body, law.pairs_per_body
-        return BodyContact(parts, law.outer_faces, *lists), 1.0 / (1.0 - (law.parts / parts) ** 2)
+        return BodyContact(parts, *same, *lists), 1.0 / (1.0 - (law.parts / parts) ** 2)
     if isinstance(law, SphereContact):
         return BodyContact(_FINE, law.outer_faces), 1.0
     return None, math.nan

@@ -9,6 +9,7 @@ from taichi_dem.kit.products import matvec, squared
 from taichi_dem.kit.validation import between, flag, shown, whole
 from taichi_dem.laws.base import Effect
 from taichi_dem.materials import Material
+from taichi_dem.materials.body_materials import BodyMaterials
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.physics.sphere_pair import Nearest, is_within, meeting, normal_force
@@ -71,8 +72,9 @@ class SphereContact(Effect):
     activation = "spheres of free faces touch"
     #: Whether bodies meet each other, instead of their spheres.
     meets_bodies = False
-    #: The constants of a material that are its stiffness and its dashpot; unit of the stiffness.
-    constants, unit = ("contact_stiffness", "contact_damping"), "N/m"
+    #: What makes it stiffer, how that is written, what calms it, and why it may have no dashpot.
+    knob, firmer = "contact_stiffness", "a contact_stiffness of {value:.2g} N/m"
+    calmer, undamped = "a larger contact_damping", "contact_damping of the material is 0"
 
     def __init__(
         self,
@@ -108,9 +110,17 @@ class SphereContact(Effect):
         """Spheres of a model, in balls that hold all of a face, or of a body, that can touch."""
         return spheres_of_faces(model.mesh, model.centre, self.divisions)
 
-    def areas(self, mesh: Mesh) -> Any:
-        """Largest factor of the constants in a contact of each body, (n,) or one."""
-        return 1.0
+    def strongest(self, mesh: Mesh, materials: BodyMaterials) -> tuple[Any, Any]:
+        """Largest stiffness [N/m] and dashpot [N s/m] of a contact of each body, (n,) or one."""
+        return self.firmness(materials), materials.of_contacts("contact_damping")
+
+    def firmness(self, materials: BodyMaterials) -> Any:
+        """Largest value of the constant that ``knob`` names, of each body, (n,) or one."""
+        return materials.of_contacts("contact_stiffness")
+
+    def is_damped(self, material: Material) -> bool:
+        """Whether contacts of a material, with numbers for its rules, have a dashpot."""
+        return float(material.contact_damping) > 0.0
 
     def declare_columns(self, store: PairStore) -> None:
         """Keep the pair store, which takes the contacts that are found."""
@@ -204,6 +214,11 @@ class SphereContact(Effect):
     def damping(self, m):
         """Damping coefficient of a contact [N s/m]; friction shares it."""
         return self.law[m, 1]
+
+    @ti.func
+    def weight(self, a, b, area):
+        """Factor of the rate at which entry (a, b) parts, in its dashpot."""
+        return 1.0
 
     @ti.func
     def stored(self, m, overlap):

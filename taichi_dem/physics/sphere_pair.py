@@ -94,7 +94,8 @@ class Meeting:
     normal: from the first to the second, world. arm: from the first body's centre to the middle
     of the overlap, world [m]. area: by which the numbers of a law are multiplied; 1 for spheres, of
     contact [m2] for bodies. couple: moment of the contact about its point, per force along the
-    normal, world [m]; 0 for spheres.
+    normal, world [m]; 0 for spheres. weight: by which the rate of a dashpot is multiplied, 1 for
+    spheres, as ``BodyContact.weight`` for bodies.
     """
 
     overlap: ti.f64
@@ -102,6 +103,7 @@ class Meeting:
     arm: ti.types.vector(3, ti.f64)
     area: ti.f64
     couple: ti.types.vector(3, ti.f64)
+    weight: ti.f64
 
 
 @ti.func
@@ -114,7 +116,9 @@ def meeting(first, reach, apart, rotation):
     overlap = reach - distance
     normal = matvec(rotation, apart) / distance
     arm = matvec(rotation, first.xyz) + (first[3] - 0.5 * overlap) * normal
-    return Meeting(overlap=overlap, normal=normal, arm=arm, area=1.0, couple=0.0 * normal)
+    return Meeting(
+        overlap=overlap, normal=normal, arm=arm, area=1.0, couple=0.0 * normal, weight=1.0
+    )
 
 
 @ti.func

@@ -161,9 +161,10 @@ class DivergenceCheck:
             words = "and the scene starts so: move the bodies apart"
             return self._error(body, what, (words, {}))
         law = self.run.model.contact
-        stiffness = self.run.model.materials.of_contacts(law.constants[0])
+        stiffness = law.firmness(self.run.model.materials)
         firm = RAISED * float(np.broadcast_to(stiffness, self.run.model.body_count)[body])
-        firmer = _to_try("its contacts are too soft", law.constants[0], firm, law.unit)
+        firmer = law.firmer.format(law=type(law).__name__, value=firm)
+        firmer = f"its contacts are too soft: try {firmer}", {law.knob: float(f"{firm:.2g}")}
         return self._error(body, what, self._shorter_step(body) or firmer)
 
     def _beside(self, body):
@@ -208,16 +209,14 @@ class DivergenceCheck:
         if model.by_role["dashpot"] and stiff:
             limits["bond dashpots"] = steps["bond_dashpot"]
         if run.contacts is not None:
-            of_contacts = model.materials.of_contacts
             pairs, counts, _ = run.contacts.store.near_table()
             # Most contacts that a body has with another, over its mass [1/kg].
             rates, mass = np.zeros(model.body_count), model.body_mass
             np.maximum.at(rates, pairs, np.maximum(1, counts)[:, None] / mass[pairs])
-            rates *= model.contact.areas(model.mesh)
-            stiffness, damping = model.contact.constants
-            limits["contact springs"] = spring_step(of_contacts(stiffness) * rates)
+            stiffness, damping = model.contact.strongest(model.mesh, model.materials)
+            limits["contact springs"] = spring_step(stiffness * rates)
             if stiff:
-                limits["contact dashpots"] = dashpot_step(of_contacts(damping) * rates)
+                limits["contact dashpots"] = dashpot_step(damping * rates)
         return limits
 
 

@@ -50,8 +50,7 @@ class Creep(Kept):
         law, model = run.model.contact, run.model
         self.softest, self.parting_s = np.inf, 0.0
         if law is not None:
-            of_contacts, area = model.materials.of_contacts, law.areas(model.mesh)
-            stiffness, damping = (of_contacts(name) * area for name in law.constants)
+            stiffness, damping = law.strongest(model.mesh, model.materials)
             self.softest = float(np.min(stiffness))
             self.parting_s = float(np.max(damping)) / self.softest
 

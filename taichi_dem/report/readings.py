@@ -317,7 +317,8 @@ class Readings:
                 else:
                     rate = count * self.contacts.law.damping(self.tables.pair(i, j))
                     if ti.static(self.contacts.law.meets_bodies):
-                        rate *= self.contacts.law.largest_area(i, j)
+                        area = self.contacts.law.largest_area(i, j)
+                        rate *= area * self.contacts.law.weight(i, j, area)
                     rate *= 1.0 / self.tables.mass[i] + 1.0 / self.tables.mass[j]
                     ti.atomic_max(taken[i], rate * self.advance.schedule.pair_step(i, j))
 

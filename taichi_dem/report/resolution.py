@@ -68,22 +68,24 @@ class StepResolution(Kept):
 
     slip: largest residual slip of a bond that held over the shortest edge of its face, the bond,
     when, and the number of bonds that slipped too far. share: least share of its dashpots that each
-    bond kept while it held, (bond_count,). step: shortest step of each body [s]; lightest: least
-    ``mass`` of it and of bodies near it; pair_share: least recorded share of its contacts; taken:
-    largest part of a speed that they take in a step; all (body_count,). mass: of each body over
-    what the dashpot of a contact is multiplied by at most [kg; of whole bodies kg/m2].
+    bond kept while it held, (bond_count,). step: shortest step of each body [s]; fastest: largest
+    ``rate`` of it and of bodies near it; pair_share: least recorded share of its contacts; taken:
+    largest part of a speed that they take in a step; all (body_count,). rate: of the dashpot of a
+    contact, by which a body slows [1/s].
     """
 
-    kept = "slip", "share", "pair_share", "taken", "step", "lightest"
+    kept = "slip", "share", "pair_share", "taken", "step", "fastest"
 
     def __init__(self, run: Run):
         self.run, bodies = run, run.model.body_count
         self.slip = np.array([0.0, -1.0, 0.0, 0.0])
         self.share, self.pair_share = np.ones(run.model.bond_count), np.ones(bodies)
         self.taken, self.step = np.zeros(bodies), np.full(bodies, np.inf)
-        contact, mass = run.model.contact, run.model.body_mass
-        self.mass = mass / (1.0 if contact is None else contact.areas(run.model.mesh))
-        self.lightest = self.mass.copy()
+        contact, self.rate = run.model.contact, np.zeros(bodies)
+        if contact is not None:
+            _, damping = contact.strongest(run.model.mesh, run.model.materials)
+            self.rate = damping / run.model.body_mass
+        self.fastest = self.rate.copy()
         corners = run.model.mesh.points[run.model.topology.vertices]
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
         by_role = run.model.by_role
@@ -119,11 +121,11 @@ class StepResolution(Kept):
 
     def _note_partners(self, contacts):
         """Remember steps and light partners: few contacts last until a recording."""
-        level = values(self.run.state.level, slice(len(self.mass)))
+        level = values(self.run.state.level, slice(len(self.rate)))
         self.step = np.minimum(self.step, self.run.schedule.dt0 / 2.0**level)
         pairs, _, _ = contacts.store.near_table()
         for one, other in (pairs.T, pairs.T[::-1]):
-            np.minimum.at(self.lightest, one, self.mass[other])
+            np.maximum.at(self.fastest, one, self.rate[other])
 
     def findings(self) -> tuple[str, ...]:
         """Sentences about dashpots and failures that the step did not resolve; may be empty."""
@@ -165,19 +167,18 @@ class StepResolution(Kept):
     def _contact_shares(self):
         """Largest share that limited contact dashpots can have had where they acted, (body_count,).
 
-        The recorded share, or that of a single contact, 1 / X with X = 2 c dt / m; see
+        The recorded share, or that of a single contact, 1 / X with X = 2 dt c / m; see
         ``stability/body_limits.py``. Contacts that took energy have acted; it is booked to the
         first body of a pair.
         """
         if self.run.contacts is None or not self.run.advance.limited:
             return self.pair_share
-        damping = self.run.model.materials.of_contacts(self.run.model.contact.constants[1])
-        if not np.any(damping):
-            return self.pair_share
         heat = values(self.run.state.contact_heat, slice(self.run.model.body_count))
         acted = heat[:, :2].sum(axis=1) > 0.0
-        x = 2.0 * damping * self.step / self.lightest
-        return np.minimum(self.pair_share, np.where(acted, 1.0 / np.maximum(1.0, x), 1.0))
+        with np.errstate(invalid="ignore"):
+            # A body without dashpots and of no recorded step gives no number, and keeps all.
+            x = np.fmax(1.0, 2.0 * self.fastest * self.step)
+        return np.minimum(self.pair_share, np.where(acted, 1.0 / x, 1.0))
 
     def _openings_at_failure(self):
         """Largest opening of the units of every bond that failed over the failure opening, (b,)."""

@@ -140,8 +140,7 @@ class SharedVolume(Kept):
         if contact is None or worst.share <= NOTABLE or worst == _told(self.first):
             return self.at_start()
         law = type(contact).__name__
-        stiffness = contact.constants[0]
-        advice = f"a larger {stiffness}, or more points of {law}, keeps them apart"
+        advice = f"a larger {contact.knob}, or more points, of {law} keeps them apart"
         if not contact.outer_faces:
             advice = f"{remedy(contact)} lets them touch there too"
         return (*self.at_start(), f"{_words(worst, f't = {worst.time_s:.4g} s')}: {advice}")

@@ -124,8 +124,11 @@ class ContactLimits:
                 p, side = self.store.second_slot[second + k - swap], 1
             if self.count[p] != 0:
                 a, b, c = self._add_pair(p, side, a, b, c)
-                m = self.tables.pair(self.store.body[p][0], self.store.body[p][1])
-                constants = self.contacts.law.damping(m), self.contacts.law.elastic(m, 1.0)
+                i, j = self.store.body[p][0], self.store.body[p][1]
+                law, m, weight = ti.static(self.contacts.law), self.tables.pair(i, j), 1.0
+                if ti.static(law.meets_bodies):
+                    weight = law.weight(i, j, law.largest_area(i, j))
+                constants = weight * law.damping(m), law.elastic(m, 1.0)
                 largest = ti.max(largest, ti.Vector(constants))
         return largest_eigenvalue(a, b, c) * largest
 

@@ -187,9 +187,8 @@ def step_report(scene: Scene) -> StepReport:
     if not damped:
         del limits["bond_dashpot"]
     if contact is not None:
-        stiffness, damping = map(material.of_contacts, contact.constants)
+        stiffness, damping = contact.strongest(mesh, material)
         whole_face = contact_eigenvalues(mesh, material.density, contact.divisions, friction)
-        whole_face = whole_face * contact.areas(mesh)
         limits["contact_stiffness"] = spring_step(stiffness * whole_face)
         limits["contact_dashpot"] = dashpot_step(damping * whole_face)
     vectors = geometry.area_vectors(mesh.points, geometry.all_faces(mesh.tetrahedra))

@@ -156,8 +156,9 @@ class ContactForce:
                 slide = velocity - rate * normal
                 if ti.static(self.contacts.law.meets_bodies):
                     rate += dot(met.couple, self.state.spin[j] - self.state.spin[i])
-                push = met.area * self.contacts.law.normal(m, overlap, self._limited(rate, scale))
-                drag = met.area * self._limited(self.contacts.law.damping(m), scale)
+                weighted = self._limited(met.weight * rate, scale)
+                push = met.area * self.contacts.law.normal(m, overlap, weighted)
+                drag = met.area * self._limited(met.weight * self.contacts.law.damping(m), scale)
                 spring = met.area * self.contacts.law.elastic(m, overlap)
                 rub, stuck, spent = self._rub(m, k, i, normal, push, drag, slide, elapsed, stepping)
                 pushed = push * normal + rub

@@ -133,6 +133,9 @@ class BlastScene:
         draws = self.draws
         if of is effects.SphereContact and draws.chance(0.3):
             return of(outer_faces=draws.one_of(True, False, "once_broken"), skin=draws.near(0.015))
+        if of is effects.BodyContact and draws.chance(0.5):
+            stiffness = draws.near(CONCRETE.normal_stiffness)
+            return of(restitution=draws.one_of(1.0, 0.5, 0.01), stiffness=stiffness)
         if of is effects.SlipWeakening:
             return of(draws.near(1000.0))
         return of()

@@ -170,7 +170,7 @@ def test_a_small_body_on_a_large_face_has_the_energy_of_its_own_face(size):
 
 def run(parts, until, turn=(1.0, 0.0, 0.0, 0.0), velocity=0.0):
     """Report of a run of bodies, and their motion at its end."""
-    scene = Scene(placed_together(parts), LOSSLESS, [effects.BodyContact()])
+    scene = Scene(placed_together(parts), LOSSLESS, [effects.BodyContact(restitution=1.0)])
     simulation = Simulation(scene, Uniform(1e-7))
     simulation.state.set_motion(simulation.model.centre, turn, velocity)
     return run_simulation(simulation, until=until, progress=None).report, simulation.motion()

@@ -72,7 +72,7 @@ class PairDashpots:
         self.share = ti.Vector.field(2, real, shape=spheres)
         self.of_bodies = self.contacts.law.meets_bodies
         if self.of_bodies:
-            self.area = ti.field(real, shape=spheres)
+            self.drag_area = ti.field(real, shape=spheres)
             self.couple = ti.Vector.field(3, real, shape=spheres)
         self.impulse = self.store.sphere_column("solved_impulse", real, 3)
         self.branch = ti.Vector.field(3, real, shape=pairs)
@@ -195,7 +195,7 @@ class PairDashpots:
                 moment += cross(arm, self.impulse[k])
                 depth = overlap
                 if ti.static(self.of_bodies):
-                    self.area[end], self.couple[end] = met.area, met.couple
+                    self.drag_area[end], self.couple[end] = met.area * met.weight, met.couple
                     moment += dot(self.impulse[k], normal) * met.couple
                     depth = near.reach
                 deepest = ti.max(deepest, depth / near.size)
@@ -232,7 +232,7 @@ class PairDashpots:
         """Impulse of a contact's dashpot per velocity in a step [kg]."""
         damping = self.schedule.step_seconds[0] * self.contacts.law.damping(m)
         if ti.static(self.of_bodies):
-            damping *= self.area[c]
+            damping *= self.drag_area[c]
         return damping
 
     @ti.func
@@ -392,10 +392,10 @@ class PairDashpots:
                 spring = met.area * self.contacts.law.elastic(m, ti.max(met.overlap, 0.0))
                 found.dragged += (spring - pressed) * rate
                 rub = pushed - pressed * met.normal
+                found.rub += norm(rub)
                 if ti.static(self.springs.present):
                     rub -= self.springs.force(m, k, rotation)
                 found.rubbed -= dot(rub, velocity)
-                found.rub += norm(rub)
                 found.bound += self.tables.friction.limit(m, pressed)
                 found.stored += self.contacts.overlap_energy(m, met)
                 found.leverage += self.contacts.leverage(met, pushed, pressed)
