@@ -14,7 +14,7 @@ from ca_damper.report.steady_state import BATCHES, correlation_factor
 from ca_damper.runs.response import Response
 from taichi_dem.kit.bars.answer import ErrorParts, Values
 from taichi_dem.kit.bars.chance import clusters_of, t_quantile
-from taichi_dem.kit.bars.step import StepPart, step_part
+from taichi_dem.kit.bars.step import SUPPORTED, StepPart, step_part
 
 #: Order of the step's error: contacts begin and end within a step, and so do an automaton's
 #: events, which is of first order whatever integrates the motion between them.
@@ -152,8 +152,12 @@ def estimate(
     grid: np.ndarray,
     confidence: float,
     rounding: float = 0.0,
+    tolerance: float = 0.0,
 ) -> Estimate:
-    """Estimate of a goal from its values at steps, as multiples of the finest and from it on."""
+    """Estimate of a goal from its values at steps, as multiples of the finest and from it on.
+
+    tolerance: share that is asked for, of which two steps support no less than a part.
+    """
     means = np.array([one.mean for one in levels])
     errors = np.array([np.maximum(one.sampling, one.apart) for one in levels])
     step = step_part(steps, means, errors, STEP_ORDER, confidence)
@@ -162,6 +166,8 @@ def estimate(
     shown = np.minimum(rounding, np.abs(means).max(axis=0))
     sampling = np.hypot(np.hypot(sampling, grid), shown)
     shift = np.where(step.regular, _shift(step.error, np.hypot(sampling, chance), confidence), 0.0)
+    if len(steps) < 3:
+        shift = np.maximum(shift, SUPPORTED * tolerance * size_of(step.value))
     parts = ErrorParts(step=np.maximum(step.error, shift), chance=chance, sampling=sampling)
     return Estimate(goal, parts, tuple(levels), step, grid, rounding)
 

@@ -175,7 +175,8 @@ class Search:
             few = seeds[:_GRID_SEEDS], self.steps[-1] * self.at.dt
             grid = self.readings.grid_error(goal, ratios, self._wide(), *few)
         rounding = rounding_of(goal, self.job.oscillator)
-        return estimate(goal, self.steps, levels, grid, self.job.confidence, rounding)
+        asked = self.job.confidence, rounding, self.job.tolerance
+        return estimate(goal, self.steps, levels, grid, *asked)
 
     def _reduce(self, found: list[Estimate]) -> bool:
         """Ask for more where the worst estimate needs it; False where all is done that can be."""

@@ -21,7 +21,7 @@ from taichi_dem.kit.bars.answer import (
 )
 from taichi_dem.kit.bars.budget import Source
 from taichi_dem.kit.bars.chance import mean_and_deviation, t_quantile
-from taichi_dem.kit.bars.step import StepError, step_error
+from taichi_dem.kit.bars.step import SUPPORTED, StepError, step_error
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.validation import told_apart
@@ -62,6 +62,8 @@ class Search:
     def _answered(self):
         self._begin()
         parts, pilot_s = self._parts(), self.runs.seconds
+        if self._is_pair and not self._eventful:
+            self._confirm()
         while not self.why and parts.total > self._allowed:
             self._reduce(parts)
             parts = self._parts()
@@ -93,6 +95,8 @@ class Search:
         falling = f"{counted(runs.count, 'run')} at falling steps"
         twins = counted(self.twins.count, "twin") if self.twins.count else "nothing can split twins"
         step = Source("step", math.hypot(parts.step, parts.solver), falling, runs.seconds)
+        if self._is_pair:
+            falling += ", a third of the tolerance at least"
         return step, Source("chance", parts.chance, twins, 0.0)
 
     def _beside(self):
@@ -121,6 +125,20 @@ class Search:
     @property
     def _allowed(self):
         return self.job.tolerance * abs(self._value(self.levels[-1]))
+    def _confirm(self):
+        """Make a third run where two have the same value: another step may have another one."""
+        last, third = self.levels[-1], self.job.nearby(self.levels[-1])
+        agree = self._allowed > 0.0 and self._step().error == 0.0
+        if agree and self._affords(2.0 ** (third - last), last):
+            self.levels += [third] * (self.runs.value(third) is not None)
+        # What is not confirmed has the bar of two runs.
+        self.why = ""
+
+    @property
+    def _is_pair(self):
+        """Whether two runs are all that the bar has: twins without events differ by rounding."""
+        return len(self.levels) == 2 and not (self._eventful and self.twins.count)
+
 
     def _value(self, level):
         """Value at a level; where one run means little, the mean over a run and its twins."""
@@ -151,7 +169,9 @@ class Search:
         """Half-widths of the bar by source; that of sweeps once a second step was not enough."""
         step, first = self._step().error, self.levels[0]
         chance = self._spread() if self._eventful or self.job.goal.averaged else 0.0
-        if len(self.levels) == 2 or self.why or not self.job.solves:
+        if self._is_pair:
+            step = max(step, SUPPORTED * self._allowed)
+        if not step or len(self.levels) == 2 or self.why or not self.job.solves:
             return ErrorParts(step=step, chance=chance)
         tight = self.runs.value(first, 0, True)
         sweeps = math.inf if tight is None else abs(tight - self.runs.value(first))

@@ -120,8 +120,39 @@ def test_bars_of_a_power_law_hold_and_are_not_too_wide(searched, tolerance, orde
 
 
 def test_a_value_that_agrees_by_chance_has_the_bar_of_what_usual_bodies_do(searched):
-    answer = searched(job(0.1), lambda level, twin: 3.0, moved=0.06)
+    answer = searched(job(0.05), lambda level, twin: 3.0, moved=0.06)
     assert answer.error == pytest.approx(1.1 / 3.0 * 0.06 * 3.0)
+
+
+@pytest.mark.parametrize("tolerance", [0.01, 0.1])
+@pytest.mark.parametrize("averaged", [False, True])
+def test_two_runs_support_no_bar_below_a_third_of_the_tolerance(searched, tolerance, averaged):
+    """Nor do twins that differ by rounding. It costs no run, and what was asked is reached."""
+    goal = goals.displacement("right")
+    asked = job(tolerance, goal.mean() if averaged else goal)
+    answer = searched(asked, power(2.0, 1e-6))
+    assert answer.reached and answer.error == pytest.approx(tolerance * answer.value / 3.0)
+    assert answer.plan.runs == (2 if not averaged else 2 + 5 * 2)
+    assert answer.sources[0].error == pytest.approx(answer.error)
+
+
+@pytest.mark.parametrize("tolerance", [0.01, 0.1])
+def test_a_bar_narrower_than_a_third_has_three_runs_or_more(searched, tolerance):
+    """Over power laws whose first difference is a tenth of what is asked to ten times as much."""
+    for factor in np.geomspace(0.1, 10.0, 9) * 3.0 * tolerance:
+        for order, events in ((1.0, True), (2.0, False)):
+            answer = searched(job(tolerance), power(order, factor), events=events, moved=1e-9)
+            assert answer.plan.runs > 2 or answer.share >= 0.999 * tolerance / 3.0
+
+
+@pytest.mark.parametrize(("budget", "runs"), [(math.inf, 3), (3.5, 2)])
+def test_the_same_number_twice_is_confirmed_by_a_third_step(searched, budget, runs):
+    """Or has the bar of two, where no budget is left for it."""
+    answer = searched(job(0.01), lambda level, twin: 3.0, budget=budget)
+    assert answer.plan.runs == runs and answer.reached
+    assert answer.error == pytest.approx(0.0 if runs > 2 else 0.01 * 3.0 / 3.0)
+    other = searched(job(0.01), lambda level, twin: 3.0 if level < 1.5 else 2.0)
+    assert not other.reached or abs(other.value - 2.0) <= other.error
 
 
 def test_twins_that_scatter_get_no_single_number(searched):

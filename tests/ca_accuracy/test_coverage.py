@@ -149,3 +149,13 @@ def test_a_bar_holds_the_limit_where_the_step_s_error_is_like_that_of_chance():
             found = estimate(GOAL, steps, levels, NOTHING, 0.95)
             held.append(bool(abs(found.value[0] - 1.0) <= found.parts.total[0]))
     assert 0.93 <= np.mean(held) <= 0.97
+
+
+@pytest.mark.parametrize("steps", [(1.0, 2.0), (1.0, 2.0, 4.0)])
+def test_two_steps_support_no_bar_below_a_third_of_the_tolerance(steps):
+    """Three that agree do: their error is that of their changes, of first order."""
+    levels = [SeedValues(np.array([[2.0 + 1e-6 * k]]), np.zeros(1), 200, NOTHING) for k in steps]
+    found = estimate(GOAL, steps, levels, NOTHING, 0.95, tolerance=0.03)
+    third = 0.03 * found.value[0] / 3.0
+    assert found.parts.step[0] == pytest.approx(third if len(steps) == 2 else 1.25e-6)
+    assert found.parts.total[0] <= found.allowed(0.03)

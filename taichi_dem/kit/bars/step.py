@@ -17,6 +17,8 @@ from taichi_dem.kit.bars.chance import t_quantile
 
 #: Factor on the error of a finest run whose order has been seen.
 SAFETY = 1.25
+#: Share of the error that is allowed below which two runs support no bar: they may agree by luck.
+SUPPORTED = 1.0 / 3.0
 #: Orders that are believed: from the least one to the declared one and so much, which is more where
 #: chance blurs it.
 _LEAST_ORDER, _MORE, _MORE_BLURRED = 0.5, 0.5, 1.5
