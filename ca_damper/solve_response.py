@@ -143,7 +143,10 @@ def solve_response(
         search, estimates = _answered(replace(question, listener=open_ended))
         open_ended.end()
     failures = search.runs.failures
-    answers = tuple(doubted(_answer(search, found), *failures) for found in estimates)
+    answers = tuple(
+        doubted(_answer(search, found), *failures, *search.doubts(found.goal))
+        for found in estimates
+    )
     others = _others(question, other, answers, progress)
     answers = tuple(_with_filling(*pair, filling) for pair in zip(answers, others))
     return answers if isinstance(goal, (list, tuple)) else answers[0]

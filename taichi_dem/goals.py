@@ -2,7 +2,7 @@
 
 A user-defined goal takes one line; its function gets a ``Result`` with a frame at its end:
 
-    fastest = Goal("fastest body", "m/s", lambda result: result.peak_speed.max())
+    fastest = Goal("fastest body", "m/s", lambda result: result.peak_speed.max(), "extreme")
 """
 
 from collections.abc import Callable
@@ -35,8 +35,9 @@ class Goal(BaseGoal):
     function : callable, optional
         Function of a Result with a frame at its end; returns a number.
     kind : str, default "value"
-        ``"value"``: at the end. ``"extreme"``: over the run; Results then have a time series.
-        ``"count"``: a value that changes in steps, such as a whole number.
+        ``"value"``: at the end. ``"extreme"``: over the run; Results then have a time series, and
+        an extreme at its start, or that still grows at its end, is no answer. ``"count"``: a value
+        that changes in steps, such as a whole number.
     averaged : bool, default False
         Whether the goal is the mean over runs that differ by chance, see ``mean``.
     check : callable or None, optional
@@ -49,8 +50,8 @@ class Goal(BaseGoal):
 
     Examples
     --------
-    >>> Goal("fastest body", "m/s", lambda result: result.peak_speed.max()).kind
-    'value'
+    >>> Goal("fastest body", "m/s", lambda result: result.peak_speed.max(), "extreme").kind
+    'extreme'
     """
 
     kinds: ClassVar[tuple[str, ...]] = ("value", "extreme", "count")

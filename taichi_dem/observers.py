@@ -311,6 +311,11 @@ class RunView:
         return locked(self._simulation.state.broken())
 
     @property
+    def peak_speed(self) -> np.ndarray:
+        """Largest speed of each body at the samples so far [m/s], (body_count,)."""
+        return locked(self._recorder.peak_speed)
+
+    @property
     def evaluations(self) -> int:
         """Bonds and contact pairs evaluated so far."""
         return self._simulation.evaluations()

@@ -245,6 +245,20 @@ class Readings:
         known = np.where(np.isnan(change), -1.0, change).max(axis=0)
         return np.where(known < 0.0, 0.1 * np.abs(own), known)
 
+    def is_at_end(
+        self, goal: Goal, ratios: Sequence[float], seeds: Sequence[int], dt: float
+    ) -> bool:
+        """Whether most seeds have an extreme at the first or last of some ratios.
+
+        It changes without them then, and nothing says how much further it goes beyond.
+        """
+        whole, *without = (
+            goal.values(self.response(some, seeds, dt))
+            for some in (ratios, ratios[1:], ratios[:-1])
+        )
+        changed = np.any([np.abs(one - whole) > 0.0 for one in without], axis=0)
+        return bool((changed.mean(axis=0) > 0.5).any())
+
     def series(self, goal: Goal, key: SceneKey) -> np.ndarray:
         """A goal by cycle, of one that is made of the frequency of this scene alone, (cycles,)."""
         values = {name: value[None, None] for name, value in self.runs.by_cycle(key).items()}

@@ -151,6 +151,19 @@ class Search:
         """Triples of ratios at twice the spacing around the peak, where a goal lies on it."""
         return self.lattice.wide(self.peak, self.at.level) if self.job.follows_peak else ()
 
+    def doubts(self, goal: Goal) -> list[str]:
+        """Reason to doubt a goal of the peak: it does not peak there."""
+        if goal.ratios:
+            return []
+        ratios = sorted({*self.ratios_of(goal), *(one for some in self._wide() for one in some)})
+        seeds, dt = self.at.seeds[:_GRID_SEEDS], self.steps[-1] * self.at.dt
+        if not self.readings.is_at_end(goal, ratios, seeds, dt):
+            return []
+        return [
+            "the extreme lies at an end of the frequencies around the highest RMS, so that it may "
+            "go on beyond: ask for values at ratios"
+        ]
+
     def longest(self) -> int:
         """Most cycles that a scene went."""
         return max(map(self.runs.cycles, self._keys()))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_dem.accuracy.extremes import BEFORE, Earlier, change
 from taichi_dem.elasticity.rates import largest_bond_rate, springs_of
 from taichi_dem.goals import Goal
 from taichi_dem.kit.display import counted
@@ -140,6 +141,7 @@ class Runs:
         self.results: dict[float, Result] = {}
         self.cost: dict[float, float] = {}
         self._simulation: Simulation | None = None
+        self._earlier: dict[float, Earlier] = {}
         self._known: dict[tuple[float, int, bool], float | None] = {}
 
     def eventful(self, level: float) -> bool:
@@ -193,6 +195,23 @@ class Runs:
         slower, faster = (self.results[level].peak_speed for level in (coarse, fine))
         return _share(np.abs(slower - faster), faster, _EPSILON * faster.max())
 
+    def late_change(self, level: float) -> float:
+        """How much an extreme changes in the last tenth of the run at a level."""
+        at = self._earlier[level]
+        return change(self.job.goal, self.results[level], at.time_s, at.peak_speed)
+
+    def longer_change(self, level: float) -> float:
+        """How much an extreme changes after the end of the run at a level, in one that is longer.
+
+        Infinite where that diverges.
+        """
+        self.release()
+        longer = Runs(replace(self.job, until=self.job.until / BEFORE), self.listen)
+        value = longer.value(level)
+        longer.release()
+        self.seconds, self.count = self.seconds + longer.seconds, self.count + 1
+        return math.inf if value is None else longer.late_change(level)
+
     def leap(self, coarse: float, fine: float) -> float:
         """Change of a number of broken faces between two levels that may go unseen, as a share.
 
@@ -235,6 +254,9 @@ class Runs:
             simulation.state.set_motion(**_displaced(simulation, twin))
         looks: Any = {"samples": self.job.rows(level, brief), "frames": frames, "progress": None}
         until = self.job.until
+        if self.job.goal.kind == "extreme" and not (twin or tight):
+            self._earlier[level] = Earlier(until)
+            looks["observers"] = [self._earlier[level]]
         return result_of(run_simulation, simulation, until=until, brief=brief, **looks)
 
 

@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Callable
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
 
+from taichi_dem.accuracy.extremes import extreme_doubts
 from taichi_dem.accuracy.runs import Job, Runs
 from taichi_dem.accuracy.sources import Beside, awake_price
 from taichi_dem.accuracy.twins import MANY, Twins
@@ -61,16 +62,17 @@ class Search:
 
     def _answered(self):
         self._begin()
-        parts, pilot_s = self._parts(), self.runs.seconds
         if self._is_pair and not self._eventful:
             self._confirm()
+        parts, pilot_s = self._parts(), self.runs.seconds
         while not self.why and parts.total > self._allowed:
             self._reduce(parts)
             parts = self._parts()
         job, last, beside = self.job, self.levels[-1], tuple(self._beside().sources())
         parting = self.runs.parting(self.twins.level) if parts.chance > self._allowed else math.inf
-        words, spent = job.in_words(last), self.runs.seconds - pilot_s
         short = f"{100.0 * job.tolerance:g} % was not reached: {self.why}" if self.why else ""
+        doubts = tuple(self._doubts(parts.total))
+        words, spent = job.in_words(last), self.runs.seconds - pilot_s
         made = Answer(
             goal=job.goal.name,
             unit=job.goal.unit,
@@ -87,22 +89,23 @@ class Search:
         if parts.chance > self._allowed:
             made = self.twins.branched(made, self._allowed, self._step().error)
         made = reduce(with_source, beside, made)
-        return doubted(made, *self._doubts(self.runs.results[last].report))
+        return doubted(made, *doubts)
 
     def _sources(self, parts):
         """Sources of error that runs of this question show, with the CPU time of all of them."""
         runs = self.runs
         falling = f"{counted(runs.count, 'run')} at falling steps"
-        twins = counted(self.twins.count, "twin") if self.twins.count else "nothing can split twins"
-        step = Source("step", math.hypot(parts.step, parts.solver), falling, runs.seconds)
         if self._is_pair:
             falling += ", a third of the tolerance at least"
+        twins = counted(self.twins.count, "twin") if self.twins.count else "nothing can split twins"
+        step = Source("step", math.hypot(parts.step, parts.solver), falling, runs.seconds)
         return step, Source("chance", parts.chance, twins, 0.0)
 
     def _beside(self):
         """What measures the sources that no step of this question mends."""
         first, report = self.levels[0], self.runs.results[self.levels[-1]].report
-        return Beside(self.job, self.runs, first, report, lambda more: self._affords(more, first))
+        affords = partial(self._affords, level=first)
+        return Beside(self.job, self.runs, first, report, affords, self._eventful)
 
     def _begin(self):
         """Find the longest step that is stable, and make the run again with a shorter one."""
@@ -122,9 +125,6 @@ class Search:
         self.levels.append(second)
         self.twins.level = first
 
-    @property
-    def _allowed(self):
-        return self.job.tolerance * abs(self._value(self.levels[-1]))
     def _confirm(self):
         """Make a third run where two have the same value: another step may have another one."""
         last, third = self.levels[-1], self.job.nearby(self.levels[-1])
@@ -139,6 +139,9 @@ class Search:
         """Whether two runs are all that the bar has: twins without events differ by rounding."""
         return len(self.levels) == 2 and not (self._eventful and self.twins.count)
 
+    @property
+    def _allowed(self):
+        return self.job.tolerance * abs(self._value(self.levels[-1]))
 
     def _value(self, level):
         """Value at a level; where one run means little, the mean over a run and its twins."""
@@ -268,8 +271,12 @@ class Search:
     def _percent(self, error):
         return share_in_words(error, self._value(self.levels[-1]), self.job.goal.unit)
 
-    def _doubts(self, report):
+    def _doubts(self, bar):
         """Reasons to doubt the finest run, and what would settle each."""
+        first, last = self.levels[0], self.levels[-1]
+        report = self.runs.results[last].report
+        if self.job.goal.kind == "extreme":
+            yield from extreme_doubts(self.runs, first, last, bar, self._affords)
         yield from open_account(report.energy_balance, report.round_off_J)
         found = report.certificate
         if found is not None and not found.holds:

@@ -21,6 +21,9 @@ MEASURED = ("step", "contact", "mesh")
 _FINE = 6
 #: Share of all bodies that a run with all effects is compared with, at least.
 _LEAST_AWAKE = 1e-3
+#: Half-width by the mesh that half of all questions exceed, as a share of the value: where nothing
+#: breaks, touches or slips, and elsewhere (docs/decisions/028-error-bars.md).
+COMMON = {False: 0.008, True: 0.03}
 #: Times that a run with four times the rays takes longer, about.
 _RAYS = 4.0
 
@@ -30,7 +33,8 @@ class Beside:
     """Measures errors that no shorter step reduces, by runs at the coarsest level.
 
     They are as large there, and cost least. runs: those of the question. report: of the finest one.
-    affords: whether the budget lets so many runs be made.
+    affords: whether the budget lets so many runs be made. eventful: whether anything broke, touched
+    or slipped.
     """
 
     job: Job
@@ -38,6 +42,7 @@ class Beside:
     level: float
     report: Any
     affords: Callable[[float], bool]
+    eventful: bool = False
 
     def sources(self) -> Iterator[Source]:
         """Sources that the scene has, measured where the question asks for them."""
@@ -64,7 +69,9 @@ class Beside:
     def _mesh(self):
         """Spread over meshes of one size: half-width for the value on one of them."""
         if not self._measures("mesh", len(self.job.meshes)):
-            return self._unmeasured("mesh", "give other meshes of this size", 2.0)
+            unknown = self._unmeasured("mesh", "give other meshes of this size", 2.0)
+            common = COMMON[self.eventful] * abs(self.runs.value(self.level))
+            return replace(unknown, common=common)
         count = f"{len(self.job.meshes) + 1} meshes"
         values, seconds = self._values(
             [replace(self.job.scene, mesh=mesh) for mesh in self.job.meshes]

@@ -1,6 +1,7 @@
 """Sources of error beside the step: each is measured by its formula, or named as not measured."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -34,7 +35,9 @@ def touching(law=None, word=None):
 def found(monkeypatch):
     """Sources by name of a question whose runs have the values of a formula of their scene."""
 
-    def sources_of(scene, formula, asked=("step",), meshes=(), pairs=1, certificate=None, budget=9):
+    def sources_of(
+        scene, formula, asked=("step",), meshes=(), pairs=1, certificate=None, budget=9, **given
+    ):
         class Runs:
             seconds, listen, cost = 2.0, None, {0: 1.0}
 
@@ -50,7 +53,7 @@ def found(monkeypatch):
         monkeypatch.setattr(sources, "Runs", Runs)
         job = Job(scene, UNTIL, goals.kinetic_energy(), 0.01, 0.95, asked, tuple(meshes))
         report = SimpleNamespace(pair_evaluations=pairs, certificate=certificate)
-        beside = Beside(job, Runs(job), 0, report, lambda runs: runs <= budget)
+        beside = Beside(job, Runs(job), 0, report, lambda runs: runs <= budget, **given)
         return {one.name: one for one in beside.sources()}
 
     return sources_of
@@ -151,6 +154,34 @@ def test_a_bar_names_what_it_does_not_have():
     plan = Plan("a method", 2, 1.0, 0.0)
     words = str(Answer("way", "mm", 3.0, ErrorParts(step=0.3), 0.1, 0.95, plan, sources=listed))
     assert "(step 0.3; not in the bar: mesh)" in words and "not measured: ask" in words
+
+
+@pytest.mark.parametrize(
+    ("half", "common", "larger"), [(0.3, 0.4, 1), (0.3, 0.2, 0), (0.3, 0.0, 0)]
+)
+def test_the_first_line_names_a_larger_error_that_is_not_in_the_bar(half, common, larger):
+    listed = (
+        Source("step", half, "two runs"),
+        Source("contact", math.nan, "not measured: ask"),
+        Source("mesh", math.nan, "not measured: ask", 1.0, common),
+    )
+    plan = Plan("a method", 2, 1.0, 0.0)
+    made = Answer("way", "mm", 10.0, ErrorParts(step=half), 0.1, 0.95, plan, sources=listed)
+    assert [one.name for one in made.larger] == ["mesh"] * larger
+    first = str(made).splitlines()[0]
+    assert ("4 %" in first) == bool(larger) and "not in the bar: contact, mesh" in first
+    measured = replace(made, sources=(Source("mesh", common, "spread over 3 meshes", 1.0, common),))
+    assert measured.larger == ()
+
+
+@pytest.mark.parametrize("events", [False, True])
+def test_a_mesh_that_is_not_measured_has_the_error_that_half_of_all_questions_exceed(found, events):
+    """More where something breaks, and none of its own where it is measured."""
+    plain = found(touching(), lambda scene: -3.0, eventful=events)["mesh"]
+    assert plain.common == pytest.approx(3.0 * sources.COMMON[events])
+    assert sources.COMMON[False] < sources.COMMON[True]
+    asked = found(touching(), _length, ("step", "mesh"), [BAR, BAR], eventful=events)["mesh"]
+    assert asked.common == 0.0
 
 
 def test_a_branch_keeps_what_was_measured_beside_the_step():

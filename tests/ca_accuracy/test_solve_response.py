@@ -10,6 +10,7 @@ from ca_damper import (
     Automaton,
     Batch,
     Empty,
+    Goal,
     Oscillator,
     RigidMass,
     SceneTable,
@@ -55,6 +56,23 @@ def test_a_quantity_that_is_zero_has_the_bar_of_its_noise(noise):
     found = estimate(goals.loss_factor_at(1.0), (1.0, 2.0, 4.0), levels, none, 0.95, 1e-12)
     total = float(found.parts.total[0])
     assert 2.0 * noise <= total <= 20.0 * noise and found.shortfall(0.01, "") == ""
+
+
+@pytest.mark.parametrize(
+    ("measure", "peaks"),
+    [
+        (lambda found: found.amplitude[0], True),
+        # What only grows with the frequency, or only falls.
+        (lambda found: found.ratios[:, None] ** 2 * np.ones(len(found.seeds)), False),
+        (lambda found: -found.ratios[:, None] * np.ones(len(found.seeds)), False),
+    ],
+)
+def test_an_extreme_at_an_end_of_the_frequencies_is_no_answer(measure, peaks):
+    """The frequencies are those around the peak of RMS, where another measure may only grow."""
+    goal = Goal("largest", "1", lambda found: measure(found).max(axis=0), "extreme")
+    answer = solve_response(RigidMass(), particles=30, goal=goal, tolerance=0.05, **QUIET)
+    assert answer.reached == peaks == ("frequencies around" not in answer.shortfall)
+    assert answer.error <= 0.05 * abs(answer.value)
 
 
 def test_a_curve_of_a_rigid_mass():

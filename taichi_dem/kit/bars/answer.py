@@ -223,6 +223,12 @@ class Answer:
         return self.parts.total
 
     @property
+    def larger(self) -> tuple[Source, ...]:
+        """Sources that are not in the bar and commonly larger than it."""
+        outside = (one for one in self.sources if not one.measured)
+        return tuple(one for one in outside if one.common > largest(self.error))
+
+    @property
     def certificate(self) -> Any:
         """Certificate of the finest run, of a scene with effects="auto"; else None."""
         return getattr(self.result, "certificate", None)
@@ -251,7 +257,11 @@ class Answer:
     def _unmeasured(self):
         """What the bar does not have, in words."""
         names = [one.name for one in self.sources if not one.measured]
-        return f"; not in the bar: {', '.join(names)}" if names else ""
+        told = [f"; not in the bar: {', '.join(names)}"] if names else []
+        for one in self.larger:
+            share = share_in_words(one.common, self.value, self.unit)
+            told.append(f"; the {one.name} is commonly {share}, more than this bar")
+        return "".join(told)
 
     def _bar(self):
         if isinstance(self.value, np.ndarray):

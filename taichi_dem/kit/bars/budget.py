@@ -27,12 +27,16 @@ class Source:
         How it was measured, or what would measure it.
     seconds : float, default nan
         CPU time that its measurement took or would take [s]; nan if unknown.
+    common : float, default 0.0
+        Of a source that was not measured, the half-width that half of such questions exceed, in the
+        unit of the value; 0 if unknown.
     """
 
     name: str
     error: Any
     how: str
     seconds: float = math.nan
+    common: float = 0.0
 
     @property
     def measured(self) -> bool:
