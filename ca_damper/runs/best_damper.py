@@ -120,7 +120,25 @@ class BestDamper(Tabulated):
         words += [f"{name}: {value}" for name, value in self.errors.items()]
         if self.equals:
             words.append(f"{len(self.equals)} other boxes are as good to within the bars")
+        if self.at_ends:
+            ends = " and ".join(self.at_ends)
+            words.append(f"the best has the {ends} that was tried: one beyond may be better")
         return "\n".join(words)
+
+    @property
+    def at_ends(self) -> tuple[str, ...]:
+        """What of the best box lies at an end of what was tried, in words."""
+        best, boxes = self.grains, [one for one, _ in self.tried]
+        numbers = {float(one.particles) for one in boxes}
+        heights = {one.height for one in boxes if one.particles == best.particles}
+        found = []
+        for name, own, tried in (
+            ("number of grains", float(best.particles), numbers),
+            ("height", best.height, heights),
+        ):
+            ends = {"smallest": min(tried), "largest": max(tried)} if len(tried) > 1 else {}
+            found += [f"{side} {name}" for side, end in ends.items() if own == end]
+        return tuple(found)
 
     def columns(self) -> dict[str, Any]:
         """A row a box of the first look.

@@ -8,7 +8,7 @@ import pytest
 
 from ca_damper import Automaton, Oscillator, best_damper, excitation
 from ca_damper.errors import InputError
-from ca_damper.runs.best_damper import Value, _searched
+from ca_damper.runs.best_damper import BestDamper, Value, _searched
 from ca_damper.runs.grains import DENSITY, boxes_of, shifted
 from ca_damper.runs.settled import limit_of
 
@@ -76,6 +76,17 @@ def test_the_winner_has_the_lowest_upper_end_and_damps():
     assert all(made.value.mean + made.value.error <= end for end in ends)
     assert len(made.table()) == 2 and made.search_seconds > 0.0
     assert "30 grains of 6 mm" in str(made)
+
+
+@pytest.mark.parametrize(("place", "ends"), [(0, 2), (4, 0), (7, 1), (8, 2)])
+def test_a_winner_at_an_end_of_what_was_tried_says_so(place, ends):
+    """Of three numbers of grains with three heights each; of one box alone nothing is an end."""
+    boxes = boxes_of(6e-3, (10, 20, 30), BOX, DENSITY, 3)
+    value, none = Value(1e-3, 1e-4), (None, 2e-3, (), {})
+    tried = tuple((box, 1e-3) for box in boxes)
+    made = BestDamper(boxes[place], value, *none, tried, 0.0, 0.0)
+    assert len(made.at_ends) == ends and ("may be better" in str(made)) == bool(ends)
+    assert BestDamper(boxes[0], value, *none, tried[:1], 0.0, 0.0).at_ends == ()
 
 
 def test_a_box_whose_scenes_diverge_is_no_winner():
