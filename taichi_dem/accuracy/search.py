@@ -96,7 +96,7 @@ class Search:
         runs = self.runs
         falling = f"{counted(runs.count, 'run')} at falling steps"
         if self._is_pair:
-            falling += ", a third of the tolerance at least"
+            falling = "2 runs at falling steps, a third of the tolerance at least"
         twins = counted(self.twins.count, "twin") if self.twins.count else "nothing can split twins"
         step = Source("step", math.hypot(parts.step, parts.solver), falling, runs.seconds)
         return step, Source("chance", parts.chance, twins, 0.0)
