@@ -125,11 +125,12 @@ class ContactLimits:
             if self.count[p] != 0:
                 a, b, c = self._add_pair(p, side, a, b, c)
                 i, j = self.store.body[p][0], self.store.body[p][1]
-                law, m, weight = ti.static(self.contacts.law), self.tables.pair(i, j), 1.0
-                if ti.static(law.meets_bodies):
-                    weight = law.weight(i, j, law.largest_area(i, j))
-                constants = weight * law.damping(m), law.elastic(m, 1.0)
-                largest = ti.max(largest, ti.Vector(constants))
+                m, weight = self.tables.pair(i, j), 1.0
+                if ti.static(self.contacts.law.meets_bodies):
+                    weight = self.contacts.law.weight(i, j, self.contacts.law.largest_area(i, j))
+                damping = weight * self.contacts.law.damping(m)
+                constants = ti.Vector([damping, self.contacts.law.elastic(m, 1.0)])
+                largest = ti.max(largest, constants)
         return largest_eigenvalue(a, b, c) * largest
 
     @ti.func

@@ -4,6 +4,7 @@ A slope is a plate of 96 bodies under inclined gravity, with a cube of 48 bodies
 """
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,11 +15,13 @@ from taichi_dem import (
     Material,
     Scene,
     SimulationDiverged,
+    StepControl,
     Uniform,
     effects,
     simulate,
     step_report,
 )
+from taichi_dem.kit.allocation import values
 from taichi_dem.laws.body_contact import damping_ratio
 from taichi_dem.mesh.shapes import bar, placed_together, single
 from taichi_dem.simulate import run_simulation
@@ -99,6 +102,20 @@ def test_a_dashpot_kicks_back_from_the_reported_limit_on():
     )
     known = step_report(pair.simulation.scene).limits["contact_dashpot"]
     assert known.min() == pytest.approx(pair.mass[0] / dashpot, rel=1e-9)
+
+
+def test_controlled_steps_know_the_dashpot_of_the_pair():
+    """Face to face and centre to centre without friction, the rate of each is c / m of its mass."""
+    steps = partial(Uniform, control=StepControl())
+    pair = Pair(0.2, 1e-7, steps, restitution=0.05)
+    dashpot = (
+        2.0 * damping_ratio(0.05) * math.sqrt(CONCRETE.normal_stiffness * AREA * pair.pair_mass)
+    )
+    assert pair.rebound() == pytest.approx(0.05, rel=2.0 * damping_ratio(0.05) * pair.rate * 1e-7)
+    pair.simulation.state.set_motion(pair.simulation.model.centre)
+    pair.simulation.broad_phase.search()
+    limits = pair.simulation.schedule.limits
+    assert values(limits.contact_damping, slice(2)) == pytest.approx(dashpot / pair.mass, rel=0.07)
 
 
 def test_a_body_that_sinks_in_is_advised_of_the_stiffness_of_contact():
