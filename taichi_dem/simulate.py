@@ -107,7 +107,8 @@ def simulate(
     Notes
     -----
     A UserWarning before the first step names what the scene cannot do (``scene_warnings``),
-    histories that change within less than a step, and bodies that overlap at the start.
+    histories that change within less than a step, bodies that overlap at the start, and steps
+    above the longest one that is stable for sure (``step_report``).
 
     Examples
     --------
@@ -125,7 +126,8 @@ def simulate(
         warnings.warn(sentence, stacklevel=2)
     with reporting(progress, title) as tell:
         simulation, recorder = _started(Simulation(scene, method, driver))
-        for sentence in simulation.shared_volume.at_start():
+        found = simulation.shared_volume.at_start(), simulation.step_resolution.at_start()
+        for sentence in (*found[0], *found[1]):
             warnings.warn(sentence, stacklevel=2)
         writer = writer_of(simulation, recorder, checkpoint, resume, arrays)
         result, error = _result(simulation, recorder, writer, plan, tell)

@@ -51,7 +51,11 @@ def springs_of(material: AnyMaterial) -> tuple[Constant, Constant]:
 
 
 def bond_rates(
-    mesh: Mesh, topology: Topology, density: Density, coefficients: tuple[Constant, Constant]
+    mesh: Mesh,
+    topology: Topology,
+    density: Density,
+    coefficients: tuple[Constant, Constant],
+    multiply: Any = product,
 ) -> np.ndarray:
     """Largest eigenvalue of M^-1/2 G M^-1/2 of every body, shape (body_count,).
 
@@ -60,9 +64,10 @@ def bond_rates(
     contact units of each bonded face, J the map from (velocity, spin) to the velocity at the
     vertex (Konno et al., section 2.1, units at the vertices).  M holds mass and inertia.
     coefficients: normal and tangential coefficient per area, numbers or rules (``springs_of``);
-    [Pa s/m] gives rates [1/s], [Pa/m] gives squared angular frequencies [1/s2].
+    [Pa s/m] gives rates [1/s], [Pa/m] gives squared angular frequencies [1/s2]. multiply: np.matmul
+    takes a tenth of the time, by LAPACK, and differs in last bits.
     """
-    return subset_rates(mesh, topology, density, coefficients, subsets=(15,))[:, 0]
+    return subset_rates(mesh, topology, density, coefficients, (15,), multiply)[:, 0]
 
 
 def subset_rates(
@@ -71,31 +76,30 @@ def subset_rates(
     density: Density,
     coefficients: tuple[Constant, Constant],
     subsets: Sequence[int] = range(16),
+    multiply: Any = product,
 ) -> np.ndarray:
     """``bond_rates`` with only some of a body's bonds intact, shape (body_count, len(subsets)).
 
     subsets: bit f of each stands for the bond at local face f; the default is all sixteen.
     """
-    root, blocks = _roots_and_blocks(mesh, topology, density, coefficients)
+    root, blocks = _roots_and_blocks(mesh, topology, density, coefficients, multiply)
     rates = np.zeros((mesh.body_count, len(subsets)))
     for part in parts_in_cache(mesh.body_count):
         for column, subset in enumerate(subsets):
             intact = [face for face in range(4) if subset >> face & 1]
             total = blocks[part][:, intact].sum(axis=1)
-            rates[part, column] = scaled_eigenvalues(root[part], total)
+            rates[part, column] = scaled_eigenvalues(root[part], total, multiply)
     return np.maximum(rates, 0.0)
 
 
 def largest_bond_rate(
     mesh: Mesh, topology: Topology, density: Density, coefficients: tuple[Constant, Constant]
 ) -> float:
-    """Largest of ``bond_rates``, in a tenth of the time: by LAPACK, so but for its last bits."""
-    root, blocks = _roots_and_blocks(mesh, topology, density, coefficients, np.matmul)
-    scaled = root @ blocks.sum(axis=1) @ transposed(root)
-    return max(0.0, float(np.linalg.eigvalsh(scaled).max()))
+    """Largest of ``bond_rates``, in a tenth of the time."""
+    return float(bond_rates(mesh, topology, density, coefficients, np.matmul).max())
 
 
-def _roots_and_blocks(mesh, topology, density, coefficients, multiply=product):
+def _roots_and_blocks(mesh, topology, density, coefficients, multiply):
     """``inverse_root`` of every body, (n, 6, 6), and the blocks of its four bonds, (n, 4, 6, 6)."""
     mass, centre, inertia = body_properties(mesh, density)
     body, face = np.nonzero(topology.body_bond >= 0)
@@ -123,12 +127,14 @@ def face_laws(
     return area, across * np.eye(3) + (normally - across) * along
 
 
-def contact_eigenvalues(mesh: Mesh, density: Density, divisions: int, friction: bool) -> np.ndarray:
+def contact_eigenvalues(
+    mesh: Mesh, density: Density, divisions: int, friction: bool, multiply: Any = product
+) -> np.ndarray:
     """Largest eigenvalue of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], (n,).
 
     For all contacts of its worst face. D is the identity with friction, n n^T without; contacts act
     where a sphere touches its face. The step finds the same from the near contacts
-    (``stability/body_limits.py``).
+    (``stability/body_limits.py``). multiply: as for ``bond_rates``.
     """
     mass, centre, inertia = body_properties(mesh, density)
     spheres = spheres_of_faces(mesh, centre, divisions)
@@ -141,7 +147,8 @@ def contact_eigenvalues(mesh: Mesh, density: Density, divisions: int, friction: 
         arms = spheres.centre[:, face] + spheres.radius[:, face, :, None] * outward[:, None]
         along = outward[:, :, None] * outward[:, None, :]
         law = np.broadcast_to(np.eye(3), along.shape) if friction else along
-        largest = np.maximum(largest, scaled_eigenvalues(root, point_blocks(arms, law)))
+        blocks = point_blocks(arms, law, multiply)
+        largest = np.maximum(largest, scaled_eigenvalues(root, blocks, multiply))
     return largest
 
 
@@ -165,8 +172,10 @@ def levers(arms: np.ndarray) -> np.ndarray:
     return made
 
 
-def scaled_eigenvalues(root: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+def scaled_eigenvalues(root: np.ndarray, blocks: np.ndarray, multiply: Any = product) -> np.ndarray:
     """Largest eigenvalue of root G root^T for every 6x6 block G, shape (n,)."""
+    if multiply is not product:
+        return np.linalg.eigvalsh(root @ blocks @ transposed(root))[:, -1]
     return largest_eigenvalues(product(root, product(blocks, transposed(root))))
 
 

@@ -26,9 +26,9 @@ _COLUMNS = (
 HELD = ("kinetic", "bond_strain", "sphere_strain")
 #: Terms of the energy put in and injected; all others are what it goes into.
 GIVEN = ("load_work", "support_work", "injected")
-#: Share of the energy beyond which an account counts as open.
+#: Share of the energy put in or held from which on no answer is drawn from a run.
 OPEN = 0.5
-#: Share of the energy put in from which on injected energy is told.
+#: The same from which on injected and unexplained energy are told.
 NOTED = 0.01
 #: Share of all impulses of loads and supports, by their sizes, below which no momentum is a scale.
 _LEAST_SHARE = 1e-6
@@ -84,15 +84,23 @@ def injected_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
     )
 
 
-def open_account(account: Mapping[str, float], round_off: float) -> tuple[str, ...]:
-    """Sentence about an account that explains less than half of its energy; else none."""
-    share = unexplained_share(account, round_off)
-    if share <= OPEN:
+def open_account(
+    account: Mapping[str, float], round_off: float, least: float = NOTED
+) -> tuple[str, ...]:
+    """Sentence about energy that an account does not explain, from a share of all on; else none.
+
+    least: that share, of the energy put in or of that held if more. round_off: energy [J] up to
+    which a residual may be rounding.
+    """
+    given, held = energy_put_in(account), sum(account[name] for name in HELD)
+    residual, whole = abs(account["residual"]), max(given, held)
+    if residual <= round_off or residual < least * whole:
         return ()
+    share, of = 100.0 * residual / max(whole, 1e-300), "held" if held > given else "put in"
     return (
-        f"the energy balance leaves {account['residual']:.3g} J unexplained, {share:.2g} of all "
-        "energy in it: take a shorter step, or start with velocities that dashpots of bonds do not "
-        "stop within one step",
+        f"the energy balance leaves {account['residual']:.3g} J unexplained, {share:.3g} % of the "
+        f"energy {of}: take a shorter step, or start with velocities that dashpots of bonds do "
+        "not stop within one step",
     )
 
 

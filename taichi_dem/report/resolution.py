@@ -5,8 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.display import counted
+from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.report.missing_effects import MissingEffect, middle_of_bond
 from taichi_dem.report.readings import Kept, Run
+from taichi_dem.stability.step_report import stable_steps, step_limits
 from taichi_dem.state.timeline import MAX_LEVEL
 
 #: Largest slip over the shortest edge at which a bond still represents its face. Of a triangle that
@@ -37,6 +40,31 @@ _TOO_LONG = (
     "the contact dashpots of {count} bodies: those of body {worst} take {value:.2g} of "
     "a speed in one step, and push bodies apart that they should stop",
 )
+
+
+#: What limits a step, and the share of a limit within which a step is at it.
+_LINKS, ROUNDING = ("bonds", "contact"), 1e-6
+
+
+def limits_of(run: Run) -> dict[str, np.ndarray]:
+    """Largest stable steps [s] of each body by criterion, see ``StepReport``; but for last bits."""
+    model = run.model
+    dashpot, friction, contact = (
+        next((effect for effect in model.by_role[role] if effect.name), None)
+        for role in ("dashpot", "friction", "contact")
+    )
+    return step_limits(model.mesh, model.materials, dashpot, friction, contact, np.matmul)
+
+
+def way_of(run: Run) -> str:
+    """How the method of a run takes dashpots, a key of ``step_report.METHODS``."""
+    return "solved" if run.advance.solves else "limited" if run.advance.limited else "full"
+
+
+def is_bounded(run: Run) -> bool:
+    """Whether the limits of stability of its steps are known, and no control keeps below them."""
+    controlled = run.schedule.has_limits and run.schedule.limits.controlled
+    return not controlled and type(run.advance).__module__.startswith("taichi_dem.step.")
 
 
 @dataclass(frozen=True)
@@ -71,13 +99,20 @@ class StepResolution(Kept):
     bond kept while it held, (bond_count,). step: shortest step of each body [s]; fastest: largest
     ``rate`` of it and of bodies near it; pair_share: least recorded share of its contacts; taken:
     largest part of a speed that they take in a step; all (body_count,). rate: of the dashpot of a
-    contact, by which a body slows [1/s].
+    contact, by which a body slows [1/s]. longest: step of each body that is stable for sure in its
+    bonds and in contact [s]; over: largest step over these while a bond held, or once it touched;
+    both (2, body_count).
     """
 
-    kept = "slip", "share", "pair_share", "taken", "step", "fastest"
+    kept = "slip", "share", "pair_share", "taken", "step", "fastest", "over"
 
     def __init__(self, run: Run):
         self.run, bodies = run, run.model.body_count
+        self.longest = np.full((2, bodies), np.inf)
+        if is_bounded(run):
+            limits, way = limits_of(run), way_of(run)
+            self.longest[:] = [stable_steps(limits, way, link) for link in ("bond", "contact")]
+        self.over = np.zeros_like(self.longest)
         self.slip = np.array([0.0, -1.0, 0.0, 0.0])
         self.share, self.pair_share = np.ones(run.model.bond_count), np.ones(bodies)
         self.taken, self.step = np.zeros(bodies), np.full(bodies, np.inf)
@@ -96,6 +131,7 @@ class StepResolution(Kept):
     def sample(self, time_s: float) -> None:
         """Update the figures at a recording time [s]; not those of dashpots that are solved."""
         advance, readings, contacts = self.run.advance, self.run.readings, self.run.contacts
+        self.over = np.maximum(self.over, np.where(self._linked(), self._over_now(), 0.0))
         if self.slips:
             share = readings.residual_slip() / self.shortest
             if share.max() > self.slip[0]:
@@ -110,6 +146,40 @@ class StepResolution(Kept):
                 self._note_partners(contacts)
             readings.contact_shares(self.pair_share, self.taken)
 
+    def _over_now(self):
+        """Present steps over the longest ones that are stable, (2, body_count)."""
+        return self._step_now() / self.longest
+
+    def _step_now(self):
+        level = values(self.run.state.level, slice(self.run.model.body_count))
+        return self.run.schedule.dt0 / 2.0**level
+
+    def _linked(self):
+        """Whether a bond of each body holds, and whether it ever touched, (2, body_count)."""
+        model, state = self.run.model, self.run.state
+        # Bond -1 stands for an outer face.
+        holds = ~np.append(state.broken(), True)[model.topology.body_bond]
+        active = values(state.active_effects, slice(model.body_count))
+        return np.stack([holds.any(axis=1), active & CONTACT > 0])
+
+    def at_start(self) -> tuple[str, ...]:
+        """Sentences about steps above their limits in bonds and in contact; or none."""
+        return self._unstable(self._over_now())
+
+    def _unstable(self, over):
+        """The same of steps over their limits, (2, body_count)."""
+        found = []
+        for link, own, longest in zip(_LINKS, over, self.longest):
+            count, worst = int((own > 1.0 + ROUNDING).sum()), int(own.argmax())
+            if count:
+                found.append(
+                    f"the step of {counted(count, 'body')} is above the longest that is stable for "
+                    f"sure in {link}, that of body {worst} with {own[worst]:.3g} times "
+                    f"{longest[worst]:.3g} s: energy may come from nowhere, take a shorter one "
+                    "(step_report)"
+                )
+        return tuple(found)
+
     def bond_slip(self) -> tuple[BondSlip, ...]:
         """The ``BondSlip`` of the run so far, or nothing where no bond slipped."""
         share, bond, time_s, count = self.slip.tolist()
@@ -121,8 +191,7 @@ class StepResolution(Kept):
 
     def _note_partners(self, contacts):
         """Remember steps and light partners: few contacts last until a recording."""
-        level = values(self.run.state.level, slice(len(self.rate)))
-        self.step = np.minimum(self.step, self.run.schedule.dt0 / 2.0**level)
+        self.step = np.minimum(self.step, self._step_now())
         pairs, _, _ = contacts.store.near_table()
         for one, other in (pairs.T, pairs.T[::-1]):
             np.maximum.at(self.fastest, one, self.rate[other])
@@ -131,7 +200,8 @@ class StepResolution(Kept):
         """Sentences about dashpots and failures that the step did not resolve; may be empty."""
         worse = -self.share, self._openings_at_failure(), -self._contact_shares(), self.taken
         found = (_too_long(*look) for look in zip(worse, _ALLOWED, _TOO_LONG))
-        return tuple(filter(None, (*found, self._sweeps(), self._levels())))
+        unstable = self._unstable(self.over)
+        return tuple(filter(None, (*unstable, *found, self._sweeps(), self._levels())))
 
     def _levels(self):
         if not values(self.run.schedule.undivided):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,10 +12,11 @@ from numpy.typing import ArrayLike
 from taichi_dem.elasticity.mesh_stiffness import MeshStiffness, mesh_stiffness
 from taichi_dem.elasticity.rates import bond_rates, contact_eigenvalues, dashpots_of, springs_of
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.fixed_order import product
 from taichi_dem.kit.terminal import aligned
 from taichi_dem.kit.validation import instance
 from taichi_dem.materials import Material
-from taichi_dem.materials.body_materials import AnyMaterial
+from taichi_dem.materials.body_materials import AnyMaterial, BodyMaterials
 from taichi_dem.materials.bond_rules import ModulusOverDistance
 from taichi_dem.materials.material import elastic_constants
 from taichi_dem.mesh import tetrahedra as geometry
@@ -90,15 +92,7 @@ class StepReport:
         ndarray
             Steps [s], shape (body_count,); infinite where nothing limits them.
         """
-        none = np.full(len(self.step_s), np.inf)
-        springs = self.limits.get(f"{link}_stiffness", none)
-        if dashpots == "solved":
-            return springs
-        together = stable_together(springs, self.limits.get(f"{link}_dashpot", none))
-        if dashpots == "full":
-            return together
-        # Of the stability limit 2 of an explicit step, limited dashpots take at most LIMITED.
-        return np.maximum(together, springs * np.sqrt(1.0 - 0.5 * LIMITED))
+        return stable_steps(self.limits, dashpots, link)
 
     def __str__(self):
         """Steps by method, numbers of bodies by criterion, the worst bodies and their cost."""
@@ -139,6 +133,19 @@ class StepReport:
             f"with steps of their own they take {taken:.3g} % of the updates"
         )
         return [*aligned(rows), "", words]
+
+
+def stable_steps(limits: dict[str, np.ndarray], dashpots: str, link: str = "bond") -> np.ndarray:
+    """Largest stable step of each body [s], see ``StepReport.borne``; limits: by criterion."""
+    none = np.full(len(limits["bond_stiffness"]), np.inf)
+    springs = limits.get(f"{link}_stiffness", none)
+    if dashpots == "solved":
+        return springs
+    together = stable_together(springs, limits.get(f"{link}_dashpot", none))
+    if dashpots == "full":
+        return together
+    # Of the stability limit 2 of an explicit step, limited dashpots take at most LIMITED.
+    return np.maximum(together, springs * np.sqrt(1.0 - 0.5 * LIMITED))
 
 
 def stable_together(springs: ArrayLike, drags: ArrayLike) -> np.ndarray:
@@ -182,15 +189,8 @@ def step_report(scene: Scene) -> StepReport:
     >>> print(step_report(Scene(read_mesh(PAPER_BLOCK), CONCRETE)))  # doctest: +SKIP
     """
     mesh, material = instance("scene", scene, Scene).mesh, scene.body_materials
-    damped, friction, contact = map(scene.effect, ("dashpot", "friction", "contact"))
-    limits = bond_steps(mesh, material)
-    if not damped:
-        del limits["bond_dashpot"]
-    if contact is not None:
-        stiffness, damping = contact.strongest(mesh, material)
-        whole_face = contact_eigenvalues(mesh, material.density, contact.divisions, friction)
-        limits["contact_stiffness"] = spring_step(stiffness * whole_face)
-        limits["contact_dashpot"] = dashpot_step(damping * whole_face)
+    effects = map(scene.effect, ("dashpot", "friction", "contact"))
+    limits = step_limits(mesh, material, *effects)
     vectors = geometry.area_vectors(mesh.points, geometry.all_faces(mesh.tetrahedra))
     volume = geometry.signed_volumes(mesh.points, mesh.tetrahedra)
     altitude = 3.0 * volume / np.linalg.norm(vectors, axis=1).reshape(-1, 4).max(axis=1)
@@ -198,13 +198,38 @@ def step_report(scene: Scene) -> StepReport:
     return StepReport(limits, altitude, longest / altitude, scene_warnings(scene))
 
 
-def bond_steps(mesh: Mesh, material: AnyMaterial) -> dict[str, np.ndarray]:
+def step_limits(
+    mesh: Mesh,
+    material: BodyMaterials,
+    dashpot: Any,
+    friction: Any,
+    contact: Any,
+    multiply: Any = product,
+) -> dict[str, np.ndarray]:
+    """Largest steps [s] of each body by criterion; dashpot, friction, contact: effects or None.
+
+    multiply: np.matmul takes a tenth of the time and differs in last bits.
+    """
+    limits = bond_steps(mesh, material, multiply, bool(dashpot))
+    if contact is not None:
+        stiffness, damping = contact.strongest(mesh, material)
+        of_faces = mesh, material.density, contact.divisions, bool(friction)
+        whole_face = contact_eigenvalues(*of_faces, multiply)
+        limits["contact_stiffness"] = spring_step(stiffness * whole_face)
+        limits["contact_dashpot"] = dashpot_step(damping * whole_face)
+    return limits
+
+
+def bond_steps(
+    mesh: Mesh, material: AnyMaterial, multiply: Any = product, damped: bool = True
+) -> dict[str, np.ndarray]:
     """Largest steps [s] that the springs and the dashpots of the bonds of each body allow."""
     of_bonds = mesh, topology_of(mesh), material.density
-    return {
-        "bond_stiffness": spring_step(bond_rates(*of_bonds, springs_of(material))),
-        "bond_dashpot": dashpot_step(bond_rates(*of_bonds, dashpots_of(material))),
-    }
+    steps = {"bond_stiffness": spring_step(bond_rates(*of_bonds, springs_of(material), multiply))}
+    if damped:
+        rates = bond_rates(*of_bonds, dashpots_of(material), multiply)
+        steps["bond_dashpot"] = dashpot_step(rates)
+    return steps
 
 
 @dataclass(frozen=True, eq=False)

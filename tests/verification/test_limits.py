@@ -1,16 +1,28 @@
 """Stability limits of the explicit step, found by bisection and compared with their formulas."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, step_report
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    Multirate,
+    Scene,
+    Simulation,
+    StepControl,
+    Uniform,
+    effects,
+    simulate,
+    step_report,
+)
 from taichi_dem.elasticity.rates import bond_rates, contact_eigenvalues, dashpots_of, springs_of
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.mesh import checked_mesh
-from taichi_dem.mesh.shapes import pair, single
+from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED, dashpot_step, spring_step
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL
@@ -258,3 +270,68 @@ def test_limited_bonds_leave_contacts_what_they_need():
         taken = shares(limits, 1.0) * x
         assert taken[1] >= min(x[1], FOR_CONTACTS) - rounding
         assert taken.sum() <= LIMITED + rounding
+
+
+def thrown_together(count=6, aspect=16.0):
+    """Slivers, tetrahedra pressed flat, that fly at each other and turn; nothing takes energy."""
+    random, body = np.random.default_rng(0), single()
+    flat = checked_mesh(body.points / [aspect, 1.0, 1.0], body.tetrahedra, {})
+    thin = np.ptp(flat.points[:, 0])
+    places = [(1.05 * thin * k, *(5e-3 * random.standard_normal(2))) for k in range(count)]
+    mesh = placed_together({f"sliver_{k}": (flat, place) for k, place in enumerate(places)})
+    velocity = 0.2 * random.standard_normal((count, 3))
+    velocity[:, 0] += 1.0 - 2.0 * np.arange(count) / count
+    spin, elastic = 20.0 * random.standard_normal((count, 3)), replace(CONCRETE, friction=0.0)
+    elastic = replace(elastic, normal_damping=0.0, shear_damping=0.0)
+    return Scene(mesh, elastic, [effects.BodyContact()], velocity=velocity, spin=spin)
+
+
+def told_by(scene, method, until, **options):
+    """Report of a run, what was said before it, and what of its report names an own limit."""
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        report = simulate(scene, method=method, until=until, progress=None, **options).report
+    return report, [str(one.message) for one in heard]
+
+
+@pytest.mark.parametrize("times", [0.7, 1.4])
+def test_a_step_above_the_limit_in_contact_is_told_before_and_after(times):
+    """With the limit that ``step_report`` prints; unexplained energy is told from 1 % on."""
+    scene = thrown_together()
+    limit = step_report(scene).borne("full", "contact").min()
+    report, before = told_by(scene, Uniform(times * limit), 4e-3)
+    for sentences in (before, report.needs):
+        named = [words for words in sentences if f"{limit:.3g} s" in words]
+        assert len(named) == (times > 1.0) and all("contact" in words for words in named)
+    account = report.energy_balance
+    whole = max(report.energy_balance["kinetic"], account["kinetic"] + account["residual"])
+    is_open = abs(account["residual"]) >= 0.01 * whole
+    assert is_open or times < 1.0
+    assert is_open == any(f"{account['residual']:.3g} J" in words for words in report.needs)
+
+
+#: Ways to step, with that of ``StepReport.borne``; None where no step is above a limit.
+STEPPING = {
+    "full": (Uniform, "full"),
+    "displacement": (lambda step: Multirate(step, 1e-3), "full"),
+    "limited": (lambda step: Uniform(step, dashpot="limited"), "limited"),
+    "solved": (ImplicitDashpots, "solved"),
+    "controlled": (lambda step: Multirate(step, 1e-3, control=StepControl()), None),
+}
+
+
+@pytest.mark.parametrize("name", STEPPING)
+def test_a_step_is_warned_of_above_its_own_limit_only(name):
+    """Of the bonds of a bar that nothing moves; contact is listed, and nothing touches."""
+    method, way = STEPPING[name]
+    scene = Scene(bar(0.1, 0.05, (2, 1, 1)), CONCRETE, "all")
+    limits = [step_report(scene).borne(way or "full", link).min() for link in ("bond", "contact")]
+    for times in (0.98, 1.1):
+        for limit in limits:
+            step = times * limit
+            report, before = told_by(scene, method(step), 2.0 * step, samples=1)
+            above = [one for one in limits if way and step > one]
+            assert len(before) == len(above)
+            assert all(any(f"{one:.3g} s" in words for words in before) for one in above)
+            told = [words for words in report.needs if f"{limits[0]:.3g} s" in words]
+            assert len(told) == (limits[0] in above)
