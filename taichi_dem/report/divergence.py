@@ -7,13 +7,13 @@ import numpy as np
 
 from taichi_dem.contact.contacts import FARTHEST
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import SimulationDiverged
-from taichi_dem.physics.sphere_pair import DEEPEST_SHARE, SUNK
+from taichi_dem.physics.sphere_pair import CONTACT, DEEPEST_SHARE, SUNK
 from taichi_dem.report.energy_balance import EnergyBalance, unexplained_share
 from taichi_dem.report.readings import Run
+from taichi_dem.report.resolution import ROUNDING, is_bounded, limits_of, way_of
 from taichi_dem.report.shared_volume import SharedVolume
-from taichi_dem.stability.body_limits import dashpot_step, spring_step
-from taichi_dem.stability.step_report import bond_steps
 from taichi_dem.step.drivers import CALL_SECONDS
 
 #: Unexplained energy beyond which a run counts as diverged, as a share of the energy present.
@@ -29,6 +29,8 @@ SHARE = 0.02
 CLOSED = 0.1
 #: Factor by which a bound or a stiffness that is not the step's is raised at a time.
 RAISED = 10.0
+#: Criteria of a step in words.
+_PARTS = {"stiffness": "springs", "dashpot": "dashpots"}
 
 
 class DivergenceCheck:
@@ -148,12 +150,35 @@ class DivergenceCheck:
         remedy: the end of the sentence, and its numbers for ``SimulationDiverged.advice``.
         """
         schedule, level = self.run.schedule, int(values(self.run.state.level)[body])
-        error = SimulationDiverged(
-            f"diverged at t = {schedule.time_s:.6g} s: body {body} {what}; its step was "
-            f"{schedule.dt0 / 2.0**level:.3g} s (level {level}), {remedy[0]}"
-        )
-        error.advice = remedy[1]
+        step = f"its step was {schedule.dt0 / 2.0**level:.3g} s (level {level})"
+        words, advice = f"body {body} {what}; {step}, {remedy[0]}", remedy[1]
+        above = self._above_limit() if values(self.run.state.tick) else None
+        if above:
+            words, (remedy, advice) = f"{above[0]}; body {body} {what}", above[1]
+            words += remedy
+        error = SimulationDiverged(f"diverged at t = {schedule.time_s:.6g} s: {words}")
+        error.advice = advice
         return error
+
+    def _above_limit(self):
+        """The body whose step is farthest above its limit, in words, and a shorter step as remedy.
+
+        None where no step is above its limit, or the limits are not known.
+        """
+        if not is_bounded(self.run):
+            return None
+        limits = self._limits()
+        steps = np.stack([*limits.values()])
+        over = self._taken() / steps
+        k, body = np.unravel_index(int(over.argmax()), over.shape)
+        if over[k, body] <= 1.0 + ROUNDING:
+            return None
+        count = counted(int((over > 1.0 + ROUNDING).any(axis=0).sum()), "body")
+        words = (
+            f"the step of {count} was above its limit, that of body {body} with up to "
+            f"{self._taken()[body]:.3g} s, where its {[*limits][k]} allow {steps[k, body]:.3g} s"
+        )
+        return words, _to_try("", "step", 0.5 * float(steps.min()), "s")
 
     def _too_deep(self, body, what):
         """SimulationDiverged of a body that has sunk too deep into another."""
@@ -182,9 +207,8 @@ class DivergenceCheck:
         Control keeps bodies below their limits: there, and below half of them, a shorter step helps
         where the account of energy does not close.
         """
-        schedule, limits, near = self.run.schedule, self._limits(), [body, *self._beside(body)]
-        level = values(self.run.state.level)[near].max()
-        taken = schedule.dt0 / 2.0 ** (int(level) if schedule.has_limits else 0)
+        limits, near = self._limits(), [body, *self._beside(body)]
+        taken = self._taken()[near].min()
         limit, cause, tight = min((limits[name][k], name, k) for name in limits for k in near)
         whose = f"its {cause}" if tight == body else f"the {cause} of body {tight} beside it"
         bounded = np.isfinite(limit)
@@ -196,28 +220,28 @@ class DivergenceCheck:
             return _to_try(words, "step", 0.5 * min(taken, limit), "s")
         return None
 
+    def _taken(self):
+        """Largest steps [s] that each body may have taken of late, (body_count,).
+
+        By the limit of a displacement a body that is thrown has short steps afterwards.
+        """
+        schedule, level = self.run.schedule, values(self.run.state.level)
+        return schedule.dt0 / 2.0 ** (level[: self.run.model.body_count] * schedule.has_limits)
+
     def _limits(self):
         """Largest stable explicit steps [s] by criterion, arrays (body_count,).
 
-        Dashpots that are solved or limited set none.
+        Those in contact of bodies that have touched. Dashpots that are solved or limited set none.
         """
-        model, run = self.run.model, self.run
-        steps = bond_steps(model.mesh, model.materials)
-        limits = {"bond springs": steps["bond_stiffness"]}
-        limited = run.schedule.has_limits and run.schedule.limits.limited
-        stiff = not (run.advance.solves or limited)
-        if model.by_role["dashpot"] and stiff:
-            limits["bond dashpots"] = steps["bond_dashpot"]
-        if run.contacts is not None:
-            pairs, counts, _ = run.contacts.store.near_table()
-            # Most contacts that a body has with another, over its mass [1/kg].
-            rates, mass = np.zeros(model.body_count), model.body_mass
-            np.maximum.at(rates, pairs, np.maximum(1, counts)[:, None] / mass[pairs])
-            stiffness, damping = model.contact.strongest(model.mesh, model.materials)
-            limits["contact springs"] = spring_step(stiffness * rates)
-            if stiff:
-                limits["contact dashpots"] = dashpot_step(damping * rates)
-        return limits
+        marks = values(self.run.state.active_effects, slice(self.run.model.body_count))
+        touched = marks & np.int64(CONTACT) > 0
+        found = {}
+        for name, own in limits_of(self.run).items():
+            link, part = name.split("_")
+            if part == "stiffness" or way_of(self.run) == "full":
+                acts = touched | (link == "bond")
+                found[f"{link} {_PARTS[part]}"] = np.where(acts, own, np.inf)
+        return found
 
 
 def _to_try(why, name, value, unit):

@@ -12,8 +12,9 @@ from taichi_dem import (
     Uniform,
     effects,
     simulate,
+    step_report,
 )
-from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.shapes import bar, placed_together
 
 STEP, UNTIL = 1e-6, 2e-4
 
@@ -29,7 +30,7 @@ def run(step, output=None):
 def diverged(tmp_path_factory):
     """The refusal of a step twenty times too large, and the folder of its output."""
     folder = tmp_path_factory.mktemp("diverged")
-    with pytest.raises(SimulationDiverged) as refusal:
+    with pytest.warns(UserWarning, match="bonds"), pytest.raises(SimulationDiverged) as refusal:
         run(STEP, str(folder))
     return refusal.value, folder
 
@@ -44,6 +45,26 @@ def test_the_step_it_advises_is_stable(diverged):
     assert report.energy_residual_fraction < 1.0
     assert np.isfinite(report.energy_balance["kinetic"])
     assert report.energy_balance["kinetic"] <= report.energy_balance["load_work"]
+
+
+def test_what_is_above_its_limit_is_named_before_what_flies():
+    """A bar whose springs the step is too long for, beside a block that flies and is calm."""
+    block, slender = bar(0.4, 0.1, (4, 1, 1)), bar(0.3, 0.05, (6, 1, 1))
+    mesh = placed_together({"block": (block, (0, 0, 0)), "bar": (slender, (0, 0.5, 0))})
+    velocity = np.zeros((mesh.body_count, 3))
+    velocity[: block.body_count, 2] = 50.0
+    velocity[block.body_count, 0] = 0.1
+    scene = Scene(mesh, CONCRETE, [effects.BondDamping()], velocity=velocity)
+    limits = step_report(scene).limits["bond_dashpot"]
+    limit = limits[block.body_count :].min()
+    assert 1.4 * limit < limits[: block.body_count].min()
+    with pytest.warns(UserWarning), pytest.raises(SimulationDiverged) as refusal:
+        simulate(scene, method=Uniform(1.4 * limit), until=1e-4, progress=None)
+    words, above = str(refusal.value), np.flatnonzero(limits < 1.4 * limit)
+    first = int(words.split("body ")[1].split()[0])
+    assert first in above and first >= block.body_count
+    assert words.index(f"{limit:.3g} s") < words.rindex("body ")
+    assert refusal.value.advice["step"] <= limit
 
 
 def test_an_idle_scene_does_not_diverge_however_long_it_rests():
