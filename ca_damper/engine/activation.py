@@ -12,9 +12,11 @@ import numpy as np
 
 from ca_damper.filling import Fillings
 from ca_damper.report.certificate import Certificate, Periods
+from ca_damper.report.checked_range import checked_range
 from ca_damper.report.measures import Cycles
 from ca_damper.report.steady_state import period
 from taichi_dem.kit.certificate import Estimate
+from taichi_dem.kit.display import counted
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
 
@@ -45,6 +47,8 @@ def _largest(estimates):
 
 def certificate_of(batch: Any) -> Certificate:
     """Certificate of a batch since its start."""
+    checked, diverged = checked_range(batch), len(batch.divergences())
+    outside = checked.outside if checked is not None else ()
     kinds, device, most = batch.fillings.kinds, batch.device, _most_particles(batch.table)
     left_out = [one.left_out(most) for one in kinds if hasattr(one, "left_out")]
     audit = device.audit() if hasattr(device, "audit") else None
@@ -55,6 +59,10 @@ def certificate_of(batch: Any) -> Certificate:
         estimates=batch.estimates,
         audits=() if audit is None else (audit,),
         periods=batch.periods,
+        warnings=(
+            *(f"outside of the checked range, {one}" for one in outside),
+            *((f"{counted(diverged, 'scene')} diverged",) if diverged else ()),
+        ),
     )
 
 

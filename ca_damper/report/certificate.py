@@ -52,6 +52,8 @@ class Certificate(BaseCertificate):
         Audit of contact tests that were skipped; none where none were.
     left_out : tuple of Estimate, default ()
         Estimated size of each effect that was not computed.
+    warnings : tuple of str, default ()
+        What lies outside of the checked range, and scenes that diverged.
     effects : str
         ``"listed"`` or ``"auto"``, as asked for.
     estimates : tuple of Estimate, default ()

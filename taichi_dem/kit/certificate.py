@@ -12,6 +12,8 @@ from typing import Any
 from taichi_dem.kit.effect_usage import EffectUse
 
 NEGLIGIBLE, NEEDED, UNCLEAR = "negligible", "needed", "unclear"
+#: Grades of a certificate.
+HOLDS, HOLDS_BUT, FAILS = "holds", "holds but for", "does not hold"
 #: Groups below which an effect is negligible, and from which on it is needed.
 LIMITS = (0.05, 2.0)
 #: Confidence of the bound of misses.
@@ -127,12 +129,13 @@ class BaseCertificate:
     """What the certificates of both packages have in common.
 
     acting: activity and onset of each effect. audits: of what was skipped. left_out: estimate of
-    each effect that was not computed.
+    each effect that was not computed. warnings: sentences of the report about the run.
     """
 
     acting: tuple[EffectUse, ...] = ()
     audits: tuple[Audit, ...] = ()
     left_out: tuple[Estimate, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def _faults(self) -> list[str]:
         """Why it does not hold, in words."""
@@ -140,8 +143,22 @@ class BaseCertificate:
 
     @property
     def holds(self) -> bool:
-        """Whether no audit found a miss, and there is no other fault."""
+        """Whether nothing is known to be wrong or missed; ``but_for`` names what is not clear."""
         return not self.failure
+
+    @property
+    def but_for(self) -> tuple[str, ...]:
+        """What may have been left out that is not negligible, and what the report warns of."""
+        unclear = (one for one in self.left_out if one.verdict != NEGLIGIBLE)
+        findings = (sentence.partition(": ")[0] for sentence in self.warnings)
+        return *(f"{one.effect} ({one.verdict})" for one in unclear), *findings
+
+    @property
+    def grade(self) -> str:
+        """``"holds"``, ``"holds but for"`` (see ``but_for``) or ``"does not hold"``."""
+        if not self.holds:
+            return FAILS
+        return HOLDS_BUT if self.but_for else HOLDS
 
     @property
     def failure(self) -> str:
@@ -152,7 +169,9 @@ class BaseCertificate:
     @property
     def verdict(self) -> str:
         """Whether it holds, in words."""
-        return "holds" if self.holds else f"does not hold, as {self.failure}"
+        if not self.holds:
+            return f"{FAILS}, as {self.failure}"
+        return f"{self.grade} {'; '.join(self.but_for)}".strip()
 
     @property
     def remedy(self) -> str:
@@ -170,6 +189,8 @@ class BaseCertificate:
         return {
             "acting_since_s": {use.effect: use.since_s for use in self.acting},
             "holds": self.holds,
+            "grade": self.grade,
+            "but_for": list(self.but_for),
             "audits": [audit.as_dict() for audit in self.audits],
             "left_out": [estimate.as_dict() for estimate in self.left_out],
         }
@@ -184,7 +205,7 @@ class BaseCertificate:
         """What was left out, in lines."""
         lines = [f"left out: {estimate}" for estimate in self.left_out]
         lines += [f"audit: {audit}" for audit in self.audits if audit.skipped]
-        lines += [] if self.holds else [f"this certificate {self.verdict}"]
+        lines += [] if self.grade == HOLDS else [f"this certificate {self.verdict}"]
         return lines
 
     def __str__(self):

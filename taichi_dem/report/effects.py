@@ -22,6 +22,7 @@ from taichi_dem.report.readings import Run
 from taichi_dem.state.model import names_of
 from taichi_dem.state.state import LATER
 from taichi_dem.state.timeline import MACRO_TICKS, NEVER
+from taichi_dem.step.sleeping import ROUNDINGS
 
 _EPSILON = np.finfo(np.float64).eps
 #: Terms of the account that pass through bonds; dashpots are compared with their sum.
@@ -181,6 +182,8 @@ class Certificate(BaseCertificate):
         Audit of what sleeps.
     left_out : tuple of Estimate
         Estimate of each effect that no law of the scene serves.
+    warnings : tuple of str
+        Sentences of the report about the run, all but those about missing effects.
     sleep : float
         Share that was asked for [-], see ``Scene``.
     asleep : float
@@ -287,6 +290,7 @@ def certificate_of(simulation: Any, report: Any) -> Certificate:
         audits=(Audit(max(asleep, audited), audited, missed, "bonds asleep"),),
         left_out=_not_served(simulation, scales, energy),
         missing=report.missing_effects,
+        warnings=report.needs[len(report.missing_effects) :],
     )
 
 
@@ -303,11 +307,21 @@ def _energy(run, balance, scales):
 
 
 def _left_out(run, balance, scales, energy):
-    """Largest shares of impulse and energy of a part that sleep left out there."""
+    """Largest shares of impulse and energy of a part that sleep left out there.
+
+    Zero for a part whose energy is no more than that of the openings that sleep takes for rounding
+    itself. The impulse is a share of the momenta by size, or, as
+    these may have died out, of what the lightest body would have with the energy that the part got.
+    """
     table = np.zeros((max(1, run.model.bond_count), 2))
     run.readings.left_out(table)
     left = [scales.sum_of_bonds(column) for column in table[: run.model.bond_count].T]
-    wholes = balance.momentum_exchanged(scales.sum), energy
+    lightest = np.full(scales.count, np.inf)
+    np.minimum.at(lightest, scales.part, run.model.body_mass)
+    had = np.sqrt(2.0 * lightest * energy)
+    wholes = np.maximum(had, balance.momentum_exchanged(scales.sum)), energy
+    rounding = ROUNDINGS**2 * scales.sum_of_bonds(bond_rounding(run))
+    left = [np.where(energy > rounding, part, 0.0) for part in left]
     return [float((part / np.maximum(whole, 1e-300)).max()) for part, whole in zip(left, wholes)]
 
 

@@ -28,7 +28,7 @@ _CHUNK = 256
 #: Largest steps between two sums of the momenta, once the run is as many steps old as the next one.
 _EVERY, _EARLY = 16, 64
 #: Roundings of a coordinate that the opening of a bond at rest may show.
-_ROUNDINGS = 16.0
+ROUNDINGS = 16.0
 
 
 @ti.func
@@ -182,7 +182,7 @@ class Sleeping(Places):
     def rounding(self, i):
         """Opening [m] that a bond of body i may show at rest: a few roundings of coordinates."""
         place = ti.abs(self.state.position[i]).max() + self.tables.radius[i]
-        return ti.static(_ROUNDINGS * np.finfo(float).eps) * place
+        return ti.static(ROUNDINGS * np.finfo(float).eps) * place
 
     @ti.func
     def stir(self, i, elapsed, velocity, angular_momentum):

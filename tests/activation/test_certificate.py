@@ -16,7 +16,9 @@ from taichi_dem import (
     simulate,
     solve,
 )
+from taichi_dem.kit.certificate import Audit, Estimate
 from taichi_dem.mesh.shapes import bar
+from taichi_dem.report.effects import Certificate
 from taichi_dem.state.timeline import NEVER
 from tests.scenes import beside
 
@@ -84,3 +86,47 @@ def test_an_answer_is_reached_only_if_its_certificate_holds():
     answer = solve(scene, until=6e-4, goal=goals.broken_faces())
     assert answer.error == 0.0 and answer.reached == answer.certificate.holds
     assert answer.certificate.holds or "run the scene with effects='all'" in str(answer)
+
+
+CLEAR, UNCLEAR, LACKING = (Estimate("gravity", group, "share") for group in (0.01, 0.5, 9.0))
+FINDING = "the energy balance leaves 3 J unexplained, 2 % of all"
+
+
+@pytest.mark.parametrize(
+    ("left_out", "warnings", "misses", "grade", "named"),
+    [
+        (CLEAR, (), 0, "holds", ()),
+        (UNCLEAR, (), 0, "holds but for", ("gravity (unclear)",)),
+        (Estimate("gravity", np.nan, "share"), (), 0, "holds but for", ("gravity (unclear)",)),
+        (LACKING, (), 0, "holds but for", ("gravity (needed)",)),
+        (CLEAR, (f"{FINDING}: take a shorter step",), 0, "holds but for", (FINDING,)),
+        (UNCLEAR, (f"{FINDING}: do",), 1, "does not hold", ("gravity (unclear)", FINDING)),
+    ],
+)
+def test_a_certificate_names_what_it_holds_but_for(left_out, warnings, misses, grade, named):
+    shares = {"sleep": 1e-6, "asleep": 0.0, "impulse": 0.0, "energy": 0.0}
+    audits = (Audit(100, 10, misses),)
+    made = Certificate(left_out=(left_out,), warnings=warnings, audits=audits, **shares)
+    assert made.grade == made.as_dict()["grade"] == grade
+    assert made.but_for == tuple(made.as_dict()["but_for"]) == named
+    assert made.holds == (misses == 0) and made.verdict.startswith(grade)
+    assert misses or all(words in made.verdict and words in str(made) for words in named)
+
+
+def test_the_certificate_of_a_run_names_what_its_report_warns_of(result):
+    """A bar that is pushed by a pulse; its report says what it does not resolve."""
+    found = result.certificate
+    told = [sentence.partition(": ")[0] for sentence in result.report.needs]
+    unclear = [one for one in found.left_out if one.verdict != "negligible"]
+    assert [*found.but_for[len(unclear) :]] == told
+    assert (found.grade == "holds") == (found.holds and not (told or unclear))
+
+
+def test_what_sleep_leaves_out_of_rounding_is_nothing():
+    """A body of a cube turns so slowly that rounding alone may open bonds as much."""
+    mesh = bar(0.05, 0.05, (1, 1, 1))
+    spin = np.zeros((mesh.body_count, 3))
+    spin[0, 2] = 1e-9
+    made = simulate(Scene(mesh, CONCRETE, "auto", spin=spin), method=METHOD, until=2e-4, samples=1)
+    assert made.report.energy_balance["kinetic"] < made.report.round_off_J
+    assert made.certificate.asleep > 0.0 and made.certificate.holds
