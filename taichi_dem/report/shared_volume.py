@@ -1,4 +1,4 @@
-"""Volume that bodies share: the measure of interpenetration, counted in 512 parts of a body.
+"""Volume that bodies share, counted in 512 parts of a body, and how deep they are in each other.
 
 Bodies are rigid, so two bodies without a bond share volume only where nothing keeps them apart:
 without contact, at faces that it leaves out, or where it is too soft or too sparse.
@@ -17,7 +17,13 @@ from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.products import cross, dot, entry, expression, matvec
 from taichi_dem.kit.types import vec3, vec4
-from taichi_dem.mesh.tetrahedra import points_of_parts
+from taichi_dem.mesh.tetrahedra import (
+    all_faces,
+    area_vectors,
+    penetration,
+    points_of_parts,
+    signed_volumes,
+)
 from taichi_dem.physics.body_overlap import mat4, mat43, raised, smallest
 from taichi_dem.physics.rotation_arrays import rotations
 from taichi_dem.report.readings import Kept, Run
@@ -27,6 +33,8 @@ from taichi_dem.scene import remedy
 DEEP = 0.1
 #: The same beyond which a report warns although contact is listed.
 NOTABLE = 0.25
+#: Depth of two bodies in each other, over the height of the smaller one, from which on it is told.
+DEPTH = 0.05
 #: Way of a body, as a share of its radius, after which all are compared again.
 MOVED = 0.25
 #: Pairs that there is room for at first.
@@ -52,14 +60,41 @@ class Interpenetration:
         Time of that [s].
     deep : int, default 0
         Largest number of pairs at one time that share more than ``DEEP``.
+    depth_share : float, default 0.0
+        Largest way that parts a pair, over the least height of the smaller body; 0 below ``DEPTH``.
+    depth_m : float, default 0.0
+        That way [m], through faces without a bond.
+    deepest : tuple, default (-1, -1)
+        The pair of bodies.
+    deepest_s : float, default 0.0
+        Time of that [s].
     """
 
     share: float = 0.0
     bodies: tuple = (-1, -1)
     time_s: float = 0.0
     deep: int = 0
+    depth_share: float = 0.0
+    depth_m: float = 0.0
+    deepest: tuple = (-1, -1)
+    deepest_s: float = 0.0
+
+    @property
+    def depth(self) -> str:
+        """How deep the deepest pair is, in words; "" where none is."""
+        if not self.depth_share:
+            return ""
+        first, second = self.deepest
+        return (
+            f"bodies {first} and {second} were {1e3 * self.depth_m:.3g} mm within each other at "
+            f"t = {self.deepest_s:.4g} s, {100.0 * self.depth_share:.2g} % of the height of the "
+            "smaller one"
+        )
 
     def __str__(self):
+        return "; ".join(filter(None, (self._shared(), self.depth)))
+
+    def _shared(self):
         if self.share == 0.0:
             return "no volume shared"
         first, second = self.bodies
@@ -72,7 +107,8 @@ class Interpenetration:
 class SharedVolume(Kept):
     """Finds bodies within each other, at the start and at recording times after some body moved.
 
-    Of the last look: pairs (n, 2) that share volume and their share of the smaller body (n,).
+    Of the last look: pairs (n, 2) that share volume and their share of the smaller body (n,); close
+    (n, 2): pairs that may be deep in each other, and depth: their ways apart [m] (n,).
     figures: those of ``worst`` so far; first: those at the start.
     """
 
@@ -85,8 +121,13 @@ class SharedVolume(Kept):
         # From nowhere: the first look is never left out.
         self.place = np.full_like(model.centre, np.inf)
         self.orientation = np.zeros((model.body_count, 4))
-        self.figures = self.first = np.array([0.0, -1.0, -1.0, 0.0, 0.0])
+        self.figures = self.first = np.array([0.0, -1.0, -1.0, 0.0, 0.0, 0.0, 0.0, -1.0, -1.0, 0.0])
         self.pairs, self.share = np.zeros((0, 2), dtype=np.int32), np.zeros(0)
+        self.close, self.depth = self.pairs, self.share
+        # Of each body above its four faces [m].
+        area = area_vectors(model.mesh.points, all_faces(model.mesh.tetrahedra))
+        volume = signed_volumes(model.mesh.points, model.mesh.tetrahedra)
+        self.height = 3.0 * volume[:, None] / np.linalg.norm(area, axis=1).reshape(-1, 4)
 
     @property
     def has_looked(self) -> bool:
@@ -109,9 +150,19 @@ class SharedVolume(Kept):
         if share > figures[0]:
             figures[:4] = share, *self.pairs[self.share.argmax()], time_s
         figures[4] = max(figures[4], (self.share > DEEP).sum())
+        self._deepen(figures, time_s)
         self.figures = figures
         if time_s == 0.0:
             self.first = figures
+
+    def _deepen(self, figures, time_s):
+        """Take in the depth of the deepest pair."""
+        lowest, mass = self.height.min(axis=1), self.run.model.body_mass
+        small = np.where(np.diff(mass[self.close], axis=1)[:, 0] < 0.0, *self.close.T[::-1])
+        share = self.depth / lowest[small]
+        if share.max(initial=0.0) > max(DEPTH, figures[5]):
+            worst = int(share.argmax())
+            figures[5:] = share[worst], self.depth[worst], *self.close[worst], time_s
 
     def _way(self):
         """Longest way of a body since the last look, as a share of its radius."""
@@ -136,22 +187,28 @@ class SharedVolume(Kept):
 
     def findings(self) -> tuple[str, ...]:
         """Sentences where bodies are within each other although contact is listed; or none."""
-        contact, worst = self.run.model.contact, self.worst
-        if contact is None or worst.share <= NOTABLE or worst == _told(self.first):
-            return self.at_start()
+        contact, worst, first = self.run.model.contact, self.worst, _told(self.first)
+        found = [*self.at_start()]
+        if contact is None or worst == first:
+            return tuple(found)
         law = type(contact).__name__
         advice = f"a larger {contact.knob}, or more points, of {law} keeps them apart"
         if not contact.outer_faces:
             advice = f"{remedy(contact)} lets them touch there too"
-        return (*self.at_start(), f"{_words(worst, f't = {worst.time_s:.4g} s')}: {advice}")
+        if worst.share > max(NOTABLE, first.share):
+            found.append(f"{_words(worst, f't = {worst.time_s:.4g} s')}: {advice}")
+        if worst.depth_share > first.depth_share:
+            found.append(f"{worst.depth}: {advice}")
+        return tuple(found)
 
     def at_start(self) -> tuple[str, ...]:
         """A sentence where bodies that may touch begin within each other; or none."""
         contact, first = self.run.model.contact, _told(self.first)
-        if contact is None or first.share == 0.0:
+        words = first.depth if first.share == 0.0 else _words(first, "the start")
+        if contact is None or not words:
             return ()
         rest = f", or {type(contact).__name__} takes their overlap as unloaded"
-        return (f"{_words(first, 'the start')}: move them apart{rest * contact.meets_bodies}",)
+        return (f"{words}: move them apart{rest * contact.meets_bodies}",)
 
     def _compare(self, corners):
         """Find all pairs and their shares; corners (n, 4, 3) [m]."""
@@ -164,22 +221,26 @@ class SharedVolume(Kept):
         own = np.ascontiguousarray(corners[body])
         box = np.stack([own.min(axis=1), own.max(axis=1)], axis=1)
         mass, count = np.ascontiguousarray(self.run.model.body_mass[body]), np.ones(1, np.int32)
-        found = np.zeros((0, 3))
+        found, height = np.zeros((0, 4)), np.ascontiguousarray(self.height[body])
         while count[0] > len(found):
-            found, count = np.zeros((max(_ROOM, count[0]), 3)), np.zeros(1, np.int32)
-            _launch_pairs(last, box, own, mass, *self.points, found, count)
+            found, count = np.zeros((max(_ROOM, count[0]), 4)), np.zeros(1, np.int32)
+            _launch_pairs(last, box, own, mass, height, *self.points, found, count)
         found = found[: count[0]]
         pairs = body[found[:, :2].astype(np.int32)]
         strangers = (tied[pairs[:, 0]] != pairs[:, 1:]).all(axis=1)
         order = np.lexsort(found[strangers][:, [1, 0]].T)
-        self.pairs = np.sort(pairs[strangers][order], axis=1)
-        self.share = found[strangers][order, 2]
+        pairs = np.sort(pairs[strangers][order], axis=1)
+        self.share, near = found[strangers][order, 2:].T
+        self.pairs, self.share = pairs[self.share > 0.0], self.share[self.share > 0.0]
+        self.close = pairs[near > 0.0]
+        self.depth = penetration(*corners[self.close].swapaxes(0, 1), free[self.close])
 
 
 def _told(figures):
     """Figures as an ``Interpenetration``."""
-    share, first, second, time_s, deep = figures.tolist()
-    return Interpenetration(share, (int(first), int(second)), time_s, int(deep))
+    share, first, second, time_s, deep, sunk, way, one, other, then = figures.tolist()
+    deepest = sunk, way, (int(one), int(other)), then
+    return Interpenetration(share, (int(first), int(second)), time_s, int(deep), *deepest)
 
 
 def _words(found, when):
@@ -204,26 +265,36 @@ def _find_pairs(
     box: ti.types.ndarray(dtype=vec3, ndim=2),
     corners: ti.types.ndarray(dtype=mat43, ndim=1),
     mass: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    height: ti.types.ndarray(dtype=vec4, ndim=1),
     few: ti.types.ndarray(dtype=vec4, ndim=1),
     many: ti.types.ndarray(dtype=vec4, ndim=1),
     found: ti.types.ndarray(dtype=ti.f64, ndim=2),
     count: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Count and write pairs of bodies that share volume, as far as there is room, in any order."""
+    """Count and write pairs of bodies that share volume, as far as there is room, in any order.
+
+    Also those that the normals of their faces show to be deep in each other, which are marked.
+    """
     for i in range(last.shape[0]):
         for j in range(i + 1, last[i]):
             if (box[i, 0] < box[j, 1]).all() and (box[j, 0] < box[i, 1]).all():
                 small, large = i, j
                 if mass[i] > mass[j]:
                     small, large = j, i
-                share, depths = 0.0, _depths(corners[large], corners[small])
-                if _reach(depths) > _ROUNDING:
+                share, near, one = 0.0, 0.0, vec4(1.0)
+                depths, high = _depths(corners[large], corners[small]), height[large]
+                if _reach(depths, one) > _ROUNDING:
                     if _share(depths, few) > 0.0:
                         share = _share(depths, many)
-                if share > 0.0:
+                    least = DEPTH * height[small].min()
+                    if _reach(depths, high) > least:
+                        depths, high = _depths(corners[small], corners[large]), height[small]
+                        if _reach(depths, high) > least:
+                            near = 1.0
+                if share + near > 0.0:
                     a = ti.atomic_add(count[0], 1)
                     if a < found.shape[0]:
-                        found[a, 0], found[a, 1], found[a, 2] = i, j, share
+                        found[a, 0], found[a, 1], found[a, 2], found[a, 3] = i, j, share, near
 
 
 _launch_pairs = Launch(_find_pairs)
@@ -245,10 +316,10 @@ def _depths(first, second):
 
 
 @expression
-def _reach(depths):
-    """Least of the four depths that the corners reach below a face."""
+def _reach(depths, height):
+    """Least of the four depths that the corners reach below a face, times a height of each face."""
     highest = (reduce(ti.max, (entry(depths, f, c) for c in range(4))) for f in range(4))
-    return reduce(ti.min, highest)
+    return reduce(ti.min, (depth * entry(height, f) for f, depth in enumerate(highest)))
 
 
 @ti.func

@@ -7,10 +7,19 @@ import pytest
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
-from taichi_dem import CONCRETE, Scene, Simulation, SimulationDiverged, Uniform, simulate
-from taichi_dem.mesh.shapes import placed_together, single
-from taichi_dem.mesh.tetrahedra import eighths
-from taichi_dem.report.shared_volume import DEEP, SharedVolume
+from taichi_dem import (
+    CONCRETE,
+    Scene,
+    Simulation,
+    SimulationDiverged,
+    Uniform,
+    checked_mesh,
+    effects,
+    simulate,
+)
+from taichi_dem.mesh.shapes import bar, pair, placed_together, single
+from taichi_dem.mesh.tetrahedra import all_faces, eighths, penetration
+from taichi_dem.report.shared_volume import DEEP, DEPTH, SharedVolume
 from tests.scenes import apart, quaternions
 
 EDGE = 1.0
@@ -104,7 +113,11 @@ def test_bodies_that_overlap_at_the_start_are_told_at_once_and_rest_as_they_are(
     parts = {"one": (single(EDGE), (0.0, 0.0, 0.0)), "other": (single(EDGE), (shift, 0.0, 0.0))}
     scene = Scene(placed_together(parts), CONCRETE, "auto")
     asked = {"method": Uniform(1e-7), "until": 1e-5, "samples": 1, "progress": None}
+    corners = single(EDGE).points[None]
+    depth = penetration(corners, corners + np.array([shift, 0.0, 0.0]))[0]
     words = f"bodies 0 and 1 share {share:.2g} % of the smaller one at the start"
+    if not share:
+        words = f"{1e3 * depth:.3g} mm within each other at t = 0 s"
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         if share > 50.0:
@@ -113,5 +126,84 @@ def test_bodies_that_overlap_at_the_start_are_told_at_once_and_rest_as_they_are(
             return
         report = simulate(scene, **asked).report
     for sentences in ([str(one.message) for one in told], report.needs):
-        assert [words in sentence for sentence in sentences] == [True] * (share > 0.0)
+        assert [words in sentence for sentence in sentences] == [True]
     assert not any(report.energy_balance.values())
+
+
+SIZE, CELL = 3.0, 0.3
+
+
+class Sunk(Looked):
+    """A vertex of a regular tetrahedron of 3 m above the middle of a block of elements of 0.3 m."""
+
+    def __init__(self):
+        block, large = bar(5 * CELL, 3 * CELL, (5, 3, 3)), single(SIZE)
+        parts = {"block": (block, (0, 0, 0)), "large": (large, (0, 20.0, 0))}
+        super().__init__(placed_together(parts), effects.BodyContact(outer_faces=True))
+        top = self.model.mesh.points[: len(block.points)]
+        self.top = np.array([0.5 * np.ptp(top[:, 0]), top[:, 1].max(), 0.5 * np.ptp(top[:, 2])])
+        self.top += [top[:, 0].min(), 0.0, top[:, 2].min()]
+        arms = self.volume.arms[-1]
+        down = arms[0] / np.linalg.norm(arms[0])
+        # Turned by the shortest way, so that its first corner is the lowest.
+        axis = np.cross(down, [0.0, -1.0, 0.0])
+        self.turn = np.array([1.0 - down[1], *axis])
+        self.turn /= np.linalg.norm(self.turn)
+        self.reach = np.linalg.norm(arms[0])
+
+    def at(self, depth, aside=(0.0, 0.0)):
+        """Figures of the vertex at a depth [m] and a place from the middle [m]."""
+        place, still = (
+            self.model.centre.copy(),
+            np.tile([1.0, 0, 0, 0], (len(self.model.centre), 1)),
+        )
+        place[-1] = self.top + np.array([aside[0], self.reach - depth, aside[1]])
+        still[-1] = self.turn
+        # Looks anew, with nothing before it.
+        self.volume = SharedVolume(self.simulation.parts)
+        self.shares(place, still, 1.0)
+        return self.volume.worst, self.volume.findings()
+
+
+def test_a_vertex_deep_in_bonded_bodies_is_told_with_its_depth():
+    """The way out is through free faces alone; the vertex may be anywhere between the elements.
+
+    In the middle of a face, less deep than half of the way to its border, it is the depth; beside a
+    border of elements one of them parts by less, and never by more.
+    """
+    sunk, random = Sunk(), np.random.default_rng(1)
+    corners = sunk.model.mesh.points[all_faces(sunk.model.mesh.tetrahedra[:-1])]
+    upper = np.isclose(corners[..., 1], sunk.top[1]).all(axis=1)
+    middles = (corners[upper].mean(axis=1) - sunk.top)[:, [0, 2]]
+    least = sunk.volume.height[:-1].min()
+    for depth, aside in zip(random.uniform(0.02, 0.03, 6), middles):
+        worst, told = sunk.at(depth, aside)
+        assert worst.depth_m == pytest.approx(depth, rel=1e-9)
+        assert any(f"{1e3 * depth:.3g} mm" in words for words in told)
+    for depth in random.uniform(0.06, 0.12, 12):
+        worst, told = sunk.at(depth, random.uniform(-0.3, 0.3, 2))
+        assert worst.deepest[1] == len(sunk.model.centre) - 1 and worst.share < 0.1
+        assert DEPTH * least < worst.depth_m <= depth * (1.0 + 1e-9) and told
+    for depth in (-1e-3, 0.9 * DEPTH * least):
+        worst, told = sunk.at(depth)
+        assert not (worst.depth_share or told)
+
+
+def test_bodies_side_by_side_are_not_deep_in_each_other():
+    """Bonded or not, with a rounding between them, flat, or long and thin."""
+    random = np.random.default_rng(3)
+    for scale in ([1.0, 1.0, 1.0], [1.0 / 40.0, 1.0, 1.0], [1.0, 1.0 / 40.0, 1.0 / 40.0]):
+        for mesh in (bar(1.0, 1.0, (2, 2, 2)), pair(1.0)):
+            whole = mesh.moved(by=(0.0, 0.0, 0.0))
+            flat = checked_mesh(whole.points * scale, whole.tetrahedra, {})
+            cut = checked_mesh(
+                flat.points[flat.tetrahedra].reshape(-1, 3),
+                np.arange(4 * flat.body_count).reshape(-1, 4),
+                {},
+                keep_coincident=True,
+            )
+            for one in (flat, cut):
+                looked = Looked(one, effects.BodyContact(outer_faces=True))
+                noise = 1e-15 * random.standard_normal(looked.model.centre.shape)
+                looked.shares(looked.model.centre + noise, time_s=1.0)
+                assert not looked.volume.worst.depth_share and not looked.volume.findings()
