@@ -14,17 +14,19 @@ WANTED = (1, 7, 4)
 #: By module or class.
 NEEDED = {
     "taichi._lib.core": "DebugInfo ExprGroup with_cuda with_vulkan",
-    "taichi._lib.core.Program": "synchronize",
-    "taichi._lib.core.SNode": "data_type get_ch get_num_ch is_place",
     "taichi._snode.fields_builder.FieldsBuilder": "_finalized_roots finalize",
     "taichi.lang.expr": "Expr",
     "taichi.lang.impl": "_root_fb current_cfg default_cfg expr_init get_runtime inside_kernel",
-    "taichi.lang.impl.PyTaichi": "get_current_src_info initialize_fields_builder",
     "taichi.lang.matrix": "MatrixField",
     "taichi.lang.snode": "SNode",
     "taichi.lang.struct": "StructField",
     "taichi.lang.util": "to_numpy_type",
 }
+#: Of what ``taichi.lang.impl.get_runtime`` returns.
+_OF_RUNTIME = (
+    *("dual_vars", "get_current_src_info", "global_vars", "grad_vars", "initialize_fields_builder"),
+    *("matrix_fields", "prog", "unfinalized_fields_builder"),
+)
 
 
 def named(path: str) -> Any:
@@ -34,10 +36,13 @@ def named(path: str) -> Any:
 
 def check_needed() -> None:
     """Raise ImportError where Taichi lacks a name without which nothing runs."""
-    for place, names in NEEDED.items():
-        for name in names.split():
-            if named(f"{place}.{name}") is None:
-                raise ImportError(f"{_wanted(f'{place}.{name}')}, which is needed")
+    paths = [f"{place}.{name}" for place, names in NEEDED.items() for name in names.split()]
+    lacking = [path for path in paths if named(path) is None]
+    if not lacking:
+        runtime = named("taichi.lang.impl.get_runtime")()
+        lacking = [name for name in _OF_RUNTIME if not hasattr(runtime, name)]
+    if lacking:
+        raise ImportError(f"{_wanted(lacking[0])}, which is needed")
 
 
 @functools.cache

@@ -78,6 +78,18 @@ def test_without_a_name_that_is_needed_a_sentence_says_which_taichi_is():
     assert "taichi.lang.util.to_numpy_type" in sentence
 
 
+@pytest.mark.parametrize("name", taichi_names._OF_RUNTIME)
+def test_each_name_of_the_runtime_is_looked_for(name, monkeypatch):
+    class Other:
+        def __getattr__(self, asked):
+            if asked == name:
+                raise AttributeError(asked)
+
+    monkeypatch.setattr(taichi_names.taichi.lang.impl, "get_runtime", Other)
+    with pytest.raises(ImportError, match=rf"{name}, which is needed"):
+        taichi_names.check_needed()
+
+
 @pytest.mark.parametrize(
     ("place", "name"), [(place, name) for place in NEEDED for name in NEEDED[place].split()]
 )
