@@ -37,8 +37,11 @@ class BondStep:
         if self._is_pending(b):
             slots, scale = self.tables.bond_slots[b], self.bond_share(b)
             motion = motion_of(self, b)
+            moved = motion
             if ti.static(self.solves_bonds):
                 motion = self.solver.bonds.mean(b, motion)
+            i, j = slots[0] >> 2, slots[1] >> 2
+            dt = self.schedule.pair_step(i, j)
             stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
             force, torque, failed = vec3(0.0), vec3(0.0), 0
             dragged, slipped = 0.0, 0.0
@@ -46,7 +49,12 @@ class BondStep:
                 u = 3 * b + q
                 arm = unit_arm(motion, self.tables.vertex_slave[u])
                 opening = unit_opening(motion, arm, self.tables.vertex_master[u])
+                before = self._residual_slip(u)
                 traction, spent, broken = self.by_law(m, b, u, stiffness, opening)
+                if spent != 0.0:
+                    # Booked at the mean of the tractions before and after the step.
+                    way, slip = dt * unit_velocity(moved, arm), self._residual_slip(u) - before
+                    spent -= 0.5 * stiffness[1] * dot(vec2(way[1], way[2]), slip)
                 if ti.static(self.notes_limits):
                     across = vec2(traction[1], traction[2])
                     self.state.note_passed(m, b, traction[0], squared(across))
@@ -59,10 +67,8 @@ class BondStep:
                 torque += cross(arm, traction)
                 slipped += spent
                 failed |= broken
-            i, j = slots[0] >> 2, slots[1] >> 2
             if ti.static(self.schedule.controlled):
                 self.schedule.applied_until.bond[b] = self.schedule.applied_until.until(i, j)
-            dt = self.schedule.pair_step(i, j)
             area = self.tables.unit_area[b]
             if failed == 0:
                 self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
@@ -78,7 +84,10 @@ class BondStep:
                     # Booked for the step before: it was full, though a unit fails now.
                     self._book_drag(b, dragged * (area * dt))
                 if ti.static(not self.tables.bond.is_null):
-                    self._book_heat(b, area * vec2(slipped, self._stored(b, motion)))
+                    # The springs have acted for the first half of the step to here.
+                    work = dot(force, moved.velocity) + dot(torque, moved.spin) - dragged
+                    freed = self._stored(b, motion) - 0.5 * dt * work
+                    self._book_heat(b, area * vec2(slipped, freed))
                 self._release(b, slots)
                 if ti.static(self.solves_bonds):
                     self.solver.bonds.end(b)
@@ -90,6 +99,14 @@ class BondStep:
     @ti.func
     def _book_heat(self, b, energies):
         self.state.bond_heat[b] = self.state.bond_heat[b] + energies
+
+    @ti.func
+    def _residual_slip(self, u):
+        """Slip of a unit that its law remembers, in the face frame [m], else zero."""
+        slip = vec2(0.0)
+        if ti.static(self.tables.bond.remembers_slip):
+            slip = self.tables.bond.residual_slip(u)
+        return slip
 
     @ti.func
     def by_law(self, m, b, u, stiffness, opening):

@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from taichi_dem import ImplicitDashpots, Multirate, Uniform, simulate
+from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Uniform, effects, simulate
+from taichi_dem.mesh.shapes import bar
 from taichi_dem.methods import order_of
 from tests.accuracy.small_bar import UNTIL, struck_bar
 
@@ -55,3 +56,24 @@ def test_a_method_has_the_order_that_it_declares(name):
     assert orders == pytest.approx(order_of(make(step), damping, varying), abs=SEEN)
     word = "steps up to" if varying else "step"
     assert report.known_error.startswith(f"{word} {step:.3g} s, order {round(orders.mean())};")
+
+
+@pytest.mark.parametrize("tension", [(), (effects.Softening(),)], ids=["slip", "slip and breaks"])
+def test_the_account_of_crushed_bonds_closes_with_the_order_of_the_steps(tension):
+    """Slip takes a third of the work at the mean of the tractions at both ends of a step.
+
+    Each break falls anywhere within its step, so that the third scale is needed: over four times
+    smaller steps the residual falls 16 times, and 4 times where a term is of first order.
+    """
+    blow = effects.GasPressure("left", peak=5e7, rise=1e-5)
+    scene = Scene(bar(0.1, 0.05, (3, 2, 2)), CONCRETE, [blow, effects.ShearSlip(), *tension])
+    looks = {"until": 6e-5, "samples": 1, "progress": None}
+    accounts = [
+        (report := simulate(scene, method=Uniform(4e-7 / 2**k), **looks).report).energy_balance
+        for k in (0, 2)
+    ]
+    assert (report.broken_faces > 30) == bool(tension)
+    assert accounts[1]["slip"] > 0.2 * accounts[1]["load_work"]
+    coarse, fine = (abs(account["residual"]) for account in accounts)
+    seen = SEEN if not tension else 0.5
+    assert 0.5 * np.log2(coarse / fine) > 2.0 - seen
