@@ -73,8 +73,8 @@ _ENTRY = Entry(
     part="",
     question="What does a handful of grains in a box do to its vibration?",
     look="",
-    time="6 s",
-    quick="5 s",
+    time="10",
+    quick="10",
     pictures=("damper.gif", "decay.png", "view.html"),
     figures=("cycles_*", "decrement_*"),
 )

@@ -44,8 +44,8 @@ _ENTRY = Entry(
     part="",
     question="How does a block of concrete break when a hole in it is blasted?",
     look="",
-    time="7 s",
-    quick="5 s",
+    time="30",
+    quick="26",
     pictures=("cracks.png", "view.html", "blast.gif"),
     figures=("hole_radial*", "monitor*", "broken_faces", "ledger*", "injected*"),
 )
