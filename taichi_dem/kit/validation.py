@@ -44,14 +44,14 @@ def told_apart(value: float, bound: float, digits: int = 3) -> tuple[str, str]:
     """A refused value and the bound that it misses, in the fewest digits that differ.
 
     digits: of the bound at least; the value has six. The bound is rounded away from the value, so
-    that it is allowed as it reads.
+    that it is allowed as it reads; it is whole where both are equal.
     """
     given, limit = float(value), float(bound)
     side = decimal.ROUND_FLOOR if given > limit else decimal.ROUND_CEILING
     for count in range(digits, _MOST_DIGITS):
-        if given == limit or f"{given:.{count}g}" != f"{limit:.{count}g}":
-            rounding = decimal.Context(prec=count, rounding=side)
-            inward = float(rounding.create_decimal(repr(limit)))
+        rounding = decimal.Context(prec=count, rounding=side)
+        inward = float(rounding.create_decimal(repr(limit)))
+        if given == limit == inward or f"{given:.{count}g}" != f"{limit:.{count}g}":
             return f"{given:.{max(count, 6)}g}", f"{inward:.{count}g}"
     return repr(given), repr(limit)
 

@@ -17,6 +17,7 @@ from ca_damper import (
     shake,
 )
 from taichi_dem import CONCRETE, Scene, Simulation, StepControl, Uniform, checked_mesh, effects
+from taichi_dem.kit.validation import told_apart
 from taichi_dem.mesh.mesh import with_inner_group
 from taichi_dem.mesh.shapes import pair, single
 from tests.bad_input.refusals import assert_refused
@@ -135,3 +136,14 @@ def test_a_scene_that_is_changed_keeps_its_loads():
     assert [effect.name for effect in every.effects] == [effect.name for effect in made.effects]
     stronger = replace(made, material=replace(CONCRETE, cohesion=1e7))
     assert tuple(stronger.effects) == tuple(made.effects) and stronger.on_demand
+
+
+@pytest.mark.parametrize("scale", [1.0, 60.0, 1e-7])
+@pytest.mark.parametrize("apart", [0.0, 1e-14, 1e-9, -1e-9, 1e-3, -1.0])
+def test_a_value_and_the_bound_that_it_misses_read_as_they_are(scale, apart):
+    """Unequal unless they are equal, and the bound on its own side of the limit."""
+    limit = scale * 0.99999999
+    given = limit * (1.0 + apart)
+    value, bound = told_apart(given, limit)
+    assert (float(value) == float(bound)) == (given == limit)
+    assert float(bound) == limit if apart == 0.0 else apart * (limit - float(bound)) >= 0.0
