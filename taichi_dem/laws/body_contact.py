@@ -102,7 +102,7 @@ class BodyContact(SphereContact):
     at rest, faces, edges or vertices first, at any speed, but for 2 z sqrt(k A / m) times the step.
     Bodies hit off their centres, or on several bodies at once, rebound less; bodies in a bonded
     piece, which are heavier in effect, more. With the default a block of four elements in height
-    rests on slopes up to 0.95 of its friction, whatever the damping of its bonds.
+    rests on slopes up to 0.94 of its friction, whatever the damping of its bonds.
 
     References
     ----------

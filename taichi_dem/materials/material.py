@@ -135,7 +135,7 @@ class Material:
     shear_stiffness : float or rule
         Shear stiffness of a bond per area [Pa/m].
     normal_damping : float or rule
-        Normal dashpot of a bond per area [Pa s/m], and of a contact of two bodies.
+        Normal dashpot of a bond per area [Pa s/m].
     shear_damping : float or rule
         Shear dashpot of a bond per area [Pa s/m].
     tensile_strength : float
