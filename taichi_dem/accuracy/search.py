@@ -26,7 +26,7 @@ from taichi_dem.kit.bars.step import SUPPORTED, StepError, step_error
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.validation import told_apart
-from taichi_dem.report.energy_balance import OPEN, open_account
+from taichi_dem.report.energy_balance import OPEN, open_account, unexplained_share
 
 #: Halvings of the step until one is stable, and from there on; of one refinement.
 _MOST_COARSE, _MOST_FINE, _MOST_AT_ONCE = 6, 7, 2
@@ -277,7 +277,9 @@ class Search:
         report = self.runs.results[last].report
         if self.job.goal.kind == "extreme":
             yield from extreme_doubts(self.runs, first, last, bar, self._affords)
-        yield from open_account(report.energy_balance, report.round_off_J, OPEN)
+        account, round_off = report.energy_balance, report.round_off_J
+        if unexplained_share(account, round_off) > OPEN:
+            yield from open_account(account, round_off)
         found = report.certificate
         if found is not None and not found.holds:
             why = f"the certificate of its run does not hold, as {found.failure}"

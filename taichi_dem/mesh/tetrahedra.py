@@ -22,8 +22,6 @@ LOCAL_EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]], dtype=n
 
 #: Two edges of each of the four faces.
 _FROM, _TO = [0, 0, 1, 3], [1, 2, 2, 4]
-#: The two faces at each local edge, by the corners opposite of them.
-_BESIDE = LOCAL_EDGES[::-1]
 
 #: Powers of the inverse of the root of x^4 = x + 1: their multiples fill the unit cube evenly.
 _SPREAD = np.multiply.accumulate(np.full(3, 1.0 / 1.2207440846057596))
@@ -102,43 +100,31 @@ def equal_rows(rows: np.ndarray) -> np.ndarray:
     return np.column_stack([order[:-1][same], order[1:][same]])
 
 
-def penetration(
-    first: np.ndarray, second: np.ndarray, free: np.ndarray | None = None
-) -> np.ndarray:
+def penetration(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Least way [m] that parts each two tetrahedra, at most 0 where they share no volume, (n,).
 
     first, second: corners [m], (n, 4, 3). By the theorem of separating axes: two convex bodies are
-    apart if they are so along a normal of a face, or across an edge of both. free: faces through
-    which and across whose edges they may part, of both, (n, 2, 4), at least one; by default all.
+    apart if they are so along a normal of a face, or across an edge of both.
     """
     origin = first[:, :1]
     first, second = first - origin, second - origin
     one, other = (np.diff(c[:, LOCAL_EDGES], axis=2)[:, :, 0] for c in (first, second))
     normals = [np.cross(edges[:, _FROM], edges[:, _TO]) for edges in (one, other)]
-    ways = _overlap(np.concatenate(normals, axis=1), first, second)
-    least = ways.min(axis=1)
+    least = _overlap(np.concatenate(normals, axis=1), first, second)
     (left,) = np.nonzero(least > 0.0)
     across = np.cross(one[left, :, None], other[left, None]).reshape(len(left), 36, 3)
-    across = _overlap(across, first[left], second[left])
-    least[left] = np.minimum(least[left], across.min(axis=1))
-    if free is None:
-        return least
-    # A face is that opposite of a corner; the normals begin with that of the last.
-    ways = np.where(free[:, :, ::-1].reshape(-1, 8), ways, np.inf).min(axis=1)
-    borders = np.any(free[left][:, :, _BESIDE], axis=3)
-    both = (borders[:, 0, :, None] & borders[:, 1, None]).reshape(len(left), 36)
-    ways[left] = np.minimum(ways[left], np.where(both, across, np.inf).min(axis=1))
-    return np.where(least > 0.0, ways, least)
+    least[left] = np.minimum(least[left], _overlap(across, first[left], second[left]))
+    return least
 
 
 def _overlap(axes, first, second):
-    """Overlap [m] of the projections of each two bodies on some axes, (n, a, 3), as (n, a)."""
+    """Least overlap [m] of the projections of each two bodies on some axes, (n, axes, 3), (n,)."""
     size = np.linalg.norm(axes, axis=2)
     one, other = (np.einsum("nax,ncx->nac", axes, corners) for corners in (first, second))
     both = np.minimum(one.max(axis=2) - other.min(axis=2), other.max(axis=2) - one.min(axis=2))
     # Parallel edges have no axis across both.
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(size > 0.0, both / size, np.inf)
+        return np.where(size > 0.0, both / size, np.inf).min(axis=1, initial=np.inf)
 
 
 def components(count: int, pairs: np.ndarray) -> np.ndarray:

@@ -26,9 +26,9 @@ _COLUMNS = (
 HELD = ("kinetic", "bond_strain", "sphere_strain")
 #: Terms of the energy put in and injected; all others are what it goes into.
 GIVEN = ("load_work", "support_work", "injected")
-#: Share of the energy put in or held from which on no answer is drawn from a run.
+#: Share of the energy beyond which an account counts as open.
 OPEN = 0.5
-#: The same from which on injected and unexplained energy are told.
+#: Share of the energy put in from which on injected and unexplained energy are told.
 NOTED = 0.01
 #: Share of all impulses of loads and supports, by their sizes, below which no momentum is a scale.
 _LEAST_SHARE = 1e-6
@@ -84,17 +84,15 @@ def injected_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
     )
 
 
-def open_account(
-    account: Mapping[str, float], round_off: float, least: float = NOTED
-) -> tuple[str, ...]:
-    """Sentence about energy that an account does not explain, from a share of all on; else none.
+def open_account(account: Mapping[str, float], round_off: float) -> tuple[str, ...]:
+    """Sentence about energy that an account does not explain, from ``NOTED`` on; else none.
 
-    least: that share, of the energy put in or of that held if more. round_off: energy [J] up to
-    which a residual may be rounding.
+    A share of the energy put in, or of that held if more. round_off: energy [J] up to which a
+    residual may be rounding.
     """
     given, held = energy_put_in(account), sum(account[name] for name in HELD)
     residual, whole = abs(account["residual"]), max(given, held)
-    if residual <= round_off or residual < least * whole:
+    if residual <= round_off or residual < NOTED * whole:
         return ()
     share, of = 100.0 * residual / max(whole, 1e-300), "held" if held > given else "put in"
     return (
