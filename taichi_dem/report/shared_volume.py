@@ -63,7 +63,7 @@ class Interpenetration:
     depth_share : float, default 0.0
         Largest way that parts a pair, over the least height of the smaller body; 0 below ``DEPTH``.
     depth_m : float, default 0.0
-        That way [m], through faces without a bond.
+        That way [m]; where other bodies are in the way, the depth is at least that.
     deepest : tuple, default (-1, -1)
         The pair of bodies.
     deepest_s : float, default 0.0
@@ -233,7 +233,7 @@ class SharedVolume(Kept):
         self.share, near = found[strangers][order, 2:].T
         self.pairs, self.share = pairs[self.share > 0.0], self.share[self.share > 0.0]
         self.close = pairs[near > 0.0]
-        self.depth = penetration(*corners[self.close].swapaxes(0, 1), free[self.close])
+        self.depth = penetration(*corners[self.close].swapaxes(0, 1))
 
 
 def _told(figures):

@@ -166,10 +166,10 @@ class Sunk(Looked):
 
 
 def test_a_vertex_deep_in_bonded_bodies_is_told_with_its_depth():
-    """The way out is through free faces alone; the vertex may be anywhere between the elements.
+    """The vertex may be anywhere between the elements.
 
-    In the middle of a face, less deep than half of the way to its border, it is the depth; beside a
-    border of elements one of them parts by less, and never by more.
+    In the middle of a face, less deep than half of the way to its border, its depth is the way that
+    parts the two; beside a border of elements one of them parts by less, and never by more.
     """
     sunk, random = Sunk(), np.random.default_rng(1)
     corners = sunk.model.mesh.points[all_faces(sunk.model.mesh.tetrahedra[:-1])]
