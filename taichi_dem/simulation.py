@@ -35,7 +35,7 @@ from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.drivers import DRIVERS, MEASURED, AutoDriver, driver_name
+from taichi_dem.step.drivers import DRIVERS, driver_name
 from taichi_dem.step.multirate.schedule import Schedule
 from taichi_dem.step.phases import Step
 from taichi_dem.step_control import CRITERIA
@@ -117,8 +117,7 @@ class Simulation:
         structure = Structure(scene.effects, method, scene.on_demand)
         self._engine = ENGINES.borrow(structure, capacity_of(self.model), self.model, self)
         self._load()
-        drivers = self.engine.drivers
-        self.driver = AutoDriver(self.step, drivers) if name == MEASURED else drivers[name]
+        self.driver = self.engine.drivers[name]
         self.compile_seconds = time.perf_counter() - started
 
     def __repr__(self):

@@ -22,7 +22,7 @@ class Report:
     method : str
         Name of the method.
     driver : str
-        Driver that ran, and those that were measured.
+        Driver that ran.
     effects : tuple of str
         Names of the effects.
     until_s : float
