@@ -5,20 +5,14 @@ no machine is equally fast for long. Here a run is stopped at some times, its st
 scenes with other effects, and all of them take a few steps from each state, by turns.
 """
 
-from functools import partial
-
 import numpy as np
 from scipy.stats import quantile_test
 
 import taichi_dem as dem
 from _blast import EFFECTS
-from ca_damper import Automaton, Batch, Oscillator, SceneTable, Spheres
-from ca_damper.automaton.lattice import DOWN, HELD, UP
-from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.study import on_device, seconds_of
 
-FILLINGS = {"spheres": Spheres, "automaton": partial(Automaton, rules="paper")}
 #: Pressure of the blast [Pa].
 PEAK = 575e6
 #: Effects in the order in which they are listed; the load is always there.
@@ -35,18 +29,6 @@ def scene_of(names, peak=PEAK):
     if names == "auto":
         return dem.Scene(mesh, dem.CONCRETE, "auto", loads=[gas])
     return dem.Scene(mesh, dem.CONCRETE, [gas, *(EFFECTS[name]() for name in names)])
-
-
-def batch_of(filling, options, particles, step, ratios, seeds, measured_cycles):
-    """Scenes of the paper's oscillator; ratios: of frequencies to its natural one, each seed."""
-    oscillator = Oscillator()
-    frequency, seed = np.meshgrid(np.array(ratios) * oscillator.natural_frequency, seeds)
-    scenes = particles, seed.ravel(), step, frequency.ravel(), oscillator.base_amplitude
-    job = {"measured_cycles": measured_cycles, "if_diverged": "raise"}
-    batch = Batch(FILLINGS[filling](**options), SceneTable(*scenes), **job)
-    batch.start("rigid")
-    batch.advance(0)
-    return batch
 
 
 class FrozenScene:
@@ -88,66 +70,6 @@ class FrozenScene:
         self.simulation.driver.few(1 << 60, substeps)
 
 
-class FrozenBatch:
-    """Scenes of a damper in states of a batch with other options; steps are timed from each."""
-
-    #: Fields with numbers of the filling's options, and the share of the steps that is not timed.
-    OWN, WARM = ("device.pair_contacts.", "device.wall_contacts.", "device.parameters."), 0.2
-
-    def __init__(self, filling, options, table):
-        self.batch = batch_of(filling, options, **table)
-        self.memory = FieldMemory(self.batch.engine)
-        # Places in the engine's list of fields differ with the options, their order does not.
-        fields = self.memory.fields
-        for k, name in enumerate([name for name in fields if name.startswith("table.made.")]):
-            fields[f"table.in_order.{k}"] = fields.pop(name)
-
-    def states_of_run(self, count, transient, measured):
-        """States of the run, at phases spread over the cycle: arrays by name of the field."""
-        found, gap = [], measured // count + 1.0 / count
-        for k in range(count):
-            whole = self.batch.steps_per_cycle * (gap if k else transient)
-            self.batch.advance(whole.astype(int))
-            found.append(self.memory.read())
-        return found
-
-    def freeze(self, states, substeps):
-        """Take over states, and the steps to go from each."""
-        own, self.substeps, self.states = self.memory.read(), substeps, []
-        taken = {name for name in own if not name.startswith(self.OWN)}
-        for state in states:
-            self.memory.write({**own, **{name: state[name] for name in taken & state.keys()}})
-            if "device.resting.held" in state and not self.batch.device.resting.rests:
-                release(self.batch.device)
-            coupling = self.batch.engine.coupling
-            begin = coupling.read_status()[0]
-            goal = begin + substeps
-            coupling.aim(np.stack([begin, goal, goal, np.arange(self.batch.count)]))
-            self.states.append(self.memory.read())
-
-    def seconds(self, state):
-        """Seconds of a step of a scene from a state."""
-        self.memory.write(self.states[state])
-        advance = self.batch.engine.coupling.advance
-        advance(self.WARM)
-        return seconds_of(advance, 1.0) / ((1.0 - self.WARM) * self.substeps * self.batch.count)
-
-
-def release(device):
-    """Let go of held particles where they are, as ``StaticContact.release`` does."""
-    fields = device.cells.kind, device.cells.speed, device.cells.travelled
-    kind, speed, travelled = arrays = [values(field) for field in fields]
-    scene, cell = np.nonzero(kind == HELD)
-    velocity, offset = values(device.velocity)[scene], values(device.cells.offset)[scene]
-    rising = velocity > 0.0
-    kind[scene, cell] = np.where(rising, UP, DOWN)
-    speed[scene, cell] = np.abs(velocity)
-    travelled[scene, cell] = np.where(rising, offset, -offset)
-    for field, array in zip(fields, arrays):
-        assign(field, array)
-    device.resting.held.fill(0)
-
-
 def paired_costs(frozen, states, rounds):
     """Time of a step over that of the first of frozen scenes: median and 95 % interval, by name.
 
@@ -181,14 +103,4 @@ def costs_of_blast(scenes, until, step, states, substeps, rounds):
         name: FrozenScene(scene, method, begun[alike[name]], substeps)
         for name, scene in made.items()
     }
-    return paired_costs(frozen, states, rounds)
-
-
-def costs_of_damper(filling, scenes, table, transient, states, substeps, rounds):
-    """Costs of options of a filling by name, the first as it is, whose run the states are of."""
-    frozen = {name: FrozenBatch(filling, own, table) for name, own in scenes.items()}
-    first = next(iter(frozen.values()))
-    found = first.states_of_run(states, transient, table["measured_cycles"])
-    for one in frozen.values():
-        one.freeze(found, substeps)
     return paired_costs(frozen, states, rounds)

@@ -1,17 +1,15 @@
 """What does each effect cost, and what does the result lose without it?
 
-    python experiments/cost_of_effects.py          # about four minutes on one core
+    python experiments/cost_of_effects.py
     python experiments/cost_of_effects.py --quick
 
-Effects are left out one by one of the blast of the paper's block, and of a response curve of the
-damper by spheres and by the automaton.
+Effects are left out one by one of the blast of the paper's block.
 
 - What an effect costs: CPU seconds of a step with and without it, from the same states. States of
   the run with all effects are loaded into every other scene, and all scenes take turns in random
   order. The interval is that of the timing; the states represent equal parts of the run. Contacts
   of another kind start from states of their own run, as their lists must be equally old.
-- What it is good for: the change of the hole's displacement, or of the response, in runs without
-  it.
+- What it is good for: the change of the hole's displacement in runs without it.
 
 Writes effects.png, effects.csv and summary.json to results/cost_of_effects/.
 """
@@ -23,8 +21,7 @@ import numpy as np
 import pandas as pd
 
 import taichi_dem as dem
-from _effects import ORDER, PEAK, batch_of, costs_of_blast, costs_of_damper, scene_of
-from ca_damper.report.measures import curve_distance
+from _effects import ORDER, PEAK, costs_of_blast, scene_of
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, SKY, area_key, line_key, picture
 from taichi_dem.kit.progress_bar import ProgressBar
@@ -34,112 +31,65 @@ NAME = "cost_of_effects"
 LEFT_OUT = [(name, "sticking_friction") if name == "body_contact" else (name,) for name in ORDER]
 #: Contact and friction in the place of those of bodies, by row: the paper's, then on all faces.
 CONTACTS = {"contact of spheres": "sphere_contact", "spheres on all faces": "surface_contact"}
-ADDED = {"rotation": "added", **dict.fromkeys(CONTACTS, "instead")}
-#: Names of effects, or options of a filling, by what is left out or added; the complete one first.
+#: Names of effects by what is left out or replaced; the complete scene first.
 SCENES = {
-    "blast": {
-        "": ORDER,
-        **{" and ".join(out): [e for e in ORDER if e not in out] for out in LEFT_OUT},
-        **{name: [*ORDER[:3], one, "friction"] for name, one in CONTACTS.items()},
-    },
-    "spheres": {
-        "": {},
-        "friction of spheres": {"friction": 0.0},
-        "friction at walls": {"wall_friction": 0.0},
-        "rotation": {"rotation": True},
-    },
-    "automaton": {
-        "": {},
-        "static contact": {"accounting": "landing+ejection"},
-        "ejection and static contact": {"accounting": "landing"},
-    },
+    "": ORDER,
+    **{" and ".join(out): [e for e in ORDER if e not in out] for out in LEFT_OUT},
+    **{name: [*ORDER[:3], one, "friction"] for name, one in CONTACTS.items()},
 }
-#: In the quick job every scene compiles.
-QUICK = {"blast": ("", "shear_slip"), "spheres": ("", "friction of spheres")}
 SETTINGS = {
     "until": (2.5e-4, 1e-4, study.number(0, 1), "simulated time of the blast [s], default 2.5e-4"),
     "rounds": (40, 10, study.whole(6, 10_000), "rounds from the same states, default 40"),
     "states": (8, 4),
     "substeps": (16, 8),
-    "ratios": ((0.88, 0.91, 0.94, 0.96, 0.98, 1.0, 1.03), (0.92, 0.98)),
-    "cycles": ((60, 20), (10, 4)),
-    "scenes": (SCENES, QUICK),
+    # In the quick job every scene compiles.
+    "scenes": (tuple(SCENES), ("", "shear_slip")),
 }
-STEPS = {"blast": 4e-7, "spheres": 3e-5, "automaton": 1e-4}
-#: Steps of a damper from a state, about a tenth of a cycle.
-TENTH = {"spheres": 600, "automaton": 180}
-TITLES = {"spheres": "Damper, spheres", "automaton": "Damper, automaton"}
-TITLES["blast"] = "Blast of the paper's block"
+#: Step [s].
+DT = 4e-7
 #: Cost of a step, between the ends of its interval.
 STEP = ("step_low_percent", "step_percent", "step_high_percent")
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
 
-def rows_of_blast(scenes, options):
-    """Rows of the blast: cost of each effect, and change of the hole's displacement without it."""
-    until, step = options.until, STEPS["blast"]
+def hole(names, until, peak=PEAK):
+    """Displacement of the hole [m] with effects by name."""
+    method, looks = dem.ImplicitDashpots(DT), {"samples": 1, "frames": 1}
+    result = dem.simulate(scene_of(names, peak), method=method, until=until, **looks)
+    return dem.goals.hole_displacement().value(result)
 
-    def hole(names, peak=PEAK):
-        method = dem.ImplicitDashpots(step)
-        result = dem.simulate(
-            scene_of(names, peak), method=method, until=until, samples=1, frames=1
-        )
-        return dem.goals.hole_displacement().value(result)
 
-    holes = {name: hole(names) for name, names in scenes.items()}
-    # A gas whose pressure differs in the last bit: nobody would notice but a chaotic run.
-    chance = abs(hole(ORDER, np.nextafter(PEAK, np.inf)) / holes[""] - 1.0)
+def rows_of(options):
+    """Rows of all scenes; of the complete one the change is that by chance."""
+    scenes, until = {name: SCENES[name] for name in options.scenes}, options.until
+    holes = {name: hole(names, until) for name, names in scenes.items()}
     change = {name: abs(one / holes[""] - 1.0) for name, one in holes.items()}
-    costs = costs_of_blast(scenes, until, step, options.states, options.substeps, options.rounds)
-    return rows_of("blast", costs, {**change, "": chance})
-
-
-def rows_of_damper(filling, scenes, options):
-    """Rows of a filling: cost of each option, and change of the response curve without it."""
-    (transient, measured), curves = options.cycles, {}
-    table = {"particles": 30, "seeds": (1, 2), "ratios": options.ratios, "step": STEPS[filling]}
-    table["measured_cycles"] = measured
-    for name, own in scenes.items():
-        rms = batch_of(filling, own, **table).run(transient, measured).rms
-        curves[name] = rms.reshape(len(table["seeds"]), -1)
-    change = {name: curve_distance(one.mean(0), curves[""].mean(0)) for name, one in curves.items()}
-    # Half of the distance of two seeds: what the mean may owe to chance.
-    change[""] = 0.5 * curve_distance(*curves[""])
-    given = filling, scenes, table, transient, options.states, TENTH[filling], options.rounds
-    return rows_of(filling, costs_of_damper(*given), change)
-
-
-def rows_of(group, costs, change):
-    """Rows of a group; of the complete scene the change is that by chance."""
+    # A gas whose pressure differs in the last bit: nobody would notice but a chaotic run.
+    change[""] = abs(hole(ORDER, until, np.nextafter(PEAK, np.inf)) / holes[""] - 1.0)
+    costs = costs_of_blast(scenes, until, DT, options.states, options.substeps, options.rounds)
     rows = []
     for name, cost in costs.items():
-        # What was added costs what the complete scene spares.
-        sign = -1.0 if name in ADDED else 1.0
+        # A contact in the place of the complete scene's costs what that one spares.
+        sign = -1.0 if name in CONTACTS else 1.0
         spared = sorted(100.0 * sign * (1.0 - one) for one in cost)
-        row = {"group": group, "effect": name, **dict(zip(STEP, spared))}
+        row = {"effect": name, **dict(zip(STEP, spared))}
         rows.append({**row, "change_percent": 100.0 * change[name]})
     return rows
 
 
 def draw(path, table):
-    """Bars, a row of panels for each group: what an effect costs, what changes without it."""
-    groups = dict([*table.groupby("group", sort=False)])
-    heights = [len(rows) - 1 for rows in groups.values()]
-    size = (9.2, 1.6 + 0.42 * sum(heights) + 0.7 * len(heights))
-    ratios = {"height_ratios": heights, "width_ratios": [1, 1.25]}
-    with picture(path, len(heights), 2, size, squeeze=False, gridspec_kw=ratios) as (figure, axes):
-        for (left, right), (group, rows) in zip(axes, groups.items()):
-            left.set_title(TITLES[group], fontweight="bold")
-            left.sharex(axes[0, 0])
-            draw_costs(left, rows.iloc[1:])
-            draw_changes(right, rows.change_percent.iloc[1:], rows.change_percent.iloc[0])
+    """Bars: what an effect costs, what changes without it."""
+    rows, size = table.iloc[1:], (9.2, 1.8 + 0.45 * len(table))
+    with picture(path, 1, 2, size, width_ratios=(1, 1.25)) as (figure, (left, right)):
+        draw_costs(left, rows)
+        draw_changes(right, rows.change_percent, table.change_percent.iloc[0])
         marks = [
             line_key("95 % interval, from the same states", color=BLACK, lw=1.0),
             area_key("not resolved: that interval holds 0", fc=SKY),
-            area_key("change by chance alone (round-off, seeds)", fc=GREY, alpha=0.3),
+            area_key("change by chance alone (round-off)", fc=GREY, alpha=0.3),
         ]
         figure.legend(handles=marks, loc="outside lower right", ncols=3)
-        figure.suptitle("What does an effect cost, and what does it change?")
+        figure.suptitle("Blast of the paper's block: what an effect costs, and what it changes")
 
 
 def draw_costs(axes, rows):
@@ -152,7 +102,7 @@ def draw_costs(axes, rows):
         text = f"  {value:z.{int(abs(value) < 10.0)}f} %" + ", not resolved" * hidden[place]
         end = max(most[place], 0.0)
         axes.text(end, place, text.replace("-", "−"), va="center", fontsize=8.5)
-    names = [f"{one}\n({ADDED[one]})" if one in ADDED else one for one in rows.effect]
+    names = [f"{one}\n(instead)" if one in CONTACTS else one for one in rows.effect]
     names = [name.replace("_", " ").replace(" and ", "\nand ") for name in names]
     axes.set(yticks=places, yticklabels=names)
     axes.set_xlabel("cost: share of a step's time [%], below 0: slower without it")
@@ -178,19 +128,15 @@ def draw_changes(axes, changes, chance):
 
 def run(options):
     """Measure, then write and print."""
-    folder, rows = study.begin(options), []
+    folder = study.begin(options)
     with ProgressBar("comparing") as bar:
-        for done, (group, names) in enumerate(options.scenes.items()):
-            bar.count(done, len(options.scenes))
-            scenes = {name: SCENES[group][name] for name in names}
-            given = (scenes, options) if group == "blast" else (group, scenes, options)
-            rows += (rows_of_blast if group == "blast" else rows_of_damper)(*given)
-    table = pd.DataFrame(rows)
+        bar.at(0.0)
+        table = pd.DataFrame(rows_of(options))
     table.to_csv(folder / "effects.csv", index=False)
     draw(folder / "effects.png", table)
     figures = {}
     for row in table.itertuples():
-        key = f"{row.group}_{row.effect or 'chance'}".replace(" ", "_")
+        key = f"blast_{row.effect or 'chance'}".replace(" ", "_")
         figures[f"{key}_change_percent"] = row.change_percent, "%"
         if row.effect:
             figures.update({f"{key}_{name}": (getattr(row, name), "%") for name in STEP})

@@ -3,32 +3,12 @@
 import numpy as np
 import pytest
 
-from _effects import WARM, FrozenBatch, FrozenScene
+from _effects import WARM, FrozenScene
 from _threads import thread_job
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.mesh.shapes import bar
 
 pytestmark = pytest.mark.experiment
-
-TABLE = {"particles": 30, "ratios": (0.96, 1.0), "seeds": (1, 2), "measured_cycles": 2}
-
-
-def batches(filling, step, *options):
-    """Frozen batches by their options, and states of the first."""
-    made = [FrozenBatch(filling, one, {**TABLE, "step": step}) for one in options]
-    return made, made[0].states_of_run(3, 4, 3)
-
-
-def test_a_frozen_batch_goes_on_with_the_bits_of_its_run():
-    (first, second), states = batches("spheres", 2e-5, {}, {})
-    first.freeze(states, 50)
-    second.batch.advance((second.batch.steps_per_cycle * 4).astype(int))
-    second.batch.advance(50)
-    wanted = second.batch.snapshot(3)
-    for _ in range(2):
-        assert first.seconds(0) > 0.0
-        for name, values in first.batch.snapshot(3).items():
-            assert np.array_equal(values, wanted[name]), name
 
 
 def test_a_frozen_scene_goes_on_with_the_bits_of_its_run_as_often_as_it_is_asked():
