@@ -30,6 +30,7 @@ class Hops(Kept):
     """
 
     kept = "code", "table", "hops", "worst"
+    grows = "code", "table"
 
     def __init__(self, run: Run):
         self.run, self.code, self.table = run, np.zeros(0, dtype=np.int64), np.zeros((0, _COLUMNS))

@@ -273,7 +273,7 @@ def _find_pairs(
 ):
     """Count and write pairs of bodies that share volume, as far as there is room, in any order.
 
-    Also those that the normals of their faces show to be deep in each other, which are marked.
+    Also those that no face of the larger shows not to be deep in each other, which are marked.
     """
     for i in range(last.shape[0]):
         for j in range(i + 1, last[i]):
@@ -281,16 +281,13 @@ def _find_pairs(
                 small, large = i, j
                 if mass[i] > mass[j]:
                     small, large = j, i
-                share, near, one = 0.0, 0.0, vec4(1.0)
-                depths, high = _depths(corners[large], corners[small]), height[large]
-                if _reach(depths, one) > _ROUNDING:
+                share, near = 0.0, 0.0
+                depths = _depths(corners[large], corners[small])
+                if _reach(depths, vec4(1.0)) > _ROUNDING:
                     if _share(depths, few) > 0.0:
                         share = _share(depths, many)
-                    least = DEPTH * height[small].min()
-                    if _reach(depths, high) > least:
-                        depths, high = _depths(corners[small], corners[large]), height[small]
-                        if _reach(depths, high) > least:
-                            near = 1.0
+                    if _reach(depths, height[large]) > DEPTH * height[small].min():
+                        near = 1.0
                 if share + near > 0.0:
                     a = ti.atomic_add(count[0], 1)
                     if a < found.shape[0]:

@@ -44,16 +44,18 @@ class BondStep:
             dt = self.schedule.pair_step(i, j)
             stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
             force, torque, failed = vec3(0.0), vec3(0.0), 0
-            dragged, slipped = 0.0, 0.0
+            dragged, slipped, worked = 0.0, 0.0, 0.0
             for q in range(3):
                 u = 3 * b + q
                 arm = unit_arm(motion, self.tables.vertex_slave[u])
                 opening = unit_opening(motion, arm, self.tables.vertex_master[u])
                 before = self._residual_slip(u)
                 traction, spent, broken = self.by_law(m, b, u, stiffness, opening)
+                way = dt * unit_velocity(moved, arm)
+                worked += dot(traction, way)
                 if spent != 0.0:
                     # Booked at the mean of the tractions before and after the step.
-                    way, slip = dt * unit_velocity(moved, arm), self._residual_slip(u) - before
+                    slip = self._residual_slip(u) - before
                     spent -= 0.5 * stiffness[1] * dot(vec2(way[1], way[2]), slip)
                 if ti.static(self.notes_limits):
                     across = vec2(traction[1], traction[2])
@@ -85,8 +87,7 @@ class BondStep:
                     self._book_drag(b, dragged * (area * dt))
                 if ti.static(not self.tables.bond.is_null):
                     # The springs have acted for the first half of the step to here.
-                    work = dot(force, moved.velocity) + dot(torque, moved.spin) - dragged
-                    freed = self._stored(b, motion) - 0.5 * dt * work
+                    freed = self._stored(b, motion) - 0.5 * worked
                     self._book_heat(b, area * vec2(slipped, freed))
                 self._release(b, slots)
                 if ti.static(self.solves_bonds):

@@ -124,7 +124,8 @@ def test_limited_dashpots_take_the_share_that_the_step_bears_and_name_it(dt, is_
     assert factor == pytest.approx(1.0 - share * rate * dt, rel=1e-9)
     assert -1.0 < factor
     said = f"bond 0 to {100 * share:.2g} %"
-    assert [said in need for need in simulation.report().needs] == [True] * is_less
+    findings = simulation.step_resolution.findings()
+    assert [said in finding for finding in findings] == [True] * is_less
 
 
 def test_kernels_and_arrays_share_the_formulas_of_the_stable_step():
