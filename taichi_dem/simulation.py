@@ -17,6 +17,7 @@ from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress import compiling
 from taichi_dem.kit.validation import choice, flag, instance, shown, whole
+from taichi_dem.loads.history import unresolved_histories
 from taichi_dem.methods import Method
 from taichi_dem.report.divergence import DivergenceCheck
 from taichi_dem.report.effects import certificate_of, effect_uses, on_demand
@@ -465,6 +466,7 @@ class Simulation:
             missing_effects=() if brief else self.missing_effects.findings(shared_volume),
             unresolved=(
                 *self.step_resolution.findings(),
+                *unresolved_histories(self.scene.effects, self.method.dt0),
                 *self.hops.findings(),
                 *shared_volume.findings(),
                 *open_account(account, self.divergence_check.round_off()),

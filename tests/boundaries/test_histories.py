@@ -1,10 +1,12 @@
 """Pressures and velocities over time: values, impulse, work and displacement in closed form."""
 
+import warnings
+
 import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
 from taichi_dem.loads.history import History
 from taichi_dem.mesh.shapes import pair
 
@@ -70,3 +72,15 @@ def test_a_velocity_that_rises_moves_its_bodies_by_its_integral(method):
         assert np.abs(gone - np.array([2.0, 0.0, 1.0]) * way).max() < 1e-15
     account = simulation.energy_balance.account()
     assert abs(account["residual"]) < 0.01 * abs(account["support_work"])
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.5, True), (2.0, False)])
+def test_a_load_that_changes_within_less_than_a_step_is_told_before_and_after(share, told):
+    """By name and group, with its time and the step."""
+    pulse = effects.Pressure("left", [0.0, 1.0, 0.0], [0.0, share * STEP, 9.0 * STEP])
+    scene, said = Scene(pair(), CONCRETE, [pulse]), f"pressure left changes within {share * STEP:g}"
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        report = simulate(scene, method=Uniform(STEP), until=STEP, progress=None).report
+    for sentences in ([str(one.message) for one in heard], report.needs):
+        assert any(said in sentence for sentence in sentences) == told
