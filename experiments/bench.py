@@ -42,9 +42,7 @@ HEADER += ["others'", "times", "by"]
 
 def options_parser():
     """Options of this script."""
-    made = study.parser(NAME, __doc__, threads=1, summary="bench.json")
-    made.folder = ""
-    return made
+    return study.parser(NAME, __doc__, folder="", threads=1, summary="bench.json")
 
 
 def run(options):

@@ -169,7 +169,7 @@ def run(options):
     rows = [{name: getattr(options, name) for name in names} for _ in range(options.members)]
     # A second process would compile as well, which takes longer than four blasts.
     workers = 1 if options.quick else options.threads
-    version = Path(options.mesh).read_text(errors="replace")
+    version = f"{BLOCK_STEP} {Path(options.mesh).read_text(errors='replace')}"
     where = {"out": at("members"), "workers": workers}
     table = dem.sweep(blast, rows, seed=options.seed, version=version, **where)
     table.to_csv(at("members.csv"), index=False)

@@ -51,6 +51,10 @@ class Lattice:
         return tuple(tuple(self.ratio(j, level) for j in (k - 2, k, k + 2)) for k in sorted(middle))
 
 
+class PeakOutside(InputError):
+    """A range of frequencies does not contain the peak."""
+
+
 class PeakSearch:
     """Search of a peak in [lowest, highest] f/f0.
 
@@ -120,7 +124,7 @@ class PeakSearch:
         further = end - self.lattice.spacing if below else end + self.lattice.spacing
         if not self.may_extend or not LEAST_RATIO < further < MOST_RATIO or not rms.any():
             side = "below" if below else "above"
-            raise InputError(
+            raise PeakOutside(
                 f"ratios must contain the peak, which lies outside, {side} {end:.6g}: the response "
                 f"still rises there, got ({self.lowest:g}, {self.highest:g})"
             )

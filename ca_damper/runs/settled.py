@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from ca_damper.report.measures import Cycles, peak
-from ca_damper.report.peak_search import PeakSearch
+from ca_damper.report.peak_search import PeakOutside, PeakSearch
 from ca_damper.runs.response import Grid
 from ca_damper.scenes.gravity import gravity_along
-from taichi_dem.kit.errors import InputError
 
 # Cycles that show an approach, at least.
 _LEAST_CYCLES = 4
@@ -50,7 +49,7 @@ class SteadyPeak:
         finest = self.scenes["oscillator"].damping_ratio
         try:
             PeakSearch(rms_at, low, high, True, finest).run()
-        except InputError:
+        except PeakOutside:
             # A peak outside has no vertex: the highest value stands.
             pass
         ratios = np.array(sorted(self.found))

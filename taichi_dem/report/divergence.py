@@ -154,8 +154,9 @@ class DivergenceCheck:
         words, advice = f"body {body} {what}; {step}, {remedy[0]}", remedy[1]
         above = self._above_limit() if values(self.run.state.tick) else None
         if above:
-            words, (remedy, advice) = f"{above[0]}; body {body} {what}", above[1]
-            words += remedy
+            found, (shorter, advised) = above
+            own = "" if "step" in advice else f"; {step}, {remedy[0]}"
+            words, advice = f"{found}{shorter}; body {body} {what}{own}", {**advice, **advised}
         error = SimulationDiverged(f"diverged at t = {schedule.time_s:.6g} s: {words}")
         error.advice = advice
         return error
@@ -169,14 +170,16 @@ class DivergenceCheck:
             return None
         limits = self._limits()
         steps = np.stack([*limits.values()])
-        over = self._taken() / steps
+        level = values(self.run.state.level, slice(self.run.model.body_count))
+        present = self.run.schedule.dt0 / 2.0**level
+        over = present / steps
         k, body = np.unravel_index(int(over.argmax()), over.shape)
         if over[k, body] <= 1.0 + ROUNDING:
             return None
         count = counted(int((over > 1.0 + ROUNDING).any(axis=0).sum()), "body")
         words = (
-            f"the step of {count} was above its limit, that of body {body} with up to "
-            f"{self._taken()[body]:.3g} s, where its {[*limits][k]} allow {steps[k, body]:.3g} s"
+            f"the step of {count} was above its limit, that of body {body} with "
+            f"{present[body]:.3g} s, where its {[*limits][k]} allow {steps[k, body]:.3g} s"
         )
         return words, _to_try("", "step", 0.5 * float(steps.min()), "s")
 

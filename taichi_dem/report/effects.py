@@ -310,8 +310,8 @@ def _left_out(run, balance, scales, energy):
     """Largest shares of impulse and energy of a part that sleep left out there.
 
     Zero for a part whose energy is no more than that of the openings that sleep takes for rounding
-    itself. The impulse is a share of the momenta by size, or, as
-    these may have died out, of what the lightest body would have with the energy that the part got.
+    itself. The impulse is a share of the momenta by size, or, as these may have died out, of what
+    the lightest body would have with the energy that the part got.
     """
     table = np.zeros((max(1, run.model.bond_count), 2))
     run.readings.left_out(table)

@@ -45,16 +45,12 @@ class Hops(Kept):
         if not self.follows:
             return
         bodies, count = self.run.contacts.store.near_table()[0], self.run.model.body_count
-        found, place = (
-            self.run.readings.contacts_now(),
-            values(self.run.state.position, slice(count)),
-        )
+        found = self.run.readings.contacts_now()
+        place = values(self.run.state.position, slice(count))
         offset = place[bodies[:, 1]] - place[bodies[:, 0]]
         here = np.column_stack([np.full(len(bodies), time_s), offset])
-        code, table = (
-            bodies[:, 0].astype(np.int64) * count + bodies[:, 1],
-            np.zeros((len(here), 12)),
-        )
+        code = bodies[:, 0].astype(np.int64) * count + bodies[:, 1]
+        table = np.zeros((len(here), _COLUMNS))
         _, now, then = np.intersect1d(code, self.code, assume_unique=True, return_indices=True)
         table[now] = self.table[then]
         touches = (found[:, 6:9] != 0.0).any(axis=1)

@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ca_damper import Automaton, Oscillator, best_damper, excitation
+from ca_damper import Automaton, Oscillator, RigidMass, best_damper, excitation
 from ca_damper.errors import InputError
 from ca_damper.runs.best_damper import BestDamper, Value, _searched
 from ca_damper.runs.grains import DENSITY, boxes_of, shifted
-from ca_damper.runs.settled import limit_of
+from ca_damper.runs.settled import SteadyPeak, limit_of
 
 BOX = (60e-3, 96e-3)
 ONE = {"heights": 1}
@@ -147,3 +147,16 @@ def test_a_signal_is_judged_on_the_base():
 def test_input_without_an_answer_is_refused_in_a_sentence(wrong, words):
     with pytest.raises(InputError, match="^" + words):
         best_damper(Oscillator(), 0.6e-3, **{**JOB, **wrong})
+
+
+def test_only_a_peak_outside_ends_a_search_in_silence():
+    """Whatever else is refused in a look is refused by the search."""
+
+    def refused(ratios, doublings):
+        raise InputError("the device no longer answers")
+
+    scenes = {"oscillator": Oscillator(), "particles": [1], "seeds": [1], "base_amplitude": 1e-3}
+    search = SteadyPeak(RigidMass(), (10, 4), None, **scenes)
+    search._rms = refused
+    with pytest.raises(InputError, match="no longer answers"):
+        search.run(0.9, 1.02, 0)

@@ -117,17 +117,18 @@ def parser(
     description: str | None,
     drivers: Sequence[str] = (),
     settings: Settings = MappingProxyType({}),
+    folder: str | None = None,
     **defaults: Any,
 ) -> Parser:
     """Parser with the options every experiment has; drivers: to choose from, where there are.
 
     settings: numbers of the full and of the quick job, which are options where they have a type.
-    defaults: of options that every experiment has.
+    folder: of the output, by default the name. defaults: of options that every experiment has.
     """
     made = bare_parser(name, description)
     made.add_argument("--quick", action="store_true", help="a smaller job, in a folder of its own")
     made.add_argument("--json", action="store_true", help="print summary.json and nothing else")
-    add_out(made, name)
+    add_out(made, name if folder is None else folder)
     made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
     if drivers:
         made.add_argument("--driver", default=drivers[0], choices=drivers)
