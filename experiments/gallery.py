@@ -45,7 +45,9 @@ SMALL_PICTURES, SMALL = "docs/pictures", (960, 256)
 #: Figures by experiment, lines of the table that it writes for a page, if any, and the command, the
 #: machine and the versions of its run.
 KEPT = "docs/figures.json"
-_MARK = re.compile(r"(<!-- figure: ([^>]+?), (\d) digits -->)(.*?)(<!-- end -->)", re.DOTALL)
+_MARK = re.compile(
+    r"(<!--\s+figure:\s+([^>]+?),\s+(\d)\s+digits\s+-->)(.*?)(<!--\s+end\s+-->)", re.DOTALL
+)
 _TABLE = re.compile(r"(<!-- table: (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 FLAGS = {
     "quick": "run smaller jobs, with results and a page of their own",

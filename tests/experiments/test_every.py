@@ -16,8 +16,8 @@ from tests.terminal import phases_of
 ENTRY = {entry.name: entry for entry in read_entries(FOLDER / ENTRIES)}
 #: Those that the fast suite runs: a damper, a struck bar.
 FAST = ("damper_patterns", "stable_or_not")
-#: Line on standard error of what is known to be outside the range of the paper's rules.
-KNOWN = "rules 'paper' of the automaton are known to fail"
+#: Lines on standard error of what is known to be outside the range of the paper's rules and steps.
+KNOWN = "rules 'paper' of the automaton are known to fail", "is above the longest that is stable"
 #: Lines of bars.txt by experiment, without its comments.
 BARS = {
     name: [line.split() for line in lines if not line.startswith("#")]
@@ -42,8 +42,10 @@ def test_a_quick_run_ends_well_and_its_key_figures_lie_within_their_bars(name, t
     assert done.returncode == 0, done.stderr
     # No progress bar, no banner, no warning: a pipe gets a line a phase, and a file stays readable.
     phases, others = phases_of(done.stderr)
-    assert [line for line in others if KNOWN not in line] == []
-    assert len(set(phases)) == len(phases)
+    assert [line for line in others if not any(words in line for words in KNOWN)] == []
+    # A long phase has further lines, with its share or part.
+    begins = [line for line in phases if len(line.rpartition(": ")[2].split()) == 1]
+    assert len(set(begins)) == len(begins)
     assert len(done.stdout.splitlines()) > 5 and "\x1b" not in done.stdout
     figures = figures_of(name, folder)
     for pattern in set(ENTRY[name].figures) - listed(name, "lacks:"):
@@ -105,8 +107,9 @@ def test_a_diverging_run_names_body_and_step_and_keeps_the_last_good_output(tmp_
     light = "--without", "body_contact,sticking_friction", "--out", tmp_path
     done = start("blast_fracture", "--method", "fixed", "--dt0", "1e-6", *light)
     phases, others = phases_of(done.stderr)
-    assert phases == ["blasting: compiling", "blasting: stepping"]
-    assert done.returncode == 3 and len(others) == 1, done.stderr
+    assert {phases[0], phases[-1]} == {"blasting: compiling", "blasting: stepping"}
+    warning, _ = others
+    assert done.returncode == 3 and KNOWN[1] in warning, done.stderr
     for word in ("diverged at t = ", "body ", "try a step of "):
         assert word in done.stderr
     rows = rows_of(tmp_path / "history.csv")
