@@ -56,6 +56,11 @@ def energy_put_in(account: Mapping[str, float]) -> float:
     return energy_at_start(account) + sum(max(0.0, account[name]) for name in GIVEN[:2])
 
 
+def given_and_held(account: Mapping[str, float]) -> tuple[float, float]:
+    """Energy put in, and energy held at the end [J]."""
+    return energy_put_in(account), sum(account[name] for name in HELD)
+
+
 def put_in_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
     """Energy put in and its parts; also what loads or supports took. round_off: as above."""
     start = {"at the start": energy_at_start(account)}
@@ -90,7 +95,7 @@ def open_account(account: Mapping[str, float], round_off: float) -> tuple[str, .
     A share of the energy put in, or of that held if more. round_off: energy [J] up to which a
     residual may be rounding.
     """
-    given, held = energy_put_in(account), sum(account[name] for name in HELD)
+    given, held = given_and_held(account)
     residual, whole = abs(account["residual"]), max(given, held)
     if residual <= round_off or residual < NOTED * whole:
         return ()

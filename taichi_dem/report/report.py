@@ -8,7 +8,7 @@ from taichi_dem.kit.display import BRIEF, counted, in_brief, in_lines
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.methods import order_of
 from taichi_dem.report.effects import Certificate
-from taichi_dem.report.energy_balance import HELD, energy_put_in, injected_words, put_in_words
+from taichi_dem.report.energy_balance import given_and_held, injected_words, put_in_words
 from taichi_dem.report.shared_volume import Interpenetration
 from taichi_dem.scene import Scene
 
@@ -157,7 +157,7 @@ class Report:
 
     def _given_and_held(self):
         """Energy put in, and energy held at the end [J]."""
-        return energy_put_in(self.energy_balance), sum(self.energy_balance[name] for name in HELD)
+        return given_and_held(self.energy_balance)
 
     @property
     def unexplained(self) -> str:
