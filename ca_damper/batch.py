@@ -552,10 +552,7 @@ class Batch(LoadedScenes):
         every: int = 0,
         late: int = 0,
     ) -> None:
-        """Take every scene a number of steps on, in launches of bounded length.
-
-        every, late: as of a Recorder.
-        """
+        """Take every scene a number of steps on, in launches of bounded length."""
         if not (progress is None or callable(progress)):
             raise InputError(f"progress must be a function or None, got {shown(progress)}")
         if not self.going_on:

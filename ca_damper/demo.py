@@ -95,15 +95,7 @@ def add_options(made: study.Parser) -> None:
 
 
 def let_go(options: Namespace, name: str) -> None:
-    """Let containers go with free and with fixed particles, compare, picture.
-
-    Parameters
-    ----------
-    options
-        Those of ``SETTINGS``, and out, the folder of the output.
-    name
-        Of the study, in summary.json.
-    """
+    """Let containers go with free and with fixed particles, compare, picture."""
     wanted = FILLINGS if options.compare else (options.filling,)
     fillings = {word: FILLINGS[word]() for word in wanted}
     shown, rigid = fillings[options.filling], RigidMass()
@@ -134,17 +126,7 @@ def let_go(options: Namespace, name: str) -> None:
 
 
 def picture(decays: Mapping[str, Decay], fillings: Sequence[Any], options: Namespace) -> None:
-    """Draw decays, and film fixed and free particles, as ``study.add_pictures`` has it asked.
-
-    Parameters
-    ----------
-    decays
-        By the label of their filling.
-    fillings
-        Of the film: the fixed particles, and the free ones.
-    options
-        As of ``let_go``.
-    """
+    """Draw decays, and film fixed and free particles, as ``study.add_pictures`` has it asked."""
     if options.pictures == "no":
         return
     at = study.output_paths(options.out)
@@ -155,10 +137,7 @@ def picture(decays: Mapping[str, Decay], fillings: Sequence[Any], options: Names
 
 
 def _batch(filling: Any, particles: Any, seeds: Any, options: Namespace) -> Batch:
-    """Containers on a base at rest, let go from the amplitude asked for.
-
-    All have the same room for results, so that those of the film run in the engines of the others.
-    """
+    """Containers on a base at rest, let go from the amplitude asked for."""
     chosen = isinstance(filling, FILLINGS[options.filling])
     dt = options.dt if chosen and options.dt else filling.default_dt
     table = SceneTable(particles, seeds, dt, Oscillator().natural_frequency, 0.0)

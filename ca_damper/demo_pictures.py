@@ -94,10 +94,7 @@ def write_decays(path: str, decays: Mapping[str, Decay]) -> None:
 
 
 def draw_films(path: str, page: str | None, films: tuple[Film, Film], options: Namespace) -> None:
-    """Write the animation, and the page that plays it, None for none.
-
-    films: of the container with fixed particles, and with those of the filling, which are free.
-    """
+    """Write the animation, and the page that plays it, None for none."""
     # Imported here, so that matplotlib loads only where a picture is drawn.
     from ca_damper.plot.boxes import Box, Hanging, film_hanging
     from ca_damper.plot.containers import show_containers

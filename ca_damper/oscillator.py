@@ -22,10 +22,7 @@ UNBOUNDED = 1e13
 
 
 def check_steady(what: str, ratio: Any, frequency: ArrayLike) -> None:
-    """Raise InputError where nothing bounds the motion at one of the frequencies [Hz].
-
-    ratio: x / y at each of them, of any number of places.
-    """
+    """Raise InputError where nothing bounds the motion at one of the frequencies [Hz]."""
     unheld = ~(np.abs(ratio) < UNBOUNDED)
     if unheld.any():
         at = np.broadcast_to(frequency, unheld.shape)[unheld][0]
@@ -256,10 +253,7 @@ class Forcing:
 
 @ti.pyfunc
 def sine_and_cosine(angle):
-    """Of an angle up to a sixth, by their series to round-off (angle^11 / 11! < 1e-16).
-
-    Faster than the library's, which must do for every angle.
-    """
+    """Of an angle up to a sixth, by their series to round-off (angle^11 / 11! < 1e-16)."""
     q = angle * angle
     sine = angle * (1 - q / 6 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72))))
     cosine = 1 - q / 2 * (1 - q / 12 * (1 - q / 30 * (1 - q / 56 * (1 - q / 90))))

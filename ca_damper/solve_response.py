@@ -166,10 +166,7 @@ def _other(filling, sources):
 
 
 def _others(question, other, answers, progress):
-    """Answers of the other filling to the same goals, for each the sentence where it has none.
-
-    None for each where it is not asked.
-    """
+    """Answers of the other filling to the same goals, for each the sentence where it has none."""
     left = question.budget_s - answers[0].plan.seconds
     if other is None:
         return [None] * len(answers)
@@ -312,10 +309,7 @@ def _plan(done):
 
 
 def _cost_curve(done, made):
-    """Costs of usual tolerances: that of the cycles and seeds beyond the transients grows as 1/x^2.
-
-    One that has been reached costs what was paid at most.
-    """
+    """Costs of usual tolerances: that of cycles and seeds beyond the transients grows as 1/x^2."""
     if not math.isfinite(made.share) or made.share <= 0.0:
         return ()
     paid = done.runs.cpu_s

@@ -72,18 +72,7 @@ def run(options: Namespace) -> None:
 
 
 def figures_of(result: Result) -> dict[str, tuple]:
-    """Figures of a blast for summary.json, beside the paper's where it names one.
-
-    Parameters
-    ----------
-    result
-        Of a run; a scene without a hole has no displacement of it.
-
-    Returns
-    -------
-    dict
-        Arguments of ``study.figure`` by name: value, unit, and the paper's value or nothing.
-    """
+    """Figures of a blast for summary.json, beside the paper's where it names one."""
     history, report = result.series, result.report
     paper_mm = 1.93 if abs(report.until_s - 5e-4) < 1e-9 else None
     per_ms = report.run_cpu_seconds / (1e3 * report.until_s)
@@ -129,20 +118,7 @@ def figures_of_certificate(certificate: Certificate | None) -> dict[str, tuple]:
 
 
 def picture(result: Result, options: Namespace) -> None:
-    """Write bodies.csv, and draw a blast as the options of ``study.add_pictures`` ask.
-
-    Parameters
-    ----------
-    result
-        Of a run with frames.
-    options
-        pictures, and out, the folder of the output; it is made where there is none.
-
-    Raises
-    ------
-    InputError
-        When the folder cannot be made or written to.
-    """
+    """Write bodies.csv, and draw a blast as the options of ``study.add_pictures`` ask."""
     at = study.output_paths(options.out)
     write_bodies(at("bodies.csv"), result.frames)
     if options.pictures == "no":

@@ -59,11 +59,7 @@ def needed_effects(result: Result, tolerance: float = ROUNDING) -> Advice:
 
 
 def _differences(result, names, tolerance):
-    """Difference that each effect makes to a run, by name, as a share of what was recorded.
-
-    names: of the effects, all left out together first; where this differs by more than the
-    tolerance, one after the other. Friction goes with the contact it acts in.
-    """
+    """Difference that each effect makes to a run, by name, as a share of what was recorded."""
     together = _difference(result, names)
     if together <= tolerance or len(names) == 1:
         return dict.fromkeys(names, together)
@@ -96,11 +92,7 @@ def _difference(result, names):
 
 
 def _without(effects, names, may_be_silent):
-    """Effects of a list without those of some names; silent friction goes with its contact.
-
-    Of these, those whose class itself says how can stay as silent copies: the same bits, and
-    nothing is compiled anew.
-    """
+    """Effects of a list without those of some names; silent friction goes with its contact."""
     kept = []
     for name, effect in zip(names_of(effects), effects):
         if name not in names:
@@ -113,12 +105,7 @@ def _without(effects, names, may_be_silent):
 
 
 def recorded_difference(first: Result, second: Result) -> float:
-    """Largest difference of all columns, speeds and times of fracture of two runs.
-
-    As a share of the largest value of each column, of all energies, or of the speeds in a connected
-    part; zero where rounding explains it. Infinite if columns have other lengths, or other bonds
-    broke.
-    """
+    """Largest difference of all columns, speeds and times of fracture of two runs."""
     history, broken, part = first.series, first.broken_time, parts_of(first.model.mesh)
     joules = [name for name in history if name.endswith("_J") and name != "residual_J"]
     energy = max((np.abs(history[name]).max(initial=0.0) for name in joules), default=0.0)
@@ -145,10 +132,7 @@ def recorded_difference(first: Result, second: Result) -> float:
 
 
 def _apart(one, other, rounding=0.0, scale=None):
-    """Largest difference of two arrays, over the largest value of the first or given scales.
-
-    Zero up to the difference that rounding explains.
-    """
+    """Largest difference of two arrays, over the largest value of the first or given scales."""
     if other is None or np.shape(one) != np.shape(other):
         return np.inf
     largest = np.abs(one).max(initial=0.0) if scale is None else scale

@@ -287,10 +287,7 @@ def _check_roles(effects):
 
 
 def scene_warnings(scene: Any) -> tuple[str, ...]:
-    """Warnings before a run: effects that a scene lists or leaves out in vain.
-
-    scene: a Scene.
-    """
+    """Warnings before a run: effects that a scene lists or leaves out in vain."""
     return (*outer_faces_warnings(scene), *_friction_warnings(scene))
 
 
@@ -319,15 +316,7 @@ def remedy(contact: Any) -> str:
 
 
 def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
-    """Warnings before a run: parts of a scene that may meet and would not touch.
-
-    A solid in one piece cannot meet itself until it breaks, which the run detects. Scenes with
-    contact are expected to have meeting bodies: any with several parts is reported. Scenes without
-    contact may hold independent solids: they are not reported where they stay at rest, fall alike,
-    or are too far from each other (``may_meet``). Faces that lie on each other without a bond
-    (``Mesh.keep_coincident``, ``Scene.unbonded``) meet in a solid of one piece too; unbonded ones
-    touch with any contact.
-    """
+    """Warnings before a run: parts of a scene that may meet and would not touch."""
     contact = scene.effect("contact")
     if contact and contact.outer_faces:
         return ()
@@ -353,24 +342,7 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
 
 
 def initial_motion(mesh: Mesh, velocity: Any, spin: Any) -> dict[str, np.ndarray]:
-    """Velocity and spin of every body at the start, as options of ``State.set_motion``.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    velocity, spin : options of a ``Scene`` [m/s], [rad/s]
-
-    Returns
-    -------
-    dict
-        Arrays "velocity" [m/s] and "spin" [rad/s], (body_count, 3); empty for bodies at rest.
-
-    Raises
-    ------
-    InputError
-        For anything that gives no three finite numbers for each body, an unknown body group, and
-        groups that share a body.
-    """
+    """Velocity and spin of every body at the start, as options of ``State.set_motion``."""
     centre = mesh.points[mesh.tetrahedra].mean(axis=1)
     moves, _ = _rows("velocity", velocity, mesh, centre)
     turns, shared = _rows("spin", spin, mesh, centre)

@@ -157,11 +157,7 @@ def run_simulation(
     observers: Sequence[Observer] = (),
     brief: bool = False,
 ) -> Result:
-    """Run a Simulation, whose motion may have been set, to a time; otherwise as ``simulate``.
-
-    brief: whether the report leaves out missing effects and, where no contact keeps all faces
-    apart, shared volume, and frames the stress.
-    """
+    """Run a Simulation, whose motion may have been set, to a time; otherwise as ``simulate``."""
     instance("simulation", simulation, Simulation)
     scene, method = simulation.scene, simulation.method
     plan = _Plan(scene, method, until, samples, frames, observers, progress, brief)
@@ -175,11 +171,7 @@ def run_simulation(
 
 
 def result_of(run: Callable[..., Result], *arguments: Any, **options: Any) -> Result:
-    """Result of ``simulate`` or ``run_simulation``, also of a run that diverged.
-
-    Its ``diverged`` is then the sentence of the program, else "". arguments, options: of run.
-    Raises SimulationDiverged for a scene that cannot begin.
-    """
+    """Result of ``simulate`` or ``run_simulation``, also of a run that diverged."""
     try:
         return run(*arguments, **options)
     except SimulationDiverged as diverged:
@@ -290,10 +282,7 @@ def _started(simulation, brief=False):
 
 
 def _result(simulation, recorder, writer, plan, tell, start=None):
-    """Run to the end, or as far as the run stays within its bounds and nothing fails beside it.
-
-    Returns the result, and the exception that ended the run and holds it, or None.
-    """
+    """Run to the end, or as far as the run stays within its bounds and nothing fails beside it."""
     calls, error = plan.calls(simulation, recorder, tell), None
     try:
         with writer:
@@ -324,10 +313,7 @@ def _result(simulation, recorder, writer, plan, tell, start=None):
 
 
 def _run(simulation, recorder, writer, plan, calls):
-    """Step from mark to mark, and call the observers at each.
-
-    A resumed run skips the marks that it has passed already.
-    """
+    """Step from mark to mark, and call the observers at each."""
     view = RunView(simulation, recorder)
     seen = int(values(simulation.state.tick)) if recorder.rows else -1
     marks = sorted(writer.marks(plan.last, plan.dt0).union(*(call.steps for call in calls)))
@@ -355,10 +341,7 @@ def _run(simulation, recorder, writer, plan, calls):
 def arrays_of(
     scene: Scene, method: Method, checkpoint: Any, resume: Any, last: int
 ) -> dict[str, np.ndarray] | None:
-    """Arrays by name to resume from, or None; last: number of largest steps of the run.
-
-    Raises InputError for an unusable checkpoint.
-    """
+    """Arrays by name to resume from, or None; last: number of largest steps of the run."""
     if isinstance(checkpoint, Checkpoint):
         # Refuses too many of them, before anything is done.
         checkpoint.marks(last, method.dt0)
@@ -392,10 +375,7 @@ def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
 
 
 def run_identity(scene: Scene, method: Method) -> dict[str, str]:
-    """Properties that a resumed run must share with the saved one, in words by name.
-
-    Driver, threads, and how long a run goes and what it records may differ.
-    """
+    """Properties that a resumed run must share with the saved one, in words by name."""
     mesh = scene.mesh
     groups = [array for name in sorted(mesh.groups) for array in (list(name), mesh.groups[name])]
     content = digest(mesh.points, mesh.tetrahedra, *groups)

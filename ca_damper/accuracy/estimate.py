@@ -59,20 +59,14 @@ class SeedValues:
 
     @property
     def apart(self) -> np.ndarray:
-        """Standard error of the mean from seed to seed, (places,); 0 for one seed.
-
-        It holds the sampling of their cycles, which is not counted again.
-        """
+        """Standard error of the mean from seed to seed, (places,); 0 for one seed."""
         count = len(self.values)
         if count < 2:
             return np.zeros_like(self.variance)
         return self.values.std(axis=0, ddof=1) / math.sqrt(count)
 
     def bars(self, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-        """Half-widths (sampling, chance), (places,) each.
-
-        chance: by which the spread of the seeds is more than that of their sampling.
-        """
+        """Half-widths (sampling, chance), (places,) each."""
         sampling = t_quantile(confidence, self.freedom) * self.sampling
         total = self.apart
         if len(self.values) > 1:
@@ -130,10 +124,7 @@ class Estimate:
         return "no order" if name == "step" and not self.step.is_regular else name
 
     def shortfall(self, tolerance: float, ended: str) -> str:
-        """Why the bar is wider than asked, and what would help; "" if it is not.
-
-        ended: in words, what ended the runs.
-        """
+        """Why the bar is wider than asked, and what would help; "" if it is not."""
         size, total = size_of(self.value), size_of(self.parts.total)
         if total <= self.allowed(tolerance):
             return ""
@@ -154,10 +145,7 @@ def estimate(
     rounding: float = 0.0,
     tolerance: float = 0.0,
 ) -> Estimate:
-    """Estimate of a goal from its values at steps, as multiples of the finest and from it on.
-
-    tolerance: share that is asked for, of which two steps support no less than a part.
-    """
+    """Estimate of a goal from its values at steps, as multiples of the finest and from it on."""
     means = np.array([one.mean for one in levels])
     errors = np.array([np.maximum(one.sampling, one.apart) for one in levels])
     step = step_part(steps, means, errors, STEP_ORDER, confidence)
@@ -173,11 +161,7 @@ def estimate(
 
 
 def _shift(error, blur, confidence):
-    """Half-width of an error that is of one sign, beside one of chance: their squares then add.
-
-    Together they must hold the error itself and chance on one side of it, which is more than the
-    root of their squares where both are alike.
-    """
+    """Half-width of an error that is of one sign, beside one of chance: their squares then add."""
     one_sided = max(0.5, 2.0 * confidence - 1.0)
     share = t_quantile(one_sided, math.inf) / t_quantile(confidence, math.inf)
     return np.sqrt(np.maximum((error + min(1.0, share) * blur) ** 2 - blur**2, 0.0))
@@ -203,11 +187,7 @@ class Readings:
     def seed_values(
         self, goal: Goal, ratios: Sequence[float], seeds: Sequence[int], dt: float
     ) -> SeedValues:
-        """Values of a goal at a step [s], with the errors of their cycles by leaving parts out.
-
-        A goal that is not linear, as a peak, is off by a share of one over the cycles: it is
-        highest where chance lifts it. Leaving parts out tells how much, and that is taken off.
-        """
+        """Values of a goal at a step [s], with the errors of their cycles by leaving parts out."""
         values = goal.values(self.response(ratios, seeds, dt))
         without = goal.values(self.response(ratios, seeds, dt, BATCHES))
         left = without.reshape(len(seeds), BATCHES, values.shape[1])
@@ -228,12 +208,7 @@ class Readings:
         seeds: Sequence[int],
         dt: float,
     ) -> np.ndarray:
-        """Half-width by the frequencies at a peak, (places,).
-
-        It is the most that the goal changes with other frequencies: those of ``wide``, at twice the
-        spacing, or all without one of those around the peak. Where the peak is lost at twice the
-        spacing, that is too wide, and the half-width a tenth.
-        """
+        """Half-width by the frequencies at a peak, (places,)."""
         everywhere = sorted({*ratios, *(ratio for some in wide for ratio in some)})
         inside = [ratio for ratio in ratios if ratio not in (everywhere[0], everywhere[-1])]
         without = [[one for one in everywhere if one != ratio] for ratio in inside]
@@ -248,10 +223,7 @@ class Readings:
     def is_at_end(
         self, goal: Goal, ratios: Sequence[float], seeds: Sequence[int], dt: float
     ) -> bool:
-        """Whether most seeds have an extreme at the first or last of some ratios.
-
-        It changes without them then, and nothing says how much further it goes beyond.
-        """
+        """Whether most seeds have an extreme at the first or last of some ratios."""
         whole, *without = (
             goal.values(self.response(some, seeds, dt))
             for some in (ratios, ratios[1:], ratios[:-1])
@@ -268,10 +240,7 @@ class Readings:
     def response(
         self, ratios: Sequence[float], seeds: Sequence[int], dt: float, leave_out: int = 0
     ) -> Response:
-        """Response of the steady parts of scenes at a step [s].
-
-        leave_out: equal parts, each of which is left out in turn: its seeds are then (seed, part).
-        """
+        """Response of the steady parts of scenes at a step [s]."""
         begins, rows = self.steady.begins(), []
         for ratio in ratios:
             keys = [SceneKey(ratio, seed, dt) for seed in seeds]

@@ -94,10 +94,7 @@ class SceneRuns:
         return self._pace * steps if self.steps else 0.0
 
     def go_on(self, cycles: Mapping[SceneKey, int]) -> None:
-        """Let scenes go on by numbers of cycles; those not known begin at rest.
-
-        Raises SimulationDiverged; the scenes of that batch are then lost.
-        """
+        """Let scenes go on by numbers of cycles; those not known begin at rest."""
         left = {key: count for key, count in cycles.items() if count}
         self._begin([key for key in left if key not in self._homes])
         homes: dict[_Home, dict[SceneKey, int]] = {}
@@ -158,10 +155,7 @@ class SceneRuns:
         return measures_of(self.oscillator, self._cycles(key, self._records[key][:, None]))
 
     def measures(self, key: SceneKey, begin: int, leave_out: int = 0) -> dict[str, np.ndarray]:
-        """Measures of a scene from cycle ``begin`` on, each (1,), by name.
-
-        leave_out: number of equal parts, each of which is left out in turn: (parts,).
-        """
+        """Measures of a scene from cycle ``begin`` on, each (1,), by name."""
         kept = self._records[key][begin:]
         rows = kept[None]
         if leave_out:
@@ -205,11 +199,7 @@ class SteadyRuns:
         return min(map(self.runs.cycles, keys)) >= _MOST_CYCLES
 
     def go_on(self, keys: Iterable[SceneKey], drift: float, least: int, window: int) -> None:
-        """Let scenes go on until all seeds are steady for a window of cycles.
-
-        drift: that does not matter, as a share of the value. least: cycles of each scene.
-        Raises BudgetSpent before runs that would take too long.
-        """
+        """Let scenes go on until all seeds are steady for a window of cycles."""
         groups = _groups(keys)
         while True:
             more: dict[SceneKey, int] = {}
@@ -220,10 +210,7 @@ class SteadyRuns:
             self._go_within_budget(more)
 
     def _go_within_budget(self, more: dict[SceneKey, int]) -> None:
-        """Let scenes go on by so many cycles; BudgetSpent where they would take too long.
-
-        The first two of the cycles tell the speed: nothing is run that would not be without budget.
-        """
+        """Let scenes go on by so many cycles; BudgetSpent where they would take too long."""
         if self.budget_s < math.inf:
             for _ in range(0 if self.runs.steps else 2):
                 first = {key: 1 for key, count in more.items() if count > 0}

@@ -20,10 +20,7 @@ _SHARED = ("restitution", "wall_restitution", "particle_mass", "gravity")
 
 
 def other_filling(filling: Any) -> Any:
-    """Spheres in the box of an automaton, or the places in which spheres lie; None for others.
-
-    None, too, for grains with what the other kind has not.
-    """
+    """Spheres in the box of an automaton, or the places in which spheres lie; None for others."""
     try:
         return _other_kind(filling)
     except InputError:
@@ -48,11 +45,7 @@ def _shared(filling) -> dict[str, Any]:
 
 
 def filling_source(answer: Answer, filling: Any, other: Answer | str | None) -> Source | None:
-    """The filling as a source of an answer; None where it has no grains.
-
-    other: what the other filling answers to the same, or the sentence with which it ended; None
-    where it was not asked.
-    """
+    """The filling as a source of an answer; None where it has no grains."""
     if not isinstance(filling, (Automaton, Spheres)):
         return None
     kind = other_filling(filling)

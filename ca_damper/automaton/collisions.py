@@ -23,11 +23,7 @@ _CELL_BITS = 16
 
 @ti.func
 def speed_after_pair(speed, other, restitution):
-    """Speed [m/s] of the particle that hits, eq. (9); ``other`` is that of the equal it meets.
-
-    Speeds are signed along the direction of the particle that hits; a result below zero sends that
-    particle back. With the two exchanged it is the speed of the one that is hit: their sum stays.
-    """
+    """Speed [m/s] of the particle that hits, eq. (9); ``other`` is that of the equal it meets."""
     return 0.5 * ((speed + other) - restitution * (speed - other))
 
 
@@ -178,11 +174,7 @@ class Collisions(Part):
 
     @ti.func
     def collide(self, s, shared, cell, other):
-        """Collide two particles along the line from ``cell`` to the one ahead (eq. 9).
-
-        Returns the gain of velocity along x that is not theirs: of the deflections, and of what one
-        that came from aside had across the line [m/s].
-        """
+        """Collide two particles along the line from ``cell`` to the one ahead (eq. 9)."""
         line = self.cells.at(s, cell)
         speed = self.cells.speed[s, cell]
         restitution = self.parameters.particle[s]
@@ -196,10 +188,7 @@ class Collisions(Part):
 
     @ti.func
     def go_on(self, s, shared, cell, line, speed):
-        """Set a particle's speed along a line; one that came along it is deflected if sent back.
-
-        One that came from aside leaves along the line, which keeps the momentum in it.
-        """
+        """Set a particle's speed along a line; one that came along it is deflected if sent back."""
         kind = self.cells.at(s, cell)
         after = line if speed >= 0.0 else turned_back(line)
         if turned_back(after) == kind:

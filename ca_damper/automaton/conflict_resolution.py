@@ -19,21 +19,14 @@ SLOTS = 8
 
 @ti.func
 def rank(step, shared, cell, purpose: ti.template()):
-    """Rank of a claimant (i64): step, then 19 random bits, then its cell so that no two are equal.
-
-    shared: hash of seed and step.
-    """
+    """Rank of a claimant (i64): step, then 19 random bits, then its cell: no two are equal."""
     chance = ti.cast((bits(shared, cell, purpose) >> 13) << 12, ti.i64)
     return (ti.cast(step + 1, ti.i64) << 32) | chance | ti.cast(cell, ti.i64)
 
 
 @ti.func
 def rank_in_phase(step, shared, phase: ti.template(), cell, slot):
-    """Rank of a claim (i64) in one of four phases of a step, of which a later one ranks higher.
-
-    Step, phase, 15 random bits, then cell and slot to tell all apart. shared: hash of seed and
-    step.
-    """
+    """Rank of a claim (i64) in one of four phases of a step, of which a later one ranks higher."""
     chance = scrambled(bits(shared, cell, EVENT) + ti.cast(slot + SLOTS * phase, ti.u32)) >> 17
     low = (ti.cast(chance, ti.i64) << 15) | ti.cast(cell * SLOTS + slot, ti.i64)
     return (ti.cast(step + 1, ti.i64) << 32) | (ti.cast(phase, ti.i64) << 30) | low

@@ -72,11 +72,7 @@ class Geometry:
         return cell - cell % self.height
 
     def neighbours(self) -> np.ndarray:
-        """Cell ahead of a particle, by its cell and kind, shape (cells + 1, KINDS).
-
-        What does not fly, and all beyond the lattice, looks at cell number ``cells``: nothing ever
-        stands there, so that one rule serves every cell.
-        """
+        """Cell ahead of a particle, by its cell and kind, shape (cells + 1, KINDS)."""
         column, row = self.column_and_row(np.arange(self.cells))
         high = (column + 1) % 2
         steps = (
@@ -90,10 +86,7 @@ class Geometry:
         return table
 
     def centres(self, width: float) -> np.ndarray:
-        """Horizontal and vertical centre of every cell [m], shape (cells, 2).
-
-        Counted from the lower left inner corner of the container. width: of a cell [m].
-        """
+        """Horizontal and vertical centre of every cell [m], shape (cells, 2)."""
         column, row = self.column_and_row(np.arange(self.cells))
         return width * np.column_stack([column + 0.5, row + 0.5 + 0.5 * ((column + 1) % 2)])
 

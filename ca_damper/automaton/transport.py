@@ -65,10 +65,7 @@ class Accumulator:
 
     @ti.func
     def distance_to_wall(self, travelled, kind, way, width):
-        """Distance travelled [m] of a particle ahead of a wall that pushes its cell along.
-
-        A particle that flies straight (up for way 1, down for -1) keeps its place in the room.
-        """
+        """Distance travelled [m] of a particle ahead of a wall that pushes its cell along."""
         result = 0.0
         if ti.static(self.reading == "signed"):
             if self.lattice.upward(kind) * way == 1.0:
@@ -114,13 +111,7 @@ class Transport(Part):
 
     @ti.func
     def fly(self, s, cell, dt, pull):
-        """Advance the content of a cell by a step.
-
-        Gravity acts by its projection. A particle that has risen as far as it can turns straight
-        down. Empty cells and walls go the same way: their speed and their pull are zero.
-        Returns whether it touches something, whether it may move on, and the vertical part of the
-        direction in which gravity found it.
-        """
+        """Advance the content of a cell by a step."""
         kind = self.cells.at(s, cell)
         upward = self.lattice.upward(kind)
         speed = self.cells.speed[s, cell] - pull * upward
@@ -194,10 +185,7 @@ class Transport(Part):
 
     @ti.func
     def reach(self, s, cell, way, number):
-        """Mark a particle, unless it is, and put it on the border; returns the border's new size.
-
-        The floor pushes through the heap that it holds; the ceiling pushes against no heap.
-        """
+        """Mark a particle, unless it is, and put it on the border; returns the border's size."""
         result = number
         kind = self.cells.at(s, cell)
         found = kind < DIRECTIONS or (kind == HELD and way > 0)

@@ -63,11 +63,7 @@ class MomentumAccount:
         self.late[s] = late
 
     def error(self, momentum: np.ndarray) -> float:
-        """Error of momentum relative to the momentum exchanged, of the worst scene.
-
-        momentum: of the fillings, (scenes,); at the start of the last step for carried particles.
-        NaN of scenes that do not count.
-        """
+        """Error of momentum relative to the momentum exchanged, of the worst scene."""
         late, expected, exchanged = map(
             self.table.in_use, (self.late, self.expected, self.exchanged)
         )
@@ -219,10 +215,7 @@ class Coupling:
 
     @ti.func
     def _measure(self, s, motion, now, middle):
-        """Add the sums of ``measures.SUMS``; the force of a step belongs to its middle.
-
-        Not by +=, which would be an atomic sum here.
-        """
+        """Add the sums of ``measures.SUMS``; the force of a step belongs to its middle."""
         x, v, f = motion.x, motion.v, self.force[s]
         sine, cosine, fs, fc = now[0], now[1], f * middle[0], f * middle[1]
         more = ti.Vector([x, x * x, x * cosine, x * sine, v * cosine, v * sine, f, fc, fs])

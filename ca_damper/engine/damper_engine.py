@@ -101,11 +101,7 @@ def borrow(
     more: dict[str, int],
     owner: Any,
 ) -> DamperEngine:
-    """An engine in which so many scenes of fillings find room, for an owner; or InputError.
-
-    mount: its word, or the number of modes. counts: scenes, measured cycles and samples. more:
-    sizes by name beside those of the fillings.
-    """
+    """An engine in which so many scenes of fillings find room, for an owner; or InputError."""
     structure, filling = fillings.structure, fillings.kinds[0]
     scenes, *others = counts
     places = next(iter(structure.sizes.values()), 0)

@@ -164,11 +164,7 @@ class LoadedScenes:
             self._recording = int(steps.max()), every, count
 
     def _recorded(self, begin: np.ndarray, steps: int, every: int, late: int) -> dict[str, Any]:
-        """Samples of a run of so many steps that began at steps ``begin``, as those of ``sample``.
-
-        late: as of a Recorder. A scene that diverged stopped at a step of its own: its samples are
-        NaN from there on, and its time stands still. Arrays are (samples, scenes).
-        """
+        """Samples of a run of so many steps from steps ``begin`` on, as those of ``sample``."""
         marks = begin + np.arange(-late % every, steps, every)[:, None]
         read = self.engine.recorder.read(-(-late // every), -(-(late + steps) // every))
         now, lost = self._read_status()[0], self.diverged
@@ -237,10 +233,7 @@ class LoadedScenes:
         engine.clock.set(self.steps_per_cycle)
 
     def _check_divergence(self) -> None:
-        """Raise SimulationDiverged where no scene is left that goes on, or one may not be lost.
-
-        And InputError where the device has ended a loop too early.
-        """
+        """Raise SimulationDiverged where no scene is left that goes on, or one may not be lost."""
         if backend.most_rounds() and CUT_SHORT in self._read_status()[2]:
             raise backend.cut_short("of these scenes", "fewer particles")
         diverged = self.diverged

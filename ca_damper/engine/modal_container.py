@@ -128,11 +128,7 @@ class ModalContainer(IntegratedContainer):
 
     @ti.func
     def resolve(self, first):
-        """Resolve the blows of all boxes of a group together.
-
-        Blows on floors and ceilings come first, with all that is struck as if it were carried, and
-        then those on side walls, by grains of which none may drag the others on.
-        """
+        """Resolve the blows of all boxes of a group together."""
         some, end = 0.0, first + self.boxes[None]
         for s in range(first, end):
             some += self.struck[s] + self.rubbed[s]
@@ -233,11 +229,7 @@ class ModalContainer(IntegratedContainer):
 
     @ti.func
     def _renew_inverse(self, first):
-        """Inverse of m + sum carried shape shape^T.
-
-        By one place after the other, with g = inverse shape: inverse - c g g^T / (1 + c shape.g)
-        (Sherman and Morrison, Ann. Math. Stat. 21 (1950) 124).
-        """
+        """Inverse of m + sum carried shape shape^T."""
         for i in range(self.modes):
             for j in range(self.modes):
                 self.inverse[first, i, j] = 0.0

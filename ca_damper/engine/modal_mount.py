@@ -82,10 +82,7 @@ class ModalMount:
         return np.stack([mass, stiffness, damping, self.sizes * s.participation])
 
     def of_scenes(self) -> np.ndarray:
-        """(group, 2 modes + 1): shape at the place, what its motion adds to the modes, residual.
-
-        The second takes the motion of all places to the modes, those of a place once.
-        """
+        """(group, 2 modes + 1): shape at the place, what its motion adds to the modes, residual."""
         s = self.structure
         to_modes = (s.masses @ s.shapes) * self.sizes
         rows = [

@@ -38,10 +38,7 @@ class Recorder:
 
     @ti.func
     def note(self, s, step, motion, force, quantities: ti.template()):
-        """Take a sample at the beginning of a step of the run, if one is due; force: before it.
-
-        quantities: ti.func of (s, motion) that returns those of ``measures.SAMPLE``.
-        """
+        """Take a sample at the beginning of a step of the run, if one is due; force: before it."""
         every, since = self.every[None], self.late[None] + step
         if every > 0:
             total = self.pushed[s] + force

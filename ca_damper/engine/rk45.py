@@ -20,22 +20,14 @@ _SMALLEST_SHARE = 1e-15
 
 @ti.pyfunc
 def step(rhs: ti.template(), context, t, y, slope, h):
-    """One step of length h from y at t, where dy/dt is ``slope``.
-
-    Returns y at t + h (fifth order), dy/dt there (the next step's slope: six new evaluations a
-    step) and the difference to the embedded fourth-order result. In a kernel, unused results cost
-    nothing, as they are not computed.
-    """
+    """One step of length h from y at t, where dy/dt is ``slope``."""
     t2, t3, t4, t5 = t + h * (1 / 5), t + h * (3 / 10), t + h * (4 / 5), t + h * (8 / 9)
     return stages(rhs, context, t2, t3, t4, t5, t + h, y, slope, h)
 
 
 @ti.pyfunc
 def stages(rhs: ti.template(), context, t2, t3, t4, t5, t_end, y, slope, h):
-    """The step of ``step`` for given times of its stages, t + h (1/5, 3/10, 4/5, 8/9, 1).
-
-    They are passed to rhs as they are, so that what it needs of them may be calculated before.
-    """
+    """The step of ``step`` for given times of its stages, t + h (1/5, 3/10, 4/5, 8/9, 1)."""
     k1 = slope
     k2 = rhs(context, t2, y + h * (1 / 5 * k1))
     k3 = rhs(context, t3, y + h * (3 / 40 * k1 + 9 / 40 * k2))
@@ -53,21 +45,14 @@ def stages(rhs: ti.template(), context, t2, t3, t4, t5, t_end, y, slope, h):
 
 @ti.pyfunc
 def scaled_norm(vector, y, y_new, rtol, atol):
-    """Euclidean length of a vector in units of atol + rtol max(|y|, |y_new|), by component.
-
-    A sum of squares and not a maximum: a maximum would let a NaN pass.
-    """
+    """Euclidean length of a vector in units of atol + rtol max(|y|, |y_new|), by component."""
     ratio = vector / (atol + rtol * ti.max(abs(y), abs(y_new)))
     return ti.sqrt((ratio * ratio).sum())
 
 
 @ti.pyfunc
 def growth(error):
-    """By how much the next step is longer, for an error in units of the tolerance.
-
-    The local error grows with the fifth power of the step; 0.9 aims a little short, and 0.2 to 5
-    bound a change. NaN shrinks the step.
-    """
+    """By how much the next step is longer, for an error in units of the tolerance."""
     factor = 0.2
     if error < 1e3:
         factor = min(5.0, max(0.2, 0.9 / fifth_root(max(error, 1e-10))))
@@ -76,11 +61,7 @@ def growth(error):
 
 @ti.pyfunc
 def attempt(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol):
-    """Try a step of length h, or the rest up to t_end.
-
-    Returns (t, y, dy/dt, length tried, error in units of the tolerance): at the end of the step
-    when its error is at most 1, at its beginning otherwise.
-    """
+    """Try a step of length h, or the rest up to t_end."""
     left = t_end - t
     size = min(h, left)
     y_new, slope_new, gap = step(rhs, context, t, y, slope, size)
@@ -96,12 +77,7 @@ def attempt(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol):
 
 @ti.pyfunc
 def integrate(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol, most_attempts):
-    """Take y from t to t_end >= t with steps chosen by the error.
-
-    slope: dy/dt at t. h: first step to try, positive.
-    Returns (y, dy/dt, attempts). attempts is -1 when the end was not reached within most_attempts
-    or the step fell to nothing, as it does at a singularity or a NaN.
-    """
+    """Take y from t to t_end >= t with steps chosen by the error."""
     now, state, change, length, attempts = 1.0 * t, y, slope, 1.0 * h, 0
     error = 1.0
     while now < t_end and attempts >= 0:

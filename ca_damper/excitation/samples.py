@@ -160,10 +160,7 @@ def _of_velocity(step, samples):
 
 
 def _evened(times, step):
-    """By how much evenly spaced times were evened, in words.
-
-    InputError that names the one that is least even.
-    """
+    """By how much evenly spaced times were evened, in words."""
     steps = np.diff(times)
     late = np.abs(times - times[0] - step * np.arange(len(times)))
     if not late.max() <= _UNEVEN * step:
@@ -179,10 +176,7 @@ def _evened(times, step):
 
 
 def _check_spectrum(step, samples, longest):
-    """InputError unless nearly all of the power lies where a spline through nodes follows.
-
-    longest: time between these nodes [s], at least the step.
-    """
+    """InputError unless nearly all of the power lies where a spline through nodes follows."""
     from scipy import signal
 
     count = len(samples)
@@ -202,10 +196,7 @@ def _check_spectrum(step, samples, longest):
 
 
 def _at_rest_again(step, samples):
-    """Double integral less that of the line a + b t that lets it end at rest in zero, and words.
-
-    At the end T the line has the speed a T + b T^2 / 2 and the place a T^2 / 2 + b T^3 / 6.
-    """
+    """Double integral less that of the line a + b t that lets it end at rest in zero, and words."""
     rough = integral(step, samples, "samples")
     total, speed, place = rough.duration, end_slope(rough), float(rough.value[-1])
     slope = 6.0 * (speed * total - 2.0 * place) / total**3

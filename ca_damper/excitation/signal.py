@@ -165,11 +165,7 @@ def _unless_tiny(values, size):
 
 
 def spline(step: float, value: np.ndarray, label: str) -> Signal:
-    """Signal through values at the nodes.
-
-    m[k-1] + 4 m[k] + m[k+1] = 6 (y[k-1] - 2 y[k] + y[k+1]) / h^2 = r[k] inside. "Not a knot" makes
-    the third derivative continuous at the first and last inner node, where this leaves 6 m = r.
-    """
+    """Signal through values at the nodes."""
     value = nodes("value", value)
     right = (6.0 * (value[:-2] - 2.0 * value[1:-1] + value[2:]) / step**2).tolist()
     bend = np.empty(len(value))

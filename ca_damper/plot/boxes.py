@@ -125,10 +125,7 @@ def frame_panel(axes: Any, box: Box, amplitude: float, margin: float = 3.0) -> N
 def _moving_picture(
     path: FileName, size: tuple[float, float], milliseconds: float = 60
 ) -> Iterator[Any]:
-    """A figure and a function that takes it as the next frame; a GIF when the block ends well.
-
-    size: in inches, at 100 pixels an inch. The layout is that of the first frame.
-    """
+    """A figure and a function that takes it as the next frame; a GIF when the block ends well."""
     drawing(path)
     with filming(size, _DPI, _SMALL) as (figure, shoot, images):
         yield figure, shoot
@@ -138,12 +135,7 @@ def _moving_picture(
 def picture_film_strips(
     path: FileName, films: Mapping[str, Any], amplitude: float, frequency: float
 ) -> None:
-    """A row of frames for every filling, from left to right through one cycle of the container.
-
-    films: (Box, ``record.Frame``s evenly spaced over one cycle) by label of the filling, as many
-    frames in each. The cycle begins when the container passes its middle upwards; arrows show its
-    velocity. amplitude [m], frequency [Hz]: of the container.
-    """
+    """A row of frames for every filling, from left to right through one cycle of the container."""
     count = len(next(iter(films.values()))[1])
     size = 1.03 * count + 0.9, 2.3 * len(films) + 0.3
     fastest = 2.0 * np.pi * frequency * amplitude
@@ -177,11 +169,7 @@ def _mark_motion(axes, box, lift, share):
 def animate_films(
     path: FileName, films: Mapping[str, Any], amplitude: float, frequency: float
 ) -> None:
-    """Containers side by side through one cycle, as a GIF below a megabyte.
-
-    films: (Box, ``record.Frame``s) by title, as many frames in each. amplitude [m], frequency [Hz]:
-    of the containers.
-    """
+    """Containers side by side through one cycle, as a GIF below a megabyte."""
     fastest, drawn = 2.0 * np.pi * frequency * amplitude, []
     with _moving_picture(path, (4.0, 2.6)) as (figure, shoot):
         panels = figure.subplots(1, len(films), squeeze=False)[0]
@@ -212,11 +200,7 @@ class Hanging:
 
 
 def film_hanging(path: FileName, containers: Sequence[Hanging], fastest: float) -> None:
-    """Write a GIF of containers side by side, with their displacement over time.
-
-    containers: with frames at the same times. fastest: end of the colour scale of the particles'
-    vertical speed [m/s]. Raises InputError when the file cannot be written.
-    """
+    """Write a GIF of containers side by side, with their displacement over time."""
     first = containers[0].frames
     # A container that diverged has frames without numbers.
     swing = 1.1 * np.nanmax([abs(frame.x) for one in containers for frame in one.frames])

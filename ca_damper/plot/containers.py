@@ -45,30 +45,7 @@ def show_containers(
     mount: str = "spring",
     notes: Sequence[str] = (),
 ) -> WebPage:
-    """Write a page that plays containers side by side, with their displacement over time.
-
-    Parameters
-    ----------
-    containers : sequence of Hanging
-        With equally many frames; frame k of all is shown at once.
-    path : file name or None
-        Of the page; None for a file in a new folder for temporary files.
-    open_browser : bool, optional
-        As of ``Film.show``.
-    mount : str
-        "spring" for containers that hang from the base; all others stand on it.
-    notes : sequence of str
-        Sentences below the view.
-
-    Returns
-    -------
-    WebPage
-
-    Raises
-    ------
-    InputError
-        When the file cannot be written, or no frame is finite.
-    """
+    """Write a page that plays containers side by side, with their displacement over time."""
     rows = list(zip(*(one.frames for one in containers)))
     size = 6 * sum(len(frame.position) for frame in rows[0]) + 24 * len(containers)
     frames, left_out = select_frames(rows, [_is_finite(row) for row in rows], size, 10_000)

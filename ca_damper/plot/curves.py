@@ -20,11 +20,7 @@ _FINE = 400
 
 
 def picture_damping(path: FileName, curves: Any, shares: Any, fixed: tuple[int, float]) -> None:
-    """Response of free and of fixed grains in one frame, and how their peaks compare.
-
-    curves: Response of one number of grains, by label. shares: by label, amplitudes of the base [m]
-    and peaks over those with fixed grains, (amplitudes, seeds). fixed: the number, and its mass.
-    """
+    """Response of free and of fixed grains in one frame, and how their peaks compare."""
     (count, mass), first = fixed, next(iter(curves.values()))
     heavy = {"color": BLACK, "lw": 2.2, "label": f"the same {count} grains, fixed"}
     with picture(path, 1, 2, (9.2, 4.6), width_ratios=(3, 2)) as (figure, (curve, share)):
@@ -45,10 +41,7 @@ def picture_damping(path: FileName, curves: Any, shares: Any, fixed: tuple[int, 
 
 
 def picture_compared(path: FileName, curves: Any, oscillator: Oscillator) -> None:
-    """Curves of several fillings: mean over seeds as lines, their range as bars; empty dotted.
-
-    curves: (ratios f/f0, RMS displacement [m] as (ratios, seeds)) by label.
-    """
+    """Curves of several fillings: mean over seeds as lines, their range as bars; empty dotted."""
     styles = styles_of(curves)
     with picture(path, 1, 1, (7.0, 4.6)) as (_, axis):
         for label, (ratios, rms) in curves.items():
@@ -60,10 +53,7 @@ def picture_compared(path: FileName, curves: Any, oscillator: Oscillator) -> Non
 
 
 def _draw_curves(axis, response, rows=None):
-    """Median over seeds as lines, lowest and highest as bands; the empty container dotted.
-
-    rows: which of the particle numbers; all if None.
-    """
+    """Median over seeds as lines, lowest and highest as bands; the empty container dotted."""
     for k in range(len(response.particles)) if rows is None else rows:
         label = f"{response.particles[k]} particles"
         _band(axis, response.ratios, 1e3 * response.rms[k], _shade(response, k), label)
@@ -112,11 +102,7 @@ def _shade(response, k):
 
 
 def picture_peaks(path: FileName | None, responses: Any, particle_mass: Any = None) -> Figure:
-    """Place and height of the peaks over the particle number; bars from seed to seed.
-
-    responses: Response by label. particle_mass [kg]: of the rigid mass drawn for scale, None for
-    none.
-    """
+    """Place and height of the peaks over the particle number; bars from seed to seed."""
     styles, first = styles_of(responses), next(iter(responses.values()))
     with picture(path, 1, 2, (9.2, 4.2)) as (figure, (place, height)):
         for label, response in responses.items():
@@ -138,10 +124,7 @@ def picture_peaks(path: FileName | None, responses: Any, particle_mass: Any = No
 
 
 def picture_measures(path: FileName, responses: Mapping[str, Any], particle_mass: float) -> None:
-    """Apparent mass and loss factor over frequency: a column a filling, a line a particle number.
-
-    Apparent mass as a share of the particles' own: 1 for a rigid mass.
-    """
+    """Apparent mass and loss factor over frequency: a column a filling, a line a number."""
     count = len(responses)
     size = (1.0 + 2.05 * count, 5.4)
     shape = {"squeeze": False, "sharex": True, "sharey": "row"}
@@ -206,27 +189,13 @@ class ResponsePlots:
 
     Each function returns a matplotlib figure, which a notebook shows, and writes it as PNG where a
     ``path`` is given (InputError where it cannot).
-
-    Examples
-    --------
-    ::
-
-        response.plot.curves(path="rms.png")
-        response.plot.curves("loss_factor")
     """
 
     def __init__(self, response: Any):
         self._response = response
 
     def curves(self, measure: str = "rms", *, path: FileName | None = None) -> Figure:
-        """Draw a measure over frequency: median over seeds, shaded from lowest to highest.
-
-        Parameters
-        ----------
-        measure : str
-            Name of a measure of the response; the RMS beside that of the empty container.
-        path : str or path, optional
-        """
+        """Draw a measure over frequency: median over seeds, shaded from lowest to highest."""
         return self._curves(choice("measure", measure, self._response.units), path)
 
     def _curves(self, name, path=None, rows=None):
@@ -312,11 +281,7 @@ class FilmMeasures:
 
 
 def picture_cycle(path: FileName, measures: Any, amplitude: float) -> None:
-    """Mean height of the particles and how many touch floor and ceiling, over one closed cycle.
-
-    measures: by title of a panel, FilmMeasures by label of the filling. amplitude: of the container
-    [mm].
-    """
+    """Mean height of the particles and how many touch floor and ceiling, over one closed cycle."""
     styles, time = styles_of(next(iter(measures.values()))), np.linspace(0.0, 1.0, 200)
     shape = {"size": (2.85 * len(measures) + 0.6, 5.7), "sharex": True, "sharey": "row"}
     with picture(path, 2, len(measures), squeeze=False, **shape) as (figure, panels):

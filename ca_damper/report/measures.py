@@ -302,10 +302,7 @@ class Cycles:
 
 
 def first_harmonic(phase: ArrayLike, values: ArrayLike) -> tuple[float, float]:
-    """Amplitude of a quantity over a cycle, and its lag [degrees] behind sin(2 pi phase).
-
-    phase: of the values, in cycles. By least squares, so that the phases need no even spacing.
-    """
+    """Amplitude of a quantity over a cycle, and its lag [degrees] behind sin(2 pi phase)."""
     angle = 2.0 * np.pi * np.asarray(phase)
     columns = np.column_stack([np.ones_like(angle), np.sin(angle), np.cos(angle)])
     _, sine, cosine = np.linalg.lstsq(columns, np.asarray(values), rcond=None)[0]
@@ -313,14 +310,7 @@ def first_harmonic(phase: ArrayLike, values: ArrayLike) -> tuple[float, float]:
 
 
 def peak(frequency_ratio: ArrayLike, response: ArrayLike) -> tuple[float, float]:
-    """Where a response curve peaks and how high it is there: (ratio, response), floats.
-
-    By the parabola of 1 / response^2 over ratio^2 through the highest point and its neighbours,
-    whatever their spacing: exact for a linear oscillator but for (2 damping ratio)^2. NaN, NaN for
-    a peak outside: where the highest point is an end of the curve or stands beside NaN, nothing
-    says how much higher the curve rises. A parabola that rises far above that point and misses the
-    next ones goes through noise: the top is then that of the parabola of the response itself.
-    """
+    """Where a response curve peaks and how high it is there: (ratio, response), floats."""
     x, y = np.asarray(frequency_ratio, dtype=float), np.asarray(response, dtype=float)
     k = -1 if np.isnan(y).all() else int(np.nanargmax(y))
     if not 0 < k < len(y) - 1 or not (y[k] > 0.0 and y[k - 1] == y[k - 1] and y[k + 1] == y[k + 1]):
@@ -348,10 +338,7 @@ def _misses(x, low, k):
 
 
 def vertex(x: ArrayLike, y: ArrayLike) -> tuple[float, float]:
-    """Lowest point (x, y) of the parabola through three points, the second of them the lowest.
-
-    The second point where they lie on a line, or where a neighbour is infinite.
-    """
+    """Lowest point (x, y) of the parabola through three points, the second of them the lowest."""
     (x0, x1, x2), (y0, y1, y2) = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     left, right = (y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1)
     bend = (right - left) / (x2 - x0)
@@ -363,18 +350,12 @@ def vertex(x: ArrayLike, y: ArrayLike) -> tuple[float, float]:
 
 
 def curve_distance(curve: ArrayLike, reference: ArrayLike) -> float:
-    """Root mean square of the difference of two response curves, as a share of the second's peak.
-
-    Both at the same frequencies, one value each.
-    """
+    """Root mean square of the difference of two response curves, as a share of its peak."""
     true = np.asarray(reference)
     return float(np.sqrt(((np.asarray(curve) - true) ** 2).mean()) / np.max(true))
 
 
 def seed_variance(responses: ArrayLike) -> float:
-    """Variance from seed to seed as a share of the peak squared, mean over the frequencies.
-
-    responses: (frequencies, seeds); the peak is that of the mean over the seeds.
-    """
+    """Variance from seed to seed as a share of the peak squared, mean over the frequencies."""
     by_seed = np.asarray(responses)
     return float(by_seed.var(axis=1, ddof=1).mean() / by_seed.mean(axis=1).max() ** 2)

@@ -76,10 +76,7 @@ class PeakSearch:
         self.found: dict[float, float] = {}
 
     def run(self) -> tuple[float, Lattice, int]:
-        """Ratio of the peak, the lattice, and its level on which the peak is resolved.
-
-        Raises InputError for a peak outside.
-        """
+        """Ratio of the peak, the lattice, and its level on which the peak is resolved."""
         ends = range(FIRST + 1)
         self._measure([self.lattice.ratio(k, 0) for k in ends])
         while True:

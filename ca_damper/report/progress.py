@@ -38,10 +38,7 @@ class Stages:
         self.pace = Pace(_LEAST_SECONDS)
 
     def __call__(self, progress: Progress) -> None:
-        """Take note of the present stage's progress; the stage ends with a share of 1.
-
-        Progress of compiling is passed on as it is: it is no part of a stage.
-        """
+        """Take note of the present stage's progress; the stage ends with a share of 1."""
         if not isinstance(progress, BatchProgress):
             return self._pass_on(progress)
         begin, end = self.before.share, self._end()

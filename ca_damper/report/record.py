@@ -40,10 +40,7 @@ class Frame:
 
 
 def frames_of(batch: Any, present: dict[str, np.ndarray] | None = None) -> tuple[Frame, ...]:
-    """A Frame of every scene of a batch as it is now.
-
-    present: what ``Batch.sample`` has just given, if it has been asked.
-    """
+    """A Frame of every scene of a batch as it is now."""
     found = batch.sample() if present is None else present
     time_s, x, y = (found[name].tolist() for name in ("time_s", "x", "y"))
     shots = [batch.snapshot(s) for s in range(batch.count)]

@@ -202,10 +202,7 @@ class Report:
         return in_lines(self._rows())
 
     def __str__(self):
-        """At most fifteen lines: what came out, how sure, how long; then how.
-
-        All else by ``details``.
-        """
+        """At most fifteen lines: what came out, how sure, how long; then how."""
         rows = self._rows()
         brief = {
             "result": f"{rows['scenes']}, {rows['simulated']}",

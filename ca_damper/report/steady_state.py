@@ -63,13 +63,7 @@ class SteadyPart:
 def steady_part(
     series: np.ndarray, allowed: float = 0.0, false_alarms: float = FALSE_ALARMS
 ) -> SteadyPart:
-    """Steady part of the values of successive cycles, (cycles,), or of their mean over the seeds.
-
-    series: of one seed, (cycles,), or of several over the same cycles, (seeds, cycles). allowed:
-    drift that does not matter, as a share of the mean. false_alarms: share of steady series that
-    are sent on, of 128 cycles or more that are correlated by up to 0.5 from cycle to cycle; twice
-    as many at 0.8.
-    """
+    """Steady part of values of successive cycles, (cycles,), or of their mean over seeds."""
     rows = np.atleast_2d(np.asarray(series, dtype=np.float64))
     x = rows.mean(axis=0)
     if len(x) < LEAST_CYCLES:
@@ -85,11 +79,7 @@ def steady_part(
 
 
 def change_of_halves(series: np.ndarray) -> tuple[float, bool]:
-    """Change of a mean from the first to the second half, and whether it may be chance.
-
-    series: of values of at least ``LEAST_TESTED`` cycles, (cycles,). The change is a share of the
-    mean.
-    """
+    """Change of a mean from the first to the second half, and whether it may be chance."""
     rows = np.asarray(series, dtype=np.float64)[None]
     change = float((_means_of_halves(rows) @ [-1.0, 1.0])[0])
     mean = float(rows.mean())
@@ -97,10 +87,7 @@ def change_of_halves(series: np.ndarray) -> tuple[float, bool]:
 
 
 def half_width(series: np.ndarray, confidence: float) -> float:
-    """Half-width of the bar of a mean over cycles, (cycles,); infinite where it still changes.
-
-    So it is of fewer cycles than LEAST_TESTED, which cannot tell.
-    """
+    """Half-width of the bar of a mean over cycles, (cycles,); infinite where it still changes."""
     if len(series) < LEAST_TESTED or not change_of_halves(series)[1]:
         return math.inf
     _, error, freedom = mean_and_error(series)
@@ -108,11 +95,7 @@ def half_width(series: np.ndarray, confidence: float) -> float:
 
 
 def period(series: np.ndarray, tolerance: float) -> int:
-    """Least number of cycles after which all values repeat, up to a third of them; 0 for none.
-
-    series: a value a cycle, complex ones too, (cycles,). tolerance: difference that does not
-    matter, as a share of the largest value. Two values of one cycle each count as alike.
-    """
+    """Least number of cycles after which all values repeat, up to a third of them; 0 for none."""
     x = np.asarray(series)
     allowed = tolerance * float(np.abs(x).max())
     for cycles in range(1, max(1, len(x) // 3) + 1):
@@ -172,11 +155,7 @@ def _halves_differ(rows, false_alarms):
 
 
 def _seeds_wander(rows, allowed):
-    """Whether seeds change from half to half, each its own way, by more than their cycles tell.
-
-    They then go from motion to motion so slowly that their cycles show a few of them only, however
-    steady each looks: means of more seeds over as many cycles would miss what comes later.
-    """
+    """Whether seeds change from half to half, each its own way, by more than their cycles tell."""
     changes = _means_of_halves(rows) @ [-1.0, 1.0]
     known = [_error_off_trend(half) for half in _halves(rows)]
     square = sum(error**2 for error, _ in known) / len(rows)
@@ -221,11 +200,7 @@ def _halves(rows):
 
 
 def _error_of_change(rows, changes):
-    """Standard error of the mean change from half to half, and its degrees of freedom.
-
-    It is that from seed to seed where there are enough: a seed may leave one motion for another at
-    any time, of which its cycles before tell nothing.
-    """
+    """Standard error of the mean change from half to half, and its degrees of freedom."""
     count = len(rows)
     if count >= LEAST_SEEDS:
         return float(changes.std(ddof=1)) / math.sqrt(count), count - 1
@@ -271,11 +246,7 @@ def _approach(x, allowed):
 
 
 def _limit(x):
-    """(limit, its standard error, time constant in cycles) of the means of three thirds.
-
-    Means that go to and fro have as limit the farthest of them from the last. Infinite where the
-    change from third to third does not fall.
-    """
+    """(limit, its standard error, time constant in cycles) of the means of three thirds."""
     (a, b, c), length = batch_means(x, 3)
     if abs(c - b) <= ROUNDING * abs(c):
         return c, 0.0, 1.0

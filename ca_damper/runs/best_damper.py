@@ -305,10 +305,7 @@ class _Case:
     def values(
         self, filling: Any, grains: Grains, seeds: Any, brief: bool = False
     ) -> tuple[np.ndarray, float]:
-        """What is to be small [m] of a box, a value a seed, and a half-width beside chance [m].
-
-        brief: in a first look.
-        """
+        """What is to be small [m] of a box, a value a seed, and a half-width beside chance [m]."""
         made = grains.put_into(filling)
         job = {"particles": grains.particles, "seeds": seeds, "oscillator": self.structure}
         if self.signal is not None:

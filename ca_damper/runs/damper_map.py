@@ -267,10 +267,7 @@ def clearance_of(filling: Any, particles: int) -> float:
 
 
 def with_clearance(filling: Any, particles: int, clearance: float) -> Any:
-    """The filling in a box with a clearance [m] above so many settled grains.
-
-    InputError for a filling without a box, and for an automaton whose box would end within a cell.
-    """
+    """The filling in a box with a clearance [m] above so many settled grains."""
     if not hasattr(filling, "with_clearance"):
         raise InputError(
             f"clearances must be None for a filling without a box, got {shown(clearance)} for "

@@ -77,11 +77,7 @@ def boxes_of(
 
 
 def shifted(best: Grains, share: float) -> Iterator[tuple[str, Grains]]:
-    """Boxes with an error of manufacture, and its name, where the grains still fit.
-
-    The name says what becomes of number, size or clearance, and of the mass of all grains: balls of
-    one density weigh by the cube of their size.
-    """
+    """Boxes with an error of manufacture, and its name, where the grains still fit."""
     for sign in (1.0, -1.0):
         by = 1.0 + sign * share
         taller = best.height + sign * share * best.clearance

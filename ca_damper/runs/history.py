@@ -17,34 +17,7 @@ from taichi_dem.kit.display import counted, in_brief, listed
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class History(Result):
-    """Base of time histories; a scene has a place and a seed.
-
-    Parameters
-    ----------
-    label : str
-        Short word for the filling.
-    excitation : Excitation
-        Motion of the base and force.
-    seeds : tuple of int
-        Seeds.
-    time_s : ndarray
-        Times [s], shape (samples,).
-    base : ndarray
-        Displacement of the base [m], shape (samples,).
-    x : ndarray
-        Displacement [m], shape (samples, places, seeds).
-    v : ndarray
-        Velocity [m/s], shape (samples, places, seeds).
-    force : ndarray
-        Force of the filling on each container [N], mean since the sample before, shape (samples,
-        containers, seeds).
-    rms : ndarray
-        RMS of the displacement about its mean [m], of all steps, shape (places, seeds).
-    peak : ndarray
-        Largest magnitude of the displacement [m], of all steps, shape (places, seeds).
-    report : Report, optional
-        Figures and cost of the run.
-    """
+    """Base of time histories; a scene has a place and a seed."""
 
     label: str
     excitation: Excitation

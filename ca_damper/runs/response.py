@@ -377,12 +377,7 @@ def frequency_response(
 
 
 def _sampling(cycles, oscillator, transient):
-    """What is known of the mean RMS in the scene where it is highest, by name for a Report.
-
-    sampling: number of cycles, and half-width as a share. transient: why that is not known. None
-    of them of a single cycle, or of a container at rest. transient, the argument: cycles before
-    those that were measured.
-    """
+    """What is known of the mean RMS in the scene where it is highest, by name for a Report."""
     highest = int(np.nanargmax(cycles.rms))
     one = slice(highest, highest + 1)
     scene = Cycles(cycles.frequency[one], cycles.steps[one], cycles.record[one])

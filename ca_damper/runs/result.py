@@ -35,10 +35,7 @@ class Result(Tabulated):
 
 
 def scenes_over(**axes: Any) -> dict[str, np.ndarray]:
-    """Value on each axis of all scenes, (scenes,) by name; the last axis runs fastest.
-
-    InputError for more scenes than a batch can count.
-    """
+    """Value on each axis of all scenes, (scenes,) by name; the last axis runs fastest."""
     scenes = math.prod(map(len, axes.values()))
     if scenes > MOST_SCENES:
         words = " x ".join(axes)

@@ -35,10 +35,7 @@ class SteadyPeak:
         self.found: dict[float, tuple[np.ndarray, np.ndarray]] = {}
 
     def run(self, low: float, high: float, doublings: int = _DOUBLINGS) -> tuple[np.ndarray, float]:
-        """Peak RMS of each seed [m], and the half-width [m] by what has not settled and spacing.
-
-        low, high: ratios f/f0 between which to look first.
-        """
+        """Peak RMS of each seed [m], and the half-width [m] by what has not settled and spacing."""
 
         def rms_at(ratios: list[float]) -> list[float]:
             rms, errors = self._rms(ratios, doublings)
@@ -79,10 +76,7 @@ class SteadyPeak:
 
 
 def _near(structure, frequency, mass, weight):
-    """State near the steady one, by name: of a fixed mass, as far as grains do not fly [m, m/s].
-
-    weight: gravity along the motion [m/s^2].
-    """
+    """State near the steady one, by name: of a fixed mass, as far as grains do not fly [m, m/s]."""
     x, v = structure.steady_state(frequency, mass)
     omega = 2.0 * np.pi * frequency
     share = np.minimum(1.0, weight / np.maximum(omega**2 * np.hypot(x, v / omega), 1e-300))
@@ -91,10 +85,7 @@ def _near(structure, frequency, mass, weight):
 
 
 def steady_rms(cycles: Cycles, weight: float) -> tuple[np.ndarray, np.ndarray]:
-    """RMS of the steady motion that cycles approach [m] and its half-width [m], (scenes,) each.
-
-    weight: gravity along the motion [m/s^2], below which grains lie still.
-    """
+    """RMS of the steady motion that cycles approach [m] and its half-width [m], (scenes,) each."""
     harmonic = cycles.harmonic_by_cycle("x")
     limit, blur = limit_of(harmonic)
     shown = cycles.rms
@@ -107,10 +98,7 @@ def steady_rms(cycles: Cycles, weight: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def limit_of(harmonic: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Limit of numbers that approach it by a factor a cycle, and its standard error, (scenes,).
-
-    harmonic: (scenes, cycles), complex. Infinite where they go away from it.
-    """
+    """Limit of numbers that approach it by a factor a cycle, and its standard error, (scenes,)."""
     before, after = harmonic[:, :-1], harmonic[:, 1:]
     means = before.mean(axis=1), after.mean(axis=1)
     x, y = before - means[0][:, None], after - means[1][:, None]

@@ -258,10 +258,7 @@ class Window(NamedTuple):
 
 
 def _window(excitation: Excitation, asked: Any, dt: float, interval: Any) -> Window:
-    """Window with the largest step that makes a whole number of samples, none longer than dt [s].
-
-    asked: duration, that of the excitation if None. interval: between samples at most [s].
-    """
+    """Window with the largest step up to dt [s] that makes a whole number of samples."""
     end = excitation.duration
     if asked is None and math.isinf(end):
         raise InputError("duration must be given for an excitation without an end, got None")
@@ -284,12 +281,7 @@ def _excitation(value: Any) -> Excitation:
 
 @contextlib.contextmanager
 def _recorded(scenes, options, window, start, progress, saving):
-    """Run a batch over its window; for its block what all scenes share, and what each has.
-
-    Both are fields of a result by name; the third is the writer of the last checkpoint.
-    scenes: filling, or one for each, and table. saving: words for the job, and both options of
-    checkpoints.
-    """
+    """Run a batch over its window; for its block what all scenes share, and what each has."""
     job, checkpoint, resume = saving
     with reporting(progress, "shaking") as tell:
         batch = Batch(*scenes, measured_cycles=1, recorded_samples=window.samples, **options)

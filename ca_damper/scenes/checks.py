@@ -35,10 +35,7 @@ def check_run(transient_cycles: Any, measured_cycles: Any, start: Any, progress:
 
 
 def for_all(name: str, value: Any, scenes: int, most: int | None = None) -> np.ndarray:
-    """One number for all scenes or one for each, (scenes,); InputError for anything else.
-
-    most: the largest of whole numbers from zero; None for any numbers.
-    """
+    """One number for all scenes or one for each, (scenes,); InputError for anything else."""
     given = real_numbers(name, value)
     words = "numbers" if most is None else f"whole numbers from 0 to {most}"
     is_whole = most is None or ((given >= 0) & (given <= most) & (given == np.floor(given))).all()
@@ -86,10 +83,7 @@ def check_within(excitation: Excitation, ends: np.ndarray) -> None:
 def sampling_found(
     excitation: Excitation, frequencies: np.ndarray, first: float
 ) -> tuple[str, ...]:
-    """Sentences about samples that are too few for a structure; InputError for a longer gap.
-
-    frequencies: of the structure [Hz]. first: of them the one whose period no gap may cut.
-    """
+    """Sentences about samples that are too few for a structure; InputError for a longer gap."""
     found = []
     for role, one in excitation.signals.items():
         if one.gap > max(_GAP * one.apart, 0.25 / first):

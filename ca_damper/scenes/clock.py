@@ -17,10 +17,7 @@ MOST_STEPS_PER_CYCLE = 10_000_000
 
 
 def steps_per_cycle(frequency: float, largest_dt: float) -> int:
-    """Least number of equal steps that make a cycle, none longer than largest_dt [s].
-
-    frequency [Hz]. Raises InputError for fewer than 40 steps, or more than ten million.
-    """
+    """Least number of equal steps that make a cycle, none longer than largest_dt [s]."""
     positive("frequency", frequency)
     positive("dt", largest_dt)
     # A step that fits but for rounding is not shortened.

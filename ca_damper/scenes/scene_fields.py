@@ -73,10 +73,7 @@ class SceneFields:
         return self._made(lambda shape: ti.Vector.field(n, dtype, shape=shape), lengths, flat)
 
     def structs(self, kind: Any, *lengths: int) -> ti.StructField:
-        """Declare structs of numbers that are given; members lie apart, which kernels find faster.
-
-        They are no state: a class names them among its ``constant_fields``.
-        """
+        """Declare structs of given numbers; members lie apart, which kernels find faster."""
         return kind.field(shape=(self.capacity, *lengths), layout=ti.Layout.SOA)
 
     def _made(self, make: Any, lengths: tuple[Length, ...], flat: bool) -> ti.Field:

@@ -196,10 +196,7 @@ def _checked(name: str, value: Any) -> np.ndarray:
 
 
 def dealt(cost: np.ndarray, threads: int) -> np.ndarray:
-    """Scene numbers in an order that gives each thread the same cost, (scenes,) i32.
-
-    A thread takes a contiguous part of the loop, so scenes are dealt out in turn by falling cost.
-    """
+    """Scene numbers in an order that gives each thread the same cost, (scenes,) i32."""
     dear_first = np.argsort(-cost, kind="stable")
     hands = [dear_first[k::threads] for k in range(threads)]
     return np.concatenate(hands)

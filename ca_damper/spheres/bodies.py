@@ -187,10 +187,7 @@ class Bodies:
 
     @ti.func
     def reset_positions(self, s):
-        """Place the spheres: given places at rest, or random ones with small velocities.
-
-        Given velocities replace both.
-        """
+        """Place the spheres: given places at rest, or random ones with small velocities."""
         if ti.static(self.kinds > 1):
             self._choose_kinds(s)
         if ti.static(self.given):
@@ -211,12 +208,7 @@ class Bodies:
 
     @ti.func
     def _scatter(self, s):
-        """Put the spheres on random sites of a grid as wide as they leave room for.
-
-        A site is taken with the chance "still wanted over still to come", which makes every
-        choice of sites equally likely (selection sampling). Where sites are wider than spheres,
-        each sphere is moved at random within its own; none can then overlap.
-        """
+        """Put the spheres on random sites of a grid as wide as they leave room for."""
         body, count, seed = self.body[s], self.table.particles[s], self.table.seed[s]
         columns, rows = self._sites(s, count)
         pitch = vec2(body.width / columns, body.height / rows)
@@ -233,11 +225,7 @@ class Bodies:
 
     @ti.func
     def _choose_kinds(self, s):
-        """Choose the size of each sphere: in their order for given places, else at random.
-
-        Random ones with the chance "left of this size over left of all", as ``_scatter``, which
-        fills sites from the floor up.
-        """
+        """Choose the size of each sphere: in their order for given places, else at random."""
         count = self.table.particles[s]
         for k in range(count):
             drawn = ti.cast(k, ti.f64)

@@ -71,10 +71,7 @@ def hertz_stiffness(
 
 
 def shear_ratio(young: float, poisson: float, other_young: float, other_poisson: float) -> float:
-    """Tangential over normal stiffness of a contact, 4 G* / E* (Mindlin 1949); moduli [Pa].
-
-    For two bodies of one material 2 (1 - poisson) / (2 - poisson), whatever the overlap.
-    """
+    """Tangential over normal stiffness of a contact, 4 G* / E* (Mindlin 1949); moduli [Pa]."""
     sides = ((young, poisson), (other_young, other_poisson))
     shear = sum(2.0 * (2.0 - nu) * (1.0 + nu) / modulus for modulus, nu in sides)
     normal = sum((1.0 - nu * nu) / modulus for modulus, nu in sides)
@@ -82,19 +79,13 @@ def shear_ratio(young: float, poisson: float, other_young: float, other_poisson:
 
 
 def contact_duration(mass: float, stiffness: float, speed: float) -> float:
-    """Time [s] that bodies of an effective mass [kg] touch, undamped, at an impact speed [m/s].
-
-    Hertz (1882): 2.943 D / v, D the deepest overlap, from k D^(5/2) 2/5 = m v^2 / 2.
-    """
+    """Time [s] that bodies of an effective mass [kg] touch, undamped, at an impact speed [m/s]."""
     root = fifth_root(1.25 * mass * speed * speed / stiffness)
     return _HERTZ * root * root / speed
 
 
 def pair_numbers(options: Any, one: int = 0, other: int = 0) -> dict[str, float]:
-    """Numbers of a contact of two spheres, of these of the sizes.
-
-    Dict of stiffness, shear_ratio, damping, friction, mass, reach.
-    """
+    """Numbers of a contact of two spheres, of these of the sizes."""
     radius, mass = (_reduced(of, one, other) for of in (options.radii, options.masses))
     partner = options.young, options.poisson, options.restitution, options.friction
     return _numbers(options, partner, radius, mass, options.radii[one] + options.radii[other])
@@ -114,10 +105,7 @@ def wall_numbers(options: Any, kind: int = 0) -> dict[str, float]:
 
 
 def _numbers(options, partner, radius, mass, reach):
-    """Numbers of a contact with a partner: its modulus and Poisson's ratio, restitution, friction.
-
-    radius, mass: effective ones.
-    """
+    """Numbers of a contact with a partner: modulus, Poisson's ratio, restitution, friction."""
     *moduli, restitution, friction = partner
     stiffness = hertz_stiffness(radius, options.young, options.poisson, *moduli)
     power, speed = POWERS[options.damping], options.reference_speed
@@ -134,11 +122,7 @@ def _numbers(options, partner, radius, mass, reach):
 def contact_members(
     kinds: Sequence[Mapping[str, float]], tangential_share: float
 ) -> dict[str, np.ndarray]:
-    """Members of Contacts of several kinds, (kinds,) each, before a step is known.
-
-    kinds: numbers of each. tangential_share: part of the effective mass that resists a tangential
-    impulse.
-    """
+    """Members of Contacts of several kinds, (kinds,) each, before a step is known."""
     found = {name: np.array([one[name] for one in kinds]) for name in kinds[0]}
     return {
         **{name: found[name] for name in ("stiffness", "damping", "friction", "reach")},
@@ -152,10 +136,7 @@ def contact_members(
 
 @lru_cache(maxsize=64)
 def damping_number(restitution: float, power: float) -> float:
-    """Number alpha of a dashpot d^power that lets spheres part at ``restitution`` times the speed.
-
-    restitution lies in (0, 1]; power is 1/4 or 1/2.
-    """
+    """Number alpha of a dashpot d^power: spheres part at ``restitution`` times the speed."""
     low, high = 0.0, 1.0
     while restitution_of(high, power) > restitution:
         low, high = high, 2.0 * high
@@ -169,11 +150,7 @@ def damping_number(restitution: float, power: float) -> float:
 
 
 def restitution_of(alpha: float, power: float) -> float:
-    """Speed of parting over speed of impact for a dashpot of number alpha.
-
-    Overlap y^4 instead of d, and a time in which y' is the speed u: then all terms are smooth,
-    where d^(1/4) is not. Integrated by the classical Runge-Kutta method.
-    """
+    """Speed of parting over speed of impact for a dashpot of number alpha."""
     y, u = 0.0, 1.0
     while True:
         rate = _rate(y, u, alpha, power)
@@ -187,10 +164,7 @@ def restitution_of(alpha: float, power: float) -> float:
 
 
 def damping(restitution: float, power: float, mass: float, stiffness: float, speed: float) -> float:
-    """Coefficient c [N s/m^(1+power)] that gives ``restitution`` at an impact speed [m/s].
-
-    mass: effective mass [kg]. stiffness: k [N/m^(3/2)]. For power = 1/4 the speed cancels.
-    """
+    """Coefficient c [N s/m^(1+power)] that gives ``restitution`` at an impact speed [m/s]."""
     root = fifth_root(mass * speed * speed / stiffness)
     depth = root * root
     more = math.sqrt(depth) if power == 0.5 else math.sqrt(math.sqrt(depth))
@@ -228,10 +202,7 @@ class ContactLaw:
 
     @ti.func
     def damping_ratio(self, share):
-        """Ratio of damping for the same restitution with a share of the effective mass.
-
-        The damping grows with the power 1 - 2 (1 + p) / 5 of the mass (see above).
-        """
+        """Ratio of damping for the same restitution with a share of the effective mass."""
         ratio = ti.sqrt(share)
         if ti.static(self.printed):
             root = fifth_root(share)
@@ -249,11 +220,7 @@ class ContactLaw:
 
     @ti.func
     def normal(self, contact, overlap, approach):
-        """Repulsion [N] at a positive overlap [m] that grows by approach [m/s]; never a pull.
-
-        The dashpot acts on the approach in the middle of the step, which the force itself has
-        slowed down by then: so the order of the leapfrog is kept.
-        """
+        """Repulsion [N] at a positive overlap [m] that grows by approach [m/s]; never a pull."""
         dashpot = self.dashpot(contact, ti.sqrt(overlap))
         force = self.elastic(contact, overlap) + dashpot * approach
         return ti.max(0.0, force) / (1.0 + dashpot * contact.yielding)

@@ -119,10 +119,7 @@ class DeviceSpheres:
 
     @ti.func
     def step(self, s, step, dt, since, motion):
-        """Take spheres whose positions run half a step ahead over it; returns their impulse [N s].
-
-        since: time that positions have moved on since the last step [s].
-        """
+        """Take spheres half a step on, whose positions run ahead; returns their impulse [N s]."""
         floor = motion.x + 0.5 * dt * (motion.v + 0.25 * dt * motion.a)
         low, high = self.bodies.reach_of_walls(s, floor)
         # Seen from spheres that fall freely, as all that is foreseen of them is their fall.
@@ -145,10 +142,7 @@ class DeviceSpheres:
 
     @ti.func
     def _push(self, s, dt, since, low, high, speed):
-        """Add the forces of all contacts; returns the container's force on the spheres [N].
-
-        low, high: where spheres begin to touch walls [m]; speed: of the container as they see it.
-        """
+        """Add the forces of all contacts; returns the container's force on the spheres [N]."""
         contact = self.pair_contacts.over_step(s, dt, since)
         which, count = self.search.find(s, contact.reach)
         if count > 0:
@@ -176,10 +170,7 @@ class DeviceSpheres:
 
     @ti.func
     def energy(self, s):
-        """Kinetic and potential energy and that of the contacts [J].
-
-        Heights count from the floor, or from the walls that gravity pulls to.
-        """
+        """Kinetic and potential energy and that of the contacts [J]."""
         total = 0.0
         for i in range(self.bodies.first(s), self.bodies.last(s)):
             total += self._own_energy(s, i)
@@ -255,10 +246,7 @@ class DeviceSpheres:
 
     @ti.func
     def _gains(self, s):
-        """Whether contacts have created a good part of the energy of late, which is impossible.
-
-        Seen from the container, as spheres that rest in the room meet a wall that comes to them.
-        """
+        """Whether contacts have created a good part of the energy of late, which is impossible."""
         body, speed = self.bodies.body[s], self.speed[s]
         weight = self.table.particles[s] * body.mass * body.pull[1]
         energy, shift = self.held[s], 0.0
@@ -306,10 +294,7 @@ class DeviceSpheres:
         return self.search.found()
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
-        """Places and velocities of the spheres of scene s.
-
-        And their spins [rad/s] if they turn, and diameters [m] if there are several sizes.
-        """
+        """Places and velocities of the spheres of scene s."""
         count = self.table.particles[s]
         rows = slice(s * self.bodies.stride, s * self.bodies.stride + count)
         velocity = values(self.bodies.velocity)[rows]

@@ -160,10 +160,7 @@ class ExpectedContacts:
 
     @ti.func
     def find(self, s, reach):
-        """Find the pairs that are to be evaluated: the list that they are in, and their number.
-
-        All that touch, at a distance below reach [m], are among them.
-        """
+        """Find the pairs that are to be evaluated: the list that they are in, and their number."""
         which, count = EXPECTED, self.pair_count[s]
         if self.most_touch[s] == 0:
             which, count = TOUCHING, 0
@@ -183,10 +180,7 @@ class ExpectedContacts:
 
     @ti.func
     def audit(self, s, step, low, high, reach):
-        """Count the tests that a step skips; of a sphere that a counter chooses, make them all.
-
-        reach: distance at which two spheres touch [m].
-        """
+        """Count the tests that a step skips; of a sphere that a counter chooses, make them all."""
         self.skipped[s] = self.skipped[s] + self.unlisted[s]
         if step % _AUDIT_EVERY == 0:
             shared = stream(self.table.seed[s], step)

@@ -134,11 +134,7 @@ class WallForces(Part):
 
     @ti.func
     def add(self, s, contacts, low, high, speed):
-        """Add the forces of the walls; returns their sum along x [N], and the spheres that touch.
-
-        contacts: with the side walls, and with floor and ceiling. low, high: where the largest
-        spheres begin to touch [m]; speed: of the walls [m/s].
-        """
+        """Add the forces of the walls; returns their sum along x [N] and who touches."""
         total, touching = 0.0, 0
         for k in range(self.search.sphere_count[s]):
             i = self.search.sphere[s, k]

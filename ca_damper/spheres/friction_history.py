@@ -90,10 +90,7 @@ class FrictionHistory(Part):
 
     @ti.func
     def at_wall(self, s, i, wall, contact, overlap, push, slip, tangent):
-        """Friction of a sphere at a wall [N]; keeps its spring.
-
-        Positions move on by the velocities as they are; slip belongs to the middle of the step.
-        """
+        """Friction of a sphere at a wall [N]; keeps its spring."""
         kept, lever = self.wall_spring[i, wall], contact.reach - overlap
         relative = self.bodies.velocity[i] - vec2(0.0, self.speed[s])
         way = contact.since * self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
@@ -103,10 +100,7 @@ class FrictionHistory(Part):
 
     @ti.func
     def force(self, contact, overlap, push, slip, way, spring, last_root):
-        """Friction [N] against a slip [m/s], and the spring's force and root from now on.
-
-        way: by which the contact has slipped since the step before [m]; spring, last_root: of it.
-        """
+        """Friction [N] against a slip [m/s], and the spring's force and root from now on."""
         root = ti.sqrt(overlap)
         most = contact.friction * push
         stretched = self._stretched(contact, root, way, spring, last_root)
@@ -133,10 +127,7 @@ class FrictionHistory(Part):
 
     @ti.func
     def of_pairs(self, s):
-        """Energy of the springs of all pairs [J], and the power that they take [W].
-
-        At the time of the velocities, half a step after the force.
-        """
+        """Energy of the springs of all pairs [J], and the power that they take [W]."""
         total, power = 0.0, 0.0
         for k in range(self.pair_count[s]):
             i, j = self.pair[s, k][0], self.pair[s, k][1]
@@ -152,10 +143,7 @@ class FrictionHistory(Part):
 
     @ti.func
     def of_walls(self, s, i, contact, above, below):
-        """Energy of the springs of a sphere at walls [J]; way left to each wall [m].
-
-        At the time of the velocities, as ``of_pairs``.
-        """
+        """Energy of the springs of a sphere at walls [J]; way left to each wall [m]."""
         total, relative = 0.0, self.bodies.velocity[i] - vec2(0.0, self.speed[s])
         if self.wall_step[i] == self.step[s]:
             for axis in ti.static(range(2)):

@@ -71,10 +71,7 @@ class AllPairs:
 
     @ti.func
     def find(self, s, reach):
-        """Find the pairs that touch: the list that they are in, and their number.
-
-        Where they are more than there is room for, spheres lie in each other by far.
-        """
+        """Find the pairs that touch: the list that they are in, and their number."""
         count = 0
         self.each_listed_pair(s, reach, self._find, count)
         return TOUCHING, count
@@ -157,10 +154,7 @@ class CellList:
 
     @ti.func
     def refresh(self, s):
-        """Renew the list if spheres may have crossed the skin; returns whether it did.
-
-        "not" includes NaN.
-        """
+        """Renew the list if spheres may have crossed the skin; returns whether it did."""
         used_up = not (self.travel[s] < self.grid[s].skin)
         if used_up:
             self._search(s)

@@ -59,11 +59,7 @@ class RecordedFall:
 
     @classmethod
     def of(cls, history: Mapping[str, np.ndarray], fall: Fall, mass: float) -> "RecordedFall":
-        """From the history of a ``film`` of one particle; mass: of it [kg].
-
-        Height and velocity follow from energy and momentum. Two parabolas of equal gravity cross
-        once: where those before and after an impact do, there the particle turned.
-        """
+        """From the history of a ``film`` of one particle; mass: of it [kg]."""
         free = history["force"] == 0.0
         time, velocity = history["time_s"][free], history["momentum"][free] / mass
         height = history["energy"][free] / (mass * fall.gravity) - 0.5 * velocity**2 / fall.gravity
@@ -77,10 +73,7 @@ class RecordedFall:
         return cls(fall, time, height, impacts, np.array(apexes))
 
     def errors(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Errors of the first impacts [s] and of the apexes after them [m], as many as there are.
-
-        count: how many impacts to compare.
-        """
+        """Errors of the first impacts [s] and of apexes after them [m], as many as there are."""
         first = range(1, 1 + min(count, len(self.impacts_s)))
         late = self.impacts_s[: len(first)] - [self.fall.impact_s(k) for k in first]
         high = self.apexes_m[: len(first)] - [self.fall.apex_m(k) for k in first]

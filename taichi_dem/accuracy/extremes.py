@@ -33,10 +33,7 @@ class Earlier:
 
 
 def change(goal: Goal, result: Result, time_s: float, peak_speed: np.ndarray) -> float:
-    """How much a goal changes from a time on [s]; NaN for a function that cannot say it then.
-
-    peak_speed: largest speeds until then [m/s], (body_count,).
-    """
+    """How much a goal changes from a time on [s]; NaN for a function that cannot say it then."""
     # A user's function may fail in whatever way where nothing changes.
     try:
         return abs(goal.value(result) - goal.value(_stopped(result, time_s, peak_speed)))
@@ -58,11 +55,7 @@ def _stopped(result, time_s, peak_speed):
 def extreme_doubts(
     runs: Any, first: float, last: float, error: float, affords: Callable[[float, float], bool]
 ) -> Iterator[str]:
-    """Reasons to doubt an extreme, as sentences; none where it was passed before the end.
-
-    runs: those of the question. first, last: its coarsest and its finest level. error: half-width
-    of the bar. affords: whether the budget lets so many runs at a level be made.
-    """
+    """Reasons to doubt an extreme, as sentences; none where it was passed before the end."""
     goal, until, result = runs.job.goal, runs.job.until, runs.results[last]
     if change(goal, result, 0.0, result.frames[0].speed) <= error:
         yield (

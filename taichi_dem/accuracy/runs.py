@@ -89,10 +89,7 @@ class Job:
         return level + min(1.0, math.log2(1.0 + more))
 
     def _longest_step(self):
-        """Longest step that all springs bear [s]: solved dashpots leave no other limit.
-
-        Without bonds that of contacts, which is not needed where no whole face ever touches.
-        """
+        """Longest step that all springs bear [s]: solved dashpots leave no other limit."""
         mesh, material = self.scene.mesh, self.scene.body_materials
         given = mesh, topology_of(mesh), material.density, springs_of(material)
         step = float(spring_step(largest_bond_rate(*given)))
@@ -101,11 +98,7 @@ class Job:
         return step
 
     def method(self, level: float, tight: bool = False, twin: int = 0) -> Method:
-        """Method at a level, of the longest stable step over 2^level.
-
-        tight: whether its sweeps must agree 8 times as well. Sweeps end at differences that fall
-        with the step: one family goes to the exact solution. twin: see ``Runs.value``.
-        """
+        """Method at a level, of the longest stable step over 2^level."""
         more = 1.0 + _MORE_STEPS * math.fmod(twin * _GOLDEN, 1.0)
         step = self.until / round(self._coarsest[0] * 2.0**level * more)
         if not self.solves:
@@ -150,12 +143,7 @@ class Runs:
         return report.broken_faces > 0 or report.pair_evaluations > 0 or bool(report.bond_slip)
 
     def value(self, level: float, twin: int = 0, tight: bool = False) -> Any:
-        """Goal of a run at a level; None for one that diverged.
-
-        twin: 0 for the scene as it is, else the number of one that differs by chance: it begins
-        displaced by one rounding, and makes up to 30 % more steps where that run is eventful.
-        tight: see ``Job.method``.
-        """
+        """Goal of a run at a level; None for one that diverged."""
         key = level, twin, tight
         if key not in self._known:
             result = self._timed(*key)
@@ -172,10 +160,7 @@ class Runs:
         self._simulation = None
 
     def parting(self, level: float) -> float:
-        """Time at which one rounding has come to the tolerance, at a level [s]; infinite if never.
-
-        Measured by the path of a typical body, to a fraction of the run. Makes two runs.
-        """
+        """Time at which one rounding has grown to the tolerance, at a level [s]; or infinite."""
         one, two = (self.frames(level, twin) for twin in (0, 1))
         for frame, other in zip(one[1:], two[1:]):
             if _apart(other, frame) > self.job.tolerance:
@@ -201,10 +186,7 @@ class Runs:
         return change(self.job.goal, self.results[level], at.time_s, at.peak_speed)
 
     def longer_change(self, level: float) -> float:
-        """How much an extreme changes after the end of the run at a level, in one that is longer.
-
-        Infinite where that diverges.
-        """
+        """How much an extreme changes after the end of the run at a level, in a longer one."""
         self.release()
         longer = Runs(replace(self.job, until=self.job.until / BEFORE), self.listen)
         value = longer.value(level)
@@ -213,10 +195,7 @@ class Runs:
         return math.inf if value is None else longer.late_change(level)
 
     def leap(self, coarse: float, fine: float) -> float:
-        """Change of a number of broken faces between two levels that may go unseen, as a share.
-
-        Faces that broke in one of the runs only, taken to add up like steps to either side.
-        """
+        """Change of a number of broken faces between two levels that may go unseen, as a share."""
         first, second = (np.isnan(self.results[level].broken_time) for level in (coarse, fine))
         return math.sqrt((first != second).sum()) / max(1, int((~second).sum()))
 
@@ -268,11 +247,7 @@ def _apart(frame, finer):
 
 
 def _share(apart, whole, rounding):
-    """Difference of a usual body as a share of a usual value.
-
-    Usual: in the middle of all, so that a few fragments that fly elsewhere do not count. rounding:
-    of a value; a difference within it is none.
-    """
+    """Difference of a usual body as a share of a usual value."""
     usual = float(np.median(apart))
     return 0.0 if usual <= rounding else usual / max(float(np.median(whole)), rounding)
 

@@ -187,11 +187,7 @@ class Search:
 
     @property
     def _smooth(self):
-        """Whether the declared order of the step's error may be trusted.
-
-        What breaks or touches does so within a step, and where the times of samples lie by a
-        largest speed is chance: only first order is trusted then.
-        """
+        """Whether the declared order of the step's error may be trusted."""
         return self.job.goal.kind == "value" and not self._eventful
 
     @property
@@ -286,10 +282,7 @@ class Search:
             yield f"{why}, about {awake_price(self.runs, found):.2g} s"
 
     def _cost_curve(self, chance):
-        """Cost of other tolerances: what the runs cost that were enough for them, or would be.
-
-        chance: half-width of its part. What no single run has is left out.
-        """
+        """Cost of other tolerances: what the runs cost that were enough for them, or would be."""
         levels, size = self.levels, abs(self._value(self.levels[-1]))
         others = self.runs.seconds - sum(self.runs.cost[level] for level in levels)
         paid = others + np.cumsum([self.runs.cost[level] for level in levels])

@@ -119,11 +119,7 @@ def awake_price(runs: Runs, certificate: Any) -> float:
 
 
 def finer_law(law: Any) -> tuple[BodyContact | None, float]:
-    """A contact law of finer resolution, and the error of the given one over their difference.
-
-    The rays of bodies converge with the second power of the parts of an edge. Spheres do not
-    converge to bodies, which are what they stand for.
-    """
+    """A contact law of finer resolution, and the error of the given one over their difference."""
     if isinstance(law, BodyContact):
         parts = min(2 * law.parts, MOST_PARTS)
         if parts == law.parts:

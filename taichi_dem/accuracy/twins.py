@@ -38,11 +38,7 @@ class Twins:
         return [value for value in found if value is not None]
 
     def spread(self, levels: Sequence[float], allowed: float, is_last: bool) -> float:
-        """Half-width by which runs that differ by chance spread, of one or of their mean.
-
-        If half the step breaks the same faces and hardly moves bodies, and no twins have separated
-        so far, twins cannot separate. is_last: whether this is the finest level.
-        """
+        """Half-width by which runs that differ by chance spread, of one or of their mean."""
         averaged = self.job.goal.averaged
         if self.count == 0:
             if not averaged and not self.parted and self._is_calm(*levels[-2:]):
@@ -74,10 +70,7 @@ class Twins:
         return mean_and_deviation(found)[1] if len(found) > self.count else math.inf
 
     def branched(self, made: Answer, allowed: float, step: float) -> Answer:
-        """The answer with its branches, where twins have a few outcomes; else unchanged.
-
-        step: error of a value by the step.
-        """
+        """The answer with its branches, where twins have a few outcomes; else unchanged."""
         values = np.array(self.sample(self.level))
         clusters = clusters_of(values, 0.0, 0.5 * allowed)
         few = 2 <= len(clusters) <= len(values) // _OF_EACH

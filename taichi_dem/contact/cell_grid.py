@@ -140,10 +140,7 @@ class CellGrid:
 
     @ti.func
     def row(self, z, y, low, high):
-        """First place, and one past the last, of the members of the cells low .. high - 1 of a row.
-
-        The cells of a row follow one another, and so do their members.
-        """
+        """First place, and one past the last, of members of cells low .. high - 1 of a row."""
         cell = (z * self.counts[None][1] + y) * self.counts[None][0]
         return self.first[cell + low], self.first[cell + high]
 

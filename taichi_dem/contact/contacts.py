@@ -98,11 +98,7 @@ class Contacts:
 
     @ti.func
     def leverage(self, met, pushed, push):
-        """Forces on the second body times their arms from the first [N m], where bodies meet.
-
-        pushed: their sum [N]; push: that along the normal. Pressure on a face also has a couple,
-        of which a part along the normal changes no stress.
-        """
+        """Forces on the second body times their arms from the first [N m], where bodies meet."""
         found = pushed.outer_product(met.arm)
         if ti.static(self.law.meets_bodies):
             found += met.normal.outer_product(cross(met.normal, push * met.couple))
@@ -148,10 +144,7 @@ class Contacts:
 
     @ti.func
     def gather(self, i):
-        """Collect the pending impulse and moment of the contacts of body i.
-
-        The heat of the pairs in which it is first is booked to it.
-        """
+        """Collect the pending impulse and moment of the contacts of body i."""
         linear, angular = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
         for a in range(self.store.first_of[i], self.store.first_of[i + 1]):
             p = self.store.near_slot[a]
@@ -184,10 +177,7 @@ class Contacts:
 
     @ti.func
     def look(self, k, i, j, turn, offset, margin, stepping: ti.template()):
-        """The ``Nearest`` of entry k, bodies i and j, of which a step takes note.
-
-        Bodies whose paths cannot have brought them within a margin [m] are not compared again.
-        """
+        """The ``Nearest`` of entry k, bodies i and j, of which a step takes note."""
         near = Nearest(reach=-AWAY)
         if self.may_meet(k, i, j, margin):
             near = self.law.nearest(self.store.sphere[k][0], self.store.sphere[k][1], turn, offset)
@@ -209,10 +199,7 @@ class Contacts:
 
     @ti.func
     def moved(self, i, velocity, spin, elapsed):
-        """Add to the displacement of body i; request a search once it may exceed the body skin.
-
-        A body that leaps too far in one step for its contacts to be followed is out of bounds.
-        """
+        """Add to the displacement of body i; request a search once it may exceed the body skin."""
         if self.free[i] == 1:
             speed = self._speed(i, velocity, spin)
             if elapsed * speed > FARTHEST * self.tables.extent[i]:
@@ -224,10 +211,7 @@ class Contacts:
 
     @ti.func
     def set_body_skin(self, i):
-        """Set the body skin of body i: half the skin, or more where it is fast.
-
-        A few fragments are faster than all others, and would cause most of the searches.
-        """
+        """Set the body skin of body i: half the skin, or more where it is fast."""
         speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
         way = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])
         self.body_skin[i] = ti.max(0.5 * self.skin[i], way)

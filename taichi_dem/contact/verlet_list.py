@@ -150,11 +150,7 @@ class VerletList:
 
     @ti.func
     def amend(self, i):
-        """List the escaped bodies at their present positions, among the neighbours of body i.
-
-        Outdated entries stay while there is room: they cost a comparison only. A full row leaves
-        the list stale.
-        """
+        """List the escaped bodies at their present positions, among the neighbours of body i."""
         escaped, count = self.reach.left[i] == 1, self.reach.escaped_count[None]
         if escaped:
             count = self.tables.body_count[None] - i - 1
@@ -183,10 +179,7 @@ class VerletList:
 
     @ti.func
     def _drop_far(self, i):
-        """Drop entries that are no longer near body i when its row is full.
-
-        Pairs that were near stay until they have lost their slot.
-        """
+        """Drop entries that are no longer near body i when its row is full."""
         if self.last[i] == self.first[i + 1]:
             place = self.first[i]
             for k in range(self.first[i], self.last[i]):
@@ -258,10 +251,7 @@ class VerletList:
 
     @ti.func
     def note_found(self, k, i, count, until, keeps):
-        """Note the contacts of entry k of body i, and up to which paths there are no others [m].
-
-        keeps: whether those that it has had are the same.
-        """
+        """Note the contacts of entry k of body i, and up to which paths there are no others [m]."""
         if self.found[k] + count > 0 and not keeps:
             self.changed[i], self.is_new[k] = 1, ti.cast(count > 0, ti.i32)
         self.found[k], self.until[k] = count, until
@@ -305,10 +295,7 @@ class NearPairs:
 
     @ti.func
     def count_row(self, i):
-        """Count the near pairs of which body i is the first, and what they want where it changes.
-
-        Pairs that only hold a pending impulse leave at the next search.
-        """
+        """Count near pairs of which body i is the first, and what they want where it changes."""
         self.row_is_new[i] = self.neighbours.changed[i]
         self.wanted[i] = ivec3(0)
         if self.row_is_new[i] == 1:

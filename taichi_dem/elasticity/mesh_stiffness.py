@@ -197,15 +197,7 @@ class _OuterFaces:
 def motions_under(
     mesh: Mesh, topology: Topology, springs: np.ndarray, forces: np.ndarray
 ) -> np.ndarray:
-    """Motions of rigid bodies joined by linear springs, up to rigid motions of each part.
-
-    mesh, topology: of the bodies. springs: normal and tangential stiffness of every bond per area
-    [Pa/m], (bond_count, 2). forces: force [N] and moment about the centre [N m], (bodies, 6,
-    loads), balanced on each part that bonds join. Returns, likewise, the displacement of the centre
-    [m] and the turn [rad]. Raises InputError where the iteration does not converge, as with forces
-    that are not balanced.
-    Conjugate gradients, preconditioned by the block of each body.
-    """
+    """Motions of rigid bodies joined by linear springs, up to rigid motions of each part."""
     own, rows, neighbour = _blocks(mesh, topology, springs)
     solved, rest = np.zeros(forces.shape), forces.copy()
     alone = (own == 0.0).all(axis=(1, 2))
@@ -232,10 +224,7 @@ def motions_under(
 
 
 def _blocks(mesh, topology, springs):
-    """Forces on each body by its own motion (bodies, 6, 6) and its neighbours' (bodies, 6, 24).
-
-    And the body behind each local face, its own number where there is none: its block is zero.
-    """
+    """Forces on each body by its own motion (bodies, 6, 6) and its neighbours' (bodies, 6, 24)."""
     _, centre, _ = body_properties(mesh, 1.0)
     corners = mesh.points[topology.vertices]
     sides = topology.master, topology.slave

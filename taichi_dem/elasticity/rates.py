@@ -57,16 +57,7 @@ def bond_rates(
     coefficients: tuple[Constant, Constant],
     multiply: Any = product,
 ) -> np.ndarray:
-    """Largest eigenvalue of M^-1/2 G M^-1/2 of every body, shape (body_count,).
-
-    G is the 6x6 block with which the bonds of a body resist its velocity and spin when the
-    neighbours stand still: the sum of (A / 3) J^T diag(normal, tangential) J over the three
-    contact units of each bonded face, J the map from (velocity, spin) to the velocity at the
-    vertex (Konno et al., section 2.1, units at the vertices).  M holds mass and inertia.
-    coefficients: normal and tangential coefficient per area, numbers or rules (``springs_of``);
-    [Pa s/m] gives rates [1/s], [Pa/m] gives squared angular frequencies [1/s2]. multiply: np.matmul
-    takes a tenth of the time, by LAPACK, and differs in last bits.
-    """
+    """Largest eigenvalue of M^-1/2 G M^-1/2 of every body, shape (body_count,)."""
     return subset_rates(mesh, topology, density, coefficients, (15,), multiply)[:, 0]
 
 
@@ -78,10 +69,7 @@ def subset_rates(
     subsets: Sequence[int] = range(16),
     multiply: Any = product,
 ) -> np.ndarray:
-    """``bond_rates`` with only some of a body's bonds intact, shape (body_count, len(subsets)).
-
-    subsets: bit f of each stands for the bond at local face f; the default is all sixteen.
-    """
+    """``bond_rates`` with only some of a body's bonds intact, shape (body_count, len(subsets))."""
     root, blocks = _roots_and_blocks(mesh, topology, density, coefficients, multiply)
     rates = np.zeros((mesh.body_count, len(subsets)))
     for part in parts_in_cache(mesh.body_count):
@@ -115,10 +103,7 @@ def _roots_and_blocks(mesh, topology, density, coefficients, multiply):
 def face_laws(
     points: np.ndarray, faces: np.ndarray, coefficients: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Areas [m^2] of faces, and what resists a velocity there per area: (n,) and (n, 3, 3).
-
-    faces: point indices, (n, 3). coefficients: normal and tangential one of each, (n, 2).
-    """
+    """Areas [m^2] of faces, and what resists a velocity there per area: (n,) and (n, 3, 3)."""
     vector = geometry.area_vectors(points, faces)
     area = length(vector)
     normal = vector / area[:, None]
@@ -130,12 +115,7 @@ def face_laws(
 def contact_eigenvalues(
     mesh: Mesh, density: Density, divisions: int, friction: bool, multiply: Any = product
 ) -> np.ndarray:
-    """Largest eigenvalue of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], (n,).
-
-    For all contacts of its worst face. D is the identity with friction, n n^T without; contacts act
-    where a sphere touches its face. The step finds the same from the near contacts
-    (``stability/body_limits.py``). multiply: as for ``bond_rates``.
-    """
+    """Largest eigenvalue of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], (n,)."""
     mass, centre, inertia = body_properties(mesh, density)
     spheres = spheres_of_faces(mesh, centre, divisions)
     root = inverse_root(mass, inertia)
@@ -153,11 +133,7 @@ def contact_eigenvalues(
 
 
 def point_blocks(arms: np.ndarray, law: np.ndarray, multiply: Any = product) -> np.ndarray:
-    """Sum over points of J^T law J, J the map from (velocity, spin) to the point's velocity.
-
-    arms: points from the centre [m], shape (n, points, 3). law: what resists their velocity,
-    shape (n, 3, 3). multiply: stacks of matrices. Returns (n, 6, 6).
-    """
+    """Sum over points of J^T law J, J the map from (velocity, spin) to the point's velocity."""
     lever = levers(arms)
     return multiply(transposed(lever), multiply(law[:, None], lever)).sum(axis=1)
 
@@ -180,10 +156,7 @@ def scaled_eigenvalues(root: np.ndarray, blocks: np.ndarray, multiply: Any = pro
 
 
 def inverse_root(mass: np.ndarray, inertia: np.ndarray) -> np.ndarray:
-    """W with W^T W = M^-1 of M = diag(mass, mass, mass, inertia), shape (n, 6, 6).
-
-    W G W^T has the eigenvalues of M^-1/2 G M^-1/2.
-    """
+    """W with W^T W = M^-1 of M = diag(mass, mass, mass, inertia), shape (n, 6, 6)."""
     root = np.zeros((len(mass), 6, 6))
     root[:, :3, :3] = np.eye(3) / np.sqrt(mass)[:, None, None]
     root[:, 3:, 3:] = inverse_factor(inertia)
@@ -191,17 +164,7 @@ def inverse_root(mass: np.ndarray, inertia: np.ndarray) -> np.ndarray:
 
 
 def wave_moduli(model: Any, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Moduli of waves that meet faces at right angles, two arrays (n,) [Pa].
-
-    model: arrays of a scene, a ``Model``. faces: points of the faces, (n, 3). The first is that of
-    compression, M = rho c_p^2, the second that of shear, G = rho c_s^2, a mean over its directions.
-    Twice the energy per volume of the bodies around a face (two rings, half of each bond's) is M
-    for the strain n n and G for (n t + t n) / 2, n the normal of the face and t its tangents.
-    Bodies follow the strain (the mean-field estimate, as of R. J. Bathurst and L. Rothenburg, J.
-    Appl. Mech. 55, 1988, 17-23), and then each gives way, where it has four bonds, by 0.7 of what
-    would bring it to rest among its neighbours. That is a bound from above; of random tetrahedra it
-    is 5 to 25 % above the modulus of a large block. NaN for a face without bonds around it.
-    """
+    """Moduli of waves that meet faces at right angles, two arrays (n,) [Pa]."""
     mesh, count = model.mesh, len(model.mesh.points)
     rings = [_bodies_at(mesh.tetrahedra, faces, count)]
     for _ in range(_RINGS):
@@ -237,11 +200,7 @@ def _tangents(normal):
 
 
 def _body_sums(model, bodies):
-    """Twice the energy of each body by pairs of unit strains [J], and its volume, (n, 37).
-
-    Half of that of its bonds, and a quarter of its volume for each; zero but for some bodies and
-    their neighbours.
-    """
+    """Twice the energy of each body by pairs of unit strains [J], and its volume, (n, 37)."""
     top = model.topology
     chosen = np.zeros(model.body_count, dtype=bool)
     chosen[bodies] = True
@@ -263,10 +222,7 @@ def _body_sums(model, bodies):
 
 
 def _openings(model, bonds, links):
-    """Maps (2, n, 3, 3, 6) from the motion of both bodies to the opening of a bond's three units.
-
-    And the laws of the units, (n, 1, 3, 3) [N/m].
-    """
+    """Maps (2, n, 3, 3, 6) from motions of both bodies to openings of a bond's three units."""
     corners = model.mesh.points[model.topology.vertices[bonds]]
     arms = (corners - model.centre[side][:, None] for side in links)
     maps = np.stack([sign * levers(each) for sign, each in zip((-1.0, 1.0), arms)])

@@ -141,11 +141,7 @@ def lies_here() -> bool:
 
 
 def _given_back(address, memory):
-    """Bytes from one number to another that are zero, as their pages were given back to the system.
-
-    Most lists are long and hardly used: only the pages in use are made anew when they are written,
-    as large ones where the system has such: a step of many bodies looks up their addresses.
-    """
+    """Bytes between two numbers that are zero, as their pages went back to the system."""
     page = mmap.PAGESIZE
     first, end = -address % page, (address + len(memory)) // page * page - address
     if len(memory) < _LARGE or not hasattr(mmap, "MADV_DONTNEED"):
@@ -215,10 +211,7 @@ def in_tree(field: ti.Field) -> bool:
 
 
 def array_of(field: ti.Field) -> np.ndarray | None:
-    """Array that lies where a field of a ``FieldTree`` does, on a CPU; else None.
-
-    Writing to it writes to the field. It serves as long as the tree exists.
-    """
+    """Array that lies where a field of a ``FieldTree`` does, on a CPU; else None."""
     _forget_other_sessions()
     array = _arrays.get(field)
     if array is None and in_tree(field):
@@ -265,10 +258,7 @@ def values(field: ti.Field, wanted: Any = ...) -> np.ndarray:
 
 
 def assign(field: ti.Field, array: ArrayLike) -> None:
-    """Write an array to the first entries of a field; the others keep their values.
-
-    A number fills the whole field.
-    """
+    """Write an array to the first entries of a field; the others keep their values."""
     array = np.asarray(array)
     if array.ndim == 0 and field.shape:
         array = np.full(values(field).shape, array)

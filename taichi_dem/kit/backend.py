@@ -60,13 +60,7 @@ def in_host_memory() -> bool:
 
 
 def probe() -> None:
-    """Find the faults of the device on which Taichi has just started.
-
-    Raises InputError where it has no double precision, or fails even with small blocks of threads.
-
-    Mesa's lavapipe, a Vulkan driver that runs on the CPU, ends all loops of a thread after 65,535
-    rounds, and threads of a block of more than 8 leave a loop with an atomic together.
-    """
+    """Find the faults of the device on which Taichi has just started."""
     _faults.update(block=0, rounds=0)
     if is_cpu():
         return
@@ -107,10 +101,7 @@ def cut_short(whose: str, advice: str) -> InputError:
 
 @ti.func
 def loops_have_ended(rounds):
-    """Whether the driver ends the loops of this thread; rounds: a number of at least 1.
-
-    Such loops make one round. No compiler knows that this one makes six.
-    """
+    """Whether the driver ends the loops of this thread; rounds: a number of at least 1."""
     x, made = ti.min(rounds, 1), 0
     while x < 1000:
         x = 3 * x + 1
@@ -165,13 +156,7 @@ def _bytes_of(node):
 
 
 def align(root: Any) -> None:
-    """Declare fillers in a tree so that each field of 8 bytes lies at a multiple of 8.
-
-    Taichi's layout for Vulkan puts fields, and members of an entry, in a row, the smallest first,
-    without a gap: one of an odd number of words would shift all larger ones, and kernels would
-    write a number of 8 bytes over its neighbour's half (taichi issue 8803). Two of the same size
-    shift none.
-    """
+    """Declare fillers in a tree so that each field of 8 bytes lies at a multiple of 8."""
     if impl.current_cfg().arch != ti.vulkan:
         return
     nodes = [root.get_ch(k) for k in range(root.get_num_ch())]

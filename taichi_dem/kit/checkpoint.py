@@ -174,11 +174,7 @@ def digest(*arrays: ArrayLike) -> str:
 
 
 def identity_of(value: Any) -> str:
-    """Words for a value, the same for equal values such as 1, 1.0 and ``np.float64(1)``.
-
-    Dataclasses and containers are looked into, an array is given by its ``digest``; of anything
-    else its ``repr`` counts.
-    """
+    """Words for a value, the same for equal values such as 1, 1.0 and ``np.float64(1)``."""
     if isinstance(value, (bool, np.bool_)):
         return repr(bool(value))
     if is_whole(value) and abs(int(value)) > 2**53:
@@ -205,12 +201,7 @@ def version_text() -> str:
 def write_checkpoint(
     path: FileName, identity: Mapping[str, str], arrays: Mapping[str, np.ndarray]
 ) -> None:
-    """Write arrays by name under an identity, a dict of words; on the disk before it appears.
-
-    A line of JSON tells the identity, and the name, type and shape of each array; the bytes of the
-    arrays follow, one after the other, then the digest of all. Raises InputError when the file
-    cannot be written; one that was there stays as it was.
-    """
+    """Write arrays by name under an identity, a dict of words; on the disk before it appears."""
     listed = [(name, _plain(array.dtype).str, array.shape) for name, array in arrays.items()]
     head, sealed = json.dumps({"identity": dict(identity), "arrays": listed}), hashlib.sha256()
     with renamed_when_done(path) as temporary, open(temporary, "wb") as file:
@@ -224,11 +215,7 @@ def write_checkpoint(
 
 
 def read_checkpoint(path: FileName, identity: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """Arrays by name from a checkpoint of the same identity; they take no more than its size.
-
-    Raises InputError for a file that is absent, none of ours or not to the last bit as it was
-    written, and for one of another identity, naming what differs.
-    """
+    """Arrays by name from a checkpoint of the same identity; they take no more than its size."""
     path = path_name("checkpoint", path)
     try:
         about, arrays = _sealed(path)

@@ -26,10 +26,7 @@ class Terminated(BaseException):
 
 
 def run(line: Sequence[str], **options: Any) -> "subprocess.CompletedProcess[str]":
-    """Run a program to its end and return what it said, as text.
-
-    Where this one ends before, by an exception or within ``ending_children``, so does that one.
-    """
+    """Run a program to its end and return what it said, as text."""
     if _told.is_set():
         raise Terminated(signal.SIGTERM)
     pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
@@ -55,11 +52,7 @@ def _end(process):
 
 @contextlib.contextmanager
 def ending_children() -> Iterator[None]:
-    """In its block a signal to end reaches the processes of ``run``, and raises Terminated here.
-
-    Python delivers signals to the main thread only: in others nothing changes, nor for a signal
-    that is ignored, as SIGHUP under nohup, or that has a handler.
-    """
+    """In its block a signal to end reaches the processes of ``run``, and raises Terminated here."""
     before = {}
     if threading.current_thread() is threading.main_thread():
         for number in _SIGNALS:

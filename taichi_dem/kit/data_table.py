@@ -24,13 +24,7 @@ _ENDINGS = {
 
 
 def unit_of(name: str) -> str:
-    """Read the unit off the name of a column, "1" where it has none.
-
-    Examples
-    --------
-    >>> unit_of("largest_speed_m_s"), unit_of("broken_faces"), unit_of("x_m_N10_seed1")
-    ('m/s', '1', 'm')
-    """
+    """Read the unit off the name of a column, "1" where it has none."""
     return _ENDINGS.get(_ending(name), "1")
 
 
@@ -104,11 +98,7 @@ def dataset(
     axes: Mapping[str, tuple[ArrayLike, str]],
     **attributes: Any,
 ) -> Any:
-    """Make an xarray.Dataset whose variables and coordinates carry their units.
-
-    variables: (dimensions, values, unit) by name. axes: (values, unit) of the coordinate of each
-    dimension that has one. attributes: of the whole.
-    """
+    """Make an xarray.Dataset whose variables and coordinates carry their units."""
     import xarray
 
     return xarray.Dataset(

@@ -92,10 +92,7 @@ def listed(values: Collection[float]) -> str:
 
 
 def in_lines(rows: Mapping[str, str], warnings: Sequence[str] = (), most: int | None = None) -> str:
-    """Rows of text by name, then a line a warning; rows without text are left out.
-
-    most: lines at most, the last of which says how many are left.
-    """
+    """Rows of text by name, then a line a warning; rows without text are left out."""
     lines = [
         f"{'' if k else name:18s} {text}"
         for name, texts in rows.items()

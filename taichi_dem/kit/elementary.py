@@ -23,10 +23,7 @@ _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.1359
 
 @expression
 def _of_rest(angle):
-    """Sine and cosine of what an angle [rad] is beyond whole quarter turns, and their number.
-
-    Within -pi/4 and pi/4; the number of quarter turns is 0 to 3. In Python also of arrays.
-    """
+    """Sine and cosine of what an angle [rad] is beyond whole quarter turns, and their number."""
     turns = once((_QUARTERS_PER_RADIAN * angle + 0.5) // 1.0)
     r = once(angle - turns * _QUARTER[0] - turns * _QUARTER[1] - turns * _QUARTER[2])
     z = once(r * r)
@@ -40,11 +37,7 @@ def _of_rest(angle):
 
 @ti.pyfunc
 def sine_and_cosine(angle):
-    """Sine and cosine of an angle [rad].
-
-    Within a unit in the last place of 1 up to a million turns; beyond, the angle's own rounding is
-    larger.
-    """
+    """Sine and cosine of an angle [rad]."""
     sine, cosine, quarter = _of_rest(angle)
     if quarter == 1.0 or quarter == 3.0:
         sine, cosine = cosine, -sine

@@ -111,11 +111,7 @@ class EnginePool:
         _pools.append(self)
 
     def borrow(self, structure: Hashable, size: Sequence[int], scene: Any, owner: Any) -> Any:
-        """An engine of a structure in which a scene of some size fits, for an owner's lifetime.
-
-        structure: hashable, equal for scenes that compile to the same kernels. size: as many whole
-        numbers as ``least`` has. The owner clears it and loads the scene.
-        """
+        """An engine of a structure in which a scene of some size fits, for an owner's lifetime."""
         runtime.check_thread(self.kind.serves)
         self._forget_other_session()
         engines = self._engines.setdefault(structure, [])

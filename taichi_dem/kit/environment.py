@@ -31,10 +31,7 @@ _own: list[Path] = []
 
 @contextlib.contextmanager
 def taichi_alone(**more: str) -> Iterator[None]:
-    """In its block Taichi finds none of its variables but ours, and says and warns nothing.
-
-    more: further variables. Without HOME it would abort.
-    """
+    """In its block Taichi finds none of its variables but ours, and says and warns nothing."""
     before = dict(os.environ)
     hidden = [name for name in before if name.startswith("TI_") and name != "TI_VISIBLE_DEVICE"]
     ours = {**_OURS, "HOME": before.get("HOME") or os.path.expanduser("~"), **more}
@@ -52,11 +49,7 @@ def taichi_alone(**more: str) -> Iterator[None]:
 
 
 def kernel_cache(default_folder: str) -> tuple[bool, str]:
-    """Whether Taichi shall keep compiled kernels, and the folder; removes a lock left there.
-
-    default_folder: where it would, unless a variable names another. Where neither can be used, it
-    is a folder that goes with this process.
-    """
+    """Whether Taichi shall keep compiled kernels, and the folder; removes a lock left there."""
     folder = Path(os.environ.get(_CACHE_FOLDER) or default_folder)
     if not _is_usable(folder):
         _own[:] = _own or [Path(tempfile.mkdtemp(prefix="taichi-kernels-"))]
@@ -86,10 +79,7 @@ def _is_usable(folder):
 
 
 def _remove_stale_lock(folder):
-    """Remove the lock that a killed process left on Taichi's kernel cache.
-
-    With it, every later process would compile all its kernels anew and say so on stderr.
-    """
+    """Remove the lock that a killed process left on Taichi's kernel cache."""
     lock = folder / "ticache.lock"
     with contextlib.suppress(OSError):
         # A clock that was set back leaves a lock of the future.

@@ -27,12 +27,7 @@ class FieldOf(NamedTuple):
 
 
 def fields_of(root: object) -> list[FieldOf]:
-    """Every field that can be reached from an object, as a list of FieldOf.
-
-    Names are ways of attributes from the root. A class may name in ``constant_fields`` what never
-    changes once it is built, and in ``scratch_fields`` what is written before it is read in every
-    step or search: all else has to be saved, so that a new part is covered without being told.
-    """
+    """Every field that can be reached from an object, as a list of FieldOf."""
     found, seen, ahead = [], set(), [("", "saved", root)]
     while ahead:
         name, kind, thing = ahead.pop(0)

@@ -27,10 +27,7 @@ _FORMULA = tuple("=+-@\uff1d\uff0b\uff0d\uff20")
 
 
 def output_folder(path: FileName) -> str:
-    """Make a folder for output and return its path, with a leading "~" as the user's home.
-
-    Raises InputError when it cannot be made or written to.
-    """
+    """Make a folder for output and return its path, with a leading "~" as the user's home."""
     path = path_name("output folder", path)
     try:
         os.makedirs(path, exist_ok=True)
@@ -63,11 +60,7 @@ def renamed_when_done(path: FileName) -> Iterator[str]:
 
 
 def remove_dead_parts(folder: str, now: float) -> None:
-    """Remove from a folder what killed processes have left of the files that they wrote.
-
-    now: as the disk has it, of a file just written there. A part is dead once its process has
-    ended; one of another machine or container, or from before the last boot, after a day unchanged.
-    """
+    """Remove from a folder what killed processes have left of the files that they wrote."""
     with contextlib.suppress(OSError), os.scandir(folder or os.curdir) as entries:
         for entry in entries:
             part = _PART.fullmatch(entry.name)
@@ -101,10 +94,7 @@ def _here() -> str:
 
 
 def remove_files(folder: FileName, pattern: str) -> None:
-    """Remove the files of a folder, if there is one, whose whole names match a regular expression.
-
-    Raises InputError when one of them cannot be removed.
-    """
+    """Remove files of a folder, if there is one, whose whole names match a regular expression."""
     for name in os.listdir(folder) if os.path.isdir(folder) else ():
         path = os.path.join(folder, name)
         if re.fullmatch(pattern, name) and os.path.isfile(path):
@@ -116,10 +106,7 @@ def remove_files(folder: FileName, pattern: str) -> None:
 
 
 def older_files(folder: FileName, since: float) -> list[str]:
-    """Names of files in a folder of a kind that programs write, unchanged since a time, sorted.
-
-    since: as of ``time.time``; clocks of file systems may lag behind by two seconds.
-    """
+    """Names of files in a folder of a kind that programs write, unchanged since a time, sorted."""
     found = []
     with contextlib.suppress(OSError), os.scandir(os.fspath(folder)) as entries:
         for entry in entries:
@@ -130,10 +117,7 @@ def older_files(folder: FileName, since: float) -> list[str]:
 
 
 def write_whole(path: FileName, write: Callable[[str], object]) -> None:
-    """Write a file through ``write(name)``, whole or not at all.
-
-    Raises InputError when the file cannot be written.
-    """
+    """Write a file through ``write(name)``, whole or not at all."""
     with renamed_when_done(path) as temporary:
         write(temporary)
 
@@ -153,11 +137,7 @@ def write_bytes(path: FileName, content: bytes) -> None:
 
 
 def write_csv(path: FileName, columns: Mapping[str, ArrayLike]) -> None:
-    """Write columns of equal length, a dict of name to sequence, as a CSV file.
-
-    A spreadsheet would compute text that begins as a formula, such as a group called "=1+1": it
-    gets an apostrophe in front. Raises InputError when the file cannot be written.
-    """
+    """Write columns of equal length, a dict of name to sequence, as a CSV file."""
     arrays = map(np.asarray, columns.values())
     cells = (a.tolist() if a.dtype.kind in "biuf" else map(_as_text, a.tolist()) for a in arrays)
     with renamed_when_done(path) as temporary:

@@ -41,10 +41,7 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def members_last(stack: np.ndarray) -> np.ndarray:
-    """The same stack, with equal entries of its members side by side in memory.
-
-    Loops over them are long then: products of 1700 matrices take a fifth of the time.
-    """
+    """The same stack, with equal entries of its members side by side in memory."""
     return np.moveaxis(np.ascontiguousarray(np.moveaxis(stack, 0, -1)), -1, 0)
 
 
@@ -54,10 +51,7 @@ def transposed(matrices: np.ndarray) -> np.ndarray:
 
 
 def inverse_factor(matrices: np.ndarray) -> np.ndarray:
-    """W with W^T W = A^-1 of symmetric positive definite A, shape (n, m, m); lower triangular.
-
-    It is the inverse of Cholesky's factor, A = W^-1 W^-T.
-    """
+    """W with W^T W = A^-1 of symmetric positive definite A, shape (n, m, m); lower triangular."""
     size = matrices.shape[-1]
     rest, found = matrices.copy(), np.zeros_like(matrices)
     found[:, range(size), range(size)] = 1.0
@@ -95,10 +89,7 @@ def weakest_direction(matrix: np.ndarray) -> np.ndarray:
 
 
 def _diagonal(matrices, *axes):
-    """Eigenvalues (m, n) by Jacobi's rotations; axes: unit matrices (m, m, n) that turn along.
-
-    Their columns are then unit eigenvectors.
-    """
+    """Eigenvalues (m, n) by Jacobi's rotations; axes: unit matrices (m, m, n) that turn along."""
     a = np.moveaxis(matrices, 0, -1).copy()
     size = range(len(a))
     for _ in range(_SWEEPS):
@@ -109,10 +100,7 @@ def _diagonal(matrices, *axes):
 
 
 def _rotate(a, axes, p, q):
-    """Turn the axes p and q of matrices (m, m, n) such that their entry (p, q) vanishes.
-
-    axes: arrays whose columns turn too. Golub and Van Loan, Matrix Computations, algorithm 8.4.1.
-    """
+    """Turn the axes p and q of matrices (m, m, n) such that their entry (p, q) vanishes."""
     twice, apart = 2.0 * a[p, q], a[q, q] - a[p, p]
     # A denominator of zero belongs to an entry that has vanished.
     root = np.abs(apart) + np.sqrt(apart * apart + twice * twice) + _TINY

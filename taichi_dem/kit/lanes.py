@@ -155,10 +155,7 @@ def _entry_by_branch(field: ti.template(), g, k: ti.template(), n):
 
 
 def access() -> tuple:
-    """What writes component k of lane n of group g, writes lane n of numbers, reads a component.
-
-    Only a CPU finds a lane by a number that is not known when the kernel is compiled.
-    """
+    """What writes component k of lane n of group g, writes lane n of numbers, reads a component."""
     if backend.is_cpu():
         return _put, _put_number, _entry
     return _put_by_branch, _put_number_by_branch, _entry_by_branch

@@ -79,10 +79,7 @@ class Launch:
         return None
 
     def _prepared(self, values):
-        """Taichi's program, the compiled kernel, and what makes a context of it.
-
-        Then the axes that an entry of each array has, and whether the kernel returns something.
-        """
+        """Taichi's program, the compiled kernel, and what makes a context of it."""
         kernel = self._kernel._primal
         owner = [self._kernel._kernel_owner] if hasattr(self._kernel, "_kernel_owner") else []
         key = kernel.ensure_compiled(*owner, *self._templates, *values)

@@ -56,10 +56,7 @@ def likely_unit(value: float, quantity: Quantity) -> str:
 
 
 def in_unit(name: str, value: float, quantity: Quantity, told_by: float | None = None) -> float:
-    """The value; UnitWarning where it looks as if it were given in another unit.
-
-    told_by: number whose size tells it, such as the density for a mass; None for the value itself.
-    """
+    """The value; UnitWarning where it looks as if it were given in another unit."""
     likely = likely_unit(value if told_by is None else told_by, quantity)
     if likely:
         warn_of_unit(f"{name} is read in {quantity.unit}, got {value:g}: likely {likely} is meant")

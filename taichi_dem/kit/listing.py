@@ -26,11 +26,7 @@ def run(
     parts: Mapping[str, ModuleType],
     arguments: Sequence[str] | None = None,
 ) -> int:
-    """Print what a package offers, and its experiments.
-
-    parts: modules by title, whose names come before the package's own. With "demo" as first
-    argument, run the module of that name with the others instead. Returns the exit code.
-    """
+    """Print what a package offers, and its experiments."""
     given = sys.argv[1:] if arguments is None else [*arguments]
     if given[:1] == ["demo"]:
         return import_module(f"{package.__name__}.demo").main(given[1:])

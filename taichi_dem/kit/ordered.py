@@ -30,10 +30,7 @@ def is_serial(places: int) -> bool:
 
 
 def tasks(phases: Phases, bodies: int) -> tuple[tuple[bool, Phases], ...]:
-    """Phases by the loops that a parallel driver makes of them: whether on one thread, and which.
-
-    bodies: their largest number. A GPU makes each phase a loop of its own.
-    """
+    """Phases by the loops that a parallel driver makes of them: if on one thread, and which."""
     found: list[tuple[bool, Phases]] = []
     for phase in phases:
         members = phase[0]

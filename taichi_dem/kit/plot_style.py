@@ -139,11 +139,7 @@ class NotebookFigure(Figure):
 def styled(
     rows: int = 1, columns: int = 1, size: tuple[float, float] = (6.4, 4.2), **options: Any
 ) -> Iterator[tuple[Figure, Any]]:
-    """A figure and its axes in the common style, which holds to the end of the block.
-
-    size: in inches. rows: 0 for no axes, which the block then makes. options: of
-    ``Figure.subplots``. The Agg canvas needs no display.
-    """
+    """A figure and its axes in the common style, which holds to the end of the block."""
     with matplotlib.rc_context(STYLE):
         figure = NotebookFigure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)
@@ -154,10 +150,7 @@ def styled(
 def picture(
     path: FileName | None, *shape: Any, dpi: Any = _FILE_DPI, **options: Any
 ) -> Iterator[tuple[Figure, Any]]:
-    """A figure and its axes, as of ``styled``, written as PNG when the block ends well.
-
-    path: None for no file. dpi: pixels per inch. Raises InputError when the file cannot be written.
-    """
+    """A figure and its axes, as of ``styled``, written as PNG when the block ends well."""
     if path is not None:
         drawing(path)
     with styled(*shape, **options) as (figure, axes):
@@ -189,10 +182,7 @@ def _write_plain_numbers(figure):
 
 
 def png_of(figure: Figure, dpi: float = PNG_DPI) -> bytes:
-    """A figure as PNG, in bytes; within the block of ``styled``.
-
-    It is drawn once; ``Figure.savefig`` draws a figure twice, to lay it out first.
-    """
+    """A figure as PNG, in bytes; within the block of ``styled``."""
     content, usual = io.BytesIO(), figure.dpi
     canvas = FigureCanvasAgg(figure)
     figure.set_dpi(dpi)
@@ -205,11 +195,7 @@ def png_of(figure: Figure, dpi: float = PNG_DPI) -> bytes:
 def filming(
     size: tuple[float, float], dpi: float, style: Mapping[str, Any]
 ) -> Iterator[tuple[Figure, Callable[[], None], list[Image.Image]]]:
-    """A figure, a function that takes it as the next image, and the RGB images taken so far.
-
-    size: in inches, at dpi pixels each. style: of matplotlib. The layout stays that of the first
-    image, so that nothing jumps. Changes are those of which matplotlib knows: ``Artist.stale``.
-    """
+    """A figure, a function that takes it as the next image, and the RGB images taken so far."""
     with matplotlib.rc_context(style):
         figure = Figure(figsize=size, dpi=dpi, layout="constrained")
         canvas = FigureCanvasAgg(figure)
@@ -231,10 +217,7 @@ def filming(
 
 
 def _draw_changes(canvas, background):
-    """Draw what has changed once and what lies over it; returns the pixels of all else.
-
-    background: what the last call returned, None at first.
-    """
+    """Draw what has changed once and what lies over it; returns the pixels of all else."""
     figure = canvas.figure
     moving = [artist for one in (*map(_layers, figure.axes), figure.texts) for artist in _over(one)]
     if background is None or not all(artist.get_animated() for artist in moving):
@@ -287,10 +270,7 @@ def write_gif(
     colours: int = 64,
     samples: int = 8,
 ) -> None:
-    """Write RGB images as a GIF with one palette, made from some of them, evenly over the whole.
-
-    milliseconds: a frame. Raises InputError when the file cannot be written.
-    """
+    """Write RGB images as a GIF with one palette, made from some of them, evenly over the whole."""
     width, height = images[0].size
     picked = np.linspace(0, len(images) - 1, samples).round().astype(int)
     sheet = Image.new("RGB", (width, samples * height))

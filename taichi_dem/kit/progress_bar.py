@@ -141,10 +141,7 @@ def hide_bars() -> None:
 
 @contextlib.contextmanager
 def reporting(progress: Listener | str | None, title: str) -> Iterator[Listener | None]:
-    """Listener to the Progress of a job for its argument ``progress``; None for silence.
-
-    "auto" gives a bar where somebody watches. A function is also told of compiling.
-    """
+    """Listener to the Progress of a job for its argument ``progress``; None for silence."""
     if progress_option("progress", progress) is None:
         yield None
     elif callable(progress):

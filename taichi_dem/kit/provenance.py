@@ -38,11 +38,7 @@ def git(*arguments: str) -> str:
 
 @functools.cache
 def commit() -> str:
-    """Short name of the commit of the sources, "unknown" where they are in no repository.
-
-    A package installed beside somebody's own sources may lie in their repository, which does not
-    track it and does not count.
-    """
+    """Short name of the commit of the sources, "unknown" where they are in no repository."""
     tracked = git("ls-files", "--", os.path.basename(__file__))
     return (git("rev-parse", "--short", "HEAD") if tracked else "") or UNKNOWN
 

@@ -39,10 +39,7 @@ class RunSnapshot:
         write_checkpoint(path, self.identity, arrays)
 
     def restore(self, arrays: Mapping[str, np.ndarray], path: FileName) -> None:
-        """Restore the run from the arrays that ``opened`` returned for a path.
-
-        Raises InputError where the fields are not those of this run.
-        """
+        """Restore the run from the arrays that ``opened`` returned for a path."""
         missing = self.memory.misfit(_under("field", arrays))
         if missing:
             raise InputError(f"checkpoint {path} is of another version: field {missing} differs")
@@ -124,10 +121,7 @@ class CheckpointWriter:
         )
 
     def save(self, result: Any = None) -> None:
-        """Save the run. Raises InputError that names the last good checkpoint.
-
-        result: of a run that has ended, which the error carries.
-        """
+        """Save the run. Raises InputError that names the last good checkpoint."""
         if self.checkpoint is None:
             return
         with carrying(result):
@@ -153,11 +147,7 @@ def opened(
     resume: FileName | None,
     identity: Callable[[], Mapping[str, str]],
 ) -> dict[str, np.ndarray] | None:
-    """Check, before any costly work, that a run can be saved and resumed.
-
-    checkpoint: a Checkpoint or None. resume: file to go on from, or None. identity: gives that of
-    the run. Returns the arrays of the file, None without. Raises InputError.
-    """
+    """Check, before any costly work, that a run can be saved and resumed."""
     if checkpoint is not None and not isinstance(checkpoint, Checkpoint):
         raise InputError(f"checkpoint must be a Checkpoint or None, got {checkpoint!r}")
     arrays = None if resume is None else read_checkpoint(resume, identity())

@@ -276,11 +276,7 @@ def usable_cores() -> int:
 
 @atexit.register
 def _end_session():
-    """End the session while all modules are there, so that Taichi writes its kernel cache.
-
-    Later it is lost wherever something still refers to a class with kernels, as the caches of
-    ``typing`` do for the classes of an annotation.
-    """
+    """End the session while all modules are there, so that Taichi writes its kernel cache."""
     if _session and _session.thread == threading.get_ident() and _session.process == os.getpid():
         if impl.get_runtime().prog is _session.program:
             _reset()

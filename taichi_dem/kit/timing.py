@@ -46,11 +46,7 @@ def thread_seconds() -> dict[int, float]:
 
 
 def busiest_seconds(before: Mapping[int, float], after: Mapping[int, float]) -> float | None:
-    """CPU seconds between two ``thread_seconds`` that no further core would have saved.
-
-    They are those of the main thread, which waits while others work, and of the busiest of the
-    others: on free cores a run takes no less. None where threads are not known.
-    """
+    """CPU seconds between two ``thread_seconds`` that no further core would have saved."""
     spent = {number: seconds - before.get(number, 0.0) for number, seconds in after.items()}
     if not spent:
         return None

@@ -7,8 +7,5 @@ __version__ = "0.1.0"
 
 
 def taichi_version() -> str:
-    """Version of Taichi, such as 1.7.4.
-
-    From the module: a package that runs from a path has no metadata to ask.
-    """
+    """Version of Taichi, such as 1.7.4."""
     return ".".join(map(str, ti.__version__))

@@ -40,12 +40,7 @@ _BISECTIONS = 64
 
 
 def damping_ratio(restitution: float) -> float:
-    """Share z of critical damping at which a spring and a dashpot that never pull rebound so.
-
-    A contact ends when its force is zero, at the share e of the speed of impact, from above 0 to 1:
-    -ln e = 2 z acos(z) / sqrt(1 - z^2), or 2 z acosh(z) / sqrt(z^2 - 1) from z = 1 (e = 0.135) on
-    (Schwager and Poeschel, Granular Matter 9 (2007) 465).
-    """
+    """Share z of critical damping at which a spring and a dashpot that never pull rebound so."""
     low, high = 0.0, 1.0 / restitution
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
@@ -203,12 +198,7 @@ class BodyContact(SphereContact):
 
     @ti.func
     def nearest(self, a, b, turn, offset):
-        """How bodies a and b overlap, or a bound of their gap, a ``Nearest``.
-
-        first: middle of the shared volume. apart: direction of the force on the second. reach:
-        overlap as if a flat side met a flat one [m], or minus the gap. reach / size: share of the
-        smaller body that both fill.
-        """
+        """How bodies a and b overlap, or a bound of their gap, a ``Nearest``."""
         force, moment, middle = vec3(0.0), vec3(0.0), vec3(0.0)
         doubled, volume, outside, ones = 0.0, 0.0, 1e30, vec4(1.0)
         for side in range(2):
@@ -252,10 +242,7 @@ class BodyContact(SphereContact):
 
     @ti.func
     def gap(self, a, b, turn, offset, enough):
-        """A bound of the way that bodies may go before a ray of one enters the other [m].
-
-        Once it is below enough, the remaining rays are left out.
-        """
+        """A bound of the way that bodies may go before a ray of one enters the other [m]."""
         outside = 1e30
         for side in range(2):
             if outside >= enough:
@@ -264,10 +251,7 @@ class BodyContact(SphereContact):
 
     @ti.func
     def _side(self, side, a, b, turn, offset, whole: ti.template(), enough):
-        """Corners of one body and planes of the other in the first's frame; their ``sum_of_rays``.
-
-        side: 0 for the rays of body a, 1 for those of body b. enough: as in ``gap``.
-        """
+        """Corners of one body, planes of the other in the first's frame; their ``sum_of_rays``."""
         body, at, planes = a, self.corner[a], matmul_transposed(self.outward[b], turn)
         distances = self.plane[b] + matvec(planes, offset)
         if side == 1:

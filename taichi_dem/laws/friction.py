@@ -104,10 +104,7 @@ class StickingFriction(Friction):
 
     @ti.func
     def follow(self, k, normal, way):
-        """Turn the spring of sphere pair k into the plane of contact and stretch it by ``way`` [m].
-
-        normal: of the contact; way: of the second sphere against the first across the normal.
-        """
+        """Turn the spring of sphere pair k into the contact's plane, stretch it by ``way`` [m]."""
         stretch = self.stretch[k]
         flat = stretch - dot(stretch, normal) * normal
         # Turned, not projected: to turn with the contact takes no energy.
@@ -115,11 +112,7 @@ class StickingFriction(Friction):
 
     @ti.func
     def slip(self, m, k, limit, way):
-        """Shorten the spring of sphere pair k to a limit [N]; return the energy dissipated [J].
-
-        way: its stretch in this step [m]. The work of the stretch, at the mean of the forces before
-        and after, is the energy stored plus that dissipated by slipping.
-        """
+        """Shorten the spring of sphere pair k to a limit [N]; return the energy dissipated [J]."""
         trial = self.stretch[k]
         stiffness = self.stiffness(m, k)
         longest = limit / stiffness

@@ -113,12 +113,7 @@ class MixedMode(Effect):
 
     @ti.func
     def _raised(self, m, u, stiffness, jump):
-        """Damage of a unit at a jump, noted with the energy that it spends.
-
-        On the straight line from strength to zero the secant stiffness is 1 - d of the first,
-        d = (1 - (e_0 / e)^(1/2)) / (1 - e_0 / e_1), of twice the energy e and its limits e_0 and
-        e_1; what is spent is e_1 / 2 times the way from the onset to the end.
-        """
+        """Damage of a unit at a jump, noted with the energy that it spends."""
         unit = self.unit[u]
         energy, begin, end = self._limits(m, stiffness, jump)
         if energy > begin:

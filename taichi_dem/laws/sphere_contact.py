@@ -128,10 +128,7 @@ class SphereContact(Effect):
 
     @ti.func
     def nearest(self, a, b, turn, offset):
-        """Where two bodies are nearest by an entry (a, b) of the pair store, a ``Nearest``.
-
-        turn, offset: rotation and place of the second body in the frame of the first [m].
-        """
+        """Where two bodies are nearest by an entry (a, b) of the pair store, a ``Nearest``."""
         first, second = self.tables.sphere[a], self.tables.sphere[b]
         apart = matvec(turn, second.xyz) + offset - first.xyz
         size = first[3] + second[3]
@@ -139,11 +136,7 @@ class SphereContact(Effect):
 
     @ti.func
     def find(self, i, j, turn, offset, faces, margin, far):
-        """Number of contacts of bodies i and j with a gap below a margin [m]; least gap of others.
-
-        That gap is at most far [m]. turn, offset: as in ``nearest``. faces: bit 4 f + g for free
-        faces f and g.
-        """
+        """Number of contacts of bodies i, j with a gap below a margin [m]; least gap of others."""
         return self._compare(i, j, turn, offset, faces, margin, far, -1)
 
     @ti.func

@@ -17,11 +17,7 @@ MOST_POINTS = 4096
 
 
 def history_points(times: Any, values: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Times [s] and values as tuples of floats.
-
-    Raises InputError unless both are lists of finite numbers of one length, from 1 to
-    ``MOST_POINTS``, and the times rise from 0 or later.
-    """
+    """Times [s] and values as tuples of floats."""
     t, v = (np.atleast_1d(real_numbers(*one)) for one in (("times", times), ("values", values)))
     if t.ndim != 1 or not 1 <= len(t) <= MOST_POINTS:
         raise InputError(f"times must be 1 to {MOST_POINTS} numbers in a row, got {shown(times)}")
@@ -77,10 +73,7 @@ class History:
 
     @ti.func
     def mean(self, since, until):
-        """Mean value from a time to a later one [s]; of one time the value.
-
-        Within a piece it is the value in the middle, which no difference of integrals spoils.
-        """
+        """Mean value from a time to a later one [s]; of one time the value."""
         first = self._passed(since, 0)
         last = self._passed(until, first)
         found = self._value(first, 0.5 * (since + until))

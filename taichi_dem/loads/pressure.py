@@ -223,11 +223,7 @@ def pulse(peak, rise, decay_ratio, t):
 
 @ti.func
 def mean_pulse(peak, rise, decay_ratio, since, until):
-    """Mean of ``pulse`` [Pa] from a time to a later one.
-
-    The mean of a cosine is its value in the middle times sin(w) / w, w half of the angle, which
-    for a short time is 1: nothing is lost to rounding at any step.
-    """
+    """Mean of ``pulse`` [Pa] from a time to a later one."""
     end, mean = (1.0 + decay_ratio) * rise, 0.0
     low, high = ti.max(since, 0.0), ti.min(until, rise)
     if low < high:

@@ -38,12 +38,7 @@ _LEAST = ("tensile_strength", "cohesion", "friction", "fracture_energy")
 
 
 def joined(first: Material, second: Material) -> Material:
-    """Constants of a bond, and of a contact, between two materials.
-
-    Stiffnesses and dashpots are in series (``bond_rules.InSeries``; of contacts 2 k1 k2 / (k1 +
-    k2), numbers by now), strengths the lesser ones. A constant that both share stays, to the bit.
-    first: of the master. Whether the fracture energy suffices is checked by a scene, bond by bond.
-    """
+    """Constants of a bond, and of a contact, between two materials."""
     least = {name: min(getattr(first, name), getattr(second, name)) for name in _LEAST}
     series = {name: joined_constants(getattr(first, name), getattr(second, name)) for name in RULES}
     density = 0.5 * (first.density + second.density)
@@ -67,14 +62,6 @@ class BodyMaterials:
 
     Stands for a ``Material`` wherever all bonds or all bodies are asked for: ``density`` and the
     constants of bonds are then those of each.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    materials : tuple of Material
-        All different; number 0 is that of the bodies in no group.
-    of_body : array, shape (body_count,), int32
-        Number of the material of every body.
     """
 
     def __init__(self, mesh: Mesh, materials: tuple[Material, ...], of_body: np.ndarray):
@@ -128,22 +115,14 @@ class BodyMaterials:
         return max(material.friction for material in self.materials)
 
     def of_contacts(self, name: str) -> Any:
-        """Largest constant of the contacts that a body can have, (body_count,).
-
-        name: of the constant. One number for all where all bodies have the same material.
-        """
+        """Largest constant of the contacts that a body can have, (body_count,)."""
         if self.is_one:
             return typical_of(getattr(self.pairs[0][0], name))
         most = [max(typical_of(getattr(pair, name)) for pair in row) for row in self.pairs]
         return np.array(most)[self.of_body]
 
     def checked_pairs(self) -> tuple[Material, ...]:
-        """Every material and every pair in a bond, with the numbers of its softest bond.
-
-        Raises InputError where the fracture energy is too small for a bond: the larger the
-        elements, the softer their bonds, and the more energy they have stored when they reach their
-        strength; and a bond between two materials has the lesser of both energies.
-        """
+        """Every material and every pair in a bond, with the numbers of its softest bond."""
         springs = self.normal_stiffness, self.shear_stiffness
         if not any(isinstance(each, BondRule) for each in springs):
             return self.materials
@@ -180,22 +159,7 @@ AnyMaterial = Material | BodyMaterials
 
 
 def body_materials(mesh: Mesh, material: Any, by_group: Any = _NONE) -> BodyMaterials:
-    """Materials of the bodies of a mesh.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    material : Material
-        Of all bodies in no group.
-    by_group : dict of str to Material, optional
-        Material of the bodies in a body group. Equal ones count as one.
-
-    Raises
-    ------
-    InputError
-        For another type, a group that the mesh does not have, a body in two groups of different
-        materials, or more than ``MOST`` different ones.
-    """
+    """Materials of the bodies of a mesh."""
     instance("material", material, Material)
     mapped = isinstance(by_group, Mapping)
     if not mapped or not all(isinstance(given, Material) for given in by_group.values()):

@@ -254,11 +254,7 @@ def typical_of(constant: Constant) -> float:
 def per_bond(
     mesh: Mesh, topology: Topology, density: Density, constants: tuple[Constant, Constant]
 ) -> np.ndarray:
-    """Normal and tangential constant of every bond per area, (bond_count, 2).
-
-    constants: both, numbers or rules. THE answer to "what is the stiffness, or dashpot, of this
-    bond".
-    """
+    """Normal and tangential constant of every bond per area, (bond_count, 2)."""
     if not any(isinstance(constant, BondRule) for constant in constants):
         return np.tile(np.array(constants, dtype=float), (topology.bond_count, 1))
     return evaluated(constants, bond_geometry(mesh, topology, density))

@@ -80,10 +80,7 @@ _STEEPEST = 89.9
 
 
 def bond_moduli(young: float, poisson: float) -> tuple[float, float]:
-    """Normal and tangential modulus E_n, E_t of bonds [Pa] for E [Pa] and Poisson's ratio.
-
-    Raises InputError for a modulus that is not positive, or a Poisson's ratio out of reach.
-    """
+    """Normal and tangential modulus E_n, E_t of bonds [Pa] for E [Pa] and Poisson's ratio."""
     young, poisson = positive("young", young), between("poisson", poisson, *POISSON)
     ratio = _ratio_of(poisson)
     normal = young / _constants_at(ratio)[0]
@@ -91,10 +88,7 @@ def bond_moduli(young: float, poisson: float) -> tuple[float, float]:
 
 
 def elastic_constants(normal: float, shear: float) -> tuple[float, float]:
-    """Young's modulus [Pa] and Poisson's ratio for the moduli E_n, E_t of bonds [Pa].
-
-    Raises InputError for moduli that are not positive or whose ratio is not in the table.
-    """
+    """Young's modulus [Pa] and Poisson's ratio for the moduli E_n, E_t of bonds [Pa]."""
     normal, shear = positive("normal", normal), positive("shear", shear)
     least, most = float(_MEASURED[0, 0]), float(_MEASURED[-1, 0])
     young, poisson = _constants_at(between("shear / normal", shear / normal, least, most))
@@ -289,10 +283,7 @@ class Material:
 
 
 def check_energy(material: Material, where: str = "") -> None:
-    """Raise InputError where a bond would fail before it reaches its strength.
-
-    where: which bond, in words, for a stiffness that is not the same for all.
-    """
+    """Raise InputError where a bond would fail before it reaches its strength."""
     if material.failure_opening <= material.onset_opening:
         least = material.tensile_strength**2 / (2.0 * float(material.normal_stiffness))
         got, bound = told_apart(material.fracture_energy, least, 6)

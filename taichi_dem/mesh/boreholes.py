@@ -33,30 +33,7 @@ _BOX = ("left", "right"), ("bottom", "top"), ("back", "front")
 
 @dataclass(frozen=True)
 class Hole:
-    """A hole in the face.
-
-    Parameters
-    ----------
-    x_m, y_m : float
-        Where it begins on the face [m].
-    length_m : float
-        Length [m].
-    angle_deg : float, default 90
-        Angle with the face in the plane of equal height [degrees], 20 to 160: 90 goes straight in,
-        less leans to the right on its way in.
-    charge_from_m : float, default 0
-        Distance from the face, along the hole, from which it is charged to its end [m]; its length
-        for one without a charge.
-    delay_s : float, default 0
-        Time at which its gas begins to act [s].
-    diameter_m : float, default 0.05
-        Diameter [m].
-
-    Raises
-    ------
-    InputError
-        A value is out of its range.
-    """
+    """A hole in the face."""
 
     x_m: float
     y_m: float
@@ -93,11 +70,7 @@ class Hole:
 
 
 def read_holes(path: FileName) -> tuple[Hole, ...]:
-    """Read holes from a CSV file with a row each and the fields of ``Hole`` as columns.
-
-    Raises InputError for a file that cannot be read or has no row, for a column that is unknown or
-    missing, and for a value out of its range, with the number of the row from 1.
-    """
+    """Read holes from a CSV file with a row each and the fields of ``Hole`` as columns."""
     known = [one.name for one in fields(Hole)]
     holes, rows = [], checked_rows(path)
     row: Any
@@ -159,36 +132,7 @@ def drilled_rock(
     slots: Sequence = (),
     seed: int = 0,
 ) -> Mesh:
-    """Mesh of a box of rock with holes in its face, by Gmsh.
-
-    Parameters
-    ----------
-    size : sequence of float
-        Width, height and depth [m].
-    holes : sequence of Hole
-        Holes; each is a prism of the same volume.
-    near, far : float
-        Edges of elements at the holes and far from them [m].
-    growth : float, default 0.3
-        How much longer edges get with each metre from the nearest hole.
-    sides : int, default 6
-        Sides of a prism, 4 to 64; twice as many for a hole wider than 0.2 m.
-    slots : sequence of pairs
-        Boxes cut out of the rock: corner (3,) and size (3,) [m] each.
-    seed : int
-        Another one turns the prisms and changes edges by up to 5 %: another mesh of the same size.
-
-    Returns
-    -------
-    Mesh
-        Groups left, right, bottom, top, back and, at z = depth, front.
-
-    Raises
-    ------
-    InputError
-        A hole lies outside or crosses another one, edges are longer than they may be, or gmsh is
-        not installed or fails.
-    """
+    """Mesh of a box of rock with holes in its face, by Gmsh."""
     check_holes(size, holes)
     near, far = positive("near", near), positive("far", far)
     thinnest = min((one.length_m for one in holes), default=2.0 * far)
@@ -259,12 +203,7 @@ def _sides(points, tetrahedra, size):
 
 
 def with_charges(mesh: Mesh, depth: float, holes: Sequence[Hole]) -> tuple[Mesh, dict[str, float]]:
-    """A mesh with a group of the charged walls of each delay, and the delays [s] by group.
-
-    Groups are stage_1 and on, the earliest first. depth: z of the face [m].
-
-    Raises InputError where no hole is charged, or the mesh is too coarse to show the wall of one.
-    """
+    """A mesh with a group of the charged walls of each delay, and the delays [s] by group."""
     delays = sorted({hole.delay_s for hole in holes if hole.charged_m > 0.0})
     if not delays:
         raise InputError("a table of holes must have one that is charged, got none")

@@ -58,11 +58,7 @@ def blocks_of(raw: Any, dimension: int) -> list[tuple[int, Any]]:
 
 
 def bodies_in(raw: Any, points: np.ndarray) -> Bodies:
-    """Tetrahedra of a file, those that other cells are cut into last and of positive volume.
-
-    points: (n, 3), finite. Raises InputError for numbers that are of no point, and for cells that
-    fold over themselves or have no volume.
-    """
+    """Tetrahedra of a file, those that other cells are cut into last and of positive volume."""
     solids = blocks_of(raw, 3)
     solids.sort(key=lambda numbered: shape_of(numbered[1].type) != "tetra")
     found, owners = zip(*(_cut(block, points) for _, block in solids))
@@ -100,10 +96,7 @@ def _cut(block, points):
 
 
 def _cones(block, corners):
-    """Cones from the lowest corner of each cell to the faces that it is no part of.
-
-    Those that have a corner twice are left out.
-    """
+    """Cones from the lowest corner of each cell to the faces that it is no part of."""
     shape, lowest = shape_of(block.type), corners.argmin(axis=1)
     found, owners = [np.empty((0, 4), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for apex in range(_CORNERS[shape]):
@@ -122,10 +115,7 @@ def _cones(block, corners):
 
 
 def face_groups_in(raw: Any) -> dict[str, np.ndarray]:
-    """Triangles (n, 3) by the names of physical surfaces, or as "data name_value" in other formats.
-
-    A physical surface without a name is "physical_TAG".
-    """
+    """Triangles (n, 3) by names of physical surfaces, or as "data name_value" in other formats."""
     groups = {}
     for name, members in _groups_in(raw, 2).items():
         corners = [corners_of(raw.cells[k], len(raw.points))[on] for k, on in members.items()]
@@ -134,10 +124,7 @@ def face_groups_in(raw: Any) -> dict[str, np.ndarray]:
 
 
 def body_groups_in(raw: Any, bodies: Bodies) -> dict[str, np.ndarray]:
-    """Numbers of bodies by the names of physical volumes; in other formats, sets of solid cells.
-
-    There, integers on solid cells give groups too, as "data name_value".
-    """
+    """Numbers of bodies by the names of physical volumes; in other formats, sets of solid cells."""
     groups = {}
     for name, members in _groups_in(raw, 3).items():
         on = np.zeros(len(bodies.block), dtype=bool)
@@ -150,10 +137,7 @@ def body_groups_in(raw: Any, bodies: Bodies) -> dict[str, np.ndarray]:
 
 
 def volumes_of(mesh: Mesh, first: int) -> tuple[list[str], np.ndarray]:
-    """Names of physical volumes, which have numbers from ``first`` on, and that of every body.
-
-    Bodies in no group have the number 0; without any group one volume holds them all.
-    """
+    """Names of physical volumes, which have numbers from ``first`` on, and that of every body."""
     if not mesh.body_groups:
         return ["bodies"], np.full(mesh.body_count, first)
     member = np.zeros((mesh.body_count, len(mesh.body_groups)), dtype=bool)
@@ -226,10 +210,7 @@ def _of_set(raw, key, dimension):
 
 
 def _tells_parts(raw, name):
-    """Whether solid cells carry different whole numbers of a name, as they do for materials.
-
-    Numbers of which each cell has its own are numbers of the cells, not of materials.
-    """
+    """Whether solid cells carry different whole numbers of a name, as they do for materials."""
     chosen = list(_values(raw, name, 3))
     cells = sum(int(members.sum()) for _, _, members in chosen)
     return 1 < len({value for value, _, _ in chosen}) < max(cells, 3)

@@ -20,10 +20,7 @@ _FARTHEST = 1e30
 def checked_arrays(
     points: Any, tetrahedra: Any, groups: Any, tolerance: float, coincident: bool, notes: list[str]
 ) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], tuple[str, ...]]:
-    """Points, tetrahedra and groups as a Mesh holds them, and the names of those of inner faces.
-
-    Arguments as for ``checked_mesh``; notes: a list to which sentences on repairs are added.
-    """
+    """Points, tetrahedra and groups as a Mesh holds them, and the names of those of inner faces."""
     places = checked_points(points)
     corners = _checked_indices("tetrahedra", tetrahedra, 4, len(places))
     faces = {
@@ -83,11 +80,7 @@ def _rows(what, values, width, kinds, words):
 def weld_labels(
     points: np.ndarray, tetrahedra: np.ndarray, tolerance: float, notes: list[str]
 ) -> np.ndarray:
-    """For every point the first of those that become one with it, (n,) int32.
-
-    points (n, 3) [m], tetrahedra (m, 4). tolerance: distance up to which points become one [m].
-    Raises InputError for a tolerance that would join the ends of an edge.
-    """
+    """For every point the first of those that become one with it, (n,) int32."""
     lengths = geometry.edge_lengths(points, tetrahedra)
     shortest = lengths[lengths > COINCIDENT * np.ptp(points, axis=0).max()].min(initial=np.inf)
     if not (finite(tolerance) and 0.0 <= tolerance < shortest):
@@ -221,11 +214,7 @@ def _listed(numbers):
 
 
 def _checked_faces(tetrahedra, groups, notes):
-    """Groups with each face once, and the names of those of inner faces.
-
-    Faces are ordered by their bodies, and look outward, an inner one out of the body of lower
-    index.
-    """
+    """Groups with each face once, and the names of those of inner faces."""
     faces = geometry.all_faces(tetrahedra)
     number, *members = geometry.numbers_in(faces, *groups.values())
     most = max(map(np.max, (number, *members)))

@@ -52,12 +52,7 @@ def interior_crossings(divisions: int) -> np.ndarray:
 
 
 def spheres_of_faces(mesh: Mesh, centre: np.ndarray, divisions: int = 5) -> ContactSpheres:
-    """Spheres tangent to their own face and as large as the other three faces allow.
-
-    centre: centres of the bodies (body_count, 3) [m]. The radius is the smallest of
-    d_g / (1 - m_f . m_g) over the other faces g, with d_g the distance of the touching point from
-    face g and m the inward unit normals.
-    """
+    """Spheres tangent to their own face and as large as the other three faces allow."""
     faces = all_faces(mesh.tetrahedra).reshape(-1, 4, 3)
     corners = mesh.points[faces] - centre[:, None, None, :]
     inward = -area_vectors(mesh.points, faces.reshape(-1, 3)).reshape(-1, 4, 3)
@@ -76,11 +71,7 @@ def spheres_of_faces(mesh: Mesh, centre: np.ndarray, divisions: int = 5) -> Cont
 
 
 def _clusters(middle, radius):
-    """Small balls around the spheres of each face: centre and radius, (body_count, 4, 4).
-
-    A centre goes towards the farthest point of its spheres, by ever smaller shares of the way: ten
-    times take off 7 % of the radius on average, a thousand 9 % (Badoiu and Clarkson 2003).
-    """
+    """Small balls around the spheres of each face: centre and radius, (body_count, 4, 4)."""
     centre = middle.mean(axis=2)
     for k in range(_CENTRINGS):
         away, reach = _reach(middle, radius, centre)

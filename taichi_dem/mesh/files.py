@@ -115,11 +115,7 @@ def read_mesh(
 
 
 def write_mesh(path: FileName, mesh: Mesh) -> None:
-    """Write a mesh with its named groups as a Gmsh 2.2 text file (exact: 17 digits).
-
-    Body groups become physical volumes. As a tetrahedron has one volume in this format, bodies in
-    several groups are in the volume "NAME|NAME", which ``read_mesh`` takes for both.
-    """
+    """Write a mesh with its named groups as a Gmsh 2.2 text file (exact: 17 digits)."""
     names, first = list(mesh.groups), 1 + len(mesh.groups)
     volumes, tags = cells.volumes_of(mesh, first)
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames"]
@@ -139,10 +135,7 @@ def write_mesh(path: FileName, mesh: Mesh) -> None:
 def write_vtu(
     path: FileName, points: np.ndarray, tetrahedra: np.ndarray, cell_data: Mapping[str, np.ndarray]
 ) -> None:
-    """Write tetrahedra with data as a VTU file, for ParaView.
-
-    cell_data: name -> (body_count, ...).
-    """
+    """Write tetrahedra with data as a VTU file, for ParaView."""
     # Imported where a file is read or written: it takes a tenth of a second.
     import meshio
 
@@ -154,10 +147,7 @@ def write_vtu(
 
 
 def write_pvd(path: FileName, times_s: Sequence[float], file_names: Sequence[str]) -> None:
-    """Write the list of VTU files of a time series, which ParaView opens as one.
-
-    times_s: time of each file [s].  file_names: relative to the folder of ``path``.
-    """
+    """Write the list of VTU files of a time series, which ParaView opens as one."""
     sets = [
         f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(str(name))}/>'
         for time, name in zip(map(float, times_s), file_names)
@@ -168,10 +158,7 @@ def write_pvd(path: FileName, times_s: Sequence[float], file_names: Sequence[str
 
 
 def _read_raw(path):
-    """The mesh as meshio reads it, and the text that meshio printed.
-
-    Whatever goes wrong inside becomes one InputError.
-    """
+    """The mesh as meshio reads it, and the text that meshio printed."""
     if not os.path.isfile(path):
         raise InputError(f"mesh file {path} does not exist, or is not a file")
     said = io.StringIO()
@@ -196,11 +183,7 @@ def _meshio_read(path, copy):
 
 
 def _read_gmsh(path, place):
-    """A Gmsh file of meshio's with groups by PhysicalName; InputError for a bad one.
-
-    Meshio reads a copy, at a place, in which each physical group has a name of its own: of faces
-    and bodies in groups of one name it loses the faces, and it takes some letters for escapes.
-    """
+    """A Gmsh file of meshio's with groups by PhysicalName; InputError for a bad one."""
     import meshio
 
     with open(path, "rb") as file:
@@ -219,11 +202,7 @@ def _read_gmsh(path, place):
 
 
 def _refuse_bad_gmsh(content):
-    """Refuse a Gmsh file of which meshio would make another mesh: damaged, or cut off.
-
-    Its sections must be whole; in text they have as many rows as they say, and points have numbers
-    from 1 on, as meshio counts others from the end. Other files are left to other readers.
-    """
+    """Refuse a Gmsh file of which meshio would make another mesh: damaged, or cut off."""
     if not content.startswith(b"$MeshFormat"):
         return
     marks = list(_ENDS.finditer(content))

@@ -358,11 +358,7 @@ def checked_mesh(
 
 
 def with_inner_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
-    """The mesh with one more group: faces between two bodies chosen by their centres.
-
-    ``Scene(unbonded=[name])`` makes a notch or an open joint of it. chosen, errors: as for
-    ``Mesh.group``.
-    """
+    """The mesh with one more group: faces between two bodies chosen by their centres."""
     inner = _inner_faces(mesh)[0]
     return _with_group(mesh, "groups", name, inner[_choose(mesh, inner, chosen)])
 
@@ -374,13 +370,7 @@ def with_cut(
     normal: Sequence[float],
     chosen: Choice | None = None,
 ) -> Mesh:
-    """The mesh with one more group: the faces along which a plane divides the bodies.
-
-    Those between a body whose centre lies behind the plane and one that lies before it, so that no
-    bond is left across: as rough as the mesh is, and flat where faces lie in the plane. point [m]
-    and normal: of the plane. chosen: which of them, by the centres of the faces, as for
-    ``Mesh.group``; None for all. Raises InputError as that, and for a normal of zero.
-    """
+    """The mesh with one more group: the faces along which a plane divides the bodies."""
     origin, along = np.array(direction("point", point)), unit_vector("normal", normal)
     inner, bodies = _inner_faces(mesh)
     centre = mesh.points[mesh.tetrahedra].mean(axis=1)

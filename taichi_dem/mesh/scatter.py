@@ -72,24 +72,7 @@ class _Solid:
 def scattered(
     points: np.ndarray, tetrahedra: np.ndarray, within: Within, element: float, seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) [m] and tetrahedra (m, 4) of the same solid and size of elements, without rows.
-
-    Parameters
-    ----------
-    points, tetrahedra : arrays
-        Of a solid whose planes are across x, y and z, or parallel to z and one element wide.
-    within : function
-        Which points lie in the solid.
-    element : float [m]
-        Length of an edge.
-    seed : int
-        Another one makes another mesh.
-
-    Raises
-    ------
-    InputError
-        Where points around a hole cannot be joined without crossing it.
-    """
+    """Points (n, 3) [m] and tetrahedra (m, 4) of the same solid and element size, without rows."""
     solid = _Solid(points, tetrahedra, within, element)
     if not solid.free.any():
         return points, tetrahedra

@@ -52,10 +52,7 @@ _BITS = 20
 
 
 def single(edge: float = 0.05) -> Mesh:
-    """One regular tetrahedron of ``edge`` [m]: base in the plane x = 0, apex at x < 0.
-
-    Groups: base, sides.
-    """
+    """One regular tetrahedron of ``edge`` [m]: base in the plane x = 0, apex at x < 0."""
     base, height = _base(edge)
     points = np.vstack([[-height, 0.0, 0.0], base])
     groups = {"base": [[1, 2, 3]], "sides": [[0, 1, 2], [0, 2, 3], [0, 3, 1]]}
@@ -63,11 +60,7 @@ def single(edge: float = 0.05) -> Mesh:
 
 
 def pair(edge: float = 0.05, height: float | None = None) -> Mesh:
-    """Two equal tetrahedra that share the face in x = 0; body 0 lies at x < 0, body 1 at x > 0.
-
-    edge, height: [m]; regular ones where no height is given.  Groups: left and right, the free
-    faces of either body.
-    """
+    """Two equal tetrahedra that share the face in x = 0; body 0 lies at x < 0, body 1 at x > 0."""
     base, regular = _base(edge)
     height = regular if height is None else positive("height", height)
     points = np.vstack([base, [-height, 0.0, 0.0], [height, 0.0, 0.0]])
@@ -77,13 +70,7 @@ def pair(edge: float = 0.05, height: float | None = None) -> Mesh:
 
 
 def bar(length: float, width: float, cells: Sequence[int]) -> Mesh:
-    """Square bar along x from the origin, regular boxes cut into six tetrahedra each.
-
-    length, width: [m].  cells: boxes along x, y and z.
-    Groups: left, right (ends), bottom, top, back, front (z = width).
-    The cut is Kuhn's: all six share the box's diagonal, and neighbours match without turning.
-    Body number = 6 * box + path; boxes run fastest along z.
-    """
+    """Square bar along x from the origin, regular boxes cut into six tetrahedra each."""
     boxes = _checked_cells(length, width, cells)
     index = np.arange(np.prod(boxes + 1)).reshape(boxes + 1)
     grid = np.stack(np.meshgrid(*(np.arange(n + 1) for n in boxes), indexing="ij"), axis=-1)
@@ -93,13 +80,7 @@ def bar(length: float, width: float, cells: Sequence[int]) -> Mesh:
 
 
 def placed_together(parts: dict, keep_coincident: bool = False) -> Mesh:
-    """Several solids as one mesh, not bonded to each other; bodies in the order of the parts.
-
-    parts: name -> (mesh, shift (3,) [m]). Groups: those of every part as NAME_GROUP, and, under
-    its own name, a group of all parts together. Body groups: likewise, and NAME for all bodies of a
-    part. keep_coincident: solids may touch point by point (see ``checked_mesh``). Raises InputError
-    as ``checked_mesh``.
-    """
+    """Several solids as one mesh, not bonded to each other; bodies in the order of the parts."""
     points, tetrahedra, groups, first = [], [], {}, 0
     for name, (mesh, shift) in parts.items():
         points.append(mesh.points + np.asarray(shift))
@@ -181,18 +162,7 @@ def drawn_out(
     sides: Mapping[str, OnOutline],
     scatter: int | None = None,
 ) -> Mesh:
-    """A solid from z = 0 to a depth; groups back (z = 0), front, and the sides by name.
-
-    Parameters
-    ----------
-    loops : arrays (k, 2) [m]
-        Outline of the front view, and holes, see ``triangulated``.
-    depth, element : float [m]
-    sides : dict
-        Name of a group to a function that says which points of the outline are on it.
-    scatter : int, optional
-        Seed of a mesh without layers and rows, see ``scattered``.
-    """
+    """A solid from z = 0 to a depth; groups back (z = 0), front, and the sides by name."""
     flat, triangles = triangulated(loops, element)
     layers = max(1, round(depth / (_LAYER * element)))
     heights = np.linspace(0.0, depth, layers + 1)
@@ -232,21 +202,7 @@ def _groups(points, outer, depth, sides):
 
 
 def triangulated(loops: Sequence[np.ndarray], element: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 2) and triangles (m, 3), anticlockwise; the points of the loops come first.
-
-    Parameters
-    ----------
-    loops : arrays (k, 2) [m]
-        Corners of the outline, anticlockwise, and of holes in it, clockwise, about an element
-        apart.
-    element : float [m]
-        Length of an edge.
-
-    Raises
-    ------
-    InputError
-        Where the outline is too narrow, or too finely divided, for elements of this size.
-    """
+    """Points (n, 2) and triangles (m, 3), anticlockwise; the points of the loops come first."""
     starts, ends = _outline(loops)
     draw = np.random.default_rng(1)
     points = np.vstack([starts, _inner_points(starts, ends, element)])

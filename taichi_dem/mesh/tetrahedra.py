@@ -41,10 +41,7 @@ def edge_lengths(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
 
 
 def area_vectors(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Right-hand normals times the area of triangles [m2], shape (n, 3).
-
-    faces: point indices, shape (n, 3).
-    """
+    """Right-hand normals times the area of triangles [m2], shape (n, 3)."""
     corners = points[faces]
     return 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
@@ -85,10 +82,7 @@ def outer_faces(tetrahedra: np.ndarray) -> np.ndarray:
 
 
 def shared_faces(tetrahedra: np.ndarray) -> np.ndarray:
-    """Rows of ``all_faces`` that are one face of two bodies, shape (n, 2), smaller row first.
-
-    Call it only where no face is shared by three bodies.
-    """
+    """Rows of ``all_faces`` that are one face of two bodies, shape (n, 2), smaller row first."""
     return equal_rows(all_faces(tetrahedra))
 
 
@@ -101,11 +95,7 @@ def equal_rows(rows: np.ndarray) -> np.ndarray:
 
 
 def penetration(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Least way [m] that parts each two tetrahedra, at most 0 where they share no volume, (n,).
-
-    first, second: corners [m], (n, 4, 3). By the theorem of separating axes: two convex bodies are
-    apart if they are so along a normal of a face, or across an edge of both.
-    """
+    """Least way [m] that parts each two tetrahedra, at most 0 where they share no volume, (n,)."""
     origin = first[:, :1]
     first, second = first - origin, second - origin
     one, other = (np.diff(c[:, LOCAL_EDGES], axis=2)[:, :, 0] for c in (first, second))
@@ -128,10 +118,7 @@ def _overlap(axes, first, second):
 
 
 def components(count: int, pairs: np.ndarray) -> np.ndarray:
-    """Connected components of a graph: the smallest member of each node's part, shape (count,).
-
-    count: number of nodes.  pairs: linked nodes, shape (n, 2).
-    """
+    """Connected components of a graph: the smallest member of each node's part, shape (count,)."""
     label = np.arange(count)
     while True:
         lowest = np.minimum(label[pairs[:, 0]], label[pairs[:, 1]])
@@ -146,11 +133,7 @@ def components(count: int, pairs: np.ndarray) -> np.ndarray:
 
 
 def close_pairs(points: np.ndarray, distance: float) -> np.ndarray:
-    """Pairs of points not farther apart than ``distance`` [m], shape (n, 2), first < second.
-
-    Two such points lie in one cell of at least one of eight cubic grids of cell size 4 distance,
-    shifted by half a cell along each axis; so sorting by cell finds them without all pairs.
-    """
+    """Pairs of points not farther apart than ``distance`` [m], shape (n, 2), first < second."""
     found = []
     cell = 4.0 * distance
     low = points.min(axis=0)
@@ -175,11 +158,7 @@ def _in_one_cell(rows):
 
 @functools.cache
 def points_of_parts(halvings: int) -> np.ndarray:
-    """A point in each of the equal parts of a tetrahedron, as shares of its corners, (parts, 4).
-
-    Their middles would lie in layers along every face, and a body that is pressed in by less than
-    a layer would hold none: Roberts's sequence spreads the points over their parts.
-    """
+    """A point in each of the equal parts of a tetrahedron, as shares of its corners, (parts, 4)."""
     parts = [np.eye(4)]
     for _ in range(halvings):
         parts = [piece for whole in parts for piece in eighths(whole)]

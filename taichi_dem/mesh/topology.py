@@ -91,10 +91,7 @@ def topology_of(mesh: Mesh) -> Topology:
 
 
 def _bonded_faces(mesh):
-    """Pairs of faces 4 * body + f with a bond, (n, 2), and the share of each that is bonded, (n,).
-
-    The least share of the groups that a face is in; all of one in none.
-    """
+    """Pairs of faces 4 * body + f with a bond, (n, 2), and the bonded share of each, (n,)."""
     rows = geometry.shared_faces(mesh.tetrahedra)
     share = np.ones(len(rows))
     if mesh.bonded_shares:
@@ -109,10 +106,7 @@ def _bonded_faces(mesh):
 
 
 def skin(topology: Topology, broken: Any) -> Any:
-    """Faces that show: outer ones and both sides of broken bonds.
-
-    broken: (bond_count,) bool. Returns body, local face (n,) and whether it is a crack face (n,).
-    """
+    """Faces that show: outer ones and both sides of broken bonds."""
     bodies = (topology.outer_body, topology.master[broken], topology.slave[broken])
     faces = (topology.outer_face, topology.master_face[broken], topology.slave_face[broken])
     body = np.concatenate(bodies)
@@ -120,19 +114,12 @@ def skin(topology: Topology, broken: Any) -> Any:
 
 
 def face_vertices(mesh: Mesh, body: np.ndarray, face: np.ndarray) -> np.ndarray:
-    """Points of local faces in the order whose right-hand normal points outward, (n, 3) int32.
-
-    body, face: body and local face, shape (n,).
-    """
+    """Points of local faces in the order whose right-hand normal points outward, (n, 3) int32."""
     return np.take_along_axis(mesh.tetrahedra[body], geometry.LOCAL_FACES[face], axis=1)
 
 
 def faces_of_group(mesh: Mesh, topology: Topology, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Body and local face of every face of a group, two arrays (n,) int32, in the group's order.
-
-    Of inner faces without bonds both sides, one after the other. Raises InputError when the mesh
-    has no such group, or bonds join its faces.
-    """
+    """Body and local face of every face of a group, two arrays (n,) int32, in the group's order."""
     check_free(mesh, name)
     if name not in topology.groups:
         topology.groups[name] = _faces_of_group(mesh, topology, name)
@@ -159,13 +146,7 @@ def check_free(mesh: Mesh, name: str) -> None:
 
 
 def body_properties(mesh: Mesh, density: Density) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mass [kg] (n,), centre of mass [m] (n, 3), inertia about it [kg m2] (n, 3, 3).
-
-    density [kg/m3]: of all bodies, or of each, (body_count,).  With the vertices x_k taken from the
-    centroid, the second moment of a homogeneous tetrahedron is S = m/20 sum_k x_k x_k^T and its
-    inertia is tr(S) 1 - S (F. Tonon, J. Math. Stat. 1(1), 2005, 8-11, writes out the same integral
-    by components).
-    """
+    """Mass [kg] (n,), centre of mass [m] (n, 3), inertia about it [kg m2] (n, 3, 3)."""
     corners = mesh.points[mesh.tetrahedra]
     centre = corners.mean(axis=1)
     mass = density * geometry.signed_volumes(mesh.points, mesh.tetrahedra)
@@ -176,20 +157,7 @@ def body_properties(mesh: Mesh, density: Density) -> tuple[np.ndarray, np.ndarra
 
 
 def body_at(mesh: Mesh, name: str, point: np.ndarray) -> int:
-    """Number of the body that holds a point, the lowest where several share it.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    name : str
-        Of the point, for the sentence.
-    point : array (3,) [m]
-
-    Raises
-    ------
-    InputError
-        For a point in no body, with the nearest body and the distance of its centre.
-    """
+    """Number of the body that holds a point, the lowest where several share it."""
     faces = geometry.all_faces(mesh.tetrahedra)
     normal = geometry.unit_normals(mesh.points, faces)
     outside = dot(point - mesh.points[faces[:, 0]], normal).reshape(-1, 4).max(axis=1)
@@ -210,10 +178,7 @@ def parts_of(mesh: Mesh) -> np.ndarray:
 
 
 def part_boxes(corners: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Boxes around parts: lowest and highest coordinates [m], two arrays (part_count, 3).
-
-    corners: of every body [m], (body_count, 4, 3). part: what ``parts_of`` gave.
-    """
+    """Boxes around parts: lowest and highest coordinates [m], two arrays (part_count, 3)."""
     order = np.argsort(part, kind="stable")
     first = np.searchsorted(part[order], np.arange(part.max() + 1))
     low = np.minimum.reduceat(corners.min(axis=1)[order], first)
@@ -221,10 +186,7 @@ def part_boxes(corners: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def any_overlap(low: np.ndarray, high: np.ndarray) -> bool:
-    """Whether two boxes overlap; touching is not enough.
-
-    Sorted by where they begin along x, a box is compared with those that begin before its end.
-    """
+    """Whether two boxes overlap; touching is not enough."""
     order = np.argsort(low[:, 0], kind="stable")
     low, high = low[order], high[order]
     ends = np.searchsorted(low[:, 0], high[:, 0])
@@ -235,14 +197,7 @@ def any_overlap(low: np.ndarray, high: np.ndarray) -> bool:
 
 
 def may_meet(scene: Any, part: np.ndarray) -> bool:
-    """Whether parts of a scene at rest may meet, as far as can be known before a run.
-
-    They cannot where nothing moves them, or where uniform acceleration is all that does. Else every
-    part may move from its box by a share of its size (``NEARNESS``), by the displacement that
-    its loads and supports may cause (``Effect.travel``), and without end along the initial velocity
-    that it has beside the mean of all parts; displacements common to all parts do not count, unless
-    they are unbounded in all directions, as with gas. scene: a Scene. part: from ``parts_of``.
-    """
+    """Whether parts of a scene at rest may meet, as far as can be known before a run."""
     drives = [effect for effect in scene.effects if effect.role in ("load", "support")]
     travels = np.array([effect.travel() for effect in drives]).reshape(-1, 2, 3)
     anywhere = np.isinf(travels).all(axis=(1, 2))
@@ -289,12 +244,7 @@ def parts_under(mesh: Mesh, effect: Any, part: np.ndarray) -> np.ndarray:
 
 
 def edge_colours(links: np.ndarray, body_count: int) -> np.ndarray:
-    """Colour of every link, (n,) from 0 on; links that share a body differ.
-
-    links: the two bodies of each, shape (n, 2). Greedy; where that would take a new colour, one
-    chain of two colours is flipped if that frees an old one. A tetrahedron has at most four
-    bonds, for which five colours always suffice and four or five come out.
-    """
+    """Colour of every link, (n,) from 0 on; links that share a body differ."""
     colours = np.full(len(links), -1, dtype=np.int32)
     at: list[dict[int, int]] = [{} for _ in range(body_count)]
     highest = -1

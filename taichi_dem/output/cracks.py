@@ -16,10 +16,7 @@ _PARALLEL = 1e-6
 
 
 def picture_axes(toward: np.ndarray) -> Any:
-    """Right and up, unit vectors (3,), of a picture seen from a unit vector.
-
-    Looking down a coordinate axis, the next two are right and up.
-    """
+    """Right and up, unit vectors (3,), of a picture seen from a unit vector."""
     main = int(np.abs(toward).argmax())
     right = np.cross(np.eye(3)[(main + 2) % 3], toward)
     right = right / np.linalg.norm(right)
@@ -27,20 +24,13 @@ def picture_axes(toward: np.ndarray) -> Any:
 
 
 def crack_areas(model: Model) -> np.ndarray:
-    """Area of the crack that each bond leaves when it breaks [m^2], (bond_count,).
-
-    Of a face that is bonded over a share of its area, that share.
-    """
+    """Area of the crack that each bond leaves when it breaks [m^2], (bond_count,)."""
     top = model.topology
     return length(area_vectors(model.mesh.points, top.vertices)) * top.bonded_share
 
 
 def apertures_of(model: Model, frame: Frame) -> np.ndarray:
-    """Opening of every bond in a frame along the normal of its face [m], (bond_count,).
-
-    The mean of its three contact units, from the start on, in the axes of the master; negative
-    where faces are pressed into each other.
-    """
+    """Opening of every bond in a frame along the normal of its face [m], (bond_count,)."""
     top, bonds = model.topology, model.bonds
     branch = frame.position[top.slave] - frame.position[top.master]
     on_slave = bonds["on_slave"].mean(axis=1)[:, :, None]
@@ -50,27 +40,7 @@ def apertures_of(model: Model, frame: Frame) -> np.ndarray:
 
 
 def cracks_of(model: Model, broken_time: np.ndarray, aperture: np.ndarray) -> Any:
-    """Tabulate the broken faces in the order in which they broke.
-
-    Parameters
-    ----------
-    model : Model
-    broken_time : ndarray, shape (bond_count,)
-        When each bond broke [s], NaN while it holds.
-    aperture : ndarray, shape (bond_count,)
-        Opening of each bond along its normal [m].
-
-    Returns
-    -------
-    pandas.DataFrame
-        ``time_s``, ``bond``, ``area_m2``, ``crack_area_m2`` of all cracks so far, ``aperture_m``,
-        place of the face at rest, its unit normal out of the master, strike and dip.
-
-    Notes
-    -----
-    Strike and dip are those of geology with z up and y north: strike clockwise from north, the
-    face dipping to its right; dip from the horizontal. A horizontal face has the strike 0.
-    """
+    """Tabulate the broken faces in the order in which they broke."""
     bond = np.flatnonzero(np.isfinite(broken_time))
     bond = bond[np.argsort(broken_time[bond], kind="stable")]
     points, corners = model.mesh.points, model.topology.vertices[bond]
@@ -104,26 +74,7 @@ def strike_and_dip(normal: np.ndarray) -> Any:
 def rose_of(
     model: Model, broken: np.ndarray, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36
 ) -> Any:
-    """Sum up the area of cracks by the direction of their traces in a plane.
-
-    Parameters
-    ----------
-    model : Model
-    broken : ndarray of bool, shape (bond_count,)
-    axis : sequence of 3 floats
-        Normal of the plane, towards the viewer.
-    sectors : int
-        Of a half turn, 2 to 360.
-
-    Returns
-    -------
-    pandas.DataFrame
-        ``angle_deg``, the middle of a sector, counter-clockwise from the right of a picture seen
-        along the axis (from x for the axis z); ``area_m2`` and number of ``faces`` in it. In its
-        ``attrs``: ``width_deg`` of a sector, ``axis``, and ``parallel_m2``, the area of the cracks
-        that lie in the plane, which have no direction there. With it the areas of the sectors add
-        up to the area of all cracks.
-    """
+    """Sum up the area of cracks by the direction of their traces in a plane."""
     axis, sectors = unit_vector("axis", axis), whole("sectors", sectors, 2, 360)
     bond = np.flatnonzero(broken)
     trace = np.cross(axis, unit_normals(model.mesh.points, model.topology.vertices[bond]))

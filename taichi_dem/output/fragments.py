@@ -25,18 +25,7 @@ COLOURS = {
 
 
 def fragment_of_body(model: Model, broken: np.ndarray) -> np.ndarray:
-    """Number the fragments by falling mass, equal ones by their first body.
-
-    Parameters
-    ----------
-    model : Model
-    broken : ndarray of bool, shape (bond_count,)
-
-    Returns
-    -------
-    ndarray of int, shape (body_count,)
-        Fragment of each body.
-    """
+    """Number the fragments by falling mass, equal ones by their first body."""
     heads, number = np.unique(model.pieces(broken), return_inverse=True)
     order = np.lexsort((heads, -np.bincount(number.reshape(-1), model.body_mass)))
     rank = np.empty(len(order), dtype=np.int64)
@@ -45,29 +34,7 @@ def fragment_of_body(model: Model, broken: np.ndarray) -> np.ndarray:
 
 
 def fragments_of(model: Model, frame: Frame, of_body: np.ndarray) -> dict[str, np.ndarray]:
-    """Tabulate the fragments in a frame, the heaviest first.
-
-    Parameters
-    ----------
-    model : Model
-    frame : Frame
-    of_body : ndarray of int, shape (body_count,)
-        Fragment of each body.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Columns by name.
-
-    Notes
-    -----
-    ``diameter_m`` is that of the sphere of the same volume. ``sieve_m`` estimates the opening of
-    the square sieve that a fragment just passes: the middle edge of the cuboid with the same
-    volume density and principal moments of inertia, in the shape at rest. A fragment's velocity is
-    its momentum by its mass, its spin its angular momentum by its inertia. ``kinetic_J`` is that of
-    its bodies; the share in ``translation_J`` and ``rotation_J`` is that of a rigid piece, the
-    rest is vibration.
-    """
+    """Tabulate the fragments in a frame, the heaviest first."""
     mass = sums(of_body, model.body_mass)
     volume = sums(of_body, signed_volumes(model.mesh.points, model.mesh.tetrahedra))
     return {
@@ -109,11 +76,7 @@ def _motion(model, frame, of_body, mass):
 def body_spins(
     inertia: np.ndarray, rotation: np.ndarray, angular_momentum: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Angular momenta [kg m^2/s] and spins [rad/s] of bodies in their own axes, (..., n, 3) each.
-
-    inertia: in body axes, (n, 3, 3). rotation: body to world, (..., n, 3, 3). angular_momentum: in
-    world axes, (..., n, 3).
-    """
+    """Angular momenta [kg m^2/s], spins [rad/s] of bodies in their own axes, (..., n, 3) each."""
     local = np.einsum("...nji,...nj->...ni", rotation, angular_momentum)
     return local, np.einsum("nij,...nj->...ni", np.linalg.inv(inertia), local)
 
@@ -134,12 +97,7 @@ def _steiner(mass, arm):
 
 
 def quaternions_of(rotation: np.ndarray) -> np.ndarray:
-    """Unit quaternions x, y, z, w of rotation matrices (n, 3, 3); (n, 4).
-
-    Four formulas differ in the component that they divide by; the largest is taken (S. W. Shepperd,
-    J. Guidance and Control 1, 1978, 223-224). SciPy's Rotation takes 0.4 s to import, and every
-    page of a run needs it.
-    """
+    """Unit quaternions x, y, z, w of rotation matrices (n, 3, 3); (n, 4)."""
     (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(rotation, 0, -1)
     x, y, z = h - f, c - g, d - b
     candidates = np.array(

@@ -154,22 +154,7 @@ class Attenuation:
 def attenuation_of(
     model: Model, peak_speed: np.ndarray, group: str, radius: float | None = None
 ) -> Attenuation:
-    """Measure the attenuation in a run.
-
-    Parameters
-    ----------
-    model : Model
-    peak_speed : ndarray
-        Largest speed of each body [m/s], shape (body_count,).
-    group : str
-        Face group of the hole's wall.
-    radius : float, optional
-        Radius of the hole [m]; that of the points of its wall by default.
-
-    Returns
-    -------
-    Attenuation
-    """
+    """Measure the attenuation in a run."""
     hole, points = hole_of(model, group), model.mesh.points
     radius = hole.radius if radius is None else positive("radius", radius)
     away = model.centre - hole.axis_point

@@ -242,11 +242,7 @@ def body_corners(model: Model, frame: Frame) -> np.ndarray:
 
 
 def write_bonds(path: FileName, model: Model, broken_time: np.ndarray) -> None:
-    """Write a CSV row a bond: its bodies, centre and area of its face, and when it broke.
-
-    broken_time: (bond_count,) [s], NaN while a bond holds; its cell is then empty.
-    Raises InputError when the file cannot be written.
-    """
+    """Write a CSV row a bond: its bodies, centre and area of its face, and when it broke."""
     top, points = model.topology, model.mesh.points
     centre = points[top.vertices].mean(axis=1)
     times = np.array(broken_time, dtype=object)
@@ -263,10 +259,7 @@ def write_bonds(path: FileName, model: Model, broken_time: np.ndarray) -> None:
 
 
 def write_bodies(path: FileName, frames: Sequence[Frame]) -> None:
-    """Write a CSV row for each body of each frame: its level, speed and displacement.
-
-    Raises InputError when the file cannot be written.
-    """
+    """Write a CSV row for each body of each frame: its level, speed and displacement."""
     moved = [np.linalg.norm(frame.displacement, axis=1) for frame in frames]
     columns = {
         "time_s": np.concatenate([np.full(len(f.level), f.time_s) for f in frames]),
@@ -279,11 +272,7 @@ def write_bodies(path: FileName, frames: Sequence[Frame]) -> None:
 
 
 def series_name(folder: FileName) -> str:
-    """Name of a series after its folder, fit for files everywhere; "run" where nothing is left.
-
-    Letters and digits of any script, "-", "_" and "." stay; all else becomes "_". At most
-    50 letters, so that numbers and endings find room in a file name.
-    """
+    """Name of a series after its folder, fit for files everywhere; "run" where nothing is left."""
     name = os.path.basename(os.path.abspath(folder))
     return re.sub(r"[^\w.-]+", "_", name)[:_LONGEST_NAME].strip("._-") or "run"
 

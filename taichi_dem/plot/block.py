@@ -54,21 +54,7 @@ def plot_cracks(
     axis: Sequence[float] = ALONG_Z,
     path: FileName | None = None,
 ) -> Figure:
-    """Draw broken faces by time of breaking, at rest and as deformed in a frame (Fig 12).
-
-    The last panel shows the most broken part, true to scale.
-
-    Parameters
-    ----------
-    result : Result
-    frame : int
-        Number of the frame.
-    magnify : float
-        Factor of the displacement in the middle panel.
-    axis : sequence of 3 floats
-        Towards the viewer.
-    path : str or path, optional
-    """
+    """Draw broken faces by time of breaking, at rest and as deformed in a frame (Fig 12)."""
     now, magnify = result.frame(frame), positive("magnify", magnify)
     view, model = View(unit_vector("axis", axis).tolist()), result.model
     broken_time = np.where(result.broken_time <= now.time_s, result.broken_time, np.nan)
@@ -128,10 +114,7 @@ def _close_up(axes, view, model, broken_time):
 
 @contextlib.contextmanager
 def _panels(path, view, model, columns, extra, names) -> Iterator[Any]:
-    """A panel of the whole block for each name, which is its title; labels at the outer ones.
-
-    extra: room around them [inch].
-    """
+    """A panel of the whole block for each name, which is its title; labels at the outer ones."""
     extent, rows = np.ptp(view.project(model.mesh.points), axis=0), -(-len(names) // columns)
     height = 2.6 * float(np.clip(extent[1] / extent[0], 0.15, 2.0)) + extra[0]
     size = 2.6 * columns + extra[1], height * rows + extra[2]
@@ -153,10 +136,7 @@ def _panels(path, view, model, columns, extra, names) -> Iterator[Any]:
 def plot_steps(
     result: Any, *, axis: Sequence[float] = ALONG_Z, path: FileName | None = None
 ) -> Figure:
-    """Draw the step of every body at several times (Konno et al., Fig 13).
-
-    Of more than six frames, six are drawn, evenly up to the last.
-    """
+    """Draw the step of every body at several times (Konno et al., Fig 13)."""
     view, model = View(axis), result.model
     frames = result.frames[1:] or result.frames
     if len(frames) > 6:
@@ -209,11 +189,7 @@ def plot_acting(
 def plot_film(
     result: Any, path: FileName, *, magnify: float = 5.0, axis: Sequence[float] = ALONG_Z
 ) -> None:
-    """Write the deforming block, coloured by speed, as a GIF below a megabyte.
-
-    Needs a frame. magnify: of the displacement. axis: towards the viewer. One palette for all
-    frames, no dithering and few colours keep 40 frames small.
-    """
+    """Write the deforming block, coloured by speed, as a GIF below a megabyte."""
     drawing(path)
     view, model, frames = View(axis), result.model, result.frames
     broken_time = result.broken_time

@@ -117,11 +117,7 @@ def draw_level_shares(
     dt0: float,
     loc: str = "outside right center",
 ) -> None:
-    """Share of bodies on each level over time, the coarsest at the bottom, with its legend.
-
-    owner: figure or axes that get the legend, at a place loc. time: in the unit of the axis.
-    shares: (sample_count, level_count), rows summing to 1. dt0: step of level 0 [s].
-    """
+    """Share of bodies on each level over time, the coarsest at the bottom, with its legend."""
     count = shares.shape[1]
     areas = axes.stackplot(time, 100.0 * shares.T, colors=level_shades(count))
     axes.set(ylabel="share of bodies [%]", ylim=(0.0, 100.0))
@@ -130,10 +126,7 @@ def draw_level_shares(
 
 
 def level_shares(levels: Iterable[np.ndarray]) -> np.ndarray:
-    """Share of bodies on each level: rows (sample, level) that sum to 1.
-
-    levels: of all bodies, (body_count,) each.
-    """
+    """Share of bodies on each level: rows (sample, level) that sum to 1."""
     rows = [*levels]
     count = max(int(level.max()) for level in rows) + 1
     return np.array([np.bincount(level, minlength=count) / len(level) for level in rows])
@@ -145,10 +138,7 @@ def level_columns(shares: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def plot_levels(path: FileName, time_s: np.ndarray, shares: np.ndarray, dt0: float) -> None:
-    """Share of bodies on each level over time, the coarsest at the bottom.
-
-    shares: (sample_count, level_count), rows summing to 1. dt0: step of level 0 [s].
-    """
+    """Share of bodies on each level over time, the coarsest at the bottom."""
     time = 1e3 * np.asarray(time_s)
     with picture(path, size=(6.4, 3.6)) as (figure, axes):
         draw_level_shares(figure, axes, time, shares, dt0)

@@ -27,16 +27,7 @@ _AT_HOLE = ("monitor_displacement_mm", "hole_radial_displacement_mm")
 def plot_history(
     result: Any, names: Sequence[str] | None = None, *, path: FileName | None = None
 ) -> Figure:
-    """Draw columns of the history over time.
-
-    Parameters
-    ----------
-    result : Result
-    names : sequence of str, optional
-        Columns of ``result.history``; by default displacement of the hole or largest speed,
-        broken faces, smallest step.
-    path : str or path, optional
-    """
+    """Draw columns of the history over time."""
     history = result.series
     if names is None:
         moved = [name for name in _AT_HOLE if name in history] or ["largest_speed_m_s"]
@@ -85,10 +76,7 @@ def _draw(axes, time, table, names, unit):
 
 
 def plot_energy_shares(result: Any, *, path: FileName | None = None) -> Figure:
-    """Draw every term of the energy balance as a share of the energy given, over time.
-
-    The rest to 100 % is unexplained.
-    """
+    """Draw every term of the energy balance as a share of the energy given, over time."""
     shares = arrays_of(result.energy_shares())
     factor, unit = scale(float(shares["time_s"].max(initial=0.0)), "s")
     looks = {key.replace("_J", "_share"): look for key, look in ENERGY_TERMS.items()}
@@ -109,10 +97,7 @@ def plot_energy_shares(result: Any, *, path: FileName | None = None) -> Figure:
 
 
 def plot_fragments(result: Any, frame: int = -1, *, path: FileName | None = None) -> Figure:
-    """Draw the share of the mass that passes a sieve over its opening, in a frame.
-
-    The sizes of single bodies are shaded: there the mesh decides, not the material.
-    """
+    """Draw the share of the mass that passes a sieve over its opening, in a frame."""
     fragments = arrays_of(result.fragments(frame))
     order = np.argsort(fragments["sieve_m"], kind="stable")
     size, mass = 1e3 * fragments["sieve_m"][order], fragments["mass_kg"][order]
@@ -135,10 +120,7 @@ def plot_fragments(result: Any, frame: int = -1, *, path: FileName | None = None
 def plot_rose(
     result: Any, axis: Sequence[float] = ALONG_Z, *, sectors: int = 36, path: FileName | None = None
 ) -> Figure:
-    """Draw crack area by direction in a plane; arguments as of ``Result.rose``.
-
-    The direction of a crack has no sense: both ends are shown.
-    """
+    """Draw crack area by direction in a plane; arguments as of ``Result.rose``."""
     table = result.rose(axis, sectors)
     rose, parallel_m2 = arrays_of(table), table.attrs["parallel_m2"]
     angle, width = np.radians(rose["angle_deg"]), np.radians(table.attrs["width_deg"])
@@ -176,20 +158,7 @@ def _emptiest(rose):
 def plot_attenuation(
     result: Any, group: str | None = None, *, nearest: float = 4.0, path: FileName | None = None
 ) -> Figure:
-    """Draw peak velocities over the distance from a hole, with a power law.
-
-    If too few bodies are nearer to the hole than to a side, as in a thin plate, all are fitted; if
-    too few are far enough away, no law is drawn.
-
-    Parameters
-    ----------
-    result : Result
-    group : str, optional
-        Face group of the hole's wall, as of ``Result.attenuation``.
-    nearest : float
-        Distance from which on the law is fitted [radii of the hole], beyond the crushed zone.
-    path : str or path, optional
-    """
+    """Draw peak velocities over the distance from a hole, with a power law."""
     attenuation, nearest = result.attenuation(group), positive("nearest", nearest)
     distance, speed, inner = attenuation.distance, attenuation.speed, attenuation.inner
     slope, level = attenuation.power_law(nearest)
@@ -229,21 +198,7 @@ def plot_block(
     axis: Sequence[float] = ALONG_Z,
     path: FileName | None = None,
 ) -> Figure:
-    """Draw the bodies in a frame where they are, coloured by a value.
-
-    Parameters
-    ----------
-    result : Result
-    frame : int
-        Number of the frame.
-    colour : {"speed", "peak_speed", "displacement", "damage", "level", "fragment"}
-        ``taichi_dem.output.fragments.COLOURS``.
-    magnify : float
-        Factor of the displacement.
-    axis : sequence of 3 floats
-        Towards the viewer.
-    path : str or path, optional
-    """
+    """Draw the bodies in a frame where they are, coloured by a value."""
     magnify, axis = positive("magnify", magnify), unit_vector("axis", axis).tolist()
     one, view, model = result.frame(frame), View(axis), result.model
     values, broken = body_values(result, one, colour), result.broken_time <= one.time_s

@@ -91,11 +91,7 @@ def surface(topology: Topology, view: View, corners: np.ndarray, broken: Any) ->
 
 
 def traces(mesh: Mesh, topology: Topology, view: View, broken_time: np.ndarray) -> Any:
-    """Where broken faces reach the outer faces that the viewer sees of the block at rest.
-
-    broken_time: (bond_count,) [s], NaN while a bond holds. A crack has two lips, each an edge of
-    one body. Returns body (n,), its local ends (n, 2), and time [s] (n,) of the first break there.
-    """
+    """Where broken faces reach the outer faces that the viewer sees of the block at rest."""
     body, face, _ = skin(topology, np.zeros(topology.bond_count, dtype=bool))
     seen = view.facing(mesh.points[mesh.tetrahedra[body[:, None], LOCAL_FACES[face]]])
     body = np.repeat(body[seen], 3)
@@ -109,10 +105,7 @@ def traces(mesh: Mesh, topology: Topology, view: View, broken_time: np.ndarray) 
 def first_breaks(
     mesh: Mesh, topology: Topology, broken_time: np.ndarray, edges: np.ndarray
 ) -> np.ndarray:
-    """First break [s] of a face that ends at each edge, given by its points (n, 2); (n,), or NaN.
-
-    broken_time: (bond_count,) [s], NaN while a bond holds.
-    """
+    """First break [s] of a face that ends at each edge of points (n, 2); (n,), or NaN."""
     broken = ~np.isnan(broken_time)
     cracked = _edge_keys(_edges(topology.vertices[broken]), mesh.point_count)
     times = np.repeat(broken_time[broken], 3)
@@ -164,10 +157,7 @@ def draw_stone(axes: Any, view: View, model: Model) -> None:
 
 
 def draw_lines(axes: Any, segments: np.ndarray, values: np.ndarray, **look: Any) -> Any:
-    """Draw lines (n, points, 2) coloured by a value each; look: of the ``LineCollection``.
-
-    By default colours run from dark to orange: light yellow would vanish on the stone.
-    """
+    """Draw lines (n, points, 2) coloured by a value each; look: of the ``LineCollection``."""
     lines = LineCollection(segments, **{"cmap": shades("plasma", 0.0, 0.88), **look})
     lines.set_array(values)
     lines.set_capstyle("round")
@@ -186,12 +176,7 @@ def draw_bodies(
     axis: Sequence[float] = ALONG_Z,
     **look: Any,
 ) -> Any:
-    """Draw the bodies where they are, coloured by a value each; returns the collection.
-
-    frame: a ``Frame``, None for the bodies at rest. values: (n,). magnify: of the displacement.
-    broken: (bond_count,) bool, bonds into which one sees. axis: towards the viewer. look: of the
-    ``PolyCollection``, such as cmap, norm, clim.
-    """
+    """Draw the bodies where they are, coloured by a value each; returns the collection."""
     drawn = PolyCollection([], **{"linewidth": 0.3, "edgecolor": "#00000060", **look})
     move_bodies(drawn, model, frame, values, magnify=magnify, broken=broken, axis=axis)
     axes.add_collection(drawn)
@@ -224,20 +209,7 @@ def move_bodies(
 def picture_of_groups(
     mesh: Mesh, acting: Mapping[str, Sequence[str]], held: Sequence[str] = ()
 ) -> bytes:
-    """The outer faces of a mesh as PNG, from the front and from behind, coloured by group.
-
-    A face in several groups has the colour of the smallest that something acts on, else of the
-    smallest. Strokes cover all faces of a group that is held, whatever their colour. Without groups
-    of faces, colours are those of the groups of bodies.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    acting : dict
-        Group to what acts on it, words for the legend.
-    held : sequence of str, default ()
-        Groups among them that a support holds.
-    """
+    """The outer faces of a mesh as PNG, from the front and from behind, coloured by group."""
     faces = geometry.all_faces(mesh.tetrahedra)
     rows = geometry.outer_rows(faces)
     outer = faces[rows]
@@ -287,10 +259,7 @@ def _masks(mesh, outer, bodies):
 
 
 def _coloured(masks, acting):
-    """Names of the groups for the legend, and the place of that of each outer face, -1 for none.
-
-    Groups that something acts on come first, so that the legend has all of them.
-    """
+    """Names of the groups for the legend, and the place of that of each outer face, -1 for none."""
     order = sorted(masks, key=lambda name: (name in acting, -masks[name].sum()))
     last = np.full(len(next(iter(masks.values()), ())), -1)
     for k, name in enumerate(order):

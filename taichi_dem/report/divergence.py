@@ -46,11 +46,7 @@ class DivergenceCheck:
         self.rest_until = self.last_spent = 0.0
 
     def check(self, hurried: bool = False) -> None:
-        """Raise SimulationDiverged for a runaway body, extreme overlap, or unexplained energy.
-
-        hurried: check for runaways only, as long as the rest would take more than SHARE of the
-        time.
-        """
+        """Raise SimulationDiverged for a runaway body, extreme overlap, or unexplained energy."""
         self._check_speed()
         # The system takes its time to tell the time of all threads.
         started = time.process_time() if hurried else 0.0
@@ -145,10 +141,7 @@ class DivergenceCheck:
         return max(1, int(values(self.run.schedule.evaluations)[0])) * self.rounded_once
 
     def _error(self, body, what, remedy):
-        """SimulationDiverged that says what is wrong with a body, and what to change.
-
-        remedy: the end of the sentence, and its numbers for ``SimulationDiverged.advice``.
-        """
+        """SimulationDiverged that says what is wrong with a body, and what to change."""
         schedule, level = self.run.schedule, int(values(self.run.state.level)[body])
         step = f"its step was {schedule.dt0 / 2.0**level:.3g} s (level {level})"
         words, advice = f"body {body} {what}; {step}, {remedy[0]}", remedy[1]
@@ -162,10 +155,7 @@ class DivergenceCheck:
         return error
 
     def _above_limit(self):
-        """The body whose step is farthest above its limit, in words, and a shorter step as remedy.
-
-        None where no step is above its limit, or the limits are not known.
-        """
+        """The body whose step is farthest above its limit, in words; a shorter step as remedy."""
         if not is_bounded(self.run):
             return None
         limits = self._limits()
@@ -204,12 +194,7 @@ class DivergenceCheck:
         return [*model.neighbours[body][holds].tolist(), *near.tolist()]
 
     def _shorter_step(self, body, to_blame=False):
-        """A shorter step as a remedy, or None where the step is not to blame.
-
-        Runaways are often thrown by a neighbour of a shorter step, so the tightest limit counts.
-        Control keeps bodies below their limits: there, and below half of them, a shorter step helps
-        where the account of energy does not close.
-        """
+        """A shorter step as a remedy, or None where the step is not to blame."""
         limits, near = self._limits(), [body, *self._beside(body)]
         taken = self._taken()[near].min()
         limit, cause, tight = min((limits[name][k], name, k) for name in limits for k in near)
@@ -224,18 +209,12 @@ class DivergenceCheck:
         return None
 
     def _taken(self):
-        """Largest steps [s] that each body may have taken of late, (body_count,).
-
-        By the limit of a displacement a body that is thrown has short steps afterwards.
-        """
+        """Largest steps [s] that each body may have taken of late, (body_count,)."""
         schedule, level = self.run.schedule, values(self.run.state.level)
         return schedule.dt0 / 2.0 ** (level[: self.run.model.body_count] * schedule.has_limits)
 
     def _limits(self):
-        """Largest stable explicit steps [s] by criterion, arrays (body_count,).
-
-        Those in contact of bodies that have touched. Dashpots that are solved or limited set none.
-        """
+        """Largest stable explicit steps [s] by criterion, arrays (body_count,)."""
         marks = values(self.run.state.active_effects, slice(self.run.model.body_count))
         touched = marks & np.int64(CONTACT) > 0
         found = {}

@@ -43,12 +43,7 @@ _SHARE = "share of the energy put in, at most"
 
 
 def on_demand(run: Run) -> tuple[dict[str, np.ndarray], int, int]:
-    """Where and when laws acted on demand so far; empty and zero where all are evaluated.
-
-    By name, times from which an effect acted on each body [s], NaN where never; "awake": since it
-    was evaluated. Laws of bonds: on one of its bonds, as soon as it came near a limit. Also how
-    often the law of bonds was evaluated, a unit each, and how often that was skipped.
-    """
+    """Where and when laws acted on demand so far; empty and zero where all are evaluated."""
     activity, schedule, model = run.state.activity, run.schedule, run.model
     if activity is None:
         return {}, 0, 0
@@ -72,12 +67,7 @@ def _times(ticks, never, tick_seconds):
 def effect_uses(
     run: Run, balance: EnergyBalance, account: Mapping[str, float]
 ) -> tuple[EffectUse, ...]:
-    """An EffectUse for every listed effect, in the model's order.
-
-    Events are counted where effects act: one is idle only if not a bit of the run depends on it.
-    account: of the energy balance. Effects are judged by role, so that user-defined ones are judged
-    like those of the package; they are never called idle where only their own code could tell.
-    """
+    """An EffectUse for every listed effect, in the model's order."""
     uses = _Uses(run, balance, account)
     named = zip(names_of(run.model.effects), run.model.effects)
     return tuple(uses.of(effect, name) for name, effect in named if name)
@@ -265,10 +255,7 @@ class Certificate(BaseCertificate):
 
 
 def certificate_of(simulation: Any, report: Any) -> Certificate:
-    """Certificate of a run so far.
-
-    simulation: the ``Simulation``, started. report: its ``Report`` without a certificate.
-    """
+    """Certificate of a run so far."""
     run, now = simulation.parts, simulation.time_s
     schedule = run.schedule
     awake = np.nan_to_num(on_demand(run)[0]["awake"], nan=now)
@@ -295,10 +282,7 @@ def certificate_of(simulation: Any, report: Any) -> Certificate:
 
 
 def _energy(run, balance, scales):
-    """Energy that each part got [J]: from loads and supports, or what it has and took if more.
-
-    Zero where it is no more than rounding leaves.
-    """
+    """Energy that each part got [J]: from loads and supports, or what it has and took if more."""
     body, bond, _ = balance.tables()
     given = sum(np.abs(scales.sum(column)) for column in body[:, 1:3].T)
     taken = scales.sum(body[:, 0]) + scales.sum_of_bonds(bond.sum(axis=1))
@@ -307,12 +291,7 @@ def _energy(run, balance, scales):
 
 
 def _left_out(run, balance, scales, energy):
-    """Largest shares of impulse and energy of a part that sleep left out there.
-
-    Zero for a part whose energy is no more than that of the openings that sleep takes for rounding
-    itself. The impulse is a share of the momenta by size, or, as these may have died out, of what
-    the lightest body would have with the energy that the part got.
-    """
+    """Largest shares of impulse and energy of a part that sleep left out there."""
     table = np.zeros((max(1, run.model.bond_count), 2))
     run.readings.left_out(table)
     left = [scales.sum_of_bonds(column) for column in table[: run.model.bond_count].T]
@@ -326,12 +305,7 @@ def _left_out(run, balance, scales, energy):
 
 
 def _not_served(simulation, scales, energy):
-    """Estimates of what no law of the scene serves, from where the run has brought the bodies.
-
-    Shares of the energy that each part got, 0 where nothing moved it: work of the weight along the
-    way and its fall, and of the drag of air on balls of the bodies' size at their present speed.
-    Where a support, ground or contact bears a part, weight strains it too.
-    """
+    """Estimates of what no law of the scene serves, from where the run has brought the bodies."""
     motion, model, until, found = simulation.motion(), simulation.model, simulation.time_s, []
     way = np.linalg.norm(motion["position"] - simulation.first_motion["position"], axis=1)
     speed = np.linalg.norm(motion["velocity"], axis=1)

@@ -35,10 +35,7 @@ _LEAST_SHARE = 1e-6
 
 
 def unexplained_share(account: Mapping[str, float], round_off: float = 0.0) -> float:
-    """Residual of an account over all energy that went through it; NaN where a term is none.
-
-    round_off: energy [J] below which all may be rounding.
-    """
+    """Residual of an account over all energy that went through it; NaN where a term is none."""
     through = sum(abs(value) for name, value in account.items() if name != "residual")
     return abs(account["residual"]) / max(through, 100.0 * round_off, 1e-300)
 
@@ -49,10 +46,7 @@ def energy_at_start(account: Mapping[str, float]) -> float:
 
 
 def energy_put_in(account: Mapping[str, float]) -> float:
-    """Energy at the start, and work of loads and of supports where they gave more than took [J].
-
-    That of a weight is among it as it falls.
-    """
+    """Energy at the start, and work of loads and of supports where they gave more than took [J]."""
     return energy_at_start(account) + sum(max(0.0, account[name]) for name in GIVEN[:2])
 
 
@@ -75,10 +69,7 @@ def _listed(words):
 
 
 def injected_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
-    """Energy that releases injected, in words, from ``NOTED`` of the energy put in on; else "".
-
-    round_off: energy [J] up to which all may be rounding.
-    """
+    """Energy that releases injected, in words, from ``NOTED`` of the energy put in on; else ""."""
     put_in = energy_put_in(account)
     if account["injected"] < NOTED * put_in or account["injected"] <= round_off:
         return ""
@@ -90,11 +81,7 @@ def injected_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
 
 
 def open_account(account: Mapping[str, float], round_off: float) -> tuple[str, ...]:
-    """Sentence about energy that an account does not explain, from ``NOTED`` on; else none.
-
-    A share of the energy put in, or of that held if more. round_off: energy [J] up to which a
-    residual may be rounding.
-    """
+    """Sentence about energy that an account does not explain, from ``NOTED`` on; else none."""
     given, held = given_and_held(account)
     residual, whole = abs(account["residual"]), max(given, held)
     if residual <= round_off or residual < NOTED * whole:
@@ -142,21 +129,13 @@ class EnergyBalance(Kept):
         return {name: float(value) for name, value in terms.items()}
 
     def tables(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Tables that the terms are summed from [J].
-
-        A row a body: kinetic, loads, supports, dashpots of contacts, friction, injected, ground. A
-        row a bond: strain, dashpot, slip, release, softening. A row a pair: strain, dashpots,
-        friction, injected, so far as its first body has not taken them.
-        """
+        """Tables that the terms are summed from [J]."""
         readings = self.run.readings
         with readings.held():
             return readings.bodies(), readings.bonds(), readings.pairs()
 
     def works(self) -> np.ndarray:
-        """Work of each load, of all supports and of each ground on every body, since the start [J].
-
-        Columns in this order, (body_count, accounts).
-        """
+        """Work of each load, all supports and each ground on every body, since the start [J]."""
         return self.run.readings.works() - self.start_works
 
     def load_work(self, index: int) -> float:
@@ -164,12 +143,7 @@ class EnergyBalance(Kept):
         return float(self.works()[:, index].sum())
 
     def momentum_errors(self) -> tuple[float, float]:
-        """Errors of linear and angular momentum, relative to the momentum exchanged.
-
-        The scale is the sum over bodies of the size of momentum, or of load impulse if that is
-        larger; at least a millionth of the impulses of loads and supports added by their sizes, of
-        which nothing is left where a support takes what a load gives.
-        """
+        """Errors of linear and angular momentum, relative to the momentum exchanged."""
         rows = self.run.readings.momentum()
         # The squares of a run that has diverged may be beyond all numbers.
         with np.errstate(over="ignore", invalid="ignore"):
@@ -178,10 +152,7 @@ class EnergyBalance(Kept):
             return np.linalg.norm(lost[:3]) / linear, np.linalg.norm(lost[3:]) / angular
 
     def momentum_exchanged(self, total: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Size of the momentum of bodies, or of their load impulse if larger [N s], summed.
-
-        total: sum of a number of each body over every part.
-        """
+        """Size of the momentum of bodies, or of their load impulse if larger [N s], summed."""
         rows = self.run.readings.momentum()
         sizes = (np.linalg.norm(rows[:, k : k + 3], axis=1) for k in (0, 6))
         return np.max([total(one) for one in (*sizes, _LEAST_SHARE * rows[:, 12])], axis=0)

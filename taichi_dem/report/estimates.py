@@ -90,10 +90,7 @@ class PartScales:
         return np.any([np.zeros(self.count, dtype=bool), *marks], axis=0)
 
     def stress(self, size: np.ndarray, everywhere: bool) -> np.ndarray:
-        """Sum of the stresses of loads and supports [Pa]; NaN where it is not known.
-
-        size: of each part, or of what it rests on [m]. everywhere: whether each reaches all parts.
-        """
+        """Sum of the stresses of loads and supports [Pa]; NaN where it is not known."""
         of_body, materials = self.model.materials.of_body, self.model.materials.materials
         present = np.zeros((self.count, len(materials)), dtype=bool)
         present[self.part, of_body] = True
@@ -106,11 +103,7 @@ class PartScales:
         return total
 
     def bent(self, until: float, borne: np.ndarray) -> np.ndarray:
-        """Largest stress of weight in bonded parts that are borne, over the tensile strength.
-
-        That of a beam held at one end whose weight sets in at once, twice 3 density g length^2 /
-        thickness; but no more than a speed of g until causes, sqrt(3) density wave g until.
-        """
+        """Largest stress of weight in bonded parts that are borne, over the tensile strength."""
         long, thin = self._extents()
         bent = 6.0 * WEIGHT * long**2 / thin
         most = self.density * np.minimum(bent, math.sqrt(3.0) * self.wave * WEIGHT * until)
@@ -208,10 +201,7 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
 
 
 def _speeds(model, velocity, group):
-    """Speeds of groups of bodies at the start: beside a rigid motion, of its rim, and largest.
-
-    A front that stops a speed v has the stress density wave v, a rim of speed v density v^2.
-    """
+    """Speeds of groups of bodies at the start: beside a rigid motion, of its rim, and largest."""
     found = np.zeros((3, int(group.max()) + 1))
     if velocity is None:
         return found

@@ -15,10 +15,7 @@ _F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
 def force_names(model: Model) -> list[str]:
-    """Name of the force of each load, each ground and each support, in this order.
-
-    Such as ``fixed_left_force``, of the support that reports name ``fixed left``.
-    """
+    """Name of the force of each load, each ground and each support, in this order."""
     named = list(zip(names_of(model.effects), model.effects))
     return [
         f"{column_of(name)}_force" for role in _ROLES for name, one in named if one.role == role

@@ -91,10 +91,7 @@ class Hops(Kept):
 
 
 def _slides_on(table, here, softest):
-    """Whether pairs have slid on since their marks as they did before, (n,) truth values.
-
-    softest: least stiffness of a contact [N/m].
-    """
+    """Whether pairs have slid on since their marks as they did before, (n,) truth values."""
     before, after = table[:, _MARK] - table[:, _FIRST], here - table[:, _MARK]
     way, ahead = (np.linalg.norm(each[:, 1:], axis=1) for each in (before, after))
     # Speeds times the product of both times.

@@ -111,22 +111,14 @@ class Creep(Kept):
 
 
 def _goes_far(table, offset, least):
-    """Whether pairs have moved as far as they have slid, and farther than a spring would let them.
-
-    least: way at which a spring as stiff as the contact would slip [m], (n,).
-    """
+    """Whether pairs have moved as far as they have slid, farther than a spring would let them."""
     way = table[:, _WAY]
     moved = np.linalg.norm(offset - table[:, _OFFSET:], axis=1)
     return (way > least) & (_ALIKE * moved > way) & (moved < _ALIKE * way)
 
 
 def bond_rounding(run: Run) -> np.ndarray:
-    """Heat that rounding alone may have left in each bond's dashpots [J], (bond_count,).
-
-    A bond's opening is the difference of its bodies' coordinates of up to X [m], known to eps X. In
-    every substep rounding may thus put into the bond the energy of such an opening,
-    A (k_n + k_s) (eps X)^2 / 2, which its dashpots then take.
-    """
+    """Heat that rounding alone may have left in each bond's dashpots [J], (bond_count,)."""
     model, substeps = run.model, int(values(run.schedule.evaluations)[0])
     corners = np.abs(model.mesh.points[model.mesh.tetrahedra]).max(axis=(1, 2))
     places = np.abs(values(run.state.position, slice(model.body_count))).max(axis=1)
@@ -263,10 +255,7 @@ class MissingEffects(Kept):
         return np.flatnonzero(active & CONTACT)
 
     def findings(self, volume: SharedVolume) -> tuple[MissingEffect, ...]:
-        """A ``MissingEffect`` for each effect that would have acted; a tuple, empty for none.
-
-        volume: a look at the end, which also finds bodies that have moved by little.
-        """
+        """A ``MissingEffect`` for each effect that would have acted; a tuple, empty for none."""
         found, schedule, model = self.found.copy(), self.run.schedule, self.run.model
         now_s = schedule.time_s
         ticks = values(self.run.state.passed, slice(model.bond_count))

@@ -103,13 +103,7 @@ class Readings:
         table: ti.types.ndarray(dtype=ti.f64, ndim=2),
         pushed: ti.types.ndarray(dtype=ti.f64, ndim=2),
     ):
-        """Impulse [N s] and moment [N m s] of every pair's contacts on both bodies in half a step.
-
-        Also the heat of its dashpots and friction by which the booked one is behind [J], sums of
-        friction, of its limit [N] and of its power [W], its strain and booked heats [J], the step
-        [s] of the pair, and the sum of its forces on the second body times arms from the first
-        [N m], a row a component of the force.
-        """
+        """Impulse [N s], moment [N m s] of each pair's contacts on both bodies in half a step."""
         ti.loop_config(serialize=ti.static(self.small))
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
@@ -184,10 +178,7 @@ class Readings:
         table: ti.types.ndarray(dtype=ti.f64, ndim=2),
         bonds: ti.types.ndarray(dtype=ti.f64, ndim=2),
     ):
-        """Fill in all that is read of bodies, at the present, and of bonds, or set bodies back.
-
-        One kernel for all uses, as each takes its time to compile and to launch.
-        """
+        """Fill in all that is read of bodies, at the present, and of bonds, or set bodies back."""
         ti.loop_config(serialize=ti.static(self.small))
         for i in range(self.tables.body_count[None]):
             linear, angular = vec3(0.0), vec3(0.0)
@@ -224,10 +215,7 @@ class Readings:
         return self._bonds()[:, 6:8] > 0.0
 
     def residual_slip(self) -> np.ndarray:
-        """Largest residual slip of the units of every bond that holds [m], (n,).
-
-        Zero for released bonds, and for shear laws that keep none.
-        """
+        """Largest residual slip of the units of every bond that holds [m], (n,)."""
         return self._bonds()[:, 8].copy()
 
     @ti.func
@@ -301,11 +289,7 @@ class Readings:
         share: ti.types.ndarray(dtype=ti.f64, ndim=1),
         taken: ti.types.ndarray(dtype=ti.f64, ndim=1),
     ):
-        """Note how far the steps of touching bodies limit their contact dashpots.
-
-        share: least share, where dashpots are limited; else taken: largest part of a speed that
-        they take in a step.
-        """
+        """Note how far the steps of touching bodies limit their contact dashpots."""
         ti.loop_config(serialize=ti.static(self.small))
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]

@@ -248,10 +248,7 @@ class Report:
         return in_lines(self.rows(), self.needs)
 
     def __str__(self):
-        """At most fifteen lines: what came out, how sure, how long; then how, and what was missed.
-
-        All else by ``details``.
-        """
+        """At most fifteen lines: what came out, how sure, how long; how, and what was missed."""
         rows = self.rows()
         brief = {
             "result": f"{counted(self.body_count, 'body')} for {rows['simulated']}",
@@ -275,10 +272,7 @@ class Report:
 
 
 def known_error(report: Report, scene: Scene, method: Any) -> str:
-    """Known error of a run without a requested accuracy, at no extra cost.
-
-    Step and order of the method, and closure of the energy balance, in words.
-    """
+    """Known error of a run without a requested accuracy, at no extra cost."""
     if not report.substeps:
         return ""
     varying = report.substeps > round(report.until_s / method.dt0)

@@ -214,10 +214,7 @@ class StepResolution(Kept):
 
     @property
     def unconverged(self) -> tuple[int, float]:
-        """Steps whose sweeps ended before convergence, and the worst residual.
-
-        The residual is a share of the fastest body's speed.
-        """
+        """Steps whose sweeps ended before convergence, and the worst residual."""
         solver = self.run.advance.solver
         if solver is None:
             return 0, 0.0
@@ -235,12 +232,7 @@ class StepResolution(Kept):
         )
 
     def _contact_shares(self):
-        """Largest share that limited contact dashpots can have had where they acted, (body_count,).
-
-        The recorded share, or that of a single contact, 1 / X with X = 2 dt c / m; see
-        ``stability/body_limits.py``. Contacts that took energy have acted; it is booked to the
-        first body of a pair.
-        """
+        """Largest share that limited contact dashpots can have had where they acted, (bodies,)."""
         if self.run.contacts is None or not self.run.advance.limited:
             return self.pair_share
         heat = values(self.run.state.contact_heat, slice(self.run.model.body_count))

@@ -271,10 +271,7 @@ def _find_pairs(
     found: ti.types.ndarray(dtype=ti.f64, ndim=2),
     count: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Count and write pairs of bodies that share volume, as far as there is room, in any order.
-
-    Also those that no face of the larger shows not to be deep in each other, which are marked.
-    """
+    """Count and write pairs of bodies that share volume, as far as there is room, in any order."""
     for i in range(last.shape[0]):
         for j in range(i + 1, last[i]):
             if (box[i, 0] < box[j, 1]).all() and (box[j, 0] < box[i, 1]).all():
@@ -299,10 +296,7 @@ _launch_pairs = Launch(_find_pairs)
 
 @ti.func
 def _depths(first, second):
-    """Of each corner of the second body below each face of the first, over its height, (4, 4).
-
-    first, second: their corners, (4, 3) [m].
-    """
+    """Of each corner of the second body below each face of the first, over its height, (4, 4)."""
     depths = mat4(0.0)
     for f in ti.static(range(4)):
         base = first[(f + 1) % 4, :]

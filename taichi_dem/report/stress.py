@@ -20,11 +20,7 @@ from taichi_dem.state.model import Model, sums
 
 
 def body_stress(run: Run, forces: Forces) -> np.ndarray:
-    """Mean stress of every body now [Pa], (n, 3, 3), symmetric, in world axes, tension positive.
-
-    Of springs and dashpots of bonds, of contacts, and of what loads, ground and supports do to the
-    faces of their groups: see ``output.record.Frame``. Weight acts at the centre and adds nothing.
-    """
+    """Mean stress of every body now [Pa], (n, 3, 3), symmetric, in world axes, tension positive."""
     model, state, here = run.model, run.state, slice(run.model.body_count)
     position, rotation = values(state.position, here), rotations(values(state.orientation, here))
     total = np.zeros((model.body_count, 3, 3))
@@ -56,11 +52,7 @@ def _of_bonds(run, position, rotation):
 
 
 def _wrenches(run, branch):
-    """Force of each bond on its slave [N], and its moment about the slave's centre [N m].
-
-    Of the impulse that waits in the slot of the body with the shorter step: of one step of the
-    bond. The other one gathers several.
-    """
+    """Force of each bond on its slave [N], and its moment about the slave's centre [N m]."""
     model, state, top = run.model, run.state, run.model.topology
     level = values(state.level, slice(model.body_count))
     master, slave = level[top.master], level[top.slave]
@@ -73,13 +65,7 @@ def _wrenches(run, branch):
 
 
 def _spread(arms, moment):
-    """Forces of the three units of bonds times their arms about the middle, (n, 3, 3) [N m].
-
-    arms: from the middle [m], (n, 3, 3). moment: about it [N m], (n, 3). Forces along the normal n
-    follow from the moment, sum h d = n x M. Those across it are taken as the least that have its
-    part along n, as springs and dashpots of rigid bodies have them, to the angle by which the two
-    have turned against each other; after slip, the part that cancels within the face is left out.
-    """
+    """Forces of the three units of bonds times their arms about the middle, (n, 3, 3) [N m]."""
     normal = cross(arms[:, 1] - arms[:, 0], arms[:, 2] - arms[:, 0])
     normal = normal / length(normal)[:, None]
     twist = dot(moment, normal) / dot(arms, arms).sum(axis=1)

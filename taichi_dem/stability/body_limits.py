@@ -104,14 +104,7 @@ class ContactLimits:
 
     @ti.func
     def rates(self, i):
-        """Rate of the dashpots [1/s] and squared rate of the springs [1/s^2] of body i.
-
-        The largest eigenvalue of M^-1/2 (sum of J^T D J) M^-1/2 over near contacts [1/kg], times
-        their largest dashpot [N s/m] and stiffness [N/m]: a bound where partners are of several
-        materials. J maps velocity and spin to the velocity at the contact; D is the identity with
-        friction, whose dashpot acts along all three axes, and n n^T without. Partners stand still,
-        as in ``elasticity.rates.bond_rates``.
-        """
+        """Rate of the dashpots [1/s] and squared rate of the springs [1/s^2] of body i."""
         a, b, c = mat3(0.0), mat3(0.0), mat3(0.0)
         largest = ti.Vector([0.0, 0.0])
         first, second = self.store.first_of[i], self.store.second_start[i]
@@ -167,21 +160,13 @@ class ContactLimits:
 
 
 def dashpot_step(rate: ArrayLike) -> np.ndarray:
-    """Largest step [s] at which dashpots are stable that slow a body at a rate [1/s].
-
-    A pair of equal bodies moves against each other at twice the rate of one, and forward Euler
-    is stable to 2 / (2 rate). Infinite where the rate is zero.
-    """
+    """Largest step [s] at which dashpots are stable that slow a body at a rate [1/s]."""
     with np.errstate(divide="ignore"):
         return 1.0 / np.asarray(rate)
 
 
 def spring_step(rate2: ArrayLike) -> np.ndarray:
-    """Largest step [s] at which springs are stable that hold a body at a squared rate [1/s2].
-
-    As for dashpots a pair has twice that of one, and symplectic Euler is stable to
-    2 / sqrt(2 omega^2). Infinite where it is zero.
-    """
+    """Largest step [s] at which springs are stable that hold a body at a squared rate [1/s2]."""
     with np.errstate(divide="ignore"):
         return 2.0 / np.sqrt(2.0 * np.asarray(rate2))
 
@@ -302,11 +287,7 @@ class StabilityLimits(Places):
 
     @ti.func
     def notice_listed(self, p, entered, fresh):
-        """Count the contacts of a pair that a search lists; entered, fresh: nonzero for the reason.
-
-        Entering the list does not change a body's limits, as results must not depend on the reach
-        of a search. Spheres that a break has just exposed may touch already.
-        """
+        """Count contacts of a pair that a search lists; entered, fresh: nonzero for the reason."""
         event = HIT
         if fresh != 0:
             event = RELEASE
@@ -357,10 +338,7 @@ class StabilityLimits(Places):
 
     @ti.func
     def wanted(self, i, now):
-        """Wanted level of body i at a time [s], and its criterion.
-
-        A body asks at every step: squares and tables spare it roots and quotients.
-        """
+        """Wanted level of body i at a time [s], and its criterion."""
         level, by = self.limit_level[i], self.limit_by[i]
         if ti.static(self.has_distance):
             speed2 = self.state.velocity[i].norm_sqr()
@@ -374,11 +352,7 @@ class StabilityLimits(Places):
 
     @ti.func
     def _push2(self, i, now):
-        """Square of the acceleration of body i by the loads alone [m^2/s^4].
-
-        The larger one of now and a largest step ahead, for loads that set in before its next
-        update.
-        """
+        """Square of the acceleration of body i by the loads alone [m^2/s^4]."""
         push2, step = 0.0, self.rule[0]
         for ahead in ti.static(range(2)):
             time = now + ahead * step

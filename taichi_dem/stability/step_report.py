@@ -149,12 +149,7 @@ def stable_steps(limits: dict[str, np.ndarray], dashpots: str, link: str = "bond
 
 
 def stable_together(springs: ArrayLike, drags: ArrayLike) -> np.ndarray:
-    """Largest explicit step [s] at which springs and dashpots of a body are stable together.
-
-    springs, drags: largest steps of each alone [s], ``spring_step`` and ``dashpot_step``.
-    The leapfrog whose dashpots take the velocity of half a step ago, v += -dt (w^2 x + c v), is
-    stable while c dt + (w dt)^2 / 2 <= 2, which is dt / drags + (dt / springs)^2 <= 1.
-    """
+    """Largest explicit step [s] at which springs and dashpots of a body are stable together."""
     with np.errstate(divide="ignore"):
         rate = 1.0 / np.asarray(drags)
         return 2.0 / (rate + np.sqrt(rate**2 + (2.0 / np.asarray(springs)) ** 2))
@@ -206,10 +201,7 @@ def step_limits(
     contact: Any,
     multiply: Any = product,
 ) -> dict[str, np.ndarray]:
-    """Largest steps [s] of each body by criterion; dashpot, friction, contact: effects or None.
-
-    multiply: np.matmul takes a tenth of the time and differs in last bits.
-    """
+    """Largest steps [s] of each body by criterion; dashpot, friction, contact: effects or None."""
     limits = bond_steps(mesh, material, multiply, bool(dashpot))
     if contact is not None:
         stiffness, damping = contact.strongest(mesh, material)

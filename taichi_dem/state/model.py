@@ -27,11 +27,7 @@ ROLES = (*SINGLE, *MANY)
 
 
 def names_of(effects: Iterable[Any]) -> list[str]:
-    """Name of each effect in reports, tables and pictures: its kind, and the group it acts on.
-
-    Such as ``gas_pressure hole``; "" for one that reports do not list. No two are alike, also as
-    columns: a later one of the same kind and group is numbered.
-    """
+    """Name of each effect in reports, tables and pictures: its kind, and the group it acts on."""
     names: list[str] = []
     taken = {""}
     for effect in effects:
@@ -90,10 +86,7 @@ class Model:
         return made
 
     def of_bonds(self, value: Callable[[Material], float]) -> Any:
-        """A number of what joins the bodies of each bond, an array (n,), or one for all.
-
-        value: of a material, as ``lambda material: material.cohesion``.
-        """
+        """A number of what joins the bodies of each bond, an array (n,), or one for all."""
         if self.materials.is_one:
             return value(self.material)
         table = np.array([[value(pair) for pair in row] for row in self.materials.pairs])
@@ -133,10 +126,7 @@ class Model:
         return np.where(top.body_bond < 0, -1, both - np.arange(self.body_count)[:, None])
 
     def pieces(self, broken: np.ndarray) -> np.ndarray:
-        """First body of the piece of each body, which unbroken bonds keep together, (body_count,).
-
-        broken: whether each bond has been released, (bond_count,).
-        """
+        """First body of each body's piece, which unbroken bonds keep together, (body_count,)."""
         ends = np.column_stack([self.topology.master, self.topology.slave])
         return components(self.body_count, ends[~broken])
 
@@ -148,13 +138,7 @@ class Model:
 
     @cached_property
     def bonds(self) -> dict[str, np.ndarray]:
-        """Arrays of all bonds by name.
-
-        slots (n, 2): master's and slave's face as 4 body + local face. frame (n, 3, 3): normal, xi
-        and eta in the master's body frame. area (n,): of a contact unit, so far as it is bonded
-        [m^2]. on_master, on_slave (n, 3, 3): vertices in the face frame and in the slave's body
-        frame [m].
-        """
+        """Arrays of all bonds by name."""
         top, points = self.topology, self.mesh.points
         slots = np.stack([4 * top.master + top.master_face, 4 * top.slave + top.slave_face], axis=1)
         corners = points[top.vertices]
@@ -188,10 +172,7 @@ class Model:
 
 
 def sums(group: np.ndarray, of_members: np.ndarray, count: int = 0) -> np.ndarray:
-    """Sums over groups of an array of each member; group: number of that of each member.
-
-    of_members: (members, ...). Returns (groups, ...); count: of groups, where some may be empty.
-    """
+    """Sums over groups of an array of each member; group: number of that of each member."""
     flat = of_members.reshape(len(of_members), math.prod(of_members.shape[1:]))
     columns = [np.bincount(group, column, count) for column in flat.T]
     # Of no members NumPy makes whole numbers.

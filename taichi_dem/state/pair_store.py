@@ -30,10 +30,7 @@ class Columns:
         return len(self.members)
 
     def declare(self, name: str, kind: Any, width: int = 0) -> ti.Field:
-        """Field of a new column; width: components, 0 for a number.
-
-        Raises InputError for a name that is in use.
-        """
+        """Field of a new column; width: components, 0 for a number."""
         if name in self.by_name:
             raise InputError(f"a column of the pair store must have a new name, got {name!r}")
         n = self.entries
@@ -103,10 +100,7 @@ class PairStore:
         self.free_count, self.used_end = (ti.field(ti.i32, shape=()) for _ in range(2))
 
     def column(self, name: str, kind: Any, width: int = 0) -> ti.Field:
-        """Field with an entry a slot; kind: data type, width: components, 0 for a number.
-
-        Raises InputError for a name that is in use.
-        """
+        """Field with an entry a slot; kind: data type, width: components, 0 for a number."""
         return self.columns.declare(name, kind, width)
 
     def sphere_column(self, name: str, kind: Any, width: int = 0) -> ti.Field:
@@ -199,10 +193,7 @@ class PairStore:
 
     @ti.func
     def replace_spheres(self, p, count):
-        """Replace the sphere pairs of a pair by those at its new places.
-
-        Those that were present before keep their columns; those of the others are zero.
-        """
+        """Replace the sphere pairs of a pair by those at its new places."""
         start = self.sphere_place[p]
         end = start + count
         if ti.static(len(self.sphere_columns) > 0):
@@ -216,10 +207,7 @@ class PairStore:
 
     @ti.func
     def _former(self, p, spheres, nth):
-        """Present place of two spheres of a pair, -1 where they are not listed.
-
-        nth: where they would be if nothing had come or gone before them.
-        """
+        """Present place of two spheres of a pair, -1 where they are not listed."""
         first, last, found = self.first[p], self.last[p], -1
         if first + nth < last:
             if self._is(first + nth, spheres):

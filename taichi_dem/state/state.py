@@ -92,10 +92,7 @@ class BodyMotion:
 
 
 def unserved_limits(model: Model) -> np.ndarray:
-    """Tensile strength, cohesion [Pa] and friction that no effect of a model serves, else inf.
-
-    A row for each pair of materials, ``Tables.pair``.
-    """
+    """Tensile strength, cohesion [Pa] and friction that no effect of a model serves, else inf."""
     served = {effect.role for effect in model.effects if effect.name}
     rows = np.zeros((MOST**2, 3))
     for a, row in enumerate(model.materials.pairs):
@@ -194,11 +191,7 @@ class State:
         velocity: ArrayLike | None = None,
         spin: ArrayLike | None = None,
     ) -> None:
-        """Set the motion of all bodies, arrays of a row each or one row for all.
-
-        position [m], orientation (unit quaternions, not turned by default), velocity [m/s] and
-        spin [rad/s] in world axes, zero by default.
-        """
+        """Set the motion of all bodies, arrays of a row each or one row for all."""
         given = (position, orientation, velocity, spin)
         rest = ([0.0] * 3, [1.0, 0.0, 0.0, 0.0], [0.0] * 3, [0.0] * 3)
         whole = [np.tile(still, (self.body_count, 1)) for still in rest]
@@ -221,11 +214,7 @@ class State:
 
     @ti.func
     def note_passed(self, m, b, pull, shear2):
-        """Note that a bond exceeds a limit that no listed effect serves.
-
-        m: pair of its materials. pull: traction of one of its units [Pa]; shear2: square of that
-        across [Pa^2].
-        """
+        """Note that a bond exceeds a limit that no listed effect serves."""
         limits = self.limits[m]
         if pull > limits[0]:
             self._note_first(b, 0)
@@ -268,10 +257,7 @@ class State:
         return values(self.broken_tick, bonds) != NEVER
 
     def expose(self, topology: Topology, outer: bool) -> None:
-        """Put contact spheres on faces without a bond from the start.
-
-        outer: on all of them, else on those that another body lies behind.
-        """
+        """Put contact spheres on faces without a bond from the start."""
         marks, chosen = values(self.exposed_tick), topology.is_open | outer
         marks[4 * topology.outer_body[chosen] + topology.outer_face[chosen]] = 0
         assign(self.exposed_tick, marks)
@@ -284,11 +270,7 @@ class State:
                 self.cut_short[None] = 1
 
     def motion(self) -> dict[str, np.ndarray]:
-        """Arrays of the bodies' motion by name.
-
-        position, velocity, spin, angular_momentum (n, 3), orientation (n, 4), rotation (n, 3, 3)
-        and level (n,).
-        """
+        """Arrays of the bodies' motion by name."""
         found = self.stored()
         # The stored spin is that of the orientation before the last turn.
         inverse = values(self.tables.inertia_inverse, slice(self.body_count))

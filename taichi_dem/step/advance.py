@@ -33,10 +33,7 @@ class BodyLoads:
 
     @ti.func
     def loaded(self, i, step, linear, angular, times: ti.template()):
-        """Impulse and moment with those of the loads added, and a row for each of ``drives``.
-
-        times: ``load_of_step`` or ``load_up_to``, with the step [s] that it takes.
-        """
+        """Impulse and moment with those of the loads added, and a row for each of ``drives``."""
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.drives))), 6)
         now = self.schedule.seconds(self.state.tick[None])
         for e in ti.static(range(len(self.tables.loads))):
@@ -90,10 +87,7 @@ class BodyLoads:
 
     @ti.func
     def ground_impulses(self, i, elapsed, linear, angular):
-        """Impulse and moment of each ground on body i in a step of elapsed [s], a row each.
-
-        linear [N s], angular [N m s]: what the body gathers in the step besides.
-        """
+        """Impulse and moment of each ground on body i in a step of elapsed [s], a row each."""
         rows = ti.Matrix.zero(real, ti.static(len(self.tables.ground)), 6)
         total, joined = zero_block(), 0
         for effect in ti.static(self.tables.ground):
@@ -185,12 +179,7 @@ class Advance(BondStep, ContactForce, BodyLoads):
 
     @ti.func
     def wake_up(self, i):
-        """Bring body i to the present tick when it wants a shorter step because of an event.
-
-        It waits for its own time with a step chosen before a contact came near, a bond broke or a
-        neighbour refined its step. Bonds that have applied their impulse ahead apply no more until
-        then.
-        """
+        """Bring body i to the present tick when it wants a shorter step because of an event."""
         noticed = self.limits.events[i] != 0
         self.limits.events[i] = 0
         if ti.static(self.schedule.sleeps):
@@ -270,10 +259,7 @@ class Advance(BondStep, ContactForce, BodyLoads):
 
     @ti.func
     def allowed(self, i, time, step, velocity, momentum):
-        """Velocity and angular momentum that the supports of body i allow; nothing is booked.
-
-        time: of the middle of a step [s].
-        """
+        """Velocity and angular momentum that the supports of body i allow; nothing is booked."""
         for effect in ti.static(self.tables.supports):
             if effect.acts_on(i):
                 velocity, momentum = effect.held(
@@ -283,12 +269,7 @@ class Advance(BondStep, ContactForce, BodyLoads):
 
     @ti.func
     def _supported(self, i, elapsed, kick, velocity, momentum):
-        """Velocity and angular momentum that the supports allow; books their work and the loads'.
-
-        With the means of velocity and angular momentum before and after all impulses of the step,
-        bonds, loads and supports together, the change of kinetic energy is exact: a support that
-        holds a body still does no work.
-        """
+        """Velocity and angular momentum that supports allow; books their work and the loads'."""
         free, free_momentum, held = velocity, momentum, 0
         half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
         for k, effect in ti.static(enumerate(self.tables.supports)):

@@ -111,11 +111,7 @@ class BondStep:
 
     @ti.func
     def by_law(self, m, b, u, stiffness, opening):
-        """Traction of a unit [Pa], energy per area slipped away now [J/m^2], 1 where it has failed.
-
-        On demand the law is asked only once the bond has come near a limit of it: below, it is
-        linear to the bit (tests/unit/test_bond_laws.py).
-        """
+        """Traction of a unit [Pa], energy per area slipped now [J/m^2], 1 where it has failed."""
         traction = vec3(stiffness[0], stiffness[1], stiffness[1]) * opening
         slipped, failed, acts = 0.0, 0, True
         if ti.static(self.on_demand):

@@ -130,11 +130,7 @@ class ContactForce:
 
     @ti.func
     def forces_of(self, p, elapsed, margin, stepping: ti.template()):
-        """Forces of a pair's sphere contacts now, a ``PairForces``.
-
-        elapsed: since springs between spheres were followed [s]. margin: gap up to which spheres
-        count as near [m]. stepping: whether springs follow and slip; else they stay as they are.
-        """
+        """Forces of a pair's sphere contacts now, a ``PairForces``."""
         pair = self.contacts.store.body[p]
         i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]

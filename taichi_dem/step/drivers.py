@@ -266,10 +266,7 @@ DRIVERS: dict[str, Any] = {driver.name: driver for driver in (Resident, Parallel
 
 
 def driver_name(name: str, bond_count: int) -> str:
-    """Name of the driver for a scene of so many bonds; name: of the one asked for, or "auto".
-
-    Raises InputError for one that the present architecture does not have.
-    """
+    """Name of the driver for a scene of so many bonds; name: of the one asked for, or "auto"."""
     settings: Any = runtime.settings()
     if name == "auto":
         small = settings.threads == 1 or bond_count < PARALLEL_FROM

@@ -86,11 +86,7 @@ class Sleeping(Places):
 
     @ti.func
     def at_rest(self, b, factor, rounding):
-        """Energy that the springs of a bond hold [J], and nonzero where its law would begin.
-
-        Of what the bond is opened beyond a rounding [m]; the law begins at this opening times a
-        factor, pressed as pulled.
-        """
+        """Energy that the springs of a bond hold [J], and nonzero where its law would begin."""
         stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
         motion, energy, begins = motion_of(self, b), 0.0, 0
         for u in range(3 * b, 3 * b + 3):
@@ -105,12 +101,7 @@ class Sleeping(Places):
 
     @ti.func
     def left_out_now(self, b, seconds, moved: ti.template()):
-        """Bound of the impulse [N s] and the energy [J] that a bond has left out so far.
-
-        One body moved while the other slept, since it woke. seconds: of a tick [s]. moved: whether
-        it has gone on since the bond would last have been evaluated, as it does in the step in
-        which it wakes others.
-        """
+        """Bound of the impulse [N s] and the energy [J] that a bond has left out so far."""
         slots = self.tables.bond_slots[b]
         i, j = slots[0] >> 2, slots[1] >> 2
         if self.since[i] < 0 or (self.since[j] >= 0 and self.since[j] < self.since[i]):
@@ -125,12 +116,7 @@ class Sleeping(Places):
 
     @ti.func
     def _withheld(self, b, elapsed, last, rounding):
-        """Impulse [N s] and energy [J] of a bond that was not evaluated for a time [s].
-
-        last: time [s] since the last evaluation that it missed. The springs' force has grown to
-        what it was then; the dashpots' impulse is that of the mean velocity. Energy: what springs
-        hold now, less the work of a leapfrog's coming step. Of what exceeds a rounding [m].
-        """
+        """Impulse [N s] and energy [J] of a bond that was not evaluated for a time [s]."""
         stiffness, force, energy = self.tables.bond_stiffness[b], vec3(0.0), 0.0
         motion = motion_of(self, b)
         for u in range(3 * b, 3 * b + 3):
@@ -144,10 +130,7 @@ class Sleeping(Places):
 
     @ti.func
     def begin(self, i):
-        """Wake body i at the start where something acts on it or it moves, or none may sleep.
-
-        Bodies may also be at rest with strained bonds, and these act at once.
-        """
+        """Wake body i at the start where something acts on it or it moves, or none may sleep."""
         stirred = self.share[None] <= 0.0
         for f in range(4):
             b = self.tables.face_bond[4 * i + f]
@@ -186,10 +169,7 @@ class Sleeping(Places):
 
     @ti.func
     def stir(self, i, elapsed, velocity, angular_momentum):
-        """Wake the neighbours of a body that has moved by more than may be left out.
-
-        elapsed: its step [s].
-        """
+        """Wake the neighbours of a body that has moved by more than may be left out."""
         if self.awake[i] == AWAKE:
             spin = norm(angular_momentum) * self.tables.mass_inverse[i] / self.tables.radius[i]
             is_fast = squared(velocity) + spin * spin > self.bound2[self.part[i]]
@@ -203,10 +183,7 @@ class Sleeping(Places):
 
     @ti.func
     def _opens(self, i, is_fast):
-        """Whether body i opens a bond to a body that slept until now by more than is allowed.
-
-        is_fast: whether any opening beyond rounding is.
-        """
+        """Whether body i opens a bond to a body that slept until now by more than is allowed."""
         found = False
         for f in range(4):
             b = self.tables.face_bond[4 * i + f]
@@ -229,11 +206,7 @@ class Sleeping(Places):
 
     @ti.func
     def _held(self, b, i, j, speed2):
-        """Energy that the springs of a bond hold [J], and whether that is more than allowed.
-
-        It is where a law would begin at the opening over the share, or the lighter body would get
-        more than a speed from it; speed2: its square [(m/s)^2].
-        """
+        """Energy that the springs of a bond hold [J], and whether that is more than allowed."""
         rounding = self.rounding(i)
         energy, begins = self.at_rest(b, 1.0 / self.share[None], rounding)
         lighter = ti.min(self.tables.mass[i], self.tables.mass[j])

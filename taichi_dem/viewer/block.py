@@ -55,25 +55,7 @@ def show_block(result: Any, path: FileName | None, open_browser: bool | None) ->
 
 
 def visible_faces(model: Model, broken_time: np.ndarray) -> Any:
-    """Faces that show at some time.
-
-    Parameters
-    ----------
-    model : Model
-        Of the run.
-    broken_time : ndarray
-        When each bond was released [s], (bond_count,); NaN while it holds.
-
-    Returns
-    -------
-    body, face : ndarray
-        Body and local face of each, (n,).
-    breaks : ndarray
-        Time [s] from which it shows, (n,); -inf for outer faces.
-    edges : ndarray
-        Time [s] at which a crack first reaches the edge opposite each corner, (n, 3); NaN for
-        never.
-    """
+    """Faces that show at some time."""
     broken, mesh = ~np.isnan(broken_time), model.mesh
     body, face, _ = skin(model.topology, broken)
     outer = np.full(model.topology.outer_count, -np.inf)

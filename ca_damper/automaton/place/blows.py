@@ -45,10 +45,7 @@ class Collisions(Part):
 
     @ti.func
     def resolve(self, s, step, shared, motion, pull, pressed):
-        """Carry out all but the blows on the container, and note those.
-
-        Returns the velocity that it gave to grains that came to rest [quanta].
-        """
+        """Carry out all but the blows on the container, and note those."""
         count, carried = self.contacts.find_all(s, step, shared, pull, pressed), motion.v - pull
         impulse, kept = ti.cast(0, ti.i64), 0
         for k in range(count):
@@ -70,10 +67,7 @@ class Collisions(Part):
 
     @ti.func
     def meet(self, s, shared, cell, other, kind, carried):
-        """Blow of two grains, of which one may have rested.
-
-        carried: velocity [m/s] that a grain has where it leaves the heap in this step.
-        """
+        """Blow of two grains, of which one may have rested."""
         line = ti.Vector([0.0, 1.0])
         if kind == OBLIQUE:
             width = self.parameters.width[s]
@@ -141,10 +135,7 @@ class Collisions(Part):
 
     @ti.func
     def since(self, s, cell):
-        """Time [s] between a blow on floor, heap or ceiling and the end of the step.
-
-        By how far the grain has gone too far. 0 where that is more than it can have gone in a step.
-        """
+        """Time [s] between a blow on floor, heap or ceiling and the end of the step."""
         approach = self.cells.speed[s, cell] - self.cells.container[s]
         beyond = self.cells.travelled[s, cell] - self.cells.offset[s]
         result = 0.0
@@ -162,10 +153,7 @@ class Collisions(Part):
 
     @ti.func
     def rebound(self, s, cell, after):
-        """Leave floor or ceiling; after: velocity of the container after all blows [m/s].
-
-        The grain has been on its way back since the time of the blow, and so is its place.
-        """
+        """Leave floor or ceiling; after: velocity of the container after all blows [m/s]."""
         approach, since = self.approach(s, cell), self.since(s, cell)
         share = self.parameters.wall[s]
         gain = after - self.cells.container[s] - (1.0 + share) * approach

@@ -34,12 +34,7 @@ _MOST_RATE = _NEAR * 4.0 / LEAST_WIDTH
 
 @ti.func
 def contact_rate(approach, rise, free_width):
-    """Rate of blows [1/s] of two grains in neighbouring columns.
-
-    approach: speed along their line of centres, in diameters [1/s]. rise: vertical part of that
-    line. free_width: what grains beside them leave to the two [diameters], 2 where there are none;
-    rods on a line meet in inverse proportion to it (Tonks 1936).
-    """
+    """Rate of blows [1/s] of two grains in neighbouring columns."""
     return 2.0 * approach / (1.0 + rise * rise) * 2.0 / ti.max(free_width, LEAST_WIDTH)
 
 
@@ -51,10 +46,7 @@ def chord(rise):
 
 @ti.func
 def line_of_centres(draw):
-    """Line between two discs that meet in a column, (across, up), for a draw in [0, 1).
-
-    All impact parameters from one edge to the other are equally likely, as in a gas of discs.
-    """
+    """Line between two discs that meet in a column, (across, up), for a draw in [0, 1)."""
     across = 2.0 * draw - 1.0
     return ti.Vector([across, chord(across)])
 
@@ -68,11 +60,7 @@ def dragged(slip, most):
 
 @ti.func
 def speed_change(relative, line, restitution, friction):
-    """Change of velocity [m/s] of the first of two equal grains; the second has the opposite.
-
-    relative: velocity of the first seen from the second; line: of centres, from the first to the
-    second, of length 1; both (across, up). Zero unless they approach.
-    """
+    """Change of velocity [m/s] of the first of two equal grains; the second has the opposite."""
     normal = relative.dot(line)
     change = ti.Vector([0.0, 0.0])
     if normal > 0.0:
@@ -85,21 +73,13 @@ def speed_change(relative, line, restitution, friction):
 
 @ti.func
 def common_velocity(velocity, approaches, blows, recoil, restitution):
-    """Velocity of the container after all blows of a step on floor and ceiling [m/s].
-
-    V' = (M V + m sum(v + e (v - V))) / (M + n m), whatever the order of the blows; each grain
-    leaves with V' - e (v - V). approaches: sum of v - V [m/s]. blows: n of them. recoil: m / M.
-    """
+    """Velocity of the container after all blows of a step on floor and ceiling [m/s]."""
     return velocity + recoil * (1.0 + restitution) * approaches / (1.0 + blows * recoil)
 
 
 @ti.func
 def most_drag(slip, share):
-    """Largest friction [m/s] of one of n grains at the side walls: with more they would drag on.
-
-    At this limit grains of one slip and the container have one velocity afterwards. slip: velocity
-    seen from the container [m/s]. share: n m / M, or that of a Recoil.
-    """
+    """Largest friction [m/s] of one of n grains at the side walls: with more they would drag on."""
     return ti.abs(slip) / (1.0 + share)
 
 
@@ -214,10 +194,7 @@ class Contacts(Part):
 
     @ti.func
     def beside(self, s, step, shared, count, cell, steep):
-        """Grains of the column to the right less than a diameter higher or lower.
-
-        steep: bound of the probability of a blow in this step, by the relative speed [s/m].
-        """
+        """Grains of the column to the right less than a diameter higher or lower."""
         result, height = count, self.lattice.size.height[s]
         if not self.lattice.in_side_wall(s, self.lattice.column_beside(s, cell, 1)):
             # The columns stand half a cell apart, so that one of five rows is too far; beyond floor
@@ -237,10 +214,7 @@ class Contacts(Part):
 
     @ti.func
     def partners(self, s, lowest, kind):
-        """Which of four cells hold a grain that one of a kind may meet, a bit each.
-
-        Not two that rest. Without a branch, which would go either way by chance.
-        """
+        """Which of four cells hold a grain that one of a kind may meet, a bit each."""
         result = 0
         for k in ti.static(range(4)):
             other = self.cells.at(s, lowest + k)
@@ -250,10 +224,7 @@ class Contacts(Part):
 
     @ti.func
     def meets(self, s, shared, cell, other, rows, steep):
-        """Whether two grains of neighbouring columns touch in this step, by chance.
-
-        rows: by how many cells the second cell is higher. steep: as of ``beside``.
-        """
+        """Whether two grains of neighbouring columns touch in this step, by chance."""
         width, result = self.parameters.width[s], False
         way = self.cells.way(s, other) - self.cells.way(s, cell)
         # Most pairs are told apart without a division or a root.
@@ -267,10 +238,7 @@ class Contacts(Part):
 
     @ti.func
     def touches(self, s, chance, cell, other, relative, rise):
-        """The same of two that are less than a diameter apart, from a draw by the step [1/s].
-
-        relative: velocity [m/s]. rise: of the second over the first [diameters].
-        """
+        """The same of two that are less than a diameter apart, from a draw by the step [1/s]."""
         width, result = self.parameters.width[s], False
         approach = relative.dot(ti.Vector([chord(rise), rise]))
         # Most draws say no whatever stands beside the two, which takes long to find.
@@ -285,10 +253,7 @@ class Contacts(Part):
 
     @ti.func
     def taken(self, s, cell, way):
-        """Width [diameters] that the grain beside this one takes, on the left (way -1) or right.
-
-        A side wall takes as much as a grain at the same height.
-        """
+        """Width [diameters] that the grain beside this one takes, on the left (way -1) or right."""
         result, base = 1.0, self.lattice.column_beside(s, cell, way)
         if not self.lattice.in_side_wall(s, base):
             result, width = 0.0, self.parameters.width[s]

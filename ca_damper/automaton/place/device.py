@@ -48,11 +48,7 @@ class PlaceAutomaton(LatticeDevice):
 
     @ti.func
     def divergence_code(self, s):
-        """1 when a grain would cross more than one cell a step, which no rule allows.
-
-        2 when one is more than a diameter outside the box: pushed beyond floor or ceiling by others
-        more often than it could turn over there.
-        """
+        """1 when a grain would cross more than one cell a step, which no rule allows."""
         fastest, farthest, width = 0.0, 0.0, self.parameters.width[s]
         for cell in range(self.lattice.size.cells[s]):
             across = ti.abs(self.cells.across[s, cell])

@@ -34,12 +34,7 @@ class Transport(Part):
 
     @ti.func
     def follow(self, s, step, motion):
-        """Number the cells anew when the lattice steps; nothing moves in the room, and none gains.
-
-        Each grain takes the cell behind it, those nearest to the wall first. Where that is taken,
-        by the wall or by the unbroken run of grains on it, a grain keeps its cell and stands
-        further off its centre.
-        """
+        """Number the cells anew when the lattice steps; nothing moves in the room or gains."""
         width = self.parameters.width[s]
         way = self.cells.step_along(s, step, motion, width)
         if way != 0:
@@ -79,11 +74,7 @@ class Transport(Part):
 
     @ti.func
     def fall(self, s, cell, slip):
-        """Fall across the columns, or lie on what stands there; returns the drag of that [m/s].
-
-        A grain that has no room and fell less than a diameter lies, and presses by its weight
-        on the bed that the container carries: all layers together are dragged as one body is.
-        """
+        """Fall across the columns, or lie on what stands there; returns the drag of that [m/s]."""
         result, sideways = 0.0, self.parameters.sideways[s]
         across, pull = self.cells.across[s, cell], ti.abs(sideways)
         way = 1 if sideways > 0.0 else -1
@@ -106,11 +97,7 @@ class Transport(Part):
 
     @ti.func
     def hop_all(self, s, step, shared, dt):
-        """Move grains to neighbouring columns.
-
-        Anywhere in its column with equal probability, a grain with velocity u leaves it in a step
-        with the probability |u| dt / d. It keeps its height, at which there must be room for it.
-        """
+        """Move grains to neighbouring columns."""
         count = 0
         for k in range(self.traversal.begin(s), self.traversal.end(s)):
             cell = self.traversal.cell(s, k)

@@ -281,10 +281,7 @@ def doubted(answer: Answer, *reasons: str) -> Answer:
 
 
 def with_source(answer: Answer, source: Source) -> Answer:
-    """The answer with a source of error that no step reduces.
-
-    The bar includes it if it was measured; if wider than allowed, it is a reason to doubt.
-    """
+    """The answer with a source of error that no step reduces."""
     made = replace(answer, sources=(*answer.sources, source))
     if not source.measured or not np.any(source.error):
         return made
@@ -310,11 +307,7 @@ def share_in_words(error: Values, value: Values, unit: str) -> str:
 def branched(
     answer: Answer, branches: tuple[Branch, ...], step: Values, run: str, ends: str
 ) -> Answer:
-    """The answer of a question with several outcomes: that of the most frequent.
-
-    step: error of it by the step. run: what a seed stands for, in the singular. ends: what they
-    did, with a place for how many.
-    """
+    """The answer of a question with several outcomes: that of the most frequent."""
     total = counted(sum(len(branch.seeds) for branch in branches), run)
     each = "; ".join(branch.in_words(answer.unit, f"{run}s") for branch in branches)
     words = f"no single number: {total} {ends.format(len(branches))}: {each}"

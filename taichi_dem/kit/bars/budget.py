@@ -52,10 +52,7 @@ class Source:
 
 
 def named_sources(given: Any, known: Sequence[str]) -> tuple[str, ...]:
-    """Names of sources to measure, in the order of the known ones; the first is always measured.
-
-    Raises InputError for another name.
-    """
+    """Names of sources to measure, in the order of the known ones; the first is always measured."""
     found = several("sources", given, lambda name, one: choice(name, one, known))
     return tuple(name for name in known if name in (known[0], *found))
 

@@ -19,10 +19,7 @@ def mean_and_deviation(values: Sequence[float] | np.ndarray) -> tuple[float, flo
 
 
 def t_quantile(confidence: float, freedom: float) -> float:
-    """Half-width, in standard errors, of the interval that holds the truth with a confidence.
-
-    freedom: degrees, above 0; infinite for a normal distribution.
-    """
+    """Half-width, in standard errors, of the interval that holds the truth with a confidence."""
     from scipy.special import stdtrit
 
     return -float(stdtrit(freedom, 0.5 * (1.0 - confidence)))
@@ -36,10 +33,7 @@ def t_outside(t: float, freedom: float) -> float:
 
 
 def f_outside(ratio: float, above: float, below: float) -> float:
-    """Probability that a ratio of two equal variances is larger by chance.
-
-    above, below: degrees of freedom of numerator and denominator.
-    """
+    """Probability that a ratio of two equal variances is larger by chance."""
     from scipy.special import fdtrc
 
     return float(fdtrc(above, below, ratio))
@@ -56,11 +50,7 @@ def share_error(count: int, total: int) -> float:
 def clusters_of(
     values: Sequence[float] | np.ndarray, error: float, least: float
 ) -> list[np.ndarray]:
-    """Numbers of the values in each cluster, the largest cluster first.
-
-    error: standard error of a value. least: gap below which no two clusters are told apart. One
-    cluster unless every gap stands out from the widths of the clusters and from the errors.
-    """
+    """Numbers of the values in each cluster, the largest cluster first."""
     x = np.asarray(values, dtype=np.float64)
     order = np.argsort(x, kind="stable")
     if len(x) < LEAST_SEEDS or not np.isfinite(x).all():

@@ -57,15 +57,7 @@ def step_error(
     smooth: bool = False,
     confidence: float = 0.95,
 ) -> StepError:
-    """Error of the last of at least two values, at falling steps.
-
-    declared: order of the method where all is smooth. steps: of any unit; h, h/2, h/4 and so on if
-    None. least: difference that is believed, at least, of the last two values: what they may have
-    in common by chance. smooth: whether nothing happens at an instant, so that the declared order
-    may be trusted before it was seen.
-    Where no order is seen, the error is that of first order; of a smooth run 1.1 times that of
-    the declared one.
-    """
+    """Error of the last of at least two values, at falling steps."""
     if steps is None:
         steps = [2.0**-k for k in range(len(values))]
     wider = t_quantile(confidence, _FREEDOM) / t_quantile(0.95, _FREEDOM)
@@ -126,11 +118,7 @@ def step_part(
     order: float,
     confidence: float,
 ) -> StepPart:
-    """Error by the step of values (steps, places) with standard errors of the same shape.
-
-    steps: as multiples of the finest, ascending from 1, with 2; an order can be checked with 4.
-    order: of the method.
-    """
+    """Error by the step of values (steps, places) with standard errors of the same shape."""
     noise = np.hypot(errors, _ROUNDING * np.abs(values))
     near, far = (list(steps).index(k) if k in steps else -1 for k in (2.0, 4.0))
     change = values[0] - values[near]
@@ -153,11 +141,7 @@ def _richardson(change, order):
 
 
 def _in_range(values, noise, order):
-    """Whether values at 1, 2 and 4 steps may be those of an order in range, (places,).
-
-    Then the change to the finest is a share of the one before, between two bounds; chance as a
-    whole may take it out of them.
-    """
+    """Whether values at 1, 2 and 4 steps may be those of an order in range, (places,)."""
     high, low = (_beyond(values, noise, power) for power in (_LEAST_ORDER, order + _MORE_BLURRED))
     return (high * low <= 0.0) | (np.minimum(np.abs(high), np.abs(low)) < _OTHER_ORDER)
 
@@ -171,12 +155,7 @@ def _beyond(values, noise, order):
 
 
 def _by_order(values, noise, seen, order):
-    """Half-width of the finest of values at 1, 2 and 4 steps.
-
-    All three tell it where they agree with the order of the method as far as chance lets see, and
-    the last change does where it is seen beyond chance and larger. Elsewhere the order is that of
-    the differences, if it is lower than the method's.
-    """
+    """Half-width of the finest of values at 1, 2 and 4 steps."""
     near, far = np.abs(values[0] - values[1]), np.abs(values[1] - values[2])
     with np.errstate(divide="ignore", invalid="ignore"):
         observed = np.log2(far / near)

@@ -31,12 +31,7 @@ def call_in_process(
     title: str = "",
     **arguments: Any,
 ) -> Any:
-    """Result of work(**arguments) in a new process, on this process's architecture by default.
-
-    work: a function at the top of a script or of a module beside it; arguments and result: as JSON
-    has them. cache: a folder of compiled kernels instead of Taichi's own. Raises InputError with
-    the end of what the process said, where it failed; title: of the run in that sentence.
-    """
+    """Result of work(**arguments) in a new process, on this process's architecture by default."""
     file = Path(str(sys.modules[work.__module__].__file__)).absolute()
     settings: Any = runtime.settings()
     job = [str(file.parent), file.stem, work.__name__, arch or settings.arch, threads, arguments]

@@ -80,10 +80,7 @@ def entry_of(run: Callable) -> Entry | None:
 
 
 def key_figures(figures: Mapping[str, Mapping], patterns: Sequence[str]) -> list[str]:
-    """Names of the figures of summary.json to show first, those of a paper before others.
-
-    Key are those with a paper's value and those that match a pattern, at most a dozen.
-    """
+    """Names of the figures of summary.json to show first, those of a paper before others."""
     compared = [name for name, one in figures.items() if one["paper"] is not None]
     matching = [name for name in figures if any(fnmatchcase(name, one) for one in patterns)]
     return list(dict.fromkeys([*compared, *matching]))[:MOST_FIGURES]

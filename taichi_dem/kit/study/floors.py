@@ -95,10 +95,7 @@ class Floors:
 def _least_seconds(
     work: Callable[[], object], repeats: int, clock: Callable[[], float] = process_time
 ) -> float:
-    """Shortest time of some calls, of CPU time, which a busy machine changes less, for one core.
-
-    The first call, which compiles, does not count.
-    """
+    """Shortest time of some calls, of CPU time, which a busy machine changes less, for one core."""
     work()
     seconds = []
     for _ in range(repeats):

@@ -120,11 +120,7 @@ def parser(
     folder: str | None = None,
     **defaults: Any,
 ) -> Parser:
-    """Parser with the options every experiment has; drivers: to choose from, where there are.
-
-    settings: numbers of the full and of the quick job, which are options where they have a type.
-    folder: of the output, by default the name. defaults: of options that every experiment has.
-    """
+    """Parser with the options every experiment has; drivers: to choose from, where there are."""
     made = bare_parser(name, description)
     made.add_argument("--quick", action="store_true", help="a smaller job, in a folder of its own")
     made.add_argument("--json", action="store_true", help="print summary.json and nothing else")
@@ -195,11 +191,7 @@ def add_checkpoints(made: ArgumentParser) -> None:
 
 
 def checkpoint_of(options: Namespace, name: str = "run", *, may_be_new: bool = False) -> dict:
-    """Arguments checkpoint and resume of a job: its file is out/name.checkpoint.
-
-    A job saves itself on Ctrl-C and at its end in any case. may_be_new: whether a job without a
-    file begins anew: one of several that the interruption came before.
-    """
+    """Arguments checkpoint and resume of a job: its file is out/name.checkpoint."""
     path = os.path.join(options.out, f"{name}.checkpoint")
     checkpoint = Checkpoint(**{**options.checkpoint_every, "path": path})
     goes_on = options.resume and (os.path.exists(path) or not may_be_new)
@@ -207,11 +199,7 @@ def checkpoint_of(options: Namespace, name: str = "run", *, may_be_new: bool = F
 
 
 def add_accuracy(made: ArgumentParser, what: str, source: str) -> None:
-    """Add the options --accuracy and --budget.
-
-    what: is found to that share of its value, in words. source: of error, beside the step, that is
-    measured when asked.
-    """
+    """Add the options --accuracy and --budget."""
     words = f"find {what} with an error of this share of the value, such as 1%%; do nothing else"
     made.add_argument("--accuracy", type=tolerance, default=None, help=words)
     words = f"with --accuracy, also measure the error of this source: {source}"
@@ -224,10 +212,7 @@ def accuracy_sources(options: Namespace) -> list[str]:
 
 
 def check_accuracy(options: Namespace, others: Iterable[str] = ()) -> None:
-    """Raise InputError where --accuracy was given with what leaves it no choice.
-
-    others: options beside those of checkpoints, by name.
-    """
+    """Raise InputError where --accuracy was given with what leaves it no choice."""
     given = [name for name in ("resume", "checkpoint_every", *others) if getattr(options, name)]
     if given:
         names = " and ".join(name.replace("_", "-") for name in given)
@@ -239,12 +224,7 @@ def main(
     made: Parser,
     arguments: Sequence[str] | None = None,
 ) -> int:
-    """Parse, say what is done, start Taichi, run; returns the exit code of ``exit_code``.
-
-    The settings of its parser have their values of the full or of the quick job in options, which
-    also hold started and began, when, on ``time.perf_counter`` and ``time.time``; entry, the texts
-    on the study; and command, its words after "python".
-    """
+    """Parse, say what is done, start Taichi, run; returns the exit code of ``exit_code``."""
     given = sys.argv[1:] if arguments is None else arguments
 
     def work(options):
@@ -319,12 +299,7 @@ def _summary(options):
 
 
 def exit_code(work: Callable[[], int | None]) -> int:
-    """Exit code of a program that does work(): 0 done, or what work returns.
-
-    2 bad input, 3 diverged, 130 interrupted by Ctrl-C, 128 + its number by another signal, which
-    also ends the processes of ``children.run``: each with one line on stderr. The reader of the
-    output may leave before its end (``| head -1``): the files are still written.
-    """
+    """Exit code of a program that does work(): 0 done, or what work returns."""
     with lasting_output():
         try:
             with ending_children():

@@ -28,10 +28,7 @@ CAPTION = "caption.txt"
 
 
 def markdown_table(entries: Sequence[Entry], root: str | Path, pictures: str) -> str:
-    """Table of all entries for a file of a folder root, each with its picture where there is one.
-
-    pictures: folder of theirs, as NAME.png, from root.
-    """
+    """Table of all entries for a file of a folder root, each with its picture if there is one."""
     lines = ["| question | command | time | with `--quick` | picture |", "|---|---|---|---|---|"]
     for entry in entries:
         small = f"{pictures}/{entry.name}.png"
@@ -50,11 +47,7 @@ def run_entries(
     reuse: bool = False,
     cold: bool = False,
 ) -> dict[str, str]:
-    """Run studies into root/NAME, and print how each ended; name -> why it failed, or "".
-
-    scripts: folder of them. quick: whether as smaller jobs. reuse: whether to leave out those that
-    have a result. cold: whether each compiles all of its kernels.
-    """
+    """Run studies into root/NAME, and print how each ended; name -> why it failed, or ""."""
     failed = {}
     for number, entry in enumerate(entries, 1):
         if reuse and Path(root, entry.name, "summary.json").exists():
@@ -69,10 +62,7 @@ def run_entries(
 def run_entry(
     scripts: str | Path, entry: Entry, root: str, quick: bool = False, cold: bool = False
 ) -> str:
-    """Run a study and note what it printed, for its page; returns why it failed, or "".
-
-    cold: whether it compiles all of its kernels.
-    """
+    """Run a study and note what it printed, for its page; returns why it failed, or ""."""
     folder = output_folder(os.path.join(root, entry.name))
     # None of an earlier run shall pass for this one's.
     for name in ("summary.json", RUN, CAPTION, *entry.pictures):
@@ -99,12 +89,7 @@ def _children_cpu():
 
 
 def write_page(root: str, entries: Sequence[Entry], failed: Mapping[str, str]) -> list:
-    """Write root/index.html, the page of all entries, whose results stand in root/NAME.
-
-    failed: why studies of these names did not end well. Returns the items shown, each with its
-    entry as page, and as failed why it has no result, or "". Raises InputError when it cannot be
-    written.
-    """
+    """Write root/index.html, the page of all entries, whose results stand in root/NAME."""
     from jinja2 import Environment, FileSystemLoader
 
     items = [_shown(entry, root, failed.get(entry.name, "")) for entry in entries]
@@ -123,10 +108,7 @@ def write_page(root: str, entries: Sequence[Entry], failed: Mapping[str, str]) -
 def shrink_picture(
     entry: Entry, root: str, folder: str | Path, side: int, colours: int
 ) -> str | None:
-    """Small copy of a study's first picture in a folder; its path, None without a picture.
-
-    side: the widest [pixels]. Raises InputError when the copy cannot be written.
-    """
+    """Small copy of a study's first picture in a folder; its path, None without a picture."""
     source = Path(root, entry.name, entry.pictures[0])
     target = os.path.join(folder, f"{entry.name}.png")
     if not source.is_file():
@@ -149,12 +131,7 @@ def _write_small(name, source, side, colours):
 
 
 def _shown(page, root, failed):
-    """Content of the page for an experiment, by the names that the template uses.
-
-    page: its entry. root: folder of the page, in which its results stand in root/NAME. failed: why
-    it did not end well, or "". pictures, more: files shown, and files linked. caption: words of the
-    run about its own pictures. key, rest: rows of figures (name, value, paper).
-    """
+    """Content of the page for an experiment, by the names that the template uses."""
     folder = Path(root, page.name)
     summary, run = read_json(folder / "summary.json"), read_json(folder / RUN)
     files = sorted(path.name for path in folder.glob("*") if path.is_file())
@@ -183,10 +160,7 @@ def read_json(path: str | Path) -> dict:
 
 
 def figure_rows(figures: Mapping[str, dict], patterns: Sequence[str]) -> tuple[list, list]:
-    """Rows (name, value, paper) of the key figures, and of all others; paper: "" without a value.
-
-    figures: of summary.json.
-    """
+    """Rows (name, value, paper) of key figures, and of all others; paper: "" without a value."""
     key = key_figures(figures, patterns)
     rest = [name for name in figures if name not in key]
     return [_row(name, figures[name]) for name in key], [_row(name, figures[name]) for name in rest]
@@ -198,10 +172,7 @@ def _row(name, item):
 
 
 def _in_words(name, unit):
-    """A key of summary.json without underscores, and without the unit at its end.
-
-    A number before that keeps it: plateau_at_5_MPa is that at 5 MPa.
-    """
+    """A key of summary.json without underscores, and without the unit at its end."""
     bare = name.removesuffix("_" + re.sub("[ /]", "_", unit))
     kept = unit == "1" or re.search(r"_[0-9.]+$", bare)
     return (name if kept else bare).replace("_", " ")

@@ -33,10 +33,7 @@ _PICTURES = (".png", ".svg", ".gif", ".mp4", ".html")
 
 
 def figure(value: Any, unit: str, paper: Any = None) -> dict:
-    """One figure of summary.json; what was not measured is left out instead.
-
-    value: None where it was looked for in vain; NaN and infinity, which JSON lacks, count as None.
-    """
+    """One figure of summary.json; what was not measured is left out instead."""
     if isinstance(value, float) and not math.isfinite(value):
         value = None
     return {"value": value, "unit": unit, "paper": paper}
@@ -51,13 +48,7 @@ def finish(
     see: str = "",
     draw: Callable[[], None] | None = None,
 ) -> None:
-    """Write summary.json; print its figures, and the pictures.
-
-    figures: by name, as of ``figure``, or tuples of its arguments.
-    runs: reports, objects with compile_seconds and run_seconds, or both sums as a pair of numbers;
-    or those of compiling alone: all else since ``main`` began counts as running. see: the picture
-    to look at first. draw: draws the pictures, once the figures are printed.
-    """
+    """Write summary.json; print its figures, and the pictures."""
     made = {key: figure(*one) if isinstance(one, tuple) else one for key, one in figures.items()}
     _write_summary(options, name, made, runs)
     entry = getattr(options, "entry", None)
@@ -120,11 +111,7 @@ def versions() -> dict[str, str]:
 
 
 def print_figures(figures: Mapping[str, dict], entry: Entry | None = None) -> None:
-    """Print figures of summary.json, beside the paper's values where it gives any.
-
-    entry: of the study; with one only the key figures are printed, those of a paper first, and no
-    more than a dozen.
-    """
+    """Print figures of summary.json, beside the paper's values where it gives any."""
     shown = [*figures]
     if entry is not None:
         shown = key_figures(figures, entry.figures) or shown[:MOST_FIGURES]
@@ -147,11 +134,7 @@ def value_in_words(value: Any) -> str:
 
 
 def show_files(folder: str, since: float = 0.0, first: Sequence[str] = ()) -> None:
-    """Print the paths of the pictures in a folder, and where everything else is.
-
-    since: when the run began, as of ``time.time``; what is older is not named. first: names of
-    pictures in the order in which they tell most.
-    """
+    """Print the paths of the pictures in a folder, and where everything else is."""
     names = set(os.listdir(folder)) - set(older_files(folder, since))
     made = sorted(name for name in names if name.endswith(_PICTURES) and not name.startswith("."))
     made.sort(key=lambda name: first.index(name) if name in first else len(first))
@@ -231,10 +214,7 @@ class Table:
     def figures(
         self, row: Row, name: str = "{key}", paper: Mapping[str, Any] = {}
     ) -> dict[str, dict]:
-        """Figures of a row, of the columns that have a unit.
-
-        name: of a figure, with {key} and any other key of the row in braces. paper: by key.
-        """
+        """Figures of a row, of the columns that have a unit."""
         units = {key: one.unit for key, one in self.columns.items() if one.unit}
         return {
             name.format(key=key, **row): figure(row[key], unit, paper.get(key))
@@ -249,10 +229,7 @@ def markdown_of(header: Sequence[str], cells: Iterable[Sequence[str]]) -> str:
 
 
 def write_rows(path: Any, rows: Sequence, names: str | Sequence[str] | None = None) -> None:
-    """Write rows as CSV.
-
-    rows: dicts with the same keys, or cells under names of columns, a sequence or words.
-    """
+    """Write rows as CSV."""
     if names is None:
         write_csv(path, {name: [row[name] for row in rows] for name in rows[0]})
         return

@@ -146,10 +146,7 @@ def _watched(ended, count, progress) -> Iterator[tuple[Job, Record]]:
 
 
 def _run(work, jobs: Sequence[Job], client, count) -> Iterator[tuple[Job, Record]]:
-    """Jobs and their records by Dask; count: of processes here, where there is no client.
-
-    Raises InputError where no more can be run.
-    """
+    """Jobs and their records by Dask; count: of processes here, where there is no client."""
     if not jobs:
         return
     try:
@@ -190,10 +187,7 @@ def _here(count: int):
 
 
 def _records(work, jobs: Iterable[Job], client) -> Iterator[tuple[Job, Record]]:
-    """Jobs and their records, at most one job a worker at a time.
-
-    Dask counts for each job how often a worker died that had it, also where it only waited.
-    """
+    """Jobs and their records, at most one job a worker at a time."""
     import distributed
 
     settings = runtime.settings()

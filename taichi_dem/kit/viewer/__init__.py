@@ -36,13 +36,6 @@ class WebPage(os.PathLike):
 
     As the last line of a notebook's cell it shows itself; ``open``, ``Path`` and ``str`` take it
     as the path of its file.
-
-    Parameters
-    ----------
-    path : str
-        Of the file.
-    text : str
-        The whole page.
     """
 
     def __init__(self, path: str, text: str):
@@ -68,14 +61,7 @@ def show_page(
     scripts: Sequence[FileName],
     **content: Any,
 ) -> WebPage:
-    """Write a page and open it where somebody watches.
-
-    path: None for a file in a new folder for temporary files. open_browser: None to open it only
-    from a terminal of a desktop: not in a pipe, a test, a notebook or on a build server. scripts:
-    JavaScript of the view, run after ``player.js`` in this order. content: title, subtitle: text
-    above the view; notes: sentences below it; data: what the scripts find in ``view``, fit for
-    JSON. Raises InputError when the file cannot be written.
-    """
+    """Write a page and open it where somebody watches."""
     wanted = _is_on_desktop() if open_browser is None else flag("open_browser", open_browser)
     name = None if path is None else path_name("path", path)
     if name is not None:
@@ -115,22 +101,13 @@ def _is_on_desktop() -> bool:
 
 
 def pack(values: Any, kind: str) -> dict[str, Any]:
-    """Pack an array for a page: kind, and data, its bytes in C order, little-endian, in base64.
-
-    values: numbers of any shape; NaN is allowed where kind is "float32". kind: NumPy name of the
-    type they get, such as "uint8".
-    """
+    """Pack an array for a page: kind, and data, its bytes in C order, little-endian, in base64."""
     made = np.ascontiguousarray(values, dtype=np.dtype(kind).newbyteorder("<"))
     return {"kind": kind, "data": base64.b64encode(made.tobytes()).decode("ascii")}
 
 
 def quantise(frames: Sequence[np.ndarray]) -> dict[str, Any]:
-    """Pack finite arrays of equal size as 16-bit whole numbers, each with a scale of its own.
-
-    As of ``pack``, with scale: (frames,). A value is the whole number times the scale of its frame,
-    and differs from the original by at most half the scale, which is the largest magnitude of the
-    frame over 32767.
-    """
+    """Pack finite arrays of equal size as 16-bit whole numbers, each with a scale of its own."""
     rows = np.array([np.ravel(frame) for frame in frames], dtype=float)
     scale = np.abs(rows).max(axis=1, initial=0.0) / _MOST
     whole = np.rint(rows / np.where(scale > 0.0, scale, 1.0)[:, None])
@@ -140,12 +117,7 @@ def quantise(frames: Sequence[np.ndarray]) -> dict[str, Any]:
 def select_frames(
     frames: Sequence[Any], finite: Sequence[bool], frame_bytes: int, other_bytes: int
 ) -> tuple[list[Any], list[str]]:
-    """Select the frames that a page holds, and say in sentences what is left out.
-
-    Those that are finite, or some of them, evenly up to the last, where a page of all would exceed
-    ``MOST_BYTES``. frame_bytes, other_bytes: packed size of a frame, and of all else, before
-    base64. Raises InputError if no frame is left, or a page of two would be too large.
-    """
+    """Select the frames that a page holds, and say in sentences what is left out."""
     notes, kept = [], [frame for frame, good in zip(frames, finite) if good]
     if not kept:
         raise InputError("frames must hold at least one finite snapshot, got none")

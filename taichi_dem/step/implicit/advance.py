@@ -66,10 +66,7 @@ class SolvedAdvance(Advance):
 
     @ti.func
     def _found(self, i):
-        """Velocity and angular momentum at the end of the step, before supports act.
-
-        The momentum follows from the change of the spin: without impulses it stays, to the bit.
-        """
+        """Velocity and angular momentum at the end of the step, before supports act."""
         velocities, rotation = self.solver.velocities, self.state.rotation(i)
         twist = velocities.twist[i]
         velocity = twist[0:3]

@@ -83,12 +83,7 @@ class PairDashpots:
 
     @property
     def phases(self) -> Phases:
-        """Phases that colour the pairs that touch, and list them by colour, in order.
-
-        Each takes the lowest colour that is free at both bodies, one after the other; those without
-        a free one come last. Candidates that do not touch are left out, so that no skin changes the
-        order. A pair can be coloured once all before it at both bodies are: few wait for long.
-        """
+        """Phases that colour the pairs that touch, and list them by colour, in order."""
         near = Some(self.store.number, self.store.slots, light=True)
         tally, *begin, place = self.colouring.phases
         if is_serial(self.tables.capacity.bodies):
@@ -304,11 +299,7 @@ class PairDashpots:
 
     @ti.func
     def _answer(self, m, c, linear, angular):
-        """Impulse of a contact by its laws [N s], with those of all others as they are.
-
-        linear, angular: velocity [m/s] and spin [1/s] of the second body against the first, with
-        the present impulse.
-        """
+        """Impulse of a contact by its laws [N s], with those of all others as they are."""
         normal, share, held = self.normal[c], self.share[c], self.impulse[self.entry[c]]
         velocity, damping = linear + cross(angular, self.arm[c]), self._damping(m, c)
         pressed, along = dot(held, normal), dot(velocity, normal)
@@ -329,11 +320,7 @@ class PairDashpots:
 
     @ti.func
     def book(self, p):
-        """Book the energy taken by dashpots and friction of a pair, at its mean motion.
-
-        It is that of the impulses by law, as a further sweep would find them: where sweeps ended
-        before impulses agreed, the account does not close.
-        """
+        """Book the energy taken by dashpots and friction of a pair, at its mean motion."""
         if self.touching[p] > 0:
             pair = self.store.body[p]
             i, j, branch = pair[0], pair[1], self.branch[p]

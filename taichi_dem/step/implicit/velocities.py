@@ -90,11 +90,7 @@ class Velocities:
 
     @ti.func
     def assign_lanes(self, i, linear, angular, force, moment):
-        """Set velocity and spin of the body of each lane, and note what has pushed it.
-
-        No two lanes may share a body, unless it is the spare one. A row at once: for each write
-        the compiler looks up anew where all fields lie.
-        """
+        """Set velocity and spin of the body of each lane, and note what has pushed it."""
         for n in ti.static(range(LANES)):
             self.twist[i[n]] = row_of(linear, angular, n)
         if ti.static(self.has_supports):
@@ -133,10 +129,7 @@ class GroundSweeps:
 
     @ti.func
     def _visit(self, i, e: ti.template()):
-        """Change the impulse by what is missing, as far as the body then gives way.
-
-        The mass of a free body bounds the change where supports hold it: it converges all the same.
-        """
+        """Change the impulse by what is missing, as far as the body then gives way."""
         dt, resistance = self.schedule.step_seconds[0], self.tables.ground[e].resistance(i)
         twist, mass = self.velocities.twist[i], self.tables.mass[i]
         rotation = self.state.rotation(i)

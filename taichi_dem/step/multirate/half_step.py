@@ -26,10 +26,7 @@ class HalfStep:
 
     @ti.func
     def is_due(self, i):
-        """Whether the velocity of body i is half a step behind the present.
-
-        Held bodies begin with the motion that they are given, not with that of their support.
-        """
+        """Whether the velocity of body i is half a step behind the present."""
         due = 0
         if ti.static(self.staggered):
             due = ti.cast(self.state.last_tick[i] == self.state.tick[None], ti.i32)
@@ -40,12 +37,7 @@ class HalfStep:
 
     @ti.func
     def impulse(self, i, linear, angular, back):
-        """Impulse and moment on body i by which it is behind, and a row for each of ``drives``.
-
-        linear [N s], angular [N m s]: of its contacts, from ``Readings``. A bond adds half of what
-        waits in its slot, also where the other body steps finer: the impulses of all but
-        the last of its steps have been taken. back: 1 where the body is to be set back.
-        """
+        """Impulse and moment on body i by which it is behind, and a row for each of ``drives``."""
         for f in range(4):
             linear += 0.5 * self.state.slot[4 * i + f][0:3]
             angular += 0.5 * self.state.slot[4 * i + f][3:6]
@@ -64,12 +56,7 @@ class HalfStep:
 
     @ti.func
     def visit(self, i, pushed, turned, back):
-        """Velocity [m/s] and angular momentum [kg m^2/s] of body i now, and works in half a step.
-
-        pushed, turned: impulse [N s] and moment [N m s] of its contacts in half a step. Works [J]:
-        of each load, of all supports, and of each ground. back: 1 to set the body, whose motion is
-        given at time zero, half a step back instead; held bodies stay.
-        """
+        """Velocity [m/s], angular momentum [kg m^2/s] of body i now, and works in half a step."""
         account = ti.Vector.zero(real, ti.static(len(self.tables.drives) + 1))
         before, spun = self.state.velocity[i], self.state.angular_momentum[i]
         velocity, momentum = before, spun

@@ -96,10 +96,7 @@ class ActiveList(Places):
 
     @ti.func
     def renew(self, m):
-        """Move a listed member to its present key; a negative one removes it.
-
-        It changes places with the first, or last, of each key that it passes.
-        """
+        """Move a listed member to its present key; a negative one removes it."""
         present, key = self.key[m], self.key_of(m)
         self.key[m] = key
         while present < key and present >= 0:

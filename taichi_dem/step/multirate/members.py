@@ -38,10 +38,7 @@ class Members:
 
     @ti.func
     def body_key(self, i):
-        """Own level, or the finest level among those it touches where neighbours drift along.
-
-        -1 for a body that sleeps.
-        """
+        """Own level, or the finest level among those it touches where neighbours drift along."""
         key = self._key(i, i)
         if ti.static(self.drifted):
             for f in range(4):
@@ -113,10 +110,7 @@ class Members:
 
     @ti.func
     def sort_woken(self, one):
-        """Renew the bound of sleep; bring bodies woken of late into the order of the others.
-
-        Visits in the order of waking take up to 40 % longer.
-        """
+        """Renew the bound of sleep; bring bodies woken of late into the order of the others."""
         if self.sleeping.is_due():
             self.sleeping.renew_bound()
             if self.sleeping.unsorted[None] > 0:
@@ -180,10 +174,7 @@ class LevelLimit:
 
     @ti.func
     def _visit(self, i, level, lists: ti.template()):
-        """Finest listed level of the bodies that body i touches, -1 for none.
-
-        lists: whether to list those that are too coarse beside a level.
-        """
+        """Finest listed level of the bodies that body i touches, -1 for none."""
         finest = -1
         for f in range(4):
             if self._bonded(4 * i + f):

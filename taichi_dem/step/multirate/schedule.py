@@ -190,10 +190,7 @@ class Schedule(Members):
         return ((Once(), self.forget),) if self.has_contact else ()
 
     def _rearranging(self, move, end) -> Phases:
-        """A CPU moves the members that have changed; a GPU, of which one thread is slow, lists all.
-
-        Where all have one level, members change when a bond breaks: seldom enough.
-        """
+        """A CPU moves members that have changed; a GPU, of which one thread is slow, lists all."""
         if backend.is_cpu() or self.uniform:
             return ((Once(), move),)
         phases: Phases = ()
@@ -229,11 +226,7 @@ class Schedule(Members):
         return self._listing(self.bodies, self.bonds) if self.sleeps else ()
 
     def pair_phases(self) -> Phases:
-        """Phases that take in the pairs of a new contact search; neighbours may reach further.
-
-        All lists are filled again, which restores contiguous visits; moving entries destroys them
-        with time (5 % of the time of a run).
-        """
+        """Phases that take in the pairs of a new contact search; neighbours may reach further."""
         phases: Phases = ()
         end: Phases = ()
         if self.sleeps:
