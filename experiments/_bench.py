@@ -226,7 +226,7 @@ def visits(repeats):
     simulation.advance_to(macro_steps(SHORT, method.dt0))
     # A broken bond is no visit, although its place is looked at.
     broken = simulation.state.broken()
-    count, solver = SWEEPS * int((~broken).sum()), simulation.engine.advance.solver
+    count, solver = SWEEPS * int((~broken).sum()), simulation.engine.step.solver
     sweep_bonds(solver, 1)
     seconds = [seconds_of(sweep_bonds, solver, SWEEPS) for _ in range(repeats)]
     yield Figure("visit of a bond", "ns", [1e9 * one / count for one in seconds], "<= 14", VISIT)

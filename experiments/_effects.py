@@ -48,7 +48,7 @@ class FrozenScene:
         self.memory = FieldMemory(self.simulation.engine)
         own = self.memory.read()
         # Lists of pairs have room for none in a scene without contact.
-        lists = () if self.simulation.model.has_contact else ("schedule.pairs.",)
+        lists = () if self.simulation.model.has_contact else ("schedule.lists.pairs.",)
         taken = {name for name in own if not name.endswith(self.OWN) and not name.startswith(lists)}
         self.states = [{**own, **{k: one[k] for k in taken & one.keys()}} for one in states]
 

@@ -19,7 +19,8 @@ from taichi_dem.kit.ordered import Once
 from taichi_dem.simulate import run_simulation
 from taichi_dem.state.timeline import MAX_LEVEL
 from taichi_dem.step.drivers import Resident
-from taichi_dem.step.phases import Step
+from taichi_dem.step.explicit import ExplicitStep
+from taichi_dem.step.phases import STEP
 
 #: What is counted: bonds, contact pairs, and the pairs of spheres that are compared in these.
 KINDS = ("bonds", "pairs", "spheres")
@@ -98,18 +99,19 @@ class EvaluationCounter:
         return found
 
 
-class CountedStep(Step):
+class CountedStep(ExplicitStep):
     """A step that counts the evaluations that are due; in one serial kernel only."""
 
     def __init__(self, counter, *parts):
         self.counter = counter
         super().__init__(*parts)
+        self.arrange()
 
-    def _parts(self):
-        counter, schedule = self.counter, self.schedule
-        (phases,) = super()._parts()
-        ends = (Once(), counter.tick), (schedule.bonds, counter.bond)
-        return (((schedule.pairs, counter.pair), *phases, *ends),)
+    def phases(self):
+        """Those of the step, with the pairs counted first, ticks and bonds last."""
+        counter, lists = self.counter, self.schedule.lists
+        ends = (STEP, Once(), counter.tick), (STEP, lists.bonds, counter.bond)
+        return ((STEP, lists.pairs, counter.pair), *super().phases(), *ends)
 
 
 def record_workload(scene, method, until, every):
@@ -120,7 +122,7 @@ def record_workload(scene, method, until, every):
     """
     simulation = Simulation(scene, method, "resident")
     counter, engine = EvaluationCounter(simulation), simulation.engine
-    step = CountedStep(counter, engine.advance, engine.broad_phase)
+    step = CountedStep(counter, engine.schedule, engine.broad_phase)
     simulation.driver = Resident(step)
     seen = Collector(
         Every(steps=every),

@@ -19,11 +19,10 @@ from taichi_dem.state.capacity import LEAST, Capacity
 from taichi_dem.state.model import ROLES, Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
-from taichi_dem.step.advance import Advance
 from taichi_dem.step.drivers import DRIVERS
-from taichi_dem.step.implicit.advance import SolvedAdvance
+from taichi_dem.step.explicit import ExplicitStep
 from taichi_dem.step.multirate.schedule import Schedule
-from taichi_dem.step.phases import SolvedStep, Step
+from taichi_dem.step.solved import SolvedStep
 
 
 class Structure:
@@ -67,18 +66,18 @@ class BlastEngine(Engine):
         self.state = State(self.tables)
         self.contacts = Contacts(self.tables, self.state) if self.tables.has_contact else None
         self.schedule = Schedule(self.tables, self.state, self.contacts, method)
-        # A method may have its own order of the physics (docs/add_a_time_integrator.md).
-        kinds: tuple[Any, type[Step]] = (getattr(method, "advance", Advance), Step)
-        if method.solves:
-            kinds = SolvedAdvance, SolvedStep
-        self.advance = kinds[0](self.schedule)
-        self.broad_phase = None
+        search = None
         if self.contacts is not None:
             told = self.schedule.pair_phases(), self.schedule.limits
-            self.broad_phase = BroadPhase(self.contacts, *told)
-        self.step = kinds[1](self.advance, self.broad_phase)
+            search = BroadPhase(self.contacts, *told)
+        self.broad_phase = search
+        # A method may have a step of its own (docs/add_a_time_integrator.md).
+        chosen: Any = getattr(method, "step", ExplicitStep)
+        kind: Any = SolvedStep if method.solves else chosen
+        self.step = kind(self.schedule, search)
+        self.step.arrange()
         self.drivers = {name: driver(self.step) for name, driver in DRIVERS.items()}
-        self.readings = Readings(self.tables, self.state, self.advance)
+        self.readings = Readings(self.step)
         self.forces = Forces(self.readings)
         self.recording_compiled = False
 
@@ -94,8 +93,8 @@ class BlastEngine(Engine):
             self.contacts.load(model, method)
             self.broad_phase.load(model, method)
         self.schedule.load(model, method, sleep)
-        if self.advance.solver is not None:
-            self.advance.solver.load(model, method)
+        if self.step.solver is not None:
+            self.step.solver.load(model, method)
 
     def _lengths(self, model):
         """Entries that a scene uses by those that a field has."""

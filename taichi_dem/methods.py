@@ -13,7 +13,7 @@ class Method:
     """How bodies step; base of these methods and of user-defined ones.
 
     A user-defined class has at least ``dt0`` and ``name`` (docs/add_a_time_integrator.md). It may
-    also have ``advance``, a class derived from ``step.advance.Advance``; ``structure``, on which
+    also have ``step``, a class derived from ``step.explicit.ExplicitStep``; ``structure``, on which
     its kernels depend (``structure_of``); and ``order``, that of its error (``order_of``).
 
     Attributes
@@ -86,7 +86,7 @@ def structure_of(method: Any) -> Hashable:
 def order_of(method: Any, damped: bool, varying: bool) -> int | None:
     """Order of the error in the step between events.
 
-    A class derived from a method declares its own order, or none: its ``advance`` may have another.
+    A class derived from a method declares its own order, or none: its ``step`` may have another.
 
     Parameters
     ----------

@@ -35,7 +35,6 @@ from taichi_dem.state.model import Model, names_of
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS
-from taichi_dem.step.advance import Advance
 from taichi_dem.step.drivers import DRIVERS, driver_name
 from taichi_dem.step.multirate.schedule import Schedule
 from taichi_dem.step.phases import Step
@@ -58,7 +57,7 @@ class Simulation:
     """One scene, one method, one driver, on an engine of the session.
 
     ``simulate`` makes one; use it directly to control the steps. ``tables``,
-    ``state``, ``schedule``, ``contacts``, ``broad_phase``, ``advance``, ``step``, ``readings`` and
+    ``state``, ``schedule``, ``contacts``, ``broad_phase``, ``step``, ``readings`` and
     ``forces`` are the parts of its engine, which is its own as long as it lives; contacts and
     broad_phase are None without contact. ``values`` reads their fields, which may have room for
     more.
@@ -98,7 +97,6 @@ class Simulation:
     tables: Tables = _part("tables")
     state: State = _part("state")
     schedule: Schedule = _part("schedule")
-    advance: Advance = _part("advance")
     step: Step = _part("step")
     readings: Readings = _part("readings")
     forces: Forces = _part("forces")
@@ -285,7 +283,7 @@ class Simulation:
     @property
     def parts(self) -> Run:
         """Parts that reports read."""
-        parts = self.model, self.state, self.schedule, self.advance, self.readings, self.contacts
+        parts = self.model, self.state, self.schedule, self.step, self.readings, self.contacts
         return Run(*parts)
 
     @property
@@ -405,7 +403,7 @@ class Simulation:
         int
             Their number, 0 for a method that solves none.
         """
-        solver = self.advance.solver
+        solver = self.step.solver
         return int(values(solver.total_sweeps)) if solver is not None else 0
 
     def report(self, brief: bool = False) -> Report:

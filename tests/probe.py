@@ -1,4 +1,4 @@
-"""One bond or one contact pair moved by hand: forces as ``Advance`` computes them."""
+"""One bond or one contact pair moved by hand: forces as a step computes them."""
 
 import numpy as np
 import taichi as ti
@@ -21,10 +21,10 @@ class BondProbe:
     def __init__(self, mesh, effects, material=CONCRETE):
         simulation = Simulation(Scene(mesh, material, effects), Multirate(STEP, 1.0))
         self.simulation = simulation
-        self.model, self.state, self.advance = (
+        self.model, self.state, self.step = (
             simulation.model,
             simulation.state,
-            simulation.advance,
+            simulation.step,
         )
         self.tables = simulation.tables
         corners = mesh.points[self.model.topology.vertices[0]]
@@ -95,7 +95,7 @@ class BondProbe:
             slots = self.tables.bond_slots[0]
             for side in ti.static(range(2)):
                 self.state.slot[slots[side]] = 0.0 * self.state.slot[slots[side]]
-            self.advance.bond(0)
+            self.step.bond(0)
             for side in ti.static(range(2)):
                 for k in ti.static(range(6)):
                     wrench[side, k] = self.state.slot[slots[side]][k]
@@ -117,10 +117,10 @@ class ContactProbe:
         self.simulation = simulation = Simulation(
             Scene(mesh, material, effects), Multirate(STEP, 1.0)
         )
-        self.model, self.state, self.advance = (
+        self.model, self.state, self.step = (
             simulation.model,
             simulation.state,
-            simulation.advance,
+            simulation.step,
         )
         self.tables, self.store = simulation.tables, simulation.contacts.store
         self.centre = self.model.centre
@@ -152,7 +152,7 @@ class ContactProbe:
             self.store.body[0] = [0, 1]
             self.store.sphere[0] = [a, b]
             self.store.first[0], self.store.last[0] = 0, 1
-            self.advance.contact(0)
+            self.step.contact(0)
             for side in ti.static(range(2)):
                 for k in ti.static(range(6)):
                     wrench[side, k] = self.store.impulse[side][k]

@@ -29,9 +29,9 @@ def is_serial(places: int) -> bool:
     return settings.arch == "cpu" and (places <= _SERIAL_UP_TO or settings.threads == 1)
 
 
-def tasks(phases: Phases, bodies: int) -> tuple[tuple[bool, Phases], ...]:
+def tasks(phases: tuple, bodies: int) -> tuple[tuple[bool, tuple], ...]:
     """Phases by the loops that a parallel driver makes of them: if on one thread, and which."""
-    found: list[tuple[bool, Phases]] = []
+    found: list[tuple[bool, tuple]] = []
     for phase in phases:
         members = phase[0]
         serial = backend.is_cpu() and members.most == 1
@@ -57,6 +57,10 @@ class Places:
     def pick(self, a):
         """The place itself."""
         return a
+
+    def loops(self, item: Callable[..., Any]) -> Phases:
+        """Loops that visit the members: one, as none needs another's."""
+        return ((self, item),)
 
 
 @ti.data_oriented

@@ -2,7 +2,7 @@
 
 A user's effect holds numbers on the host. An engine holds a bound copy of it with fields and
 kernels, into which each scene of the engine loads its numbers. The ``role`` determines where
-``step/advance.py`` calls it, and the members that it must have (``laws.roles``): bond, or
+``step/explicit.py`` calls it, and the members that it must have (``laws.roles``): bond, or
 tension and shear, and dashpot are laws of the contact units of bonds, contact and friction those of
 bodies that touch, loads push bodies, supports hold them, ground drags on them. Roles ``load``,
 ``support`` and ``ground`` take any number of effects, the others at most one.

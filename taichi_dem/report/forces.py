@@ -37,9 +37,9 @@ class Forces:
     """
 
     def __init__(self, readings: Readings):
-        self.readings, self.advance = readings, readings.advance
+        self.readings, self.loads = readings, readings.step.loads
         self.tables, self.state = readings.tables, readings.state
-        self.schedule, self.small = readings.advance.schedule, readings.small
+        self.schedule, self.small = readings.schedule, readings.small
         self.answers = bool(self.tables.ground or self.tables.supports)
         self.count = len(self.tables.drives) + len(self.tables.supports)
         self._launch = Launch(self._act)
@@ -76,7 +76,7 @@ class Forces:
                 for k in ti.static(range(3)):
                     force[k], moment[k] = force[k] + contacts[i, k], moment[k] + contacts[i, 3 + k]
             force, moment = self._load(table, i, now, step, force, moment)
-            if ti.static(self.advance.has_ground):
+            if ti.static(self.loads.has_ground):
                 force, moment = self._brake(table, i, step, force, moment)
             if ti.static(len(self.tables.supports) > 0):
                 self._hold(table, i, now, step, force, moment)
@@ -109,7 +109,7 @@ class Forces:
     @ti.func
     def _brake(self, table: ti.template(), i, step, force, moment):
         """Likewise the ground."""
-        rows = self.advance.ground_impulses(i, step, step * force, step * moment)
+        rows = self.loads.ground_impulses(i, step, step * force, step * moment)
         for e in ti.static(range(len(self.tables.ground))):
             push = vec3(rows[e, 0], rows[e, 1], rows[e, 2]) / step
             self._note(table, i, ti.static(len(self.tables.loads) + e), push)

@@ -15,11 +15,9 @@ from taichi_dem.kit.products import norm
 from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.state.model import Model, sums
 from taichi_dem.state.state import PARTS, State
-from taichi_dem.state.tables import Tables
-from taichi_dem.step.advance import Advance
-from taichi_dem.step.bond import motion_of
 from taichi_dem.step.multirate.half_step import HalfStep
 from taichi_dem.step.multirate.schedule import Schedule
+from taichi_dem.step.phases import Step
 
 #: Bodies up to which loops over them are serial.
 _FEW = 4096
@@ -32,11 +30,12 @@ class Readings:
     Arrays that methods fill or return have the counts of the scene.
     """
 
-    def __init__(self, tables: Tables, state: State, advance: Advance):
-        self.tables, self.state, self.advance = tables, state, advance
-        self.contacts, self.half_step = advance.contacts, HalfStep(advance)
+    def __init__(self, step: Step):
+        self.step, self.tables, self.state = step, step.tables, step.state
+        self.schedule, self.contacts = step.schedule, step.schedule.contacts
+        self.half_step = HalfStep(step)
         # A loop over few bodies takes less time than two threads to be told of it.
-        self.small = tables.capacity.bodies < _FEW and backend.is_cpu()
+        self.small = self.tables.capacity.bodies < _FEW and backend.is_cpu()
         self._held: dict[str, Any] | None = None
         self._rooms: dict[str, np.ndarray] = {}
         self._launch_push, self._launch_visit = Launch(self._push), Launch(self._visit)
@@ -107,7 +106,7 @@ class Readings:
         ti.loop_config(serialize=ti.static(self.small))
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
-            found, half = self.advance.forces_now(p), self.half_step.pair_step(p)
+            found, half = self.step.forces_now(p), self.half_step.pair_step(p)
             for k in ti.static(range(3)):
                 table[a, k], table[a, 3 + k] = -half * found.force[k], half * found.moment_i[k]
                 table[a, 6 + k], table[a, 9 + k] = half * found.force[k], half * found.moment_j[k]
@@ -185,7 +184,7 @@ class Readings:
             for k in ti.static(range(3)):
                 linear[k], angular[k] = pushed[i, k], pushed[i, 3 + k]
             velocity, momentum, works = self.half_step.visit(i, linear, angular, back)
-            spin = self.advance.spin(i, momentum)
+            spin = self.step.loads.spin(i, momentum)
             moving = self.tables.mass[i] * velocity.norm_sqr()
             table[i, 0] = 0.5 * (moving + momentum.dot(spin))
             for k in ti.static(range(3)):
@@ -224,7 +223,7 @@ class Readings:
         # into an array that it does not read is not zero on a card.
         energy, drag, spent, damage, slip = 0.0, 0.0, 0.0, 1.0, 0.0
         heat, acted = vec2(0.0), ti.cast(0, ti.i32)
-        if ti.static(self.advance.has_dashpot):
+        if ti.static(self.step.bonds.has_dashpot):
             drag = self.state.bond_drag[b]
         if ti.static(not self.tables.bond.is_null):
             heat = self.state.bond_heat[b]
@@ -233,9 +232,9 @@ class Readings:
             spent += self.tables.unit_area[b] * self.tables.bond.spent(b, u)
             acted |= ti.cast(self.tables.bond.acted(b, u), ti.i32)
         if self.state.broken_tick[b] < 0:
-            motion = motion_of(self.advance, b)
-            energy, damage = self.advance.bond_energy(b, motion), 0.0
-            if ti.static(self.advance.has_dashpot and self.advance.staggered):
+            motion = self.state.bond_motion(b)
+            energy, damage = self.step.bonds.energy(b, motion), 0.0
+            if ti.static(self.step.bonds.has_dashpot and self.step.staggered):
                 drag += self.half_step.bond_drag(b, motion)
             for q in range(3):
                 u = 3 * b + q
@@ -270,7 +269,7 @@ class Readings:
         """Bound of impulse [N s] and energy [J] that each bond has left out while it slept."""
         for b in range(self.tables.bond_count[None]):
             slots = self.tables.bond_slots[b]
-            schedule = self.advance.schedule
+            schedule = self.schedule
             found = schedule.sleeping.left_out[b]
             if not schedule.sleeping.both_awake(slots[0] >> 2, slots[1] >> 2):
                 found = schedule.sleeping.left_out_now(b, schedule.seconds(1), False)
@@ -281,7 +280,7 @@ class Readings:
         """Lower each bond's entry to the share of its dashpots that the present steps leave."""
         for b in range(self.tables.bond_count[None]):
             if self.state.broken_tick[b] < 0:
-                share[b] = ti.min(share[b], self.advance.bond_share(b))
+                share[b] = ti.min(share[b], self.step.bonds.share(b))
 
     @ti.kernel
     def _note_contact_shares(
@@ -296,15 +295,15 @@ class Readings:
             count = self.contacts.touching(p)
             if count > 0:
                 i, j = self.contacts.store.body[p][0], self.contacts.store.body[p][1]
-                if ti.static(self.advance.limited):
-                    ti.atomic_min(share[i], self.advance.contact_share(i, j))
+                if ti.static(self.step.bonds.limited):
+                    ti.atomic_min(share[i], self.step.pairs.share(i, j))
                 else:
                     rate = count * self.contacts.law.damping(self.tables.pair(i, j))
                     if ti.static(self.contacts.law.meets_bodies):
                         area = self.contacts.law.largest_area(i, j)
                         rate *= area * self.contacts.law.weight(i, j, area)
                     rate *= 1.0 / self.tables.mass[i] + 1.0 / self.tables.mass[j]
-                    ti.atomic_max(taken[i], rate * self.advance.schedule.pair_step(i, j))
+                    ti.atomic_max(taken[i], rate * self.schedule.pair_step(i, j))
 
 
 class Run(NamedTuple):
@@ -313,7 +312,7 @@ class Run(NamedTuple):
     model: Model
     state: State
     schedule: Schedule
-    advance: Advance
+    step: Step
     readings: Readings
     contacts: Contacts | None
 

@@ -58,13 +58,13 @@ def limits_of(run: Run) -> dict[str, np.ndarray]:
 
 def way_of(run: Run) -> str:
     """How the method of a run takes dashpots, a key of ``step_report.METHODS``."""
-    return "solved" if run.advance.solves else "limited" if run.advance.limited else "full"
+    return "solved" if run.step.solver else "limited" if run.step.bonds.limited else "full"
 
 
 def is_bounded(run: Run) -> bool:
     """Whether the limits of stability of its steps are known, and no control keeps below them."""
     controlled = run.schedule.has_limits and run.schedule.limits.controlled
-    return not controlled and type(run.advance).__module__.startswith("taichi_dem.step.")
+    return not controlled and type(run.step).__module__.startswith("taichi_dem.step.")
 
 
 @dataclass(frozen=True)
@@ -130,19 +130,19 @@ class StepResolution(Kept):
 
     def sample(self, time_s: float) -> None:
         """Update the figures at a recording time [s]; not those of dashpots that are solved."""
-        advance, readings, contacts = self.run.advance, self.run.readings, self.run.contacts
+        step, readings, contacts = self.run.step, self.run.readings, self.run.contacts
         self.over = np.maximum(self.over, np.where(self._linked(), self._over_now(), 0.0))
         if self.slips:
             share = readings.residual_slip() / self.shortest
             if share.max() > self.slip[0]:
                 self.slip[:3] = share.max(), share.argmax(), time_s
             self.slip[3] = max(self.slip[3], (share > MOST_SLIP).sum())
-        if advance.solves:
+        if step.solver is not None:
             return
-        if advance.limited and advance.has_dashpot and self.run.model.bond_count:
+        if step.bonds.limited and step.bonds.has_dashpot and self.run.model.bond_count:
             readings.bond_shares(self.share)
         if contacts is not None and values(contacts.store.near_count):
-            if advance.limited:
+            if step.bonds.limited:
                 self._note_partners(contacts)
             readings.contact_shares(self.pair_share, self.taken)
 
@@ -215,13 +215,13 @@ class StepResolution(Kept):
     @property
     def unconverged(self) -> tuple[int, float]:
         """Steps whose sweeps ended before convergence, and the worst residual."""
-        solver = self.run.advance.solver
+        solver = self.run.step.solver
         if solver is None:
             return 0, 0.0
         return int(values(solver.unconverged)), float(values(solver.worst))
 
     def _sweeps(self):
-        (steps, worst), solver = self.unconverged, self.run.advance.solver
+        (steps, worst), solver = self.unconverged, self.run.step.solver
         if not steps:
             return ""
         allowed = float(values(solver.tolerance))
@@ -233,7 +233,7 @@ class StepResolution(Kept):
 
     def _contact_shares(self):
         """Largest share that limited contact dashpots can have had where they acted, (bodies,)."""
-        if self.run.contacts is None or not self.run.advance.limited:
+        if self.run.contacts is None or not self.run.step.bonds.limited:
             return self.pair_share
         heat = values(self.run.state.contact_heat, slice(self.run.model.body_count))
         acted = heat[:, :2].sum(axis=1) > 0.0

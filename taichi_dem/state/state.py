@@ -13,6 +13,7 @@ from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.types import mat3, real, vec3
 from taichi_dem.materials.body_materials import MOST
 from taichi_dem.mesh.topology import Topology
+from taichi_dem.physics.bond import bond_motion
 from taichi_dem.physics.fracture import coulomb_limit
 from taichi_dem.physics.rotation import rotation_matrix
 from taichi_dem.physics.rotation_arrays import angular_momenta, rotations, spins
@@ -244,6 +245,21 @@ class State:
             step=step,
             since=since,
             until=until,
+        )
+
+    @ti.func
+    def bond_motion(self, b):
+        """Relative motion of the bodies of a bond now, a ``BondMotion``."""
+        slots = self.tables.bond_slots[b]
+        i, j = slots[0] >> 2, slots[1] >> 2
+        return bond_motion(
+            self.tables.bond_frame[b],
+            self.position[j] - self.position[i],
+            self.rotation(i),
+            self.rotation(j),
+            self.velocity[j] - self.velocity[i],
+            self.spin[i],
+            self.spin[j],
         )
 
     @property

@@ -1,130 +1,50 @@
-"""Advance one bond: its law, its dashpots, its impulse on both bodies, its release."""
+"""What a bond answers: its law, its dashpots, its impulse on both bodies, its release."""
 
 import taichi as ti
 
 from taichi_dem.kit.products import cross, dot, squared, stacked, transposed_matvec
 from taichi_dem.kit.types import real, vec2, vec3
-from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
+from taichi_dem.physics.bond import unit_arm, unit_opening, unit_velocity
 from taichi_dem.stability.body_limits import RELEASE
+from taichi_dem.step.multirate.schedule import Schedule
 
 
-@ti.func
-def motion_of(step, b):
-    """Relative motion of the bodies of a bond now, a ``BondMotion``; step has tables and state."""
-    slots = step.tables.bond_slots[b]
-    i, j = slots[0] >> 2, slots[1] >> 2
-    return bond_motion(
-        step.tables.bond_frame[b],
-        step.state.position[j] - step.state.position[i],
-        step.state.rotation(i),
-        step.state.rotation(j),
-        step.state.velocity[j] - step.state.velocity[i],
-        step.state.spin[i],
-        step.state.spin[j],
-    )
+@ti.dataclass
+class BondAnswer:
+    """What the three units of a bond answer, per area and in its axes.
+
+    force [Pa], torque [N/m]. failed: 1 where a unit failed. Energies in the step [J/m^2], dragged
+    as a power [W/m^2]: taken by dashpots and by slip, worked by springs.
+    """
+
+    force: vec3
+    torque: vec3
+    failed: ti.i32
+    dragged: real
+    slipped: real
+    worked: real
 
 
 @ti.data_oriented
-class BondStep:
-    """What a bond does when it is due: the part of ``Advance``, which owns all that is used here.
+class BondForces:
+    """Evaluates bonds and releases them.
 
-    on_demand: whether the law of bonds is asked only near its limits.
+    on_demand: whether the law of bonds is asked only near its limits. notes_limits: whether limits
+    of laws that the scene lacks are watched. dashed: whether dashpots act.
     """
 
-    @ti.func
-    def bond(self, b):
-        """Evaluate the three contact units of a bond; release it when one of them fails."""
-        if self._is_pending(b):
-            slots, scale = self.tables.bond_slots[b], self.bond_share(b)
-            motion = motion_of(self, b)
-            moved = motion
-            if ti.static(self.solves_bonds):
-                motion = self.solver.bonds.mean(b, motion)
-            i, j = slots[0] >> 2, slots[1] >> 2
-            dt = self.schedule.pair_step(i, j)
-            stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
-            force, torque, failed = vec3(0.0), vec3(0.0), 0
-            dragged, slipped, worked = 0.0, 0.0, 0.0
-            for q in range(3):
-                u = 3 * b + q
-                arm = unit_arm(motion, self.tables.vertex_slave[u])
-                opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-                before = self._residual_slip(u)
-                traction, spent, broken = self.by_law(m, b, u, stiffness, opening)
-                way = dt * unit_velocity(moved, arm)
-                worked += dot(traction, way)
-                if spent != 0.0:
-                    # Booked at the mean of the tractions before and after the step.
-                    slip = self._residual_slip(u) - before
-                    spent -= 0.5 * stiffness[1] * dot(vec2(way[1], way[2]), slip)
-                if ti.static(self.notes_limits):
-                    across = vec2(traction[1], traction[2])
-                    self.state.note_passed(m, b, traction[0], squared(across))
-                if ti.static(self.has_dashpot):
-                    velocity = unit_velocity(motion, arm)
-                    drag = scale * self.tables.dashpot.traction(b, velocity)
-                    traction += drag
-                    dragged += dot(drag, velocity)
-                force += traction
-                torque += cross(arm, traction)
-                slipped += spent
-                failed |= broken
-            if ti.static(self.schedule.controlled):
-                self.schedule.applied_until.bond[b] = self.schedule.applied_until.until(i, j)
-            area = self.tables.unit_area[b]
-            if failed == 0:
-                self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
-                if ti.static(self.has_dashpot):
-                    self._book_drag(b, area * (dragged * dt))
-                if ti.static(self.tables.bond.rubs):
-                    if slipped != 0.0:
-                        self._book_heat(b, area * vec2(slipped, 0.0))
-                if ti.static(self.solves_bonds):
-                    self.solver.bonds.begin(b, i, j, motion.branch)
-            else:
-                if ti.static(self.has_dashpot and self.solves_bonds):
-                    # Booked for the step before: it was full, though a unit fails now.
-                    self._book_drag(b, dragged * (area * dt))
-                if ti.static(not self.tables.bond.is_null):
-                    # The springs have acted for the first half of the step to here.
-                    freed = self._stored(b, motion) - 0.5 * worked
-                    self._book_heat(b, area * vec2(slipped, freed))
-                self._release(b, slots)
-                if ti.static(self.solves_bonds):
-                    self.solver.bonds.end(b)
+    def __init__(self, schedule: Schedule):
+        self.schedule, self.tables, self.state = schedule, schedule.tables, schedule.state
+        self.law, self.dashpot = self.tables.bond, self.tables.dashpot
+        self.on_demand = self.tables.on_demand and not self.law.is_null
+        self.notes_limits = not self.law.is_whole
+        # Without fast_math a product with zero is not folded: absent terms must not be written.
+        self.has_dashpot = bool(self.dashpot.name)
+        self.limits, self.has_limits = schedule.limits, schedule.has_limits
+        self.limited = self.has_limits and schedule.limits.limited
 
     @ti.func
-    def _book_drag(self, b, energy):
-        self.state.bond_drag[b] = self.state.bond_drag[b] + energy
-
-    @ti.func
-    def _book_heat(self, b, energies):
-        self.state.bond_heat[b] = self.state.bond_heat[b] + energies
-
-    @ti.func
-    def _residual_slip(self, u):
-        """Slip of a unit that its law remembers, in the face frame [m], else zero."""
-        slip = vec2(0.0)
-        if ti.static(self.tables.bond.remembers_slip):
-            slip = self.tables.bond.residual_slip(u)
-        return slip
-
-    @ti.func
-    def by_law(self, m, b, u, stiffness, opening):
-        """Traction of a unit [Pa], energy per area slipped now [J/m^2], 1 where it has failed."""
-        traction = vec3(stiffness[0], stiffness[1], stiffness[1]) * opening
-        slipped, failed, acts = 0.0, 0, True
-        if ti.static(self.on_demand):
-            near = self.tables.bond.begins(m, stiffness, opening)
-            acts = self.state.activity.is_active(b, near, self.state.tick[None])
-        if ti.static(not self.tables.bond.is_null):
-            if acts:
-                traction, slipped = self.tables.bond.traction(m, u, stiffness, opening)
-                failed = self.tables.bond.failed(m, u, traction)
-        return traction, slipped, failed
-
-    @ti.func
-    def _is_pending(self, b):
+    def is_pending(self, b):
         """Whether a bond holds and has not applied its impulse for the coming step already."""
         pending = self.state.broken_tick[b] < 0
         if ti.static(self.schedule.controlled):
@@ -134,7 +54,60 @@ class BondStep:
         return pending
 
     @ti.func
-    def bond_share(self, b):
+    def answer(self, b, dt, motion, moved):
+        """``BondAnswer`` at a motion, for a step [s]; moved: by how much springs stretch now."""
+        stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
+        found, scale = BondAnswer(), self.share(b)
+        for q in range(3):
+            u = 3 * b + q
+            arm = unit_arm(motion, self.tables.vertex_slave[u])
+            opening = unit_opening(motion, arm, self.tables.vertex_master[u])
+            before = self._residual_slip(u)
+            traction, spent, broken = self.by_law(m, b, u, stiffness, opening)
+            way = dt * unit_velocity(moved, arm)
+            found.worked += dot(traction, way)
+            if spent != 0.0:
+                # Booked at the mean of the tractions before and after the step.
+                slip = self._residual_slip(u) - before
+                spent -= 0.5 * stiffness[1] * dot(vec2(way[1], way[2]), slip)
+            if ti.static(self.notes_limits):
+                across = vec2(traction[1], traction[2])
+                self.state.note_passed(m, b, traction[0], squared(across))
+            if ti.static(self.has_dashpot):
+                velocity = unit_velocity(motion, arm)
+                drag = scale * self.dashpot.traction(b, velocity)
+                traction += drag
+                found.dragged += dot(drag, velocity)
+            found.force += traction
+            found.torque += cross(arm, traction)
+            found.slipped += spent
+            found.failed |= broken
+        return found
+
+    @ti.func
+    def by_law(self, m, b, u, stiffness, opening):
+        """Traction of a unit [Pa], energy per area slipped now [J/m^2], 1 where it has failed."""
+        traction = vec3(stiffness[0], stiffness[1], stiffness[1]) * opening
+        slipped, failed, acts = 0.0, 0, True
+        if ti.static(self.on_demand):
+            near = self.law.begins(m, stiffness, opening)
+            acts = self.state.activity.is_active(b, near, self.state.tick[None])
+        if ti.static(not self.law.is_null):
+            if acts:
+                traction, slipped = self.law.traction(m, u, stiffness, opening)
+                failed = self.law.failed(m, u, traction)
+        return traction, slipped, failed
+
+    @ti.func
+    def _residual_slip(self, u):
+        """Slip of a unit that its law remembers, in the face frame [m], else zero."""
+        slip = vec2(0.0)
+        if ti.static(self.law.remembers_slip):
+            slip = self.law.residual_slip(u)
+        return slip
+
+    @ti.func
+    def share(self, b):
         """Share of its coefficient that a limited dashpot of a bond keeps: the smaller of two."""
         share = 1.0
         if ti.static(self.limited):
@@ -144,18 +117,54 @@ class BondStep:
         return share
 
     @ti.func
-    def _pull_together(self, slots, motion, impulse, moment):
-        """Add opposite impulses to master and slave; moment is about the slave's centre."""
-        linear = transposed_matvec(motion.axes, impulse)
-        angular = transposed_matvec(motion.axes, moment)
+    def pull(self, b, dt, motion, found):
+        """Add the impulse of a ``BondAnswer`` to both bodies, and book what it took."""
+        area, slots = self.tables.unit_area[b], self.tables.bond_slots[b]
+        linear = transposed_matvec(motion.axes, found.force * (area * dt))
+        # About the slave's centre.
+        angular = transposed_matvec(motion.axes, found.torque * (area * dt))
         self._push(slots[0], stacked(linear, angular + cross(motion.branch, linear)))
         self._push(slots[1], stacked(-linear, -angular))
+        self.book_drag(b, area * (found.dragged * dt))
+        if ti.static(self.law.rubs):
+            if found.slipped != 0.0:
+                self._book_heat(b, area * vec2(found.slipped, 0.0))
 
     @ti.func
     def _push(self, slot, impulse):
         if ti.static(not self.schedule.every_bond_acts):
             impulse += self.state.slot[slot]
         self.state.slot[slot] = impulse
+
+    @ti.func
+    def book_drag(self, b, energy):
+        """Book energy that the dashpots of a bond took [J]."""
+        if ti.static(self.has_dashpot):
+            self.state.bond_drag[b] = self.state.bond_drag[b] + energy
+
+    @ti.func
+    def _book_heat(self, b, energies):
+        self.state.bond_heat[b] = self.state.bond_heat[b] + energies
+
+    @ti.func
+    def release(self, b, motion, found):
+        """Release a bond with a failed unit: its faces carry contact spheres from now on."""
+        if ti.static(not self.law.is_null):
+            # The springs have acted for the first half of the step to here.
+            freed = self._stored(b, motion) - 0.5 * found.worked
+            self._book_heat(b, self.tables.unit_area[b] * vec2(found.slipped, freed))
+        slots, tick = self.tables.bond_slots[b], self.state.tick[None]
+        self.state.broken_tick[b] = tick
+        for side in ti.static(range(2)):
+            if ti.static(self.schedule.every_bond_acts):
+                self.state.slot[slots[side]] = ti.Vector.zero(real, 6)
+            if ti.static(self.schedule.has_contact):
+                self.state.exposed_tick[slots[side]] = tick
+            self.schedule.lists.note_change(slots[side] >> 2)
+            if ti.static(self.has_limits):
+                self.limits.notice(slots[side] >> 2, RELEASE)
+        if ti.static(self.schedule.has_contact):
+            self.schedule.contacts.search_requested[None] = 1
 
     @ti.func
     def _stored(self, b, motion):
@@ -165,39 +174,21 @@ class BondStep:
             u = 3 * b + q
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-            normal, tangential = self.tables.bond.stored(b, u, opening)
+            normal, tangential = self.law.stored(b, u, opening)
             energy += normal
             energy += tangential
         return energy
 
     @ti.func
-    def bond_energy(self, b, motion):
+    def energy(self, b, motion):
         """Elastic energy stored in an intact bond at a motion [J]."""
         return self.tables.unit_area[b] * self._stored(b, motion)
 
     @ti.func
-    def bond_power(self, b, motion):
+    def power(self, b, motion):
         """Power that the dashpots of an intact bond take at a motion [W]."""
-        power, scale = 0.0, self.bond_share(b)
-        if ti.static(self.solves_bonds):
-            motion = self.solver.bonds.mean(b, motion)
+        power, scale = 0.0, self.share(b)
         for q in range(3):
             velocity = unit_velocity(motion, unit_arm(motion, self.tables.vertex_slave[3 * b + q]))
-            power += scale * dot(self.tables.dashpot.traction(b, velocity), velocity)
+            power += scale * dot(self.dashpot.traction(b, velocity), velocity)
         return power * self.tables.unit_area[b]
-
-    @ti.func
-    def _release(self, b, slots):
-        """Release a bond with a failed unit: its faces carry contact spheres from now on."""
-        tick = self.state.tick[None]
-        self.state.broken_tick[b] = tick
-        for side in ti.static(range(2)):
-            if ti.static(self.schedule.every_bond_acts):
-                self.state.slot[slots[side]] = ti.Vector.zero(real, 6)
-            if ti.static(self.has_contact):
-                self.state.exposed_tick[slots[side]] = tick
-            self.schedule.note_change(slots[side] >> 2)
-            if ti.static(self.has_limits):
-                self.limits.notice(slots[side] >> 2, RELEASE)
-        if ti.static(self.has_contact):
-            self.contacts.search_requested[None] = 1

@@ -1,4 +1,4 @@
-"""Contact forces of a pair of bodies, as a part of ``Advance``; springs of friction."""
+"""Contact forces of a pair of bodies; springs of friction."""
 
 import taichi as ti
 
@@ -6,7 +6,6 @@ from taichi_dem.kit.products import cross, dot, matvec, norm, transposed_matvec
 from taichi_dem.kit.types import mat3, real, vec3
 from taichi_dem.physics.rotation import place_in
 from taichi_dem.physics.sphere_pair import active_bits, add_within
-from taichi_dem.stability.body_limits import HIT
 from taichi_dem.step.multirate.schedule import Schedule
 
 
@@ -94,34 +93,15 @@ class PairForces:
 
 
 @ti.data_oriented
-class ContactForce:
-    """Base of ``Advance``, which owns all that is used here."""
+class ContactForces:
+    """Evaluates the contacts of a pair of bodies, and what it gives in a step."""
 
-    @ti.func
-    def contact(self, p):
-        """Evaluate the sphere contacts of a pair of bodies: repulsion and friction."""
-        pair = self.contacts.store.body[p]
-        i, j = pair[0], pair[1]
-        elapsed, margin = 0.0, 0.0
-        if ti.static(self.springs.present):
-            elapsed = self.springs.elapsed(p)
-        if ti.static(self.has_limits):
-            margin = self.limits.contact_limits.margin(i, j)
-        found = self.forces_of(p, elapsed, margin, True)
-        if found.active != 0:
-            self.state.note_active(i, found.active)
-            self.state.note_active(j, found.active)
-        if found.deepest > 0.0:
-            dt = self._pair_step(p, i, j)
-            self.contacts.add_impulse(p, 0, -found.force * dt, found.moment_i * dt)
-            self.contacts.add_impulse(p, 1, found.force * dt, found.moment_j * dt)
-            heat = dt * vec3(found.dragged, found.rubbed, 0.0)
-            self.contacts.store.heat[p] = self.contacts.store.heat[p] + heat
-        if ti.static(self.springs.present):
-            self.contacts.book_friction(p, found.slipped)
-        self.contacts.note_depth(p, found.deepest)
-        if ti.static(self.has_limits):
-            self.limits.notice_pair(p, found.near_count, HIT)
+    def __init__(self, schedule: Schedule):
+        self.schedule, self.tables, self.state = schedule, schedule.tables, schedule.state
+        self.contacts, self.store = schedule.contacts, schedule.store
+        self.springs = TangentialSprings(schedule)
+        self.limits, self.has_limits = schedule.limits, schedule.has_limits
+        self.limited = self.has_limits and schedule.limits.limited
 
     @ti.func
     def forces_now(self, p):
@@ -129,9 +109,28 @@ class ContactForce:
         return self.forces_of(p, 0.0, 0.0, False)
 
     @ti.func
+    def push(self, p, dt, found):
+        """Add the impulses of a pair's forces in a time [s] to both bodies, and their heat."""
+        self.contacts.add_impulse(p, 0, -found.force * dt, found.moment_i * dt)
+        self.contacts.add_impulse(p, 1, found.force * dt, found.moment_j * dt)
+        heat = dt * vec3(found.dragged, found.rubbed, 0.0)
+        self.store.heat[p] = self.store.heat[p] + heat
+
+    @ti.func
+    def book(self, p, found):
+        """Note what acted in a pair, its depth, and what its springs lost."""
+        pair = self.store.body[p]
+        if found.active != 0:
+            for side in ti.static(range(2)):
+                self.state.note_active(pair[side], found.active)
+        if ti.static(self.springs.present):
+            self.contacts.book_friction(p, found.slipped)
+        self.contacts.note_depth(p, found.deepest)
+
+    @ti.func
     def forces_of(self, p, elapsed, margin, stepping: ti.template()):
         """Forces of a pair's sphere contacts now, a ``PairForces``."""
-        pair = self.contacts.store.body[p]
+        pair = self.store.body[p]
         i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
         # Most candidates do not touch: tested in the first body's frame, at half the cost.
@@ -139,8 +138,8 @@ class ContactForce:
         turn, offset = place_in(rotation, self.state.rotation(j), branch)
         found, scale, m = PairForces(), 1.0, self.tables.pair(i, j)
         if ti.static(self.limited):
-            scale = self.contact_share(i, j)
-        for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
+            scale = self.share(i, j)
+        for k in range(self.store.first[p], self.store.last[p]):
             near = self.contacts.look(k, i, j, turn, offset, margin, stepping)
             if ti.static(self.has_limits):
                 found.near_count += ti.cast(self.contacts.law.is_within(near, margin), ti.i32)
@@ -210,7 +209,7 @@ class ContactForce:
         return value
 
     @ti.func
-    def _pair_step(self, p, i, j):
+    def pair_step(self, p, i, j):
         """Time [s] for which a touching pair applies its force now; 0 if done already."""
         dt = self.schedule.pair_step(i, j)
         if ti.static(self.schedule.controlled):
@@ -226,7 +225,7 @@ class ContactForce:
         return self.state.velocity[i] + cross(self.state.spin[i], arm)
 
     @ti.func
-    def contact_share(self, i, j):
+    def share(self, i, j):
         """Share of its coefficient that a limited dashpot of a pair in contact keeps."""
         first = self.limits.contact_share(i, self.schedule.own_step(i))
         return ti.min(first, self.limits.contact_share(j, self.schedule.own_step(j)))

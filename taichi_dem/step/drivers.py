@@ -81,7 +81,7 @@ class Resident:
     @ti.kernel
     def _steps(self, begin: ti.i32, end_tick: ti.i64, substeps: ti.i32) -> ti.i32:
         # Returns the substeps done, or -1 less them where a search is called for. At the start the
-        # bonds act alone: what takes longest to compile is compiled once.
+        # phases that always run do so alone: what takes longest to compile is compiled once.
         done = 0
         low = ti.static(self.step.schedule.low)
         ti.loop_config(serialize=True)
@@ -93,12 +93,19 @@ class Resident:
             finished = self.step.state.tick[None] >= end_tick or self.step.halted() == 1
             if s == substeps or (finished and begin == 0):
                 break
-            for members, item in ti.static(self.step.phases):
-                count = members.count(low[None])
-                if ti.static(not self.step.is_of_start(item)):
-                    count *= 1 - begin
-                for a in range(count):
-                    item(members.pick(a))
+            for group in ti.static(self.step.groups):
+                if ti.static(group.sweeps):
+                    while self.step.solver.unsolved[None] == 1:
+                        for members, item, _ in ti.static(group.phases):
+                            for a in range(members.count(low[None])):
+                                item(members.pick(a))
+                else:
+                    for members, item, always in ti.static(group.phases):
+                        count = members.count(low[None])
+                        if ti.static(not always):
+                            count *= 1 - begin
+                        for a in range(count):
+                            item(members.pick(a))
             done = s + 1
         return done
 
@@ -119,28 +126,32 @@ class Parallel:
 
     A GPU is given some substeps at a time, of which those after the end or a halt do nothing, and
     as many sweeps as were needed before: the host waits for its answer once.
+
+    ended: bits by which the last substep ended, or 0; wanted: sweeps that the next one may need.
     """
 
     name = "parallel"
+    scratch_fields = ("ended", "wanted")
 
     def __init__(self, step: Step):
         self.step, self.on_gpu, self.state = step, not backend.is_cpu(), 0
         self.queued = QUEUED if self.on_gpu else 1
         # As many as the steps before have needed; none is known at the start.
         self.sweeps = 0
+        self.ended, self.wanted = (ti.field(ti.i32, shape=()) for _ in range(2))
         bodies = step.state.position.shape[0]
-        self.tasks = tuple(tasks(part, bodies) for part in step.parts)
-        self._parts = tuple(Launch(self._run, part) for part in range(len(step.parts)))
+        self.tasks = tuple(tasks(group.loops(), bodies) for group in step.groups)
+        self._groups = tuple(Launch(self._run, number) for number in range(len(step.groups)))
 
     def begin(self) -> None:
         """Run the phases of the start; compiles their kernels."""
         self.step.start(0)
-        self._parts[-1](0, 0, 1)
+        self._groups[-1](0, 0, 1)
         self.step.start(1)
 
     def prepare(self) -> None:
         """Make a requested search, without a step; compiles the kernels."""
-        for launch in self._parts:
+        for launch in self._groups:
             launch(0, 0, 0)
         if self.step.has_contact:
             self.step.search.renew()
@@ -158,7 +169,7 @@ class Parallel:
         if self.queued > 1:
             # At least as many substeps are left as largest steps: all of them do something.
             left = (end_tick - int(values(self.step.state.tick))) // MACRO_TICKS
-            known = self.sweeps > 0 or len(self._parts) == 1
+            known = self.sweeps > 0 or len(self._groups) == 1
             count = max(1, min(left, self.queued if known else 1))
         while not self._substeps(end_tick, count):
             if time.perf_counter() - start > CALL_SECONDS:
@@ -169,7 +180,7 @@ class Parallel:
     def _substeps(self, end_tick, count):
         """Run some substeps, or to a search that is requested; nonzero at the end or a halt."""
         if self.state:
-            assign(self.step.ended, 0)
+            assign(self.ended, 0)
         for _ in range(count - 1):
             self._substep(end_tick).queue(end_tick, 1, 1)
         self._take(self._substep(end_tick)(end_tick, 1, 1))
@@ -182,11 +193,11 @@ class Parallel:
         return self.state & ~_SEARCH
 
     def _substep(self, end_tick):
-        """Queue all parts of a substep but the last one, which is returned."""
-        *earlier, last = self._parts
-        for part, launch in enumerate(earlier):
+        """Queue all groups of a substep but the last one, which is returned."""
+        *earlier, last = self._groups
+        for group, launch in zip(self.step.groups, earlier):
             if self.on_gpu:
-                for _ in range(max(1, self.sweeps) if part else 1):
+                for _ in range(max(1, self.sweeps) if group.sweeps else 1):
                     launch.queue(end_tick, 1, 1)
             else:
                 while launch(end_tick, 1, 1):
@@ -195,69 +206,84 @@ class Parallel:
 
     def _finish_sweeps(self, end_tick):
         """Go on with a substep in which more sweeps are needed than were queued."""
-        assign(self.step.ended, 0)
-        while self._parts[1](end_tick, 1, 1):
+        assign(self.ended, 0)
+        while self._groups[1](end_tick, 1, 1):
             pass
-        self._take(self._parts[-1](end_tick, 1, 1))
+        self._take(self._groups[-1](end_tick, 1, 1))
 
     def _take(self, found):
         """Take over how the last substep ended, and how many sweeps the next one may need."""
         self.state, self.sweeps = found & _ENDS, found // (_ENDS + 1)
 
     @ti.kernel
-    def _run(self, part: ti.template(), end_tick: ti.i64, rest: ti.i32, bonds: ti.i32) -> ti.i32:
-        # bonds, rest: 1 to run the phase of the bonds, and all others; 0 and 0 compile the kernel.
+    def _run(self, number: ti.template(), end_tick: ti.i64, rest: ti.i32, first: ti.i32) -> ti.i32:
+        # first, rest: 1 to run the phases that always run, and all others; 0 and 0 compile only.
         low = ti.static(self.step.schedule.low)
-        for serial, phases in ti.static(self.tasks[part]):
-            active, item = ti.static(phases[0])
-            is_of_start = ti.static(self.step.is_of_start(item))
+        for serial, phases in ti.static(self.tasks[number]):
+            active, item, always = ti.static(phases[0])
             if ti.static(serial):
                 ti.loop_config(serialize=True)
-                for _ in range(self._share(part, False, rest, bonds)):
-                    for members, each in ti.static(phases):
+                for _ in range(self._share(number, False, rest, first)):
+                    for members, each, _always in ti.static(phases):
                         for a in range(members.count(low[None])):
                             each(members.pick(a))
             elif ti.static(self.on_gpu):
                 # The length of a loop is a task of its own there, and starts 131,072 threads.
                 for a in range(ti.static(active.most)):
-                    if a < self._share(part, is_of_start, rest, bonds) * active.count(low[None]):
+                    if a < self._share(number, always, rest, first) * active.count(low[None]):
                         item(active.pick(a))
-                        self.step.state.check_loops(rest + bonds)
+                        self.step.state.check_loops(rest + first)
             else:
-                count = self._share(part, is_of_start, rest, bonds) * active.count(low[None])
+                count = self._share(number, always, rest, first) * active.count(low[None])
                 for a in range(count):
                     item(active.pick(a))
-        return self._ended(part, end_tick, rest)
+        return self._ended(number, end_tick, rest)
 
     @ti.func
-    def _share(self, part: ti.template(), is_of_start: ti.template(), rest, bonds):
-        """1 where a phase is to run; only the start runs the bonds without the rest."""
+    def _share(self, number: ti.template(), always: ti.template(), rest, first):
+        """1 where a phase is to run; a start runs those that always run without the rest."""
         share = rest
-        if self.step.ended[None] != 0 or self.step.waits(part) == 1:
+        if self.ended[None] != 0 or self._waits(number) == 1:
             share = 0
-        if ti.static(is_of_start):
-            share = bonds * (share + 1 - rest)
+        if ti.static(always):
+            share = first * (share + 1 - rest)
         return share
 
     @ti.func
-    def _ended(self, part: ti.template(), end_tick, rest):
-        """Whether a part is repeated; of the last one how the substep ended, which it notes."""
-        found = self.step.repeats(part)
-        if ti.static(part == len(self.step.parts) - 1):
-            if rest == 1 and self.step.ended[None] == 0:
+    def _waits(self, number: ti.template()):
+        """1 for sweeps once all dashpots are solved, and for what follows until they are."""
+        wait = 0
+        if ti.static(self.step.groups[number].sweeps):
+            wait = 1 - self.step.solver.unsolved[None]
+        elif ti.static(self.step.groups[number].follows):
+            wait = self.step.solver.unsolved[None]
+        return wait
+
+    @ti.func
+    def _ended(self, number: ti.template(), end_tick, rest):
+        """Whether sweeps are repeated; of the last group how the substep ended, which it notes."""
+        found = 0
+        if ti.static(self.step.groups[number].sweeps):
+            found = self.step.solver.unsolved[None]
+        if ti.static(number == len(self.step.groups) - 1):
+            if rest == 1 and self.ended[None] == 0:
                 found = ti.cast(self.step.state.tick[None] >= end_tick, ti.i32)
                 found |= self.step.halted()
                 if ti.static(self.step.has_contact):
                     found |= _SEARCH * self.step.search.is_requested()
                 if ti.static(backend.most_rounds() > 0):
                     found |= _CUT_SHORT * self.step.state.cut_short[None]
-                if self.step.waits(part) == 1:
+                if self._waits(number) == 1:
                     found = _UNSOLVED
-                self.step.ended[None] = found
+                self.ended[None] = found
                 # As many sweeps as this substep has made, or one fewer than were wanted before it.
-                wanted = ti.max(self.step.wanted[None] - 1, self.step.sweeps())
-                self.step.wanted[None] = wanted
-            found = self.step.ended[None] + (_ENDS + 1) * self.step.wanted[None]
+                wanted = self.wanted[None] - 1
+                if ti.static(self.step.solves):
+                    wanted = ti.max(wanted, self.step.solver.sweeps[None])
+                else:
+                    wanted = ti.max(wanted, 0)
+                self.wanted[None] = wanted
+            found = self.ended[None] + (_ENDS + 1) * self.wanted[None]
         return found
 
 

@@ -20,7 +20,6 @@ from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
 from taichi_dem.state.timeline import MACRO_TICKS, NEVER
-from taichi_dem.step.bond import motion_of
 
 ASLEEP, AWAKE, STIRRED = range(3)
 #: Bodies whose momenta are summed one after the other.
@@ -44,12 +43,12 @@ class Sleeping(Places):
 
     awake: ASLEEP, AWAKE, or STIRRED once the body has woken its neighbours. since: tick at which it
     woke, NEVER while asleep. stride: step [s] in which it woke others. woken: bodies that wait to
-    be listed, woken_count of them. unsorted: bodies listed out of order since. share: of an opening
-    or a speed, at which a body wakes its neighbours; 0 where none sleeps. part: connected part of
-    each body. mean: speed of each part, its momenta by size over its mass [m/s], mass [kg]. bound2:
-    square of the speed that wakes now [(m/s)^2], of each part. members: bodies by part; chunks of
-    them in a row, chunk_count, begin at chunk_first; sums: of the momenta of each [N s]. left_out:
-    bound of the impulse [N s] and the energy [J] that each bond left out before it woke.
+    be listed, woken_count of them. unsorted: bodies listed out of order since. starting: 1 at the
+    start, when all bonds act once. share: of an opening or a speed, at which a body wakes its
+    neighbours; 0 where none sleeps. part: connected part of each body. mass [kg], bound2: of each
+    part; square of the speed that wakes now [(m/s)^2]. members: bodies by part; chunks of them in
+    a row, chunk_count, begin at chunk_first; sums: of the momenta of each [N s]. left_out: bound of
+    the impulse [N s] and the energy [J] that each bond left out before it woke.
     """
 
     def __init__(self, tables: Tables, state: State):
@@ -57,11 +56,12 @@ class Sleeping(Places):
         self.tables, self.state, self.acting = tables, state, (*tables.loads, *tables.supports)
         self.awake, self.woken = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.part, self.members = (ti.field(ti.i32, shape=n) for _ in range(2))
-        self.mass, self.mean, self.bound2 = (ti.field(real, shape=n) for _ in range(3))
+        self.mass, self.bound2 = (ti.field(real, shape=n) for _ in range(2))
         self.stride, self.sums = (ti.field(real, shape=n) for _ in range(2))
         self.since, self.share = ti.field(ti.i64, shape=n), ti.field(real, shape=())
-        self.woken_count, self.unsorted = (ti.field(ti.i32, shape=()) for _ in range(2))
-        self.chunk_count = ti.field(ti.i32, shape=())
+        self.woken_count, self.unsorted, self.starting, self.chunk_count = (
+            ti.field(ti.i32, shape=()) for _ in range(4)
+        )
         self.chunk_first = ti.field(ti.i32, shape=n + 1)
         self.left_out = ti.Vector.field(2, real, shape=tables.capacity.bonds)
 
@@ -88,7 +88,7 @@ class Sleeping(Places):
     def at_rest(self, b, factor, rounding):
         """Energy that the springs of a bond hold [J], and nonzero where its law would begin."""
         stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
-        motion, energy, begins = motion_of(self, b), 0.0, 0
+        motion, energy, begins = self.state.bond_motion(b), 0.0, 0
         for u in range(3 * b, 3 * b + 3):
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = beyond(unit_opening(motion, arm, self.tables.vertex_master[u]), rounding)
@@ -118,7 +118,7 @@ class Sleeping(Places):
     def _withheld(self, b, elapsed, last, rounding):
         """Impulse [N s] and energy [J] of a bond that was not evaluated for a time [s]."""
         stiffness, force, energy = self.tables.bond_stiffness[b], vec3(0.0), 0.0
-        motion = motion_of(self, b)
+        motion = self.state.bond_motion(b)
         for u in range(3 * b, 3 * b + 3):
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
@@ -198,13 +198,6 @@ class Sleeping(Places):
         return found
 
     @ti.func
-    def leaves_out(self, b, i, j):
-        """Whether the springs of a sleeping bond hold more than is allowed."""
-        speed = self.share[None] * self.mean[self.part[i]]
-        _, is_more = self._held(b, i, j, speed * speed)
-        return is_more
-
-    @ti.func
     def _held(self, b, i, j, speed2):
         """Energy that the springs of a bond hold [J], and whether that is more than allowed."""
         rounding = self.rounding(i)
@@ -248,7 +241,7 @@ class Sleeping(Places):
 
     @ti.func
     def renew_bound(self):
-        """Set the mean speed and the bound of each part from the sums of its chunks."""
+        """Set the bound of each part from the sums of its chunks: a share of its mean speed."""
         total = 0.0
         for c in range(self.chunk_count[None]):
             total += self.sums[c]
@@ -258,7 +251,6 @@ class Sleeping(Places):
             if not last:
                 last = self.part[self.members[end]] != p
             if last:
-                self.mean[p] = total / self.mass[p]
-                bound = self.share[None] * self.mean[p]
+                bound = self.share[None] * (total / self.mass[p])
                 self.bound2[p] = bound * bound
                 total = 0.0

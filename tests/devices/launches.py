@@ -82,7 +82,7 @@ def figures(method, listed, reads):
 
 def count_of(simulation):
     """Substeps and sweeps so far."""
-    solver = simulation.engine.advance.solver
+    solver = simulation.engine.step.solver
     sweeps = int(simulation.values(solver.total_sweeps)) if solver else 0
     return int(simulation.values(simulation.schedule.evaluations)[0]), sweeps
 

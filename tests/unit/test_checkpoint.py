@@ -98,7 +98,7 @@ def test_fields_are_named_by_attributes_but_for_lanes(simulation):
     engine = simulation.engine
     names = [field.name for field in fields_of(engine) if field.kind == "saved"]
     numbered = {name for name in names if any(part.isdigit() for part in name.split("."))}
-    assert numbered == {f"advance.solver.bonds.{row}.{n}" for row in "abc" for n in range(3)}
+    assert numbered == {f"step.solver.bonds.{row}.{n}" for row in "abc" for n in range(3)}
     assert {"state.position", "schedule.evaluations", "contacts.store.body"} <= set(names)
 
 

@@ -31,7 +31,7 @@ class DashpotSystem:
     """
 
     def __init__(self, simulation):
-        solver, model = simulation.advance.solver, simulation.model
+        solver, model = simulation.step.solver, simulation.model
         bonds, count = solver.bonds, model.body_count
         names = ("masters", "slaves", "branch", "last")
         masters, slaves, branch, last = (by_lane(values(getattr(bonds, name))) for name in names)
@@ -105,7 +105,7 @@ def test_what_the_kernels_have_solved_is_a_solution(simulation):
     Nothing but what a step turns the branches: of them, and of spins near 50 / s, 2e-5.
     """
     system = DashpotSystem(simulation)
-    motion = simulation.values(simulation.advance.solver.velocities.twist)[
+    motion = simulation.values(simulation.step.solver.velocities.twist)[
         : simulation.model.body_count
     ]
     swept = after(system.gauss_seidel(motion, system.last), 0)

@@ -13,6 +13,7 @@ from taichi_dem.physics.wrench import inverse, plus, point_block, zero_block
 from taichi_dem.state.model import Model
 from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.implicit.velocities import Velocities
+from taichi_dem.step.multirate.lists import Coloured
 from taichi_dem.step.multirate.schedule import Schedule
 
 #: Colours that links of at most four a body can need: a link meets six others at most.
@@ -61,6 +62,7 @@ class BondDashpots:
         groups = ti.root.dense(ti.i, self.groups)
         groups.place(*visited)
         groups.place(self.start)
+        self.by_colour = Coloured(self.colour_first, BOND_COLOURS, self.groups)
 
     def load(self, model: Model, method: ImplicitDashpots) -> None:
         """Colour the bonds of a model and take the numbers of a method."""

@@ -11,6 +11,7 @@ from taichi_dem.physics.rotation import place_in, unit3
 from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to
 from taichi_dem.step.contact_force import PairForces, TangentialSprings
 from taichi_dem.step.implicit.velocities import Velocities
+from taichi_dem.step.multirate.lists import Coloured
 from taichi_dem.step.multirate.schedule import Schedule
 
 #: Colours of pairs that share no body; pairs without a free one are visited last, in turn.
@@ -78,8 +79,10 @@ class PairDashpots:
         self.branch = ti.Vector.field(3, real, shape=pairs)
         self.touching, self.order, self.colour = (ti.field(ti.i32, shape=pairs) for _ in range(3))
         self.colour_first = ti.field(ti.i32, shape=LEFT + 2)
+        most = schedule.lists.pairs.most
+        self.by_colour = Coloured(self.colour_first, WIDE, most, LEFT, self.visit_last)
         keys = LEFT + 1, self._key, self._key, self._list, self._end_colour
-        self.colouring = CountingSort(schedule.pairs.everyone, *keys)
+        self.colouring = CountingSort(schedule.lists.pairs.everyone, *keys)
 
     @property
     def phases(self) -> Phases:

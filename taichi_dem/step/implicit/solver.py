@@ -7,8 +7,8 @@ from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.state.model import Model
-from taichi_dem.step.implicit.bonds import BOND_COLOURS, BondDashpots
-from taichi_dem.step.implicit.pairs import LEFT, PairDashpots
+from taichi_dem.step.implicit.bonds import BondDashpots
+from taichi_dem.step.implicit.pairs import PairDashpots
 from taichi_dem.step.implicit.velocities import GroundSweeps, Velocities
 from taichi_dem.step.multirate.schedule import Schedule
 
@@ -35,12 +35,9 @@ class Solver:
         self.velocities = Velocities(tables)
         self.has_bonds, self.has_ground = bool(tables.dashpot.name), bool(tables.ground)
         self.has_contact = schedule.has_contact
-        if self.has_bonds:
-            self.bonds = BondDashpots(schedule, self.velocities)
-        if self.has_ground:
-            self.ground = GroundSweeps(schedule, self.velocities)
-        if self.has_contact:
-            self.pairs = PairDashpots(schedule, self.velocities)
+        self.bonds = BondDashpots(schedule, self.velocities) if self.has_bonds else None
+        self.ground = GroundSweeps(schedule, self.velocities) if self.has_ground else None
+        self.pairs = PairDashpots(schedule, self.velocities) if self.has_contact else None
         self.sweeps, self.unsolved = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.total_sweeps, self.unconverged = (ti.field(ti.i64, shape=()) for _ in range(2))
         self.first_change2, self.residual2 = (ti.field(real, shape=()) for _ in range(2))
@@ -50,7 +47,7 @@ class Solver:
         """Load the numbers of a method, and the bonds of a model."""
         assign(self.bounds, np.array(method.sweeps))
         assign(self.tolerance, method.tolerance)
-        if self.has_bonds:
+        if self.bonds is not None:
             self.bonds.load(model, method)
 
     @ti.func
@@ -60,21 +57,6 @@ class Solver:
         self.unsolved[None] = 1
         self.velocities.change2[None], self.speed2[None] = 0.0, 0.0
         self.velocities.twist[self.velocities.spare] = vec6(0.0)
-
-    @ti.func
-    def solve(self, one):
-        """All sweeps of a step, one member after the other."""
-        while self.unsolved[None] == 1:
-            if ti.static(self.has_bonds):
-                for g in range(self.bonds.colour_first[BOND_COLOURS]):
-                    self.bonds.visit(g)
-            if ti.static(self.has_contact):
-                for a in range(self.pairs.colour_first[LEFT]):
-                    self.pairs.visit(a)
-            if ti.static(self.has_ground):
-                for a in range(self.schedule.bodies.count(0)):
-                    self.ground.visit(self.schedule.bodies.pick(a))
-            self.check_convergence(0)
 
     @ti.func
     def check_convergence(self, one):

@@ -9,7 +9,7 @@ import taichi as ti
 
 from taichi_dem.kit.products import dot
 from taichi_dem.kit.types import real
-from taichi_dem.step.advance import Advance
+from taichi_dem.step.phases import Step
 
 
 @ti.data_oriented
@@ -20,9 +20,9 @@ class HalfStep:
     at the present time are brought forward: between two largest steps others wait for theirs.
     """
 
-    def __init__(self, advance: Advance):
-        self.advance, self.tables, self.state = advance, advance.tables, advance.state
-        self.schedule, self.staggered = advance.schedule, advance.staggered
+    def __init__(self, step: Step):
+        self.step, self.tables, self.state = step, step.tables, step.state
+        self.schedule, self.loads, self.staggered = step.schedule, step.loads, step.staggered
 
     @ti.func
     def is_due(self, i):
@@ -42,16 +42,15 @@ class HalfStep:
             linear += 0.5 * self.state.slot[4 * i + f][0:3]
             angular += 0.5 * self.state.slot[4 * i + f][3:6]
         step = self.schedule.own_step(i)
-        linear, angular, kick = self.advance.loaded(
-            i, step, linear, angular, self.advance.load_up_to
-        )
-        if ti.static(self.advance.has_ground):
-            rows = 0.5 * self.advance.ground_impulses(i, step, 2.0 * linear, 2.0 * angular)
+        loads = self.loads
+        linear, angular, kick = loads.loaded(i, step, linear, angular, loads.load_up_to)
+        if ti.static(loads.has_ground):
+            rows = 0.5 * loads.ground_impulses(i, step, 2.0 * linear, 2.0 * angular)
             if back == 1:
                 # Of a step around the present: its mean motion is the present one.
                 velocity, spin = self.state.velocity[i], self.state.spin[i]
-                rows = self.advance.ground_shares(i, 0.5 * step, velocity, spin)
-            linear, angular, kick = self.advance.with_ground(rows, linear, angular, kick)
+                rows = loads.ground_shares(i, 0.5 * step, velocity, spin)
+            linear, angular, kick = loads.with_ground(rows, linear, angular, kick)
         return linear, angular, kick
 
     @ti.func
@@ -62,21 +61,21 @@ class HalfStep:
         velocity, momentum = before, spun
         if ti.static(self.staggered):
             if back == 1:
-                self.advance.start_loads(i, 0.5 * self.schedule.own_step(i))
+                self.loads.start_loads(i, 0.5 * self.schedule.own_step(i))
         if self.is_due(i) == 1:
             linear, angular, kick = self.impulse(i, pushed, turned, back)
             linear *= self.tables.mass_inverse[i]
             if back == 1:
                 self.state.velocity[i] = before - linear
                 self.state.angular_momentum[i] = spun - angular
-                self.state.spin[i] = self.advance.spin(i, spun - angular)
+                self.state.spin[i] = self.loads.spin(i, spun - angular)
             else:
                 now = self.schedule.seconds(self.state.tick[None])
-                velocity, momentum = self.advance.allowed(
+                velocity, momentum = self.loads.allowed(
                     i, now, 0.0, before + linear, spun + angular
                 )
                 mean = 0.5 * (before + velocity)
-                turning = self.advance.spin(i, 0.5 * (spun + momentum))
+                turning = self.loads.spin(i, 0.5 * (spun + momentum))
                 for _effect, e, place, _bit in ti.static(self.tables.drives):
                     for k in ti.static(range(3)):
                         work = kick[e, k] * mean[k] + kick[e, 3 + k] * turning[k]
@@ -93,11 +92,11 @@ class HalfStep:
         slots = self.tables.bond_slots[b]
         step = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)
         # A solved dashpot is booked a step late, an explicit one ahead of its step.
-        sign = ti.static(0.5 if self.advance.solves_bonds else -0.5)
-        return sign * step * self.advance.bond_power(b, motion)
+        sign = ti.static(0.5 if self.step.solves else -0.5)
+        return sign * step * self.step.bond_power(b, motion)
 
     @ti.func
     def pair_step(self, p):
         """Half of the coming step of a pair of bodies [s]; 0 where nothing is behind."""
-        pair = self.advance.contacts.store.body[p]
+        pair = self.schedule.store.body[p]
         return 0.5 * self.schedule.pair_step(pair[0], pair[1])

@@ -5,7 +5,7 @@ from typing import Any
 
 import taichi as ti
 
-from taichi_dem.kit.ordered import CountingSort, Places
+from taichi_dem.kit.ordered import CountingSort, Once, Phases, Places
 from taichi_dem.state.timeline import MAX_LEVEL
 
 
@@ -50,6 +50,37 @@ class Colour(Places):
     def pick(self, a):
         """Place of one of them."""
         return self.colour_first[self.colour] + a
+
+
+@ti.data_oriented
+class Coloured(Places):
+    """Members of all colours in their order; those of one share nothing.
+
+    colour_first: as of ``Colour``. colours: those whose members may be visited side by side. end:
+    number of all. rest: visits those after them, one after the other.
+    """
+
+    def __init__(
+        self,
+        colour_first: ti.Field,
+        colours: int,
+        most: int,
+        end: int | None = None,
+        rest: Any = None,
+    ):
+        self.colour_first, self.colours, self.most = colour_first, colours, most
+        self.end, self.rest = colours if end is None else end, rest
+
+    @ti.func
+    def count(self, low):
+        """Number of all members."""
+        return self.colour_first[self.end]
+
+    def loops(self, item: Any) -> Phases:
+        """A loop a colour, and one for the rest."""
+        colours = (Colour(self.colour_first, c, self.most) for c in range(self.colours))
+        each: Phases = tuple((colour, item) for colour in colours)
+        return each if self.rest is None else (*each, (Once(), self.rest))
 
 
 @ti.data_oriented

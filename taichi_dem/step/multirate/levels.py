@@ -1,0 +1,96 @@
+"""What bodies that touch owe each other: how far levels differ, how far impulses reach."""
+
+from typing import Any
+
+import taichi as ti
+
+from taichi_dem.stability.body_limits import CLOSE
+from taichi_dem.state.timeline import ticks_of
+
+
+@ti.data_oriented
+class LevelLimit:
+    """A body takes a level at most jump below the finest of the bodies that it touches.
+
+    It touches those to which it is bonded and those with which contacts are near. listed_level:
+    levels at the last ordering of the lists, so that no result depends on the order of bodies.
+    """
+
+    def __init__(self, schedule: Any):
+        self.tables, self.state, self.limits = schedule.tables, schedule.state, schedule.limits
+        self.store, self.beside = schedule.store, schedule.lists.beside
+        self.listed_level = ti.field(ti.i32, shape=self.tables.capacity.bodies)
+
+    @ti.func
+    def least(self, i):
+        """Coarsest level that body i may have beside those it touches; negative for any."""
+        return self.least_beside(self._visit(i, 0, False))
+
+    @ti.func
+    def least_beside(self, finest):
+        """Coarsest level that a body may have beside one of a level."""
+        return finest - self.limits.jump[None]
+
+    @ti.func
+    def spread(self, i):
+        """Note the level of body i, and list those it touches that are too coarse."""
+        self.note(i)
+        self._visit(i, self.state.level[i], True)
+
+    @ti.func
+    def note(self, i):
+        """Note the level of body i."""
+        self.listed_level[i] = self.state.level[i]
+
+    @ti.func
+    def _visit(self, i, level, lists: ti.template()):
+        """Finest listed level of the bodies that body i touches, -1 for none."""
+        finest = -1
+        for f in range(4):
+            if self._bonded(4 * i + f):
+                j = self.tables.neighbour[4 * i + f]
+                finest = ti.max(finest, self._visit_one(j, level, lists))
+        for first, slots, other in ti.static(self.beside):
+            for k in range(first[i], first[i + 1]):
+                if self.limits.contact_limits.count[slots[k]] > 0:
+                    j = self.store.body[slots[k]][other]
+                    finest = ti.max(finest, self._visit_one(j, level, lists))
+        return finest
+
+    @ti.func
+    def _visit_one(self, j, level, lists: ti.template()):
+        if ti.static(lists):
+            if self.state.level[j] < self.least_beside(level):
+                self.limits.notice(j, CLOSE)
+        return self.listed_level[j]
+
+    @ti.func
+    def _bonded(self, face):
+        bonded = False
+        if self.tables.neighbour[face] >= 0:
+            bonded = self.state.broken_tick[self.tables.face_bond[face]] < 0
+        return bonded
+
+
+@ti.data_oriented
+class AppliedUntil:
+    """Tick up to which each bond and pair has applied its impulse, where bodies may be woken early.
+
+    A bond applies its impulse for the coming step of the finer body at once. When that body is
+    woken and takes a shorter step, the bond becomes active although its impulse reaches ahead of
+    the clock: it applies no more until that tick. This is a time of the coarser step and so of any
+    finer one: no impulse is ever applied in part.
+    bond, pair: that tick for every bond, and for every slot of the pair store.
+    """
+
+    def __init__(self, schedule: Any):
+        self.state = schedule.state
+        self.bond = ti.field(ti.i64, shape=schedule.tables.capacity.bonds)
+        if schedule.has_contact:
+            self.pair = schedule.store.column("applied_until", ti.i64)
+
+    @ti.func
+    def until(self, i, j):
+        """Tick at which a pair of bodies is evaluated again."""
+        finer = ti.max(self.state.level[i], self.state.level[j])
+        return self.state.tick[None] + ticks_of(finer)
