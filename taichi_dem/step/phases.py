@@ -11,6 +11,11 @@ import taichi as ti
 from taichi_dem.contact.search import BroadPhase
 from taichi_dem.kit import backend
 from taichi_dem.kit.launch import Launch
+from taichi_dem.kit.products import squared
+from taichi_dem.step.body import BodyMotion
+from taichi_dem.step.bond import BondForces
+from taichi_dem.step.loads import BodyLoads
+from taichi_dem.step.multirate.schedule import Schedule
 
 
 class When(Enum):
