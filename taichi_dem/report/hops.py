@@ -53,10 +53,11 @@ class Hops(Kept):
         table = np.zeros((len(here), _COLUMNS))
         _, now, then = np.intersect1d(code, self.code, assume_unique=True, return_indices=True)
         table[now] = self.table[then]
-        touches = (found[:, 6:9] != 0.0).any(axis=1)
+        touches = (found["on_second"][:, :3] != 0.0).any(axis=1)
         begins = touches & (table[:, _NOW] == 0.0)
         table[:, _NOW], table[:, _COUNT] = touches, table[:, _COUNT] + begins
-        table[:, _RUB : _BOUND + 1] += found[:, 14:16]
+        table[:, _RUB] += found["rub"]
+        table[:, _BOUND] += found["bound"]
         self._compare(bodies, table, here, begins)
         self.code, self.table = code, table
 

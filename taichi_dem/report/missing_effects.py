@@ -57,7 +57,8 @@ class Creep(Kept):
     def sample(self, time_s: float) -> np.ndarray:
         """Bodies that creep at a recording time [s]."""
         count = self.run.model.body_count
-        force, bound, power = self.run.readings.contacts_now()[:, 14:17].T
+        found = self.run.readings.contacts_now()
+        force, bound, power = (found[name] for name in ("rub", "bound", "rub_power"))
         bodies = self.run.contacts.store.near_table()[0]
         slides = (force > 0.0) & (force < _HELD * bound)
         bodies, force, bound = bodies[slides], force[slides], bound[slides]

@@ -21,6 +21,51 @@ from taichi_dem.step.phases import Step
 
 #: Bodies up to which loops over them are serial.
 _FEW = 4096
+#: Record of a pair in contact: impulse [N s] and moment [N m s] on each body in half a step, heats
+#: in it [J], friction and its limit [N], power of friction [W], elastic energy and heats booked
+#: [J], step [s], forces times arms [N m].
+PAIR = np.dtype(
+    [
+        *(("on_first", float, 6), ("on_second", float, 6), ("dragged", float), ("rubbed", float)),
+        *(("rub", float), ("bound", float), ("rub_power", float), ("strain", float)),
+        *(("heat", float, 3), ("step", float), ("leverage", float, (3, 3))),
+    ]
+)
+#: Record of a bond: its energies [J], mean damage, which parts of its law acted, and largest slip
+#: of its units [m].
+BOND = np.dtype(
+    [
+        *(("strain", float), ("dashpot", float), ("slip", float), ("release", float)),
+        *(("softening", float), ("damage", float), ("acted", float, PARTS)),
+        ("residual_slip", float),
+    ]
+)
+
+
+def body_record(drives: int) -> np.dtype:
+    """Record of a body: energy and works [J], heats of contacts [J], motion, work of each drive."""
+    vectors = ("contact_heat", "velocity", "spin", "angular_momentum")
+    return np.dtype(
+        [
+            *(("kinetic", float), ("load_work", float), ("support_work", float)),
+            *((name, float, 3) for name in vectors),
+            ("works", float, (drives + 1,)),
+        ]
+    )
+
+
+@ti.data_oriented
+class Columns:
+    """Column at which each name of a record begins, in a table of numbers."""
+
+    def __init__(self, record: np.dtype):
+        for name, (_, begin, *_title) in (record.fields or {}).items():
+            setattr(self, name, begin // 8)
+
+
+def as_numbers(records: np.ndarray) -> np.ndarray:
+    """Records as the table that a kernel fills, (n, columns), in the same memory."""
+    return records.view(float).reshape(len(records), -1)
 
 
 @ti.data_oriented
@@ -35,6 +80,8 @@ class Readings:
         self.schedule, self.contacts = step.schedule, step.schedule.contacts
         self.half_step = HalfStep(step)
         # A loop over few bodies takes less time than two threads to be told of it.
+        self.body = body_record(len(self.tables.drives))
+        self.of_body, self.of_bond, self.of_pair = map(Columns, (self.body, BOND, PAIR))
         self.small = self.tables.capacity.bodies < _FEW and backend.is_cpu()
         self._held: dict[str, Any] | None = None
         self._rooms: dict[str, np.ndarray] = {}
@@ -59,15 +106,15 @@ class Readings:
             held[name] = find()
         return held[name]
 
-    def _room(self, name, *shape):
-        """Zeros for a kernel to fill, in the same memory as before where the shape is the same."""
-        if name not in self._rooms or self._rooms[name].shape != shape:
-            self._rooms[name] = np.zeros(shape)
-        self._rooms[name][:] = 0.0
+    def _room(self, name, count, kind):
+        """Zero records for a kernel to fill, in the same memory as before for the same count."""
+        if name not in self._rooms or len(self._rooms[name]) != count:
+            self._rooms[name] = np.zeros(count, dtype=kind)
+        self._rooms[name].fill(0)
         return self._rooms[name]
 
     def contacts_now(self) -> np.ndarray:
-        """All that ``_push`` finds of the contacts of every pair, (pairs, 31)."""
+        """Records of the contacts of every pair, see ``PAIR``."""
         return self._contacts()[0].copy()
 
     def near_bodies(self) -> np.ndarray:
@@ -80,8 +127,8 @@ class Readings:
     def contact_wrenches(self) -> np.ndarray:
         """Force [N] and moment about its centre [N m] of the contacts on every body, (n, 6)."""
         table, count = self._contacts()[0], int(values(self.tables.body_count))
-        bodies, per_second = self.near_bodies(), 2.0 / table[:, 21:22]
-        first, second = per_second * table[:, :6], per_second * table[:, 6:12]
+        bodies, per_second = self.near_bodies(), 2.0 / table["step"][:, None]
+        first, second = per_second * table["on_first"], per_second * table["on_second"]
         return sums(bodies[:, 0], first, count) + sums(bodies[:, 1], second, count)
 
     def _contacts(self):
@@ -89,11 +136,11 @@ class Readings:
         return self.once("contacts", self._pushes)
 
     def _pushes(self):
-        pushed = self._room("pushed", int(values(self.tables.body_count)), 6)
+        pushed = self._room("pushed", int(values(self.tables.body_count)), (float, 6))
         count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
-        table = self._room("contacts", count, 31)
+        table = self._room("contacts", count, PAIR)
         if count:
-            self._launch_push(table, pushed)
+            self._launch_push(as_numbers(table), pushed)
         return table, pushed
 
     @ti.kernel
@@ -106,18 +153,19 @@ class Readings:
         ti.loop_config(serialize=ti.static(self.small))
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
-            found, half = self.step.forces_now(p), self.half_step.pair_step(p)
+            found, half, at = self.step.forces_now(p), self.half_step.pair_step(p), self.of_pair
             for k in ti.static(range(3)):
-                table[a, k], table[a, 3 + k] = -half * found.force[k], half * found.moment_i[k]
-                table[a, 6 + k], table[a, 9 + k] = half * found.force[k], half * found.moment_j[k]
-            table[a, 12], table[a, 13] = half * found.dragged, half * found.rubbed
-            table[a, 14], table[a, 15], table[a, 16] = found.rub, found.bound, found.rubbed
-            table[a, 17] = found.stored
-            for k in ti.static(range(3)):
-                table[a, 18 + k] = self.contacts.store.heat[p][k]
-            table[a, 21] = 2.0 * half
+                table[a, at.on_first + k] = -half * found.force[k]
+                table[a, at.on_first + 3 + k] = half * found.moment_i[k]
+                table[a, at.on_second + k] = half * found.force[k]
+                table[a, at.on_second + 3 + k] = half * found.moment_j[k]
+                table[a, at.heat + k] = self.contacts.store.heat[p][k]
+            table[a, at.dragged], table[a, at.rubbed] = half * found.dragged, half * found.rubbed
+            table[a, at.rub], table[a, at.bound] = found.rub, found.bound
+            table[a, at.rub_power], table[a, at.strain] = found.rubbed, found.stored
+            table[a, at.step] = 2.0 * half
             for r, c in ti.static(ti.ndrange(3, 3)):
-                table[a, 22 + 3 * r + c] = found.leverage[r, c]
+                table[a, at.leverage + 3 * r + c] = found.leverage[r, c]
         ti.loop_config(serialize=ti.static(self.small))
         for i in range(self.tables.body_count[None]):
             # In the order of the pairs, so that no thread changes a bit.
@@ -131,24 +179,26 @@ class Readings:
         found = ti.Vector.zero(ti.f64, 6)
         for a in range(store.first_of[i], store.first_of[i + 1]):
             for k in ti.static(range(6)):
-                found[k] += table[a, k]
+                found[k] += table[a, self.of_pair.on_first + k]
         for s in range(store.second_start[i], store.second_start[i + 1]):
             for k in ti.static(range(6)):
-                found[k] += table[store.place_of(store.second_slot[s]), 6 + k]
+                found[k] += table[store.place_of(store.second_slot[s]), self.of_pair.on_second + k]
         return found
 
     def bodies(self) -> np.ndarray:
         """Kinetic energy, work of loads, supports, contact heats, ground's heat [J], (n, 7)."""
-        table, ground = self._present(), len(self.tables.loads) + 16
-        return np.column_stack([table[:, :6], 0.0 - table[:, ground:].sum(axis=1)])
+        table, grounds = self._present(), len(self.tables.loads) + 1
+        given = (table[name] for name in ("kinetic", "load_work", "support_work", "contact_heat"))
+        return np.column_stack([*given, 0.0 - table["works"][:, grounds:].sum(axis=1)])
 
     def motion(self) -> np.ndarray:
         """Velocity, spin and angular momentum of every body at the time of its position, (n, 9)."""
-        return self._present()[:, 6:15].copy()
+        table = self._present()
+        return np.hstack([table[name] for name in ("velocity", "spin", "angular_momentum")])
 
     def works(self) -> np.ndarray:
         """Work of each load, of all supports, of each ground, on every body [J], (n, accounts)."""
-        return self._present()[:, 15:].copy()
+        return self._present()["works"].copy()
 
     def step_back(self) -> None:
         """Set the velocities, which are given at time zero, half a step back."""
@@ -163,10 +213,10 @@ class Readings:
     def _visited(self, back=0):
         """Tables of bodies and of bonds."""
         pushed, bond_count = self._contacts()[1], int(values(self.tables.bond_count))
-        bodies = self._room("bodies", len(pushed), 16 + len(self.tables.drives))
+        bodies = self._room("bodies", len(pushed), self.body)
         # A kernel takes no empty table.
-        bonds = self._room("bonds", max(1, bond_count), 9)
-        self._launch_visit(pushed, back, bodies, bonds)
+        bonds = self._room("bonds", max(1, bond_count), BOND)
+        self._launch_visit(pushed, back, as_numbers(bodies), as_numbers(bonds))
         return bodies, bonds[:bond_count]
 
     @ti.kernel
@@ -186,36 +236,37 @@ class Readings:
             velocity, momentum, works = self.half_step.visit(i, linear, angular, back)
             spin = self.step.loads.spin(i, momentum)
             moving = self.tables.mass[i] * velocity.norm_sqr()
-            table[i, 0] = 0.5 * (moving + momentum.dot(spin))
+            at = self.of_body
+            table[i, at.kinetic] = 0.5 * (moving + momentum.dot(spin))
             for k in ti.static(range(3)):
-                table[i, 6 + k], table[i, 9 + k] = velocity[k], spin[k]
-                table[i, 12 + k] = momentum[k]
+                table[i, at.velocity + k], table[i, at.spin + k] = velocity[k], spin[k]
+                table[i, at.angular_momentum + k] = momentum[k]
                 if ti.static(self.tables.has_contact):
-                    table[i, 3 + k] = self.state.contact_heat[i][k]
+                    table[i, at.contact_heat + k] = self.state.contact_heat[i][k]
             for e in ti.static(range(len(self.tables.drives) + 1)):
-                table[i, 15 + e] = self.state.load_work[i][e] + works[e]
+                table[i, at.works + e] = self.state.load_work[i][e] + works[e]
             for e in ti.static(range(len(self.tables.loads))):
-                table[i, 1] = table[i, 1] + table[i, 15 + e]
-            table[i, 2] = table[i, ti.static(15 + len(self.tables.loads))]
+                table[i, at.load_work] = table[i, at.load_work] + table[i, at.works + e]
+            table[i, at.support_work] = table[i, at.works + ti.static(len(self.tables.loads))]
         ti.loop_config(serialize=ti.static(self.small))
         for b in range(self.tables.bond_count[None]):
             self._visit_bond(bonds, b)
 
     def bonds(self) -> np.ndarray:
         """Strain, dashpot, slip, release and softening energy of every bond [J], (n, 5)."""
-        return self._bonds()[:, :5].copy()
+        return np.column_stack([self._bonds()[name] for name in BOND.names[:5]])
 
     def damage(self) -> np.ndarray:
         """Mean damage of the units of every bond, 1 once it is released, (n,)."""
-        return self._bonds()[:, 5].copy()
+        return self._bonds()["damage"].copy()
 
     def active_bonds(self) -> np.ndarray:
         """Whether each part of its law has changed a unit of every bond, (n, 2)."""
-        return self._bonds()[:, 6:8] > 0.0
+        return self._bonds()["acted"] > 0.0
 
     def residual_slip(self) -> np.ndarray:
         """Largest residual slip of the units of every bond that holds [m], (n,)."""
-        return self._bonds()[:, 8].copy()
+        return self._bonds()["residual_slip"].copy()
 
     @ti.func
     def _visit_bond(self, table: ti.template(), b):
@@ -241,16 +292,20 @@ class Readings:
                 damage += self.tables.bond.damage(b, u) / 3.0
                 if ti.static(self.tables.bond.remembers_slip):
                     slip = ti.max(slip, norm(self.tables.bond.residual_slip(u)))
-        table[b, 0], table[b, 1], table[b, 2], table[b, 3] = energy, drag, heat[0], heat[1]
-        table[b, 4], table[b, 5], table[b, 8] = spent, damage, slip
+        at = self.of_bond
+        table[b, at.strain], table[b, at.dashpot] = energy, drag
+        table[b, at.slip], table[b, at.release] = heat[0], heat[1]
+        table[b, at.softening], table[b, at.damage] = spent, damage
+        table[b, at.residual_slip] = slip
         for part in ti.static(range(PARTS)):
-            table[b, 6 + part] = ti.cast((acted >> part) & 1, ti.f64)
+            table[b, at.acted + part] = ti.cast((acted >> part) & 1, ti.f64)
 
     def pairs(self) -> np.ndarray:
         """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""
         table, _ = self._contacts()
-        found = table[:, 17:21].copy()
-        found[:, 1:3] += table[:, 12:14]
+        found = np.column_stack([table["strain"], table["heat"]])
+        found[:, 1] += table["dragged"]
+        found[:, 2] += table["rubbed"]
         return found
 
     def momentum(self) -> np.ndarray:

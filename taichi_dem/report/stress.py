@@ -77,7 +77,7 @@ def _spread(arms, moment):
 def _of_contacts(run, position):
     """Bodies and forces times arms of both sides of every pair in contact."""
     table, (first, second) = run.readings.contacts_now(), run.readings.near_bodies().T
-    force, leverage = 2.0 / table[:, 21:22] * table[:, 6:9], table[:, 22:31].reshape(-1, 3, 3)
+    force, leverage = 2.0 / table["step"][:, None] * table["on_second"][:, :3], table["leverage"]
     yield first, -leverage
     yield second, leverage - _outer(force, position[second] - position[first])
 
