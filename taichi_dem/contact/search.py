@@ -116,11 +116,14 @@ class BroadPhase:
         free, light = Some(self._free_bodies, n), Some(self._free_bodies, n, light=True)
         anew, amended = Some(self.neighbours.listed_anew, n), Some(self._all_amended, n)
         return (
+            # Faces that broke; the bodies that others can touch, listed in order.
             *self.breaks.phases(bodies),
             (bodies, self._mark_free),
             *self.listing.phases,
+            # Which of them have used up their skin, or were set free.
             (free, self._choose),
             (Once(), self._begin),
+            # Rows of neighbours: made anew from a grid of cells, or with escaped bodies added.
             (anew, self.neighbours.list_anew),
             *self.neighbours.grid.phases,
             (anew, self.neighbours.count),
@@ -128,13 +131,16 @@ class BroadPhase:
             (Once(), self.neighbours.check_room),
             (anew, self.neighbours.fill),
             (amended, self.neighbours.amend),
+            # The gap of each pair that may have closed.
             (free, self._visit),
+            # Pairs that are near get a slot, others lose theirs.
             (light, self._count_row),
             *self.near_pairs.numbering.phases,
             (light, self._release),
             (free, self._update_pairs),
             (Once(), self._end_pairs),
             *self.near_pairs.second.phases,
+            # The lists of what is due take them in.
             *self.pair_phases,
             (Once(), self._end),
         )

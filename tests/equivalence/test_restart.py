@@ -10,7 +10,7 @@ from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.record import Recorder
-from taichi_dem.simulate import run_identity, saved_run
+from taichi_dem.saved_run import run_identity, saved_run
 from taichi_dem.state.timeline import MACRO_TICKS
 from tests.bar_blast import METHODS, UNTIL, bar_scene
 

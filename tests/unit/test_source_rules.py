@@ -25,7 +25,7 @@ LAYERS = {
         | laws | loads | effects | scene | step_control | methods | contact
         | stability | step | report | engine | simulation
         | output observers | plot | viewer
-        | result | simulate needed_effects | goals
+        | result saved_run | simulate needed_effects | goals
         | accuracy | solve | demo | __init__ | __main__""",
     "ca_damper": """
         errors report | oscillator excitation | theory | scenes | filling structure
