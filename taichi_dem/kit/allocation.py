@@ -1,8 +1,6 @@
 """Field trees: fields declared in one block, allocated together, read and written in place.
 
-Taichi crashes beyond 512 field trees a session and never frees one by itself. So each engine
-declares all of its fields in the block of one ``FieldTree``, which owns their memory.
-On a CPU an array lies where each field does (``array_of``): reading or writing compiles nothing.
+Taichi crashes beyond 512 field trees a session and never frees one by itself.
 """
 
 import contextlib
@@ -48,11 +46,9 @@ class CapacityError(InputError):
 
 
 class FieldTree:
-    """Fields declared in its ``with`` block; memory is taken at the end of the block, all at once.
+    """Fields declared in its ``with`` block, allocated together at the end of the block.
 
-    advice: what to do where memory is short, as the end of a sentence. counted: how many of what
-    fit into the fields. bytes: size of all fields. Raises InputError, before anything is allocated,
-    where the machine lacks the memory or the session has no room for another tree.
+    advice: what to do where memory is short; counted: how many of what the fields hold.
     """
 
     scratch_fields = ("_anchor",)
@@ -97,7 +93,6 @@ class FieldTree:
             check_memory(self.bytes, self.advice)
 
     def _allocate(self):
-        """Take the memory of the declared fields."""
         self._check_size()
         # Taichi takes it off its list of trees that are not finalized, and expects it there.
         impl.get_runtime().initialize_fields_builder(self._builder)
@@ -142,6 +137,7 @@ def lies_here() -> bool:
 
 def _given_back(address, memory):
     """Bytes between two numbers that are zero, as their pages went back to the system."""
+    # Most lists are long and hardly used: pages given back take no memory until they are written.
     page = mmap.PAGESIZE
     first, end = -address % page, (address + len(memory)) // page * page - address
     if len(memory) < _LARGE or not hasattr(mmap, "MADV_DONTNEED"):
@@ -157,10 +153,9 @@ def _given_back(address, memory):
 
 
 class _Declared:
-    """Fields and trees that Taichi takes for declared and not yet allocated, to return to.
+    """Fields and trees that Taichi holds to be declared and not yet allocated.
 
-    It would refuse every later kernel while it knows of a tree that is not finalized, or of a field
-    without a place, as an effect whose declaration fails leaves them.
+    It refuses every later kernel while a failed declaration leaves such behind.
     """
 
     def __init__(self):
@@ -328,7 +323,6 @@ def _address(field) -> int:
 
     @ti.kernel
     def ask(found: ti.types.ndarray(dtype=ti.u64, ndim=1)):
-        """Fill in the address."""
         for _ in range(1):
             found[0] = ti.get_addr(field, 0)
 

@@ -1,7 +1,6 @@
 """Properties of the running device: the only module that distinguishes back ends.
 
-Kernels, drivers and loaders ask here. Double precision is required: Metal and most Vulkan drivers
-of telephones lack it.
+Double precision is required: Metal and most Vulkan drivers of telephones lack it.
 """
 
 import math
@@ -61,6 +60,8 @@ def in_host_memory() -> bool:
 
 def probe() -> None:
     """Find the faults of the device on which Taichi has just started."""
+    # Mesa's lavapipe, a Vulkan driver on the CPU, ends every loop after 65,535 rounds, and the
+    # threads of a block of more than 8 leave a loop with an atomic together.
     _faults.update(block=0, rounds=0)
     if is_cpu():
         return
@@ -102,6 +103,7 @@ def cut_short(whose: str, advice: str) -> InputError:
 @ti.func
 def loops_have_ended(rounds):
     """Whether the driver ends the loops of this thread; rounds: a number of at least 1."""
+    # The loops make one round; no compiler can know that these statements do not make six.
     x, made = ti.min(rounds, 1), 0
     while x < 1000:
         x = 3 * x + 1
@@ -157,6 +159,8 @@ def _bytes_of(node):
 
 def align(root: Any) -> None:
     """Declare fillers in a tree so that each field of 8 bytes lies at a multiple of 8."""
+    # Taichi's layout for Vulkan packs fields without gaps: after one of an odd number of words, a
+    # number of 8 bytes would overwrite half of its neighbour (taichi issue 8803).
     if impl.current_cfg().arch != ti.vulkan:
         return
     nodes = [root.get_ch(k) for k in range(root.get_num_ch())]

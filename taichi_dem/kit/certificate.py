@@ -1,7 +1,6 @@
 """Parts of a certificate of a run: estimates of what was left out, and audits.
 
-A few of the skipped evaluations, chosen by a counter and not by their result, are made and
-compared. The misses among them bound the share of misses among all.
+Audits recompute some skipped evaluations, chosen by a counter and not by their result.
 """
 
 import math
@@ -87,11 +86,9 @@ class Audit:
 
     @property
     def misses_bound(self) -> float:
-        """Upper bound, with a confidence of 95 %, of the share of misses among what was skipped.
+        """Upper bound of the share of misses among what was skipped, confidence 95 %.
 
-        Exact for a binomial number of misses (Clopper and Pearson, Biometrika 26, 1934): the share
-        at which so few misses or fewer have a chance of 5 %. About 3 / audited without a miss, and
-        1 where nothing was audited.
+        Clopper and Pearson, Biometrika 26, 1934: about 3 / audited without a miss.
         """
         if self.misses == self.audited:
             return 1.0
@@ -126,11 +123,7 @@ class Audit:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class BaseCertificate:
-    """What the certificates of both packages have in common.
-
-    acting: activity and onset of each effect. audits: of what was skipped. left_out: estimate of
-    each effect that was not computed. warnings: sentences of the report about the run.
-    """
+    """What the certificates of both packages have in common."""
 
     acting: tuple[EffectUse, ...] = ()
     audits: tuple[Audit, ...] = ()
@@ -138,7 +131,6 @@ class BaseCertificate:
     warnings: tuple[str, ...] = ()
 
     def _faults(self) -> list[str]:
-        """Why it does not hold, in words."""
         return [audit.failure for audit in self.audits if audit.misses]
 
     @property
@@ -179,13 +171,7 @@ class BaseCertificate:
         raise NotImplementedError
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file.
-
-        Returns
-        -------
-        dict
-            Figures by name.
-        """
+        """All figures, for a JSON file."""
         return {
             "acting_since_s": {use.effect: use.since_s for use in self.acting},
             "holds": self.holds,

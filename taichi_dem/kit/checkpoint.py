@@ -1,8 +1,4 @@
-"""Checkpoints: when a run is saved, the file, and the identity that a resumed run must share.
-
-A file holds arrays by name and an identity, words by name.
-Nothing here depends on the physics.
-"""
+"""Checkpoints: when a run is saved, the file, and the identity that a resumed run must share."""
 
 import hashlib
 import json
@@ -54,16 +50,6 @@ class Checkpoint:
         Simulated time between two checkpoints [s].
     every_wall_s : float, optional
         Wall time between two checkpoints [s].
-
-    Raises
-    ------
-    InputError
-        A value is out of its range.
-
-    Examples
-    --------
-    >>> Checkpoint("run.checkpoint", every_wall_s=600).every_wall_s
-    600
     """
 
     path: FileName
@@ -94,11 +80,6 @@ class Checkpoint:
         -------
         set of int
             Steps from 0 to ``last``.
-
-        Raises
-        ------
-        InputError
-            They are more than a million.
         """
         every = [self.every_steps] if self.every_steps else []
         if self.every_s is not None:
@@ -122,10 +103,7 @@ STOP_SIGNALS = tuple(
 
 
 class Interrupted(Portable, KeyboardInterrupt):
-    """Ctrl-C or another stop signal, after the run has been saved.
-
-    time_s: where the run stands. path: of the checkpoint. number: of the signal.
-    """
+    """Ctrl-C or another stop signal, after the run has been saved at ``time_s`` to ``path``."""
 
     def __init__(self, time_s: float, path: FileName, number: int = signal.SIGINT):
         super().__init__(f"interrupted at t = {time_s:.6g} s, saved in {path}")
@@ -133,10 +111,9 @@ class Interrupted(Portable, KeyboardInterrupt):
 
 
 class StopRequests:
-    """Notes the first stop signal in its block, in ``asked``; a second one interrupts.
+    """Notes the first stop signal in its block; a second one interrupts.
 
-    asked: number of the signal, 0 for none. One that is ignored, as SIGHUP under nohup, stays so,
-    except for Ctrl-C. Python delivers signals to the main thread only: in others nothing changes.
+    Python delivers signals to the main thread only: in others nothing changes.
     """
 
     def __init__(self) -> None:
@@ -202,6 +179,7 @@ def write_checkpoint(
     path: FileName, identity: Mapping[str, str], arrays: Mapping[str, np.ndarray]
 ) -> None:
     """Write arrays by name under an identity, a dict of words; on the disk before it appears."""
+    # A line of JSON gives identity, names, types and shapes; then come the arrays and their digest.
     listed = [(name, _plain(array.dtype).str, array.shape) for name, array in arrays.items()]
     head, sealed = json.dumps({"identity": dict(identity), "arrays": listed}), hashlib.sha256()
     with renamed_when_done(path) as temporary, open(temporary, "wb") as file:

@@ -53,6 +53,7 @@ def _end(process):
 @contextlib.contextmanager
 def ending_children() -> Iterator[None]:
     """In its block a signal to end reaches the processes of ``run``, and raises Terminated here."""
+    # Python delivers signals to the main thread only; ignored ones, as SIGHUP under nohup, stay so.
     before = {}
     if threading.current_thread() is threading.main_thread():
         for number in _SIGNALS:

@@ -1,8 +1,4 @@
-"""Tables of results: columns as plain arrays, with units for pandas and xarray.
-
-Column names end in their unit. pandas takes half a second to import: only whoever asks for a
-table waits for it.
-"""
+"""Tables of results: columns whose names end in their unit, for pandas and xarray."""
 
 import re
 from abc import abstractmethod
@@ -61,13 +57,7 @@ class Tabulated:
         """Columns of one length by name, which ends in the unit."""
 
     def table(self) -> Any:
-        """Give all rows as a table.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Units by column in ``attrs["units"]``.
-        """
+        """Give all rows as a pandas.DataFrame, with units by column in ``attrs["units"]``."""
         return data_frame(self.columns())
 
     def write_csv(self, path: FileName) -> None:
@@ -77,11 +67,6 @@ class Tabulated:
         ----------
         path : path
             CSV file; it is replaced as a whole.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
         """
         write_csv(path, self.columns())
 

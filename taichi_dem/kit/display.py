@@ -154,11 +154,6 @@ class Pictured:
         ----------
         path : path
             File; its name ends in .png.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
         """
         name = path_name("path", path)
         if not name.lower().endswith(".png"):

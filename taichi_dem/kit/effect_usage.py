@@ -101,11 +101,6 @@ class EffectUse:
         ----------
         tolerance : float
             Share of the energy.
-
-        Returns
-        -------
-        bool
-            True where it is negligible.
         """
         if self.rounding:
             return not self.kept

@@ -1,8 +1,6 @@
 """Engines of a session: each is compiled once for a structure and runs any scene of it.
 
-An engine owns the fields and kernels of one structure, with a capacity, and serves one owner at a
-time. When that is gone, a scene that fits is loaded in milliseconds; a larger one gets a larger
-engine, and one whose engines are all in use another.
+One owner at a time: a scene that does not fit, or finds all engines in use, gets a new one.
 """
 
 import gc
@@ -20,11 +18,7 @@ from taichi_dem.kit.field_memory import fields_of
 
 @ti.data_oriented
 class Engine:
-    """Base of engines: fields in one ``FieldTree``.
-
-    capacity: tuple of whole numbers, the most that fits. Derived classes declare all of their
-    fields in ``declare``, which is called once. tree: the fields' memory. owner: who uses it.
-    """
+    """Base of engines: fields in one ``FieldTree``, declared by ``declare`` for a capacity."""
 
     #: Advice where the machine lacks the memory, as the end of a sentence.
     advice = "take a smaller one"
@@ -99,8 +93,7 @@ def _made(kind, structure, capacity):
 class EnginePool:
     """Engines of one kind, by structure.
 
-    kind: class derived from ``Engine``. least: smallest capacity of an engine; sizes are rounded up
-    to powers of two from there, so that few of them are ever compiled.
+    Capacities are powers of two from ``least`` on, so that few engines are ever compiled.
     """
 
     def __init__(self, kind: type[Engine], least: Iterable[int]):

@@ -1,8 +1,6 @@
-"""Variables and folders on which Taichi depends.
+"""Variables and folders on which Taichi depends; Taichi is imported here for the first time.
 
-Taichi reads a variable ``TI_NAME`` for each of its settings: some overrule the settings that keep
-bits equal, others end the process where they are malformed. A kernel cache that it cannot write to
-crashes it. Taichi is imported here for the first time.
+Some variables TI_NAME overrule settings that keep bits equal; malformed ones end the process.
 """
 
 import atexit
@@ -32,6 +30,7 @@ _own: list[Path] = []
 @contextlib.contextmanager
 def taichi_alone(**more: str) -> Iterator[None]:
     """In its block Taichi finds none of its variables but ours, and says and warns nothing."""
+    # Without HOME Taichi aborts.
     before = dict(os.environ)
     hidden = [name for name in before if name.startswith("TI_") and name != "TI_VISIBLE_DEVICE"]
     ours = {**_OURS, "HOME": before.get("HOME") or os.path.expanduser("~"), **more}
@@ -80,6 +79,7 @@ def _is_usable(folder):
 
 def _remove_stale_lock(folder):
     """Remove the lock that a killed process left on Taichi's kernel cache."""
+    # With this lock every later process compiles all its kernels anew.
     lock = folder / "ticache.lock"
     with contextlib.suppress(OSError):
         # A clock that was set back leaves a lock of the future.

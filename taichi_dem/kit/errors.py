@@ -8,10 +8,7 @@ from typing import Any
 
 
 class Portable(BaseException):
-    """Base of exceptions that other processes raise again, whatever their ``__init__`` asks for.
-
-    result: of the run that they ended, as far as it came; None where there is none.
-    """
+    """Base of exceptions that other processes raise again, whatever their ``__init__`` asks for."""
 
     result: Any = None
 

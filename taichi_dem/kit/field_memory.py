@@ -28,6 +28,8 @@ class FieldOf(NamedTuple):
 
 def fields_of(root: object) -> list[FieldOf]:
     """Every field that can be reached from an object, as a list of FieldOf."""
+    # Fields are saved unless their class says that they never change or are written before they are
+    # read, so that no new part is forgotten.
     found, seen, ahead = [], set(), [("", "saved", root)]
     while ahead:
         name, kind, thing = ahead.pop(0)

@@ -61,6 +61,7 @@ def renamed_when_done(path: FileName) -> Iterator[str]:
 
 def remove_dead_parts(folder: str, now: float) -> None:
     """Remove from a folder what killed processes have left of the files that they wrote."""
+    # A part of another machine, or from before the last boot, is dead after a day unchanged.
     with contextlib.suppress(OSError), os.scandir(folder or os.curdir) as entries:
         for entry in entries:
             part = _PART.fullmatch(entry.name)
@@ -107,6 +108,7 @@ def remove_files(folder: FileName, pattern: str) -> None:
 
 def older_files(folder: FileName, since: float) -> list[str]:
     """Names of files in a folder of a kind that programs write, unchanged since a time, sorted."""
+    # Clocks of file systems may lag by two seconds.
     found = []
     with contextlib.suppress(OSError), os.scandir(os.fspath(folder)) as entries:
         for entry in entries:
@@ -138,6 +140,7 @@ def write_bytes(path: FileName, content: bytes) -> None:
 
 def write_csv(path: FileName, columns: Mapping[str, ArrayLike]) -> None:
     """Write columns of equal length, a dict of name to sequence, as a CSV file."""
+    # A spreadsheet would compute text such as "=1+1": an apostrophe goes in front.
     arrays = map(np.asarray, columns.values())
     cells = (a.tolist() if a.dtype.kind in "biuf" else map(_as_text, a.tolist()) for a in arrays)
     with renamed_when_done(path) as temporary:

@@ -1,15 +1,6 @@
 """Cache of what Taichi looks up at every node of a kernel, so that it reads kernels faster.
 
-For a possible error message it notes the source line of every name and operator, broken at 80
-characters, and the stack in which each field is declared; wherever a function is called it looks
-for the end of its source and breaks its lines. Here the line is noted as it is, and sources are
-kept; meanwhile no garbage is collected. The compiled code is the same.
-
-For each function that it decorates it asks ``inspect`` for a line of source, which goes through all
-modules: a third of the time in which the packages are imported. Here the line is read.
-
-Of every attribute of an object with kernels that is asked for, it finds out whether it is one: a
-thirtieth of the time of a short run. Here kernels are bound as other methods are.
+The compiled code is the same.
 """
 
 import functools
@@ -35,7 +26,6 @@ def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
     cached = {}
 
     def found(function):
-        """What there is of a function."""
         # Equal code of two files may differ in annotations, which are not part of it.
         key = (function.__code__.co_filename, function.__code__)
         if key not in cached:
@@ -57,7 +47,6 @@ def undisturbed(read: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     """The same function of a tree and a context, during which no garbage is collected."""
 
     def reading(tree, context):
-        """What the function finds."""
         collects = gc.isenabled()
         gc.disable()
         try:

@@ -1,12 +1,7 @@
 """Several members computed side by side, one per lane of a vector.
 
-The compiler turns arithmetic on vectors into vector instructions where each vector lies in one
-piece of memory, as an entry of a vector or matrix field does. Four numbers of 64 bits are what one
-instruction of most processors takes; eight were slower without AVX-512 (21.5 against 16.7 ns a
-visit of a bond). A lane computes the same, operation by operation, as one member alone would: which
-members share a vector changes no bit.
-
-A vector in space of all lanes is a matrix: rows are components x, y, z, columns are lanes.
+A lane computes the same, operation by operation, as one member alone: no bit depends on which
+members share a vector. A vector in space of all lanes is a matrix (components, lanes).
 """
 
 import numpy as np
@@ -156,6 +151,7 @@ def _entry_by_branch(field: ti.template(), g, k: ti.template(), n):
 
 def access() -> tuple:
     """What writes component k of lane n of group g, writes lane n of numbers, reads a component."""
+    # Only a CPU can index a lane by a number that is unknown when the kernel is compiled.
     if backend.is_cpu():
         return _put, _put_number, _entry
     return _put_by_branch, _put_number_by_branch, _entry_by_branch

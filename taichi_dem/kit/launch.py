@@ -29,8 +29,7 @@ _LAUNCHING = (
 class Launch:
     """A kernel, called with the same templates and other values each time.
 
-    kernel: bound method or function with templates first, then whole numbers and contiguous arrays,
-    that returns a whole number or nothing. The first call of a session is one of Taichi's own.
+    The first call of a session is one of Taichi's own.
     """
 
     def __init__(self, kernel: Any, *templates: Any):

@@ -19,8 +19,7 @@ class UnitWarning(UserWarning):
 class Quantity(NamedTuple):
     """Unit of a quantity, and the units in which its usual values lie between two numbers.
 
-    Between them no usual value lies in the right unit; zero and what lies beyond is never warned
-    about. others: rows (least, less than, unit).
+    others: rows (least, less than, unit).
     """
 
     unit: str

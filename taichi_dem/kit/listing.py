@@ -1,8 +1,4 @@
-"""Lists of the contents of a package, made from its modules and their docstrings.
-
-``python -m taichi_dem`` and ``python -m ca_damper`` print them; names are dotted, as ``import`` and
-``python -m pydoc`` take them.
-"""
+"""Lists of the contents of a package, made from its modules and their docstrings."""
 
 import argparse
 import ast
@@ -49,7 +45,6 @@ def run(
 
 
 def _rows(module):
-    """Rows of the public names of a module: of its ``__all__``, or of what it itself defines."""
     own = [
         name
         for name, thing in vars(module).items()
@@ -65,13 +60,11 @@ def _rows(module):
 
 
 def _experiments():
-    """Rows of the scripts of a checkout, none elsewhere; they are read, not run."""
     paths = sorted((_ROOT / "experiments").glob("[a-z]*.py")) if _IS_CHECKOUT else ()
     return [(f"python experiments/{path.name}", _docstring(path)) for path in paths]
 
 
 def _docstring(path):
-    """First line of the docstring of a script."""
     return _first_line(ast.get_docstring(ast.parse(path.read_bytes())))
 
 

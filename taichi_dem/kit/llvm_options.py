@@ -1,9 +1,6 @@
 """Switch off passes of LLVM that cost time at each start and save none in a step.
 
-LLVM repeats the body of each small loop eight times, and most of ours turn but a few times: without
-that kernels compile in three quarters of the time. The others work on machine code, which is made
-anew from the cache of kernels at each start: without them a fifth sooner. Taichi has no switch for
-any; those of LLVM are called by an address, where Taichi's library tells it.
+Taichi has no switch for them: they are called by their addresses in Taichi's library.
 """
 
 import ctypes

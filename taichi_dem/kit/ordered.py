@@ -1,8 +1,7 @@
 """Lists and sums in a fixed order, made by any number of threads to the same bits.
 
 Each class has ``phases``: pairs of a list and of what is done with each of its places. Places of
-one phase may be visited side by side, phases follow one another. A driver makes a loop of each, or
-of several that are short.
+one phase may be visited side by side; phases follow one another.
 """
 
 from collections.abc import Callable
@@ -47,7 +46,7 @@ def tasks(phases: tuple, bodies: int) -> tuple[tuple[bool, tuple], ...]:
 class Places:
     """Base of lists whose members are the numbers 0 .. count - 1.
 
-    most: the largest count. light: whether to visit a member takes some nanoseconds only.
+    light: whether to visit a member takes some nanoseconds only.
     """
 
     most: int
@@ -181,11 +180,9 @@ class Chunks(Places):
 
 @ti.data_oriented
 class RunningSums:
-    """Sums of the numbers of all places of a list before a place, several at a time.
+    """Sums of ``value(place)``, whole numbers, over all places of a list before a place.
 
-    value: function of a place, gives a vector of ``width`` whole numbers. put: function that is
-    called with each place, the sum of the values before it, and its value. end: is called with the
-    sum of all, after the last.
+    ``put(place, sum before, value)`` is called with each place, ``end(sum of all)`` after the last.
     """
 
     scratch_fields = ("total", "of_group")
@@ -212,7 +209,6 @@ class RunningSums:
 
     @ti.func
     def _add(self, c):
-        """Add up a chunk."""
         first, last = self.chunks.span(c)
         total = ti.Vector.zero(ti.i32, self.width)
         for a in range(first, last):
@@ -221,17 +217,14 @@ class RunningSums:
 
     @ti.func
     def _groups(self):
-        """Number of groups of chunks."""
         return (self.chunks.count(0) + _GROUP - 1) // _GROUP
 
     @ti.func
     def _add_group(self, g):
-        """Add up a group of chunks."""
         self.of_group[g] = self._sum(g * _GROUP, ti.min((g + 1) * _GROUP, self.chunks.count(0)))
 
     @ti.func
     def _sum(self, first, last):
-        """Sum of some chunks."""
         total = ti.Vector.zero(ti.i32, self.width)
         for c in range(first, last):
             total += self.total[c]
@@ -239,7 +232,6 @@ class RunningSums:
 
     @ti.func
     def _before(self, c):
-        """Sum of all chunks before one."""
         total = ti.Vector.zero(ti.i32, self.width)
         if ti.static(self.grouped):
             for g in range(c // _GROUP):
@@ -266,10 +258,7 @@ class RunningSums:
 class CountingSort:
     """Sorts the members of a list by few keys; those of one key keep their order.
 
-    keys: their number. key_of: function of a member, negative for one that is left out. kept: gives
-    the key that it has noted, or found before. put: function of a member and where it comes. end:
-    function that is called with each key and one past the last place of its members. falling: from
-    the highest key down, else up.
+    key_of: negative for a member that is left out. put(member, place); end(key, one past its last).
     """
 
     scratch_fields = ("counts",)
@@ -365,11 +354,7 @@ class CountingSort:
 
 @ti.data_oriented
 class Grouping:
-    """Lists members by many keys: those of key c, in order, at order[first[c]] .. first[c + 1].
-
-    keys, members: lists of both. key_of: function of a member, gives its key.
-    named: function of a member, gives what is written for it.
-    """
+    """Lists members by many keys: those of key c, in order, at order[first[c]] .. first[c + 1]."""
 
     def __init__(
         self,

@@ -183,6 +183,7 @@ def _write_plain_numbers(figure):
 
 def png_of(figure: Figure, dpi: float = PNG_DPI) -> bytes:
     """A figure as PNG, in bytes; within the block of ``styled``."""
+    # ``Figure.savefig`` would draw the figure twice, the first time for its layout.
     content, usual = io.BytesIO(), figure.dpi
     canvas = FigureCanvasAgg(figure)
     figure.set_dpi(dpi)
@@ -203,7 +204,6 @@ def filming(
         background: Any = None
 
         def shoot():
-            """Take the figure as the next image."""
             nonlocal background
             if images:
                 background = _draw_changes(canvas, background)

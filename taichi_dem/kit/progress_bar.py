@@ -174,7 +174,6 @@ def _nothing(title):
 
 @contextlib.contextmanager
 def _lines(title):
-    """Lines on stderr, see ``_Lines``."""
     lines, last = _lines_of[-1], ""
 
     def show(progress):
@@ -187,7 +186,6 @@ def _lines(title):
 
 @contextlib.contextmanager
 def _terminal(title):
-    """A bar on a terminal, by rich."""
     from rich.console import Console
     from rich.progress import BarColumn, SpinnerColumn, TextColumn
     from rich.progress import Progress as Bar

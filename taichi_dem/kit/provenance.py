@@ -39,6 +39,7 @@ def git(*arguments: str) -> str:
 @functools.cache
 def commit() -> str:
     """Short name of the commit of the sources, "unknown" where they are in no repository."""
+    # An installed package may lie in somebody's repository that does not track it.
     tracked = git("ls-files", "--", os.path.basename(__file__))
     return (git("rev-parse", "--short", "HEAD") if tracked else "") or UNKNOWN
 

@@ -20,12 +20,9 @@ from taichi_dem.kit.validation import FileName
 
 
 class RunSnapshot:
-    """All changing data of a run: fields on the device, and data of its owners on the host.
+    """All changing data of a run: fields on the device, and arrays of its owners on the host.
 
-    identity: what two runs must share for one to go on from the other, words by name. memory: of
-    the fields, as ``FieldMemory``. owners: by name; each gives its arrays by ``saved()`` and takes
-    such by ``resume(arrays)``. They are like those of its ``example()``, if it has one; those whose
-    names begin with one of its ``grows`` have any length, or are all absent.
+    Arrays must match those of an owner's ``example()``; those named in ``grows`` have any length.
     """
 
     def __init__(self, identity: Mapping[str, str], memory: Any, owners: Mapping[str, Any]):
@@ -73,12 +70,7 @@ def _check_like(saved, owner):
 
 
 class CheckpointWriter:
-    """Saves a run when its checkpoint is due, and on a stop signal within its block.
-
-    checkpoint: a Checkpoint, None for a run that is not to be saved. snapshot: of the run, a
-    ``RunSnapshot``. now: gives its present step and time [s]. All methods are called between two
-    steps only.
-    """
+    """Saves a run between two steps: when its checkpoint is due, and on a stop signal."""
 
     def __init__(
         self,

@@ -1,7 +1,6 @@
 """The only place that starts Taichi: architecture, threads, and the settings that keep bits equal.
 
-Imported before any other module of the package, because Taichi must not see some environment
-variables when it is first imported (``environment``).
+Imported before any other module of the package: Taichi reads variables when first imported.
 """
 
 import atexit
@@ -90,22 +89,12 @@ def start(arch: str = "cpu", threads: int | None = None, debug: bool = False) ->
     debug : bool, default False
         Check array bounds inside kernels (about three times slower).
 
-    Returns
-    -------
-    Settings
-        The settings in force.
-
     Raises
     ------
     InputError
         The architecture is unknown or absent, or its device has no doubles; the number of threads
         is out of range; Taichi already runs with other settings in this process, or this is a fork
         of the process that runs Taichi.
-
-    Examples
-    --------
-    >>> from taichi_dem import runtime
-    >>> runtime.start(threads=2)  # doctest: +SKIP
     """
     global _session
     wanted = _checked(arch, threads, debug)
@@ -122,13 +111,7 @@ def start(arch: str = "cpu", threads: int | None = None, debug: bool = False) ->
 
 
 def stop() -> None:
-    """End the Taichi session and free its engines; simulations and batches become invalid.
-
-    Raises
-    ------
-    InputError
-        Another thread started Taichi and is still alive.
-    """
+    """End the Taichi session and free its engines; simulations and batches become invalid."""
     global _session
     _check_process()
     here = threading.get_ident()
@@ -175,18 +158,7 @@ def when_cleared(forget: Callable[[], object]) -> None:
 
 
 def session() -> Session:
-    """The running session; objects that own fields remember the one they were made in.
-
-    Returns
-    -------
-    Session
-        The session.
-
-    Raises
-    ------
-    InputError
-        Taichi was not started.
-    """
+    """The running session; objects that own fields remember the one they were made in."""
     if _session is None:
         raise InputError("Taichi is not started: call runtime.start() first")
     _check_process()
@@ -211,11 +183,6 @@ def check_session(made_in: Session, what: str) -> None:
         Session to check.
     what : str
         Whose session it is, in words, such as "simulation".
-
-    Raises
-    ------
-    InputError
-        The session cannot be used.
     """
     if made_in.cleared:
         raise InputError(f"the memory of this {what} has been given back by runtime.clear()")
@@ -237,11 +204,6 @@ def check_thread(what: str) -> None:
     ----------
     what : str
         What is made, used or ended there, in words.
-
-    Raises
-    ------
-    InputError
-        This is another thread.
     """
     if threading.get_ident() != session().thread:
         raise InputError(
@@ -251,24 +213,12 @@ def check_thread(what: str) -> None:
 
 
 def settings() -> Settings | None:
-    """Settings of the running session.
-
-    Returns
-    -------
-    Settings or None
-        None before the first start.
-    """
+    """Settings of the running session; None before the first start."""
     return _session.settings if _session else None
 
 
 def usable_cores() -> int:
-    """Number of cores that this process may use.
-
-    Returns
-    -------
-    int
-        At least 1 [1].
-    """
+    """Number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -277,6 +227,8 @@ def usable_cores() -> int:
 @atexit.register
 def _end_session():
     """End the session while all modules are there, so that Taichi writes its kernel cache."""
+    # At interpreter exit Taichi's kernel cache is lost if anything still refers to a class with
+    # kernels, as the caches of ``typing`` do.
     if _session and _session.thread == threading.get_ident() and _session.process == os.getpid():
         if impl.get_runtime().prog is _session.program:
             _reset()

@@ -1,7 +1,6 @@
 """Names of Taichi that it does not promise, and that another version may lack.
 
-Without those in ``NEEDED`` nothing runs. All others save time only: what uses them asks ``may_use``
-first, and where the answer is no it does without, more slowly and for the same bits.
+Without those in ``NEEDED`` nothing runs; the others save time, for the same bits (``may_use``).
 """
 
 import functools

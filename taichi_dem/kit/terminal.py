@@ -52,7 +52,6 @@ def show_names(title: str, rows: Iterable[tuple[str, str]]) -> None:
 
 
 def _console():
-    """Rich's console on standard output, None where that is no terminal."""
     if sys.stdout is None or not sys.stdout.isatty():
         return None
     from rich.console import Console
@@ -82,13 +81,11 @@ class _LastingOutput:
         self._stream = stream
 
     def write(self, text):
-        """Write text, or drop it."""
         with self._dropping():
             self._stream.write(text)
         return len(text)
 
     def flush(self):
-        """Flush the buffer, or drop its contents."""
         with self._dropping():
             self._stream.flush()
 

@@ -47,6 +47,7 @@ def thread_seconds() -> dict[int, float]:
 
 def busiest_seconds(before: Mapping[int, float], after: Mapping[int, float]) -> float | None:
     """CPU seconds between two ``thread_seconds`` that no further core would have saved."""
+    # The main thread waits while others work, so its time and that of the busiest other add up.
     spent = {number: seconds - before.get(number, 0.0) for number, seconds in after.items()}
     if not spent:
         return None

@@ -41,11 +41,8 @@ def shown(value: Any) -> str:
 
 
 def told_apart(value: float, bound: float, digits: int = 3) -> tuple[str, str]:
-    """A refused value and the bound that it misses, in the fewest digits that differ.
-
-    digits: of the bound at least; the value has six. The bound is rounded away from the value, so
-    that it is allowed as it reads; it is whole where both are equal.
-    """
+    """A refused value and the bound that it misses, in the fewest digits that differ."""
+    # The bound is rounded away from the value, so that it is allowed as it reads.
     given, limit = float(value), float(bound)
     side = decimal.ROUND_FLOOR if given > limit else decimal.ROUND_CEILING
     for count in range(digits, _MOST_DIGITS):
@@ -57,10 +54,8 @@ def told_apart(value: float, bound: float, digits: int = 3) -> tuple[str, str]:
 
 
 def plain(value: Any) -> Any:
-    """A number of any type as a Python int or float of the same value, tuples of them likewise.
-
-    NumPy would calculate with np.float32 in 24 bits. Anything else is returned as it is.
-    """
+    """A number of any type as a Python int or float of the same value, tuples of them likewise."""
+    # NumPy would calculate with np.float32 in 24 bits.
     if isinstance(value, tuple):
         return tuple(map(plain, value))
     if isinstance(value, (bool, int, float)) and type(value) in (bool, int, float):
@@ -98,10 +93,8 @@ def finite(value: Any) -> bool:
 
 
 def positive(name: str, value: Any, zero_allowed: bool = False) -> float:
-    """The value as a float; InputError unless it is a finite number above (or at) zero.
-
-    It must lie between SMALLEST and LARGEST, where products of a few numbers stay finite.
-    """
+    """The value as a float; InputError unless it is a finite number above (or at) zero."""
+    # Between SMALLEST and LARGEST, products of a few numbers stay finite.
     if not finite(value) or value < 0.0 or (value == 0.0 and not zero_allowed):
         limit = "zero or a positive" if zero_allowed else "a positive"
         raise InputError(f"{name} must be {limit} finite number, got {shown(value)}")
@@ -183,10 +176,7 @@ def progress_option(name: str, value: Any) -> Any:
 
 
 def path_name(name: str, value: Any) -> str:
-    """The value as text, a leading "~" as the user's home.
-
-    InputError unless it can be the name of a file or folder.
-    """
+    """The value as text, a leading "~" as the user's home; InputError unless it can name a file."""
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else ""
     if not isinstance(text, str) or not text or "\0" in text:
         raise InputError(f"{name} must be the name of a file or folder, got {shown(value)}")
@@ -206,10 +196,7 @@ def file_stem(name: str, value: Any) -> str:
 
 
 def several(name: str, values: Any, check: Callable[[str, Any], Checked]) -> tuple[Checked, ...]:
-    """One value or a sequence as a tuple, each of them passed through check(name, value).
-
-    InputError for an empty sequence, or for what check refuses.
-    """
+    """One value or a sequence as a tuple, each passed through check(name, value); not empty."""
     one = isinstance(values, (str, bytes, dict)) or not hasattr(values, "__iter__")
     if one or getattr(values, "ndim", 1) == 0:
         values = (values,)

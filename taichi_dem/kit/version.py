@@ -8,4 +8,5 @@ __version__ = "0.1.0"
 
 def taichi_version() -> str:
     """Version of Taichi, such as 1.7.4."""
+    # A package that runs from a path has no metadata.
     return ".".join(map(str, ti.__version__))

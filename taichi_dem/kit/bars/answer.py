@@ -255,7 +255,6 @@ class Answer:
     __repr__ = __str__
 
     def _unmeasured(self):
-        """What the bar does not have, in words."""
         names = [one.name for one in self.sources if not one.measured]
         told = [f"; not in the bar: {', '.join(names)}"] if names else []
         for one in self.larger:

@@ -10,10 +10,7 @@ from taichi_dem.kit.validation import choice, shown, word
 
 @dataclass(frozen=True)
 class BaseGoal:
-    """Name, unit, function and kind of an output.
-
-    kinds: that there are. given: name of the class that the function gets.
-    """
+    """Name, unit, function and kind of an output."""
 
     kinds: ClassVar[tuple[str, ...]]
     given: ClassVar[str]

@@ -1,10 +1,6 @@
-"""Error of the step, from runs at falling steps.
+"""Error of the step, from runs at falling steps (grid convergence index, Roache 1994).
 
-Richardson's extrapolation as the grid convergence index takes it (Roache 1994): an order is read
-off three runs, and believed where their differences shrink as an order in range would let them.
-``step_error`` is of values without chance; ``step_part`` of values that chance blurs: where they
-have no order in range, the method has no limit to be seen at these steps, and each value is a draw,
-as that of another step, however fine, would be.
+Values that chance blurs have no order to be seen; each step then gives one draw more.
 """
 
 import math
@@ -33,10 +29,9 @@ _BISECTIONS = 50
 
 @dataclass(frozen=True)
 class StepError:
-    """Error of the finest of several runs at falling steps.
+    """Error of the finest of several runs at falling steps: half-width about its value.
 
-    error: half-width about its value. order: that was seen, NaN where differences do not shrink as
-    those of an order would.
+    order: NaN where differences do not shrink.
     """
 
     error: float
@@ -58,6 +53,7 @@ def step_error(
     confidence: float = 0.95,
 ) -> StepError:
     """Error of the last of at least two values, at falling steps."""
+    # Without an order the error is that of first order; of a smooth run 1.1 times the declared one.
     if steps is None:
         steps = [2.0**-k for k in range(len(values))]
     wider = t_quantile(confidence, _FREEDOM) / t_quantile(0.95, _FREEDOM)
@@ -94,10 +90,9 @@ def _ratio(steps, order):
 
 @dataclass(frozen=True, eq=False)
 class StepPart:
-    """A value as its steps give it (places,), and the half-width of its bar by the step (places,).
+    """A value (places,) as its steps give it, and the half-width of its bar by the step.
 
-    value: at the finest step, or the mean over all where they have no order. regular: whether they
-    have one, as far as chance lets see (places,). is_seen: whether steps differ beyond chance.
+    regular: whether the steps show an order; then the value is the finest one, else the mean.
     """
 
     value: np.ndarray
@@ -142,6 +137,7 @@ def _richardson(change, order):
 
 def _in_range(values, noise, order):
     """Whether values at 1, 2 and 4 steps may be those of an order in range, (places,)."""
+    # The change to the finest step must be a share of the change before, up to chance.
     high, low = (_beyond(values, noise, power) for power in (_LEAST_ORDER, order + _MORE_BLURRED))
     return (high * low <= 0.0) | (np.minimum(np.abs(high), np.abs(low)) < _OTHER_ORDER)
 
@@ -156,6 +152,8 @@ def _beyond(values, noise, order):
 
 def _by_order(values, noise, seen, order):
     """Half-width of the finest of values at 1, 2 and 4 steps."""
+    # All three runs count where they agree with the method's order, the last change where it is
+    # larger beyond chance; elsewhere the order seen, if lower than the method's.
     near, far = np.abs(values[0] - values[1]), np.abs(values[1] - values[2])
     with np.errstate(divide="ignore", invalid="ignore"):
         observed = np.log2(far / near)

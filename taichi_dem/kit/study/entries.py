@@ -22,12 +22,8 @@ PYTHON = ".venv/bin/python"
 class Entry:
     """Description of one study.
 
-    name: of the script. part: heading under which it stands. question: that it answers. look:
-    what to read off its pictures. time, quick: of the full run and of the smaller job, CPU seconds
-    that include compiling, or until these are measured words on the time on two cores. pictures:
-    names of its pictures and films, the most telling first; what else it writes is linked. figures:
-    patterns of the key figures in summary.json; figures with a paper's value are always shown.
-    paper: what the paper says of it, empty where it does not ask this. options: of the command.
+    time, quick: CPU seconds of the full and the quick run, with compiling, or words until these are
+    measured. figures: patterns of key figures; those with a paper's value are always shown.
     """
 
     name: str

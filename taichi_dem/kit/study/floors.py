@@ -1,8 +1,4 @@
-"""Floors of a machine: rates of a copy and of multiply-adds, with which other rates are compared.
-
-A figure that states its least work stands as a share of its floor: the time that this work takes at
-these rates over the time that was measured.
-"""
+"""Floors of a machine: rates of a copy and of multiply-adds, to compare other rates with."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -28,10 +24,9 @@ _COPIES, _STEPS = 300, 1 << 19
 
 @dataclass(frozen=True)
 class Work:
-    """Least work that something needs, however its data lie in memory.
+    """Least work of a task, however its data lie in memory: bytes, each number once, and flops.
 
-    bytes: read and written, each number once. flops: multiplications and additions. store: name of
-    the floor that holds for the bytes.
+    store: name of the floor that holds for the bytes.
     """
 
     bytes: float
@@ -70,10 +65,7 @@ class Copy:
 
 
 class Floors:
-    """Arrays for all floors of one core; those of the copies take 256 MiB.
-
-    On a device beside the CPU there is the copy in memory alone.
-    """
+    """Arrays for all floors of one core (256 MiB); on a device the copy in memory alone."""
 
     def __init__(self) -> None:
         self.large = Copy()
@@ -96,6 +88,7 @@ def _least_seconds(
     work: Callable[[], object], repeats: int, clock: Callable[[], float] = process_time
 ) -> float:
     """Shortest time of some calls, of CPU time, which a busy machine changes less, for one core."""
+    # The first call compiles. CPU time depends less on other load of the machine.
     work()
     seconds = []
     for _ in range(repeats):

@@ -32,11 +32,7 @@ _INTERVALS = {None: "every_wall_s", "s": "every_wall_s", "steps": "every_steps",
 
 
 class Parser(ArgumentParser):
-    """An argument parser whose complaints are one sentence.
-
-    settings: of the study, for ``main``. entry: its texts, where no script has an entry for them.
-    folder: of the output below results, or below results/quick for the smaller job.
-    """
+    """An argument parser whose complaints are one sentence."""
 
     folder = ""
     settings: Settings = MappingProxyType({})
@@ -300,6 +296,8 @@ def _summary(options):
 
 def exit_code(work: Callable[[], int | None]) -> int:
     """Exit code of a program that does work(): 0 done, or what work returns."""
+    # 0 done, 2 bad input, 3 diverged, 130 Ctrl-C, 128 + number of another signal. Files are written
+    # even if the reader of the output has left (``| head -1``).
     with lasting_output():
         try:
             with ending_children():

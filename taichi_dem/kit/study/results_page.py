@@ -1,7 +1,4 @@
-"""Studies run one after the other, and one static page of their results.
-
-Every study has an ``Entry`` of texts, and a folder of results as ``finish`` leaves it.
-"""
+"""Studies run one after the other, and one static page of their results."""
 
 import json
 import os
@@ -173,6 +170,7 @@ def _row(name, item):
 
 def _in_words(name, unit):
     """A key of summary.json without underscores, and without the unit at its end."""
+    # A number before the unit keeps it: plateau_at_5_MPa.
     bare = name.removesuffix("_" + re.sub("[ /]", "_", unit))
     kept = unit == "1" or re.search(r"_[0-9.]+$", bare)
     return (name if kept else bare).replace("_", " ")

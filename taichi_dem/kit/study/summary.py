@@ -171,9 +171,8 @@ def write_accuracy(
 class Column(NamedTuple):
     """A column: value, header and format of the printed table, unit of the figure.
 
-    value: dotted name of an attribute of the subject of a row, place in a subject that is a tuple,
-    or a function of it. A column without a header is not printed, one without a unit is no figure.
-    format: as in an f-string; one that ends with % is of a share in percent.
+    value: dotted attribute, place in a tuple, or function of a row's subject. A column without a
+    header is not printed, one without a unit is no figure.
     """
 
     value: str | int | Callable[[Any], Any]

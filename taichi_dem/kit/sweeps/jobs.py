@@ -27,11 +27,7 @@ SEED = "seed"
 
 
 class Record(NamedTuple):
-    """What is kept of a job.
-
-    values: results by name. error: a sentence where there are none. final: whether another run
-    would end alike. seconds: on the wall [s]. version, commit, machine: of what computed it.
-    """
+    """What is kept of a job; final: whether another run would end alike."""
 
     values: dict[str, Value]
     error: str = ""
@@ -146,7 +142,6 @@ def _checked_values(values, row):
 
 
 def _value(name, value):
-    """A result; NaN may be one."""
     return float("nan") if value != value else plain_value(name, value)
 
 
@@ -158,11 +153,7 @@ def _in_one_line(failure):
 
 
 class Journal:
-    """Records of finished jobs in a folder, a small file each: whole or not there.
-
-    folder: path; None for a journal that forgets. identity: of the function. Raises InputError for
-    a folder that cannot be written to, or holds the jobs of another function.
-    """
+    """Records of finished jobs in a folder, a small file each: whole or not there."""
 
     def __init__(self, folder: FileName | None, identity: str):
         self.folder = "" if folder is None else output_folder(folder)

@@ -188,6 +188,7 @@ def _here(count: int):
 
 def _records(work, jobs: Iterable[Job], client) -> Iterator[tuple[Job, Record]]:
     """Jobs and their records, at most one job a worker at a time."""
+    # One job a worker: Dask blames each job that a dead worker had, also one that only waited.
     import distributed
 
     settings = runtime.settings()
@@ -209,7 +210,6 @@ def _records(work, jobs: Iterable[Job], client) -> Iterator[tuple[Job, Record]]:
 
 
 def _worker_count(client):
-    """Number of workers; InputError where one has several threads."""
     threads = client.nthreads().values()
     if any(count != 1 for count in threads):
         raise InputError(
@@ -220,7 +220,6 @@ def _worker_count(client):
 
 
 def _record_of(future) -> Record:
-    """Record of a future that has ended, one way or another."""
     import distributed
 
     try:

@@ -1,7 +1,4 @@
-"""The table of a sweep: rows that go in, checked before any run.
-
-A row is a dict of column name to number or text.
-"""
+"""The table of a sweep: rows that go in, checked before any run."""
 
 import itertools
 import os
@@ -30,16 +27,6 @@ def parameter_grid(**columns: Iterable) -> list[Row]:
     ----------
     **columns : iterable
         Values of each column; the last column varies fastest.
-
-    Returns
-    -------
-    list of dict
-        One row for each combination, each value in the unit of its column.
-
-    Raises
-    ------
-    InputError
-        A column is not a list of values.
 
     Examples
     --------

@@ -1,7 +1,6 @@
 """Self-contained HTML pages that play recorded frames: page, player and packed data.
 
-A page holds its styles, scripts and data, and its Content-Security-Policy forbids any request. The
-3-D view is in ``taichi_dem.viewer``, the 2-D view in ``ca_damper.plot``.
+The Content-Security-Policy of a page forbids any request.
 """
 
 import base64
@@ -77,7 +76,6 @@ def show_page(
 
 
 def _page_text(scripts: Sequence[FileName], **content: Any) -> str:
-    """The page as one text."""
     # Imported here, since every import of the package would wait for it.
     from jinja2 import Environment, FileSystemLoader
 
@@ -108,6 +106,7 @@ def pack(values: Any, kind: str) -> dict[str, Any]:
 
 def quantise(frames: Sequence[np.ndarray]) -> dict[str, Any]:
     """Pack finite arrays of equal size as 16-bit whole numbers, each with a scale of its own."""
+    # Each frame has its own scale; the error is at most half of it, its largest magnitude / 65534.
     rows = np.array([np.ravel(frame) for frame in frames], dtype=float)
     scale = np.abs(rows).max(axis=1, initial=0.0) / _MOST
     whole = np.rint(rows / np.where(scale > 0.0, scale, 1.0)[:, None])
