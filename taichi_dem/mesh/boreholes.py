@@ -1,7 +1,6 @@
 """Rock behind a plane face with holes drilled into it: their table, the mesh, where gas acts.
 
-The rock fills a box from the origin, x to the right, y up; its free face is z = depth, and holes
-lie in planes of equal height y.
+The rock is a box from the origin, x to the right, y up, its free face at z = depth.
 """
 
 from collections.abc import Sequence
@@ -160,7 +159,6 @@ def drilled_rock(
 
 
 def _prism(occ, depth, hole, turn, sides):
-    """The prism of a hole, which begins outside the rock where it is inclined."""
     count = sides if hole.diameter_m <= _WIDE else 2 * sides
     angle = 2.0 * np.pi / count
     radius = 0.5 * hole.diameter_m * np.sqrt(angle / np.sin(angle))

@@ -1,12 +1,7 @@
 """Cells of mesh files, as meshio gives them, cut into tetrahedra and triangles; their groups.
 
-Every quadrangle is cut by the diagonal through its corner of lowest number, whoever it belongs to:
-so cells that share one agree, and faces of groups fit the cells they lie on.
 Source: Dompierre, Labbe, Vallet, Camarero, How to subdivide pyramids, prisms, and hexahedra into
 tetrahedra, 8th International Meshing Roundtable, 1999.
-
-A cell with a corner named twice, such as a prism written as a hexahedron, gives fewer tetrahedra.
-Weld points before cells are cut: two numbers of one point would make two sides disagree.
 """
 
 from collections.abc import Iterator
@@ -211,6 +206,7 @@ def _of_set(raw, key, dimension):
 
 def _tells_parts(raw, name):
     """Whether solid cells carry different whole numbers of a name, as they do for materials."""
+    # If every cell has a number of its own, the numbers count cells and name no materials.
     chosen = list(_values(raw, name, 3))
     cells = sum(int(members.sum()) for _, _, members in chosen)
     return 1 < len({value for value, _, _ in chosen}) < max(cells, 3)

@@ -59,7 +59,6 @@ def checked_points(points: Any) -> np.ndarray:
 
 
 def _rows(what, values, width, kinds, words):
-    """An array of rows of numbers; kinds: of NumPy's types, words: what they are called."""
     try:
         found = np.asarray(values)
     except ValueError:
@@ -112,7 +111,6 @@ def checked_body_groups(groups: Any, body_count: int) -> dict[str, np.ndarray]:
 
 
 def _by_name(what, groups, members):
-    """The groups, whose names are words."""
     if not isinstance(groups, Mapping):
         raise InputError(
             f"{what.replace(' ', '_')}s must be a dict of name to {members}, got {shown(groups)}"
@@ -208,7 +206,6 @@ def _refuse_bad_sharing(tetrahedra):
 
 
 def _listed(numbers):
-    """Numbers as "3, 5 and 9"."""
     *most, last = map(str, numbers.tolist())
     return f"{', '.join(most)} and {last}"
 

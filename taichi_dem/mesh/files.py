@@ -35,10 +35,7 @@ _NAME = re.compile(rb'^([ \t]*\d+[ \t]+\d+[ \t]+)("?)(.*?)\2[ \t\r]*$', re.MULTI
 
 
 class PhysicalName(NamedTuple):
-    """A name in a file, the dimension of the cells that it names, and the number that they carry.
-
-    These are the keys of ``field_data`` and ``cell_sets`` of a Gmsh file.
-    """
+    """A name in a file, the dimension of the cells that it names, and the number they carry."""
 
     dimension: int
     tag: int
@@ -86,11 +83,6 @@ def read_mesh(
     after welding. Groups of points and lines are not read. A UserWarning names what may change
     results: unread sets of points, cells of types that meshio does not know, and cells that meet
     but share no face.
-
-    Examples
-    --------
-    >>> read_mesh(PAPER_BLOCK).body_count
-    966
     """
     scale, path = positive("scale", scale), path_name("path", path)
     raw, printed = _read_raw(path)
@@ -116,6 +108,8 @@ def read_mesh(
 
 def write_mesh(path: FileName, mesh: Mesh) -> None:
     """Write a mesh with its named groups as a Gmsh 2.2 text file (exact: 17 digits)."""
+    # A tetrahedron has one volume in this format: bodies in several groups get "NAME|NAME", which
+    # ``read_mesh`` splits.
     names, first = list(mesh.groups), 1 + len(mesh.groups)
     volumes, tags = cells.volumes_of(mesh, first)
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames"]
@@ -184,6 +178,8 @@ def _meshio_read(path, copy):
 
 def _read_gmsh(path, place):
     """A Gmsh file of meshio's with groups by PhysicalName; InputError for a bad one."""
+    # Of faces and bodies with one group name meshio loses the faces, and it reads some letters as
+    # escapes: it gets a copy with unique names.
     import meshio
 
     with open(path, "rb") as file:
@@ -203,6 +199,7 @@ def _read_gmsh(path, place):
 
 def _refuse_bad_gmsh(content):
     """Refuse a Gmsh file of which meshio would make another mesh: damaged, or cut off."""
+    # Meshio would read a truncated file as a smaller mesh, and count points below 1 from the end.
     if not content.startswith(b"$MeshFormat"):
         return
     marks = list(_ENDS.finditer(content))

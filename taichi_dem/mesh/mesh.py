@@ -65,11 +65,6 @@ class Mesh(Pictured):
     inner_groups : tuple of str
         Names of the groups of inner faces.
 
-    Raises
-    ------
-    InputError
-        ``checked_mesh`` refuses the arrays.
-
     Examples
     --------
     >>> mesh = read_mesh(PAPER_BLOCK)
@@ -124,42 +119,22 @@ class Mesh(Pictured):
         return len(self.points)
 
     def group_faces(self, name: str) -> np.ndarray:
-        """Faces of a group.
+        """Point indices (n, 3) of the faces of a group.
 
         Parameters
         ----------
         name : str
             Name of the group.
-
-        Returns
-        -------
-        ndarray
-            Point indices, shape (n, 3).
-
-        Raises
-        ------
-        InputError
-            There is no such group.
         """
         return self._members("face", self.groups, name)
 
     def group_bodies(self, name: str) -> np.ndarray:
-        """Bodies of a group.
+        """Numbers (n,) of the bodies of a group.
 
         Parameters
         ----------
         name : str
             Name of the body group.
-
-        Returns
-        -------
-        ndarray
-            Numbers of bodies, shape (n,).
-
-        Raises
-        ------
-        InputError
-            There is no such group.
         """
         return self._members("body", self.body_groups, name)
 
@@ -177,16 +152,6 @@ class Mesh(Pictured):
         shares : mapping
             Share by the name of an inner group, from 0 (no bond) to 1; a face in several groups has
             the smallest.
-
-        Returns
-        -------
-        Mesh
-            The mesh with its ``bonded_shares``.
-
-        Raises
-        ------
-        InputError
-            A group does not exist or has outer faces, or a share lies outside [0, 1].
         """
         if not instance("shares", shares, Mapping) and not self.bonded_shares:
             return self
@@ -217,16 +182,6 @@ class Mesh(Pictured):
         chosen : callable
             Function of the centres of all outer faces [m], (n, 3), that returns n truth values.
 
-        Returns
-        -------
-        Mesh
-            The mesh with the group.
-
-        Raises
-        ------
-        InputError
-            The name is taken, no face is chosen, or other values are returned.
-
         Examples
         --------
         >>> mesh = read_mesh(PAPER_BLOCK).group("high", lambda x: x[:, 1] > 1.9)
@@ -245,16 +200,6 @@ class Mesh(Pictured):
             Name of the new group.
         chosen : callable
             Function of the centres of all bodies [m], (n, 3), that returns n truth values.
-
-        Returns
-        -------
-        Mesh
-            The mesh with the group.
-
-        Raises
-        ------
-        InputError
-            The name is taken, no body is chosen, or other values are returned.
         """
         bodies = np.flatnonzero(_choose(self, self.tetrahedra, chosen, "bodies"))
         return _with_group(self, "body_groups", name, bodies)
@@ -266,7 +211,7 @@ class Mesh(Pictured):
         turned: Sequence[float] = (0.0, 0.0, 0.0),
         about: Sequence[float] | None = None,
     ) -> "Mesh":
-        """Return the mesh at another place: turned, then shifted.
+        """Return the mesh, with its groups, at another place: turned, then shifted.
 
         Parameters
         ----------
@@ -277,16 +222,6 @@ class Mesh(Pictured):
             into y.
         about : sequence of float, optional
             Point on the axis [m]; the middle of the mesh's box by default.
-
-        Returns
-        -------
-        Mesh
-            The moved mesh, with the same groups.
-
-        Raises
-        ------
-        InputError
-            A value is not three finite numbers.
         """
         shift, turn = np.array(direction("by", by)), _rotation(direction("turned", turned))
         low, high = self.points.min(axis=0), self.points.max(axis=0)
@@ -336,11 +271,6 @@ def checked_mesh(
     Mesh
         The checked mesh; its ``notes`` say what was repaired.
 
-    Raises
-    ------
-    InputError
-        A defect cannot be repaired; the message names the numbers, counted from 0.
-
     Notes
     -----
     Repaired are negative volumes, points without a tetrahedron, and faces twice in a group.
@@ -359,6 +289,7 @@ def checked_mesh(
 
 def with_inner_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
     """The mesh with one more group: faces between two bodies chosen by their centres."""
+    # ``Scene(unbonded=[name])`` makes a notch or an open joint of the group.
     inner = _inner_faces(mesh)[0]
     return _with_group(mesh, "groups", name, inner[_choose(mesh, inner, chosen)])
 

@@ -1,12 +1,7 @@
 """Unstructured tetrahedra: the points of a solid moved at random and joined by Delaunay's rule.
 
-Points keep to the corners, edges and planes that bound the solid, so that its form stays exact, and
-as there are as many as before, so does the size of elements. Moves to the middle of the bodies
-around a point even them out. Delaunay's rule makes every pair of bodies meet in a face but leaves
-some that are nearly flat; points of these move at random until no body is worse than a bound.
-
-Random numbers, sums and SciPy's Qhull are the same in every run; other builds of SciPy may round
-in another way, and join other points.
+Points keep to the corners, edges and planes that bound the solid. Other builds of SciPy's Qhull may
+round in another way, and join other points.
 """
 
 from collections.abc import Callable

@@ -1,6 +1,5 @@
 """Geometry and connectivity of bare tetrahedron arrays (NumPy only).
 
-Everything here works on ``points`` (point_count, 3) [m] and ``tetrahedra`` (body_count, 4).
 Local face f of a tetrahedron is the face opposite its local vertex f.
 """
 
@@ -96,6 +95,7 @@ def equal_rows(rows: np.ndarray) -> np.ndarray:
 
 def penetration(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Least way [m] that parts each two tetrahedra, at most 0 where they share no volume, (n,)."""
+    # Theorem of separating axes: convex bodies are apart along a face normal or across two edges.
     origin = first[:, :1]
     first, second = first - origin, second - origin
     one, other = (np.diff(c[:, LOCAL_EDGES], axis=2)[:, :, 0] for c in (first, second))
@@ -134,6 +134,8 @@ def components(count: int, pairs: np.ndarray) -> np.ndarray:
 
 def close_pairs(points: np.ndarray, distance: float) -> np.ndarray:
     """Pairs of points not farther apart than ``distance`` [m], shape (n, 2), first < second."""
+    # Close points share a cell of at least one of eight grids of cell size 4 distance, shifted by
+    # half a cell along each axis.
     found = []
     cell = 4.0 * distance
     low = points.min(axis=0)
@@ -159,6 +161,8 @@ def _in_one_cell(rows):
 @functools.cache
 def points_of_parts(halvings: int) -> np.ndarray:
     """A point in each of the equal parts of a tetrahedron, as shares of its corners, (parts, 4)."""
+    # Middles of the parts would lie in layers along each face, and a body pressed in by less than a
+    # layer would hold none: Roberts's sequence spreads the points.
     parts = [np.eye(4)]
     for _ in range(halvings):
         parts = [piece for whole in parts for piece in eighths(whole)]

@@ -1,6 +1,6 @@
 """Which faces are bonds or free, mass properties of bodies, parts that no bond joins (NumPy only).
 
-Local face f of a body is the face opposite its local vertex f. Bonds of one colour share no body.
+Bonds of one colour share no body.
 """
 
 from __future__ import annotations
@@ -27,17 +27,12 @@ NEARNESS = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Topology:
-    """Bonds, which are shared faces, and free faces of a mesh.
+    """Bonds, which are shared faces, and free faces of a mesh; int32 indices.
 
-    master, slave: (bond_count,) int32 bodies, master < slave; sorted by (master, slave).
-    master_face, slave_face: (bond_count,) int32 local faces.
-    vertices: (bond_count, 3) int32 points of the face; right-hand normal out of the master.
-    body_bond: (body_count, 4) int32 bond at local face f, -1 at an outer face.
-    outer_body, outer_face: (outer_count,) int32 body and local face of the free faces.
-    is_open: (outer_count,) whether another body lies behind the free face: no bond joins them.
-    bonded_share: (bond_count,) share of the face's area that is bonded (``Mesh.bonded_by``).
-    groups: by name, what ``faces_of_group`` has found so far.
-    Source: Konno et al., section 2.1 (master is the body of lower index).
+    The master is the body of lower index (Konno et al., section 2.1); bonds are sorted by (master,
+    slave). vertices: points of the face, right-hand normal out of the master. body_bond: bond at
+    local face f of a body, -1 at an outer face. is_open: whether another body lies behind a free
+    face.
     """
 
     master: np.ndarray
@@ -147,6 +142,8 @@ def check_free(mesh: Mesh, name: str) -> None:
 
 def body_properties(mesh: Mesh, density: Density) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass [kg] (n,), centre of mass [m] (n, 3), inertia about it [kg m2] (n, 3, 3)."""
+    # Second moment S = m/20 sum_k x_k x_k^T about the centroid, inertia tr(S) 1 - S (F. Tonon, J.
+    # Math. Stat. 1(1), 2005, 8-11).
     corners = mesh.points[mesh.tetrahedra]
     centre = corners.mean(axis=1)
     mass = density * geometry.signed_volumes(mesh.points, mesh.tetrahedra)
@@ -187,6 +184,7 @@ def part_boxes(corners: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def any_overlap(low: np.ndarray, high: np.ndarray) -> bool:
     """Whether two boxes overlap; touching is not enough."""
+    # Sorted by their lower x, a box is compared only with boxes that begin before its end.
     order = np.argsort(low[:, 0], kind="stable")
     low, high = low[order], high[order]
     ends = np.searchsorted(low[:, 0], high[:, 0])
@@ -198,6 +196,8 @@ def any_overlap(low: np.ndarray, high: np.ndarray) -> bool:
 
 def may_meet(scene: Any, part: np.ndarray) -> bool:
     """Whether parts of a scene at rest may meet, as far as can be known before a run."""
+    # Each part may move by ``NEARNESS`` of its size, by ``Effect.travel``, and without end along
+    # its velocity relative to the mean; displacements that all parts share do not count.
     drives = [effect for effect in scene.effects if effect.role in ("load", "support")]
     travels = np.array([effect.travel() for effect in drives]).reshape(-1, 2, 3)
     anywhere = np.isinf(travels).all(axis=(1, 2))
@@ -245,6 +245,8 @@ def parts_under(mesh: Mesh, effect: Any, part: np.ndarray) -> np.ndarray:
 
 def edge_colours(links: np.ndarray, body_count: int) -> np.ndarray:
     """Colour of every link, (n,) from 0 on; links that share a body differ."""
+    # Greedy; before a new colour is taken, a chain of two colours is flipped if that frees one.
+    # Four bonds a body need at most five colours.
     colours = np.full(len(links), -1, dtype=np.int32)
     at: list[dict[int, int]] = [{} for _ in range(body_count)]
     highest = -1
