@@ -1,7 +1,4 @@
-"""Young's modulus, Poisson's ratio and wave speeds that a block of a mesh shows, in statics.
-
-Displacements and turns of bonded bodies are found by conjugate gradients; NumPy only.
-"""
+"""Young's modulus, Poisson's ratio and wave speeds that a block of a mesh shows, in statics."""
 
 from __future__ import annotations
 
@@ -121,24 +118,10 @@ def mesh_stiffness(mesh: Mesh, material: AnyMaterial) -> MeshStiffness:
     material : Material
         Material with the stiffness of the bonds.
 
-    Returns
-    -------
-    MeshStiffness
-        Compliance, moduli and wave speeds.
-
-    Raises
-    ------
-    InputError
-        The springs cannot be solved.
-
     Notes
     -----
     Among all stress fields in equilibrium this is the most compliant answer: blocks of few elements
     show some per cent less than large ones.
-
-    Examples
-    --------
-    >>> mesh_stiffness(read_mesh(PAPER_BLOCK), CONCRETE).young  # doctest: +SKIP
     """
     topology = topology_of(instance("mesh", mesh, Mesh))
     if not hasattr(material, "normal_stiffness"):
