@@ -1,8 +1,4 @@
-"""Materials of the bodies of a scene, and THE rule for bonds between two of them.
-
-A bond or contact between two materials has springs and dashpots in series, and the lesser of both
-strengths, cohesions, frictions and fracture energies, each for itself (``joined``).
-"""
+"""Materials of the bodies of a scene, and THE rule for bonds between two of them: ``joined``."""
 
 from __future__ import annotations
 
@@ -39,6 +35,7 @@ _LEAST = ("tensile_strength", "cohesion", "friction", "fracture_energy")
 
 def joined(first: Material, second: Material) -> Material:
     """Constants of a bond, and of a contact, between two materials."""
+    # Springs and dashpots in series, strengths the lesser ones; a shared constant keeps its bits.
     least = {name: min(getattr(first, name), getattr(second, name)) for name in _LEAST}
     series = {name: joined_constants(getattr(first, name), getattr(second, name)) for name in RULES}
     density = 0.5 * (first.density + second.density)
@@ -60,8 +57,7 @@ def _of_bonds(name) -> Any:
 class BodyMaterials:
     """Materials of the bodies of a mesh; NumPy only.
 
-    Stands for a ``Material`` wherever all bonds or all bodies are asked for: ``density`` and the
-    constants of bonds are then those of each.
+    Stands for a ``Material`` wherever constants of all bonds or bodies are asked for.
     """
 
     def __init__(self, mesh: Mesh, materials: tuple[Material, ...], of_body: np.ndarray):
@@ -123,6 +119,8 @@ class BodyMaterials:
 
     def checked_pairs(self) -> tuple[Material, ...]:
         """Every material and every pair in a bond, with the numbers of its softest bond."""
+        # The larger the elements, the softer their bonds, and the more energy these hold at their
+        # strength.
         springs = self.normal_stiffness, self.shear_stiffness
         if not any(isinstance(each, BondRule) for each in springs):
             return self.materials

@@ -1,7 +1,6 @@
 """Constants of bonds and contacts that follow from moduli and the size of the bodies (NumPy only).
 
-A constant of a ``Material`` is a number, the same for all bonds, or a rule of this module. With
-stiffness = modulus / distance the modulus of a block does not depend on the size of its elements.
+With stiffness = modulus / distance the modulus of a block does not depend on its elements' size.
 """
 
 from __future__ import annotations
@@ -27,11 +26,9 @@ FACE_SPHERES = 6
 
 @dataclass(frozen=True, eq=False)
 class BondGeometry:
-    """Sizes of bonds, arrays (bond_count,).
+    """Sizes of bonds, arrays (bond_count,); distance: of the centres along the normal [m].
 
-    distance: of the centres of the two bodies along the normal of their face [m]. area: of the face
-    [m^2]. pair_mass: m1 m2 / (m1 + m2) of the two bodies [kg]. master_share: share of the distance
-    that lies in the master. bodies: master and slave of each, (bond_count, 2).
+    pair_mass: m1 m2 / (m1 + m2) [kg]. master_share: share of the distance that lies in the master.
     """
 
     distance: np.ndarray
@@ -86,8 +83,7 @@ class Rule:
 class BondRule(Rule):
     """Base of rules for a constant that each bond has of its own.
 
-    typical: the median over the faces of bodies of one kind, as contacts of bodies use it;
-    NaN until their mesh is known.
+    typical: median over the faces of bodies of one kind; NaN until their mesh is known.
     """
 
     typical: ClassVar[float] = math.nan
@@ -114,10 +110,7 @@ class ContactRule(Rule):
 
 @dataclass(frozen=True, repr=False)
 class ModulusOverDistance(BondRule):
-    """Stiffness of a bond per area [Pa/m]: a modulus [Pa] over the distance of the two bodies.
-
-    Raises InputError unless the modulus is a positive number.
-    """
+    """Stiffness of a bond per area [Pa/m]: a modulus [Pa] over the distance of the two bodies."""
 
     modulus: float
 
@@ -130,9 +123,8 @@ class ModulusOverDistance(BondRule):
 class ShareOfCritical(BondRule):
     """Dashpot of a bond per area [Pa s/m], as a share of the critical one between its two bodies.
 
-    2 ratio sqrt(k m / A) with the stiffness per area k = modulus / distance, the pair's mass m =
-    m1 m2 / (m1 + m2) and the area A: for bodies of one shape it does not depend on their size.
-    Raises InputError unless both are positive numbers.
+    2 ratio sqrt(k m / A) with k = modulus / distance, the mass m = m1 m2 / (m1 + m2) and the area
+    A.
     """
 
     ratio: float
@@ -148,11 +140,8 @@ class ShareOfCritical(BondRule):
 class FaceStiffness(ContactRule):
     """Stiffness of one sphere contact [N/m]: as stiff as a bond where a face's six spheres touch.
 
-    The median over all faces of the bodies of modulus area / (6 distance), where the distance is
-    twice that of the face from its body's centre: one number for all bodies of a material. A step
-    that the bonds of a body bear is then borne by a contact of all spheres of a face, in a mesh of
-    even size.
-    Raises InputError unless the modulus is a positive number.
+    The median over all faces of a material's bodies of modulus area / (6 distance), the distance
+    twice that of the face from its body's centre.
     """
 
     modulus: float
@@ -168,7 +157,6 @@ class ContactShareOfCritical(ContactRule):
     """Dashpot of one sphere contact [N s/m], as a share of the critical one.
 
     2 ratio sqrt(k m), k by ``FaceStiffness``, m half the median mass of a body.
-    Raises InputError unless both are positive numbers.
     """
 
     ratio: float
@@ -189,10 +177,7 @@ Constant = float | Rule
 class InSeries(BondRule):
     """Constant of a bond between two materials per area: both parts of its distance in series.
 
-    A constant traction opens both parts: by (d / h) / k(h) that of a rule, d of the distance h of
-    the bodies in that body, which is d / E for a modulus E; by 1 / (2 k) that of a constant per
-    area, half a bond wherever the face lies. first: of the master's material, second of the
-    slave's.
+    A rule's part opens by its share of the distance over its k, a constant per area's by 1 / (2 k).
     """
 
     first: Constant
@@ -211,10 +196,7 @@ class InSeries(BondRule):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ByMaterials(BondRule):
-    """Constant of a bond per area by the materials of its two bodies.
-
-    constants: of the pair (a, b) of materials in entry a, b. of_body: material of each body.
-    """
+    """Constant of a bond per area, by entry (a, b) of ``constants`` for materials a and b."""
 
     constants: tuple[tuple[Constant, ...], ...]
     of_body: np.ndarray

@@ -150,12 +150,6 @@ class Material:
     InputError
         A value is not finite, negative, or zero where it must be positive; or a bond would fail
         before it reaches its strength.
-
-    Examples
-    --------
-    >>> from dataclasses import replace
-    >>> replace(CONCRETE, friction=0.4).friction
-    0.4
     """
 
     density: float
@@ -220,11 +214,6 @@ class Material:
         damping_ratio : float, default 0.05
             Share of the critical damping of a bond between its two bodies, and of contacts; 0 for
             none.
-
-        Returns
-        -------
-        Material
-            The material.
 
         Raises
         ------
