@@ -36,20 +36,10 @@ class ExpandingGas(GasPressure):
         Peak, rise, decay_ratio and start of a ``GasPressure``: the pressure over time if the walls
         stood still.
 
-    Raises
-    ------
-    InputError
-        A value is out of its range.
-
     Notes
     -----
     The volume is local: a face whose wall has moved by u along its normal, away from the gas, has a
     hole (1 + u / radius)^2 times as large. Gas does not flow along a hole, nor into cracks.
-
-    Examples
-    --------
-    >>> ExpandingGas("hole", radius=0.025, exponent=1.2).exponent
-    1.2
     """
 
     name = "expanding_gas"

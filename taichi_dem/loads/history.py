@@ -74,6 +74,7 @@ class History:
     @ti.func
     def mean(self, since, until):
         """Mean value from a time to a later one [s]; of one time the value."""
+        # Within a piece the middle value is the mean; a difference of integrals would lose digits.
         first = self._passed(since, 0)
         last = self._passed(until, first)
         found = self._value(first, 0.5 * (since + until))
@@ -108,7 +109,6 @@ class History:
 
     @ti.func
     def _value(self, passed, t):
-        """Value at a time [s] after a number of points."""
         found = self.values[ti.max(passed - 1, 0)]
         if 0 < passed and passed < self.count[None]:
             before, after = self.times[passed - 1], self.times[passed]

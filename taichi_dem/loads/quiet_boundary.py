@@ -1,8 +1,4 @@
-"""Quiet boundary: waves leave the mesh, as if the solid continued.
-
-Source: J. Lysmer and R. L. Kuhlemeyer, Finite dynamic model for infinite media, J. Eng. Mech. Div.
-ASCE 95(EM4), 1969, 859-877, eq. 1 and 2.
-"""
+"""Quiet boundary: waves leave the mesh, as if the solid continued."""
 
 import numpy as np
 import taichi as ti
@@ -35,11 +31,6 @@ class QuietBoundary(Effect):
     s_speed : float, optional
         Speed of shear waves [m/s]; None likewise.
 
-    Raises
-    ------
-    InputError
-        A speed is not positive, or bonds near a face give none.
-
     Notes
     -----
     Tractions of rho c_p v along the normal of a face and rho c_s v across it, v the velocity of the
@@ -51,11 +42,6 @@ class QuietBoundary(Effect):
     ----------
     J. Lysmer and R. L. Kuhlemeyer, Finite dynamic model for infinite media, J. Eng. Mech. Div. ASCE
     95(EM4), 1969, 859-877, eq. 1 and 2.
-
-    Examples
-    --------
-    >>> QuietBoundary("left").group
-    'left'
     """
 
     role = "ground"
@@ -66,10 +52,8 @@ class QuietBoundary(Effect):
         self.s_speed = None if s_speed is None else positive("s_speed", s_speed)
 
     def declare(self, capacity: Capacity) -> None:
-        """Faces of every body in the group, and what resists it: the parts of a ``Block``.
-
-        Their 27 numbers are one field, as Taichi has room for about a thousand components.
-        """
+        """Faces of every body in the group, and what resists it: the parts of a ``Block``."""
+        # One field of 27 numbers, as Taichi has room for about a thousand components.
         self.faces = ti.field(ti.i32, shape=capacity.bodies)
         self.parts = ti.field(real, shape=(capacity.bodies, 27))
 

@@ -35,19 +35,15 @@ class _Support(Effect):
         self.group = word("group", group)
 
     def stress(self, material: Material, size: float) -> float:
-        """None of its own."""
         return 0.0
 
     def travel(self) -> Travel:
-        """No displacement: the bodies are held."""
         return (0.0,) * 3, (0.0,) * 3
 
     def declare(self, capacity: Capacity) -> None:
-        """Marks of the supported bodies."""
         self.marked = ti.field(ti.i32, shape=capacity.bodies)
 
     def load(self, model: Model) -> None:
-        """Mark the supported bodies; InputError when the mesh has no such group."""
         body, _ = faces_of_group(model.mesh, model.topology, self.group)
         marks = np.zeros(model.body_count, dtype=np.int32)
         marks[body] = 1
@@ -55,7 +51,6 @@ class _Support(Effect):
 
     @ti.func
     def acts_on(self, i):
-        """1 for a supported body, else 0."""
         return self.marked[i]
 
 
@@ -67,11 +62,6 @@ class Fixed(_Support):
     ----------
     group : str
         Face group.
-
-    Examples
-    --------
-    >>> Fixed("bottom").group
-    'bottom'
     """
 
     name = "fixed"
@@ -95,16 +85,6 @@ class Roller(_Support):
         Face group.
     normal : sequence of float
         Normal of the plane [-]; its length does not matter.
-
-    Raises
-    ------
-    InputError
-        The normal has no length.
-
-    Examples
-    --------
-    >>> Roller("left", normal=(1.0, 0.0, 0.0)).group
-    'left'
     """
 
     name = "roller"
@@ -178,16 +158,6 @@ class PrescribedMotion(_Support):
     history : tuple of (sequence, sequence), optional
         (times [s], shares), in place of a ramp: the velocity is multiplied by the shares, linear
         between the times and constant before the first and after the last.
-
-    Raises
-    ------
-    InputError
-        A value is out of its range, or ramp and history are both given.
-
-    Examples
-    --------
-    >>> PrescribedMotion("top", velocity=(0.0, -0.1, 0.0), ramp=1e-4).group
-    'top'
     """
 
     name = "prescribed_motion"
