@@ -1,11 +1,7 @@
 """Base class of effects, and null objects for roles in which a scene lists none.
 
-A user's effect holds numbers on the host. An engine holds a bound copy of it with fields and
-kernels, into which each scene of the engine loads its numbers. The ``role`` determines where
-``step/explicit.py`` calls it, and the members that it must have (``laws.roles``): bond, or
-tension and shear, and dashpot are laws of the contact units of bonds, contact and friction those of
-bodies that touch, loads push bodies, supports hold them, ground drags on them. Roles ``load``,
-``support`` and ``ground`` take any number of effects, the others at most one.
+A user's effect holds numbers on the host; an engine holds a bound copy of it with fields and
+kernels, into which each scene loads its numbers. Members by role: ``laws.roles``.
 """
 
 import copy
@@ -85,16 +81,6 @@ class Effect:
 
         All bits, reports and findings are those of a scene without it, but nothing is compiled
         anew.
-
-        Returns
-        -------
-        Effect
-            The silent copy.
-
-        Raises
-        ------
-        InputError
-            The effect cannot be silent.
         """
         if not self.may_be_silent:
             raise InputError(f"effect {self.name} cannot be silent: leave it out of the scene")
@@ -109,11 +95,6 @@ class Effect:
         ----------
         material : Material
             Material of the scene.
-
-        Raises
-        ------
-        InputError
-            The effect cannot act with it.
         """
 
     def numbers(self, material: Material) -> tuple:
@@ -159,15 +140,10 @@ class Effect:
         ----------
         model : Model
             Arrays of the scene.
-
-        Raises
-        ------
-        InputError
-            The scene lacks what the effect needs.
         """
 
     def stress(self, material: Material, size: float) -> float:
-        """Stress that a load or support may cause in a block, for estimates before a run.
+        """Stress [Pa] that a load or support may cause in a block, before a run; NaN if unknown.
 
         Parameters
         ----------
@@ -175,23 +151,13 @@ class Effect:
             Material of the scene.
         size : float
             Largest extent of the block [m].
-
-        Returns
-        -------
-        float
-            Stress [Pa]; NaN where it is not known.
         """
         return np.nan
 
     def change_time(self) -> float:
-        """Shortest time within which a load or support changes; longer steps lose its shape.
+        """Shortest time [s] within which a load or support changes; longer steps lose its shape.
 
         Infinite by default.
-
-        Returns
-        -------
-        float
-            Time [s].
         """
         return np.inf
 
@@ -246,11 +212,6 @@ class Effect:
         ----------
         given : Effect
             Effect of the scene.
-
-        Returns
-        -------
-        bool
-            True where they are valid.
         """
         same = (np.array_equal(getattr(given, k, np.nan), v) for k, v in self._frozen.items())
         return _count_of(given) == self._count and all(same)
@@ -278,7 +239,6 @@ def bound(effect: Effect, tables: Tables) -> Any:
 
 
 def _count_of(effect):
-    """How many numbers an effect has, with whatever material."""
     return len(effect.numbers(CONCRETE))
 
 
@@ -320,10 +280,7 @@ def _checked_numbers(effect, material):
 
 
 def check_sliding_energy(effect: Effect, option: str, material: Material) -> None:
-    """Raise InputError for a material without cohesion, or too soft for a fracture energy G_II.
-
-    option: name of the energy of an effect that degrades the cohesion.
-    """
+    """Raise InputError for a material without cohesion, or too soft for a fracture energy G_II."""
     if not material.cohesion > 0.0:
         raise InputError(
             f"cohesion of the material must be more than 0 Pa with the effect {effect.name}, "

@@ -41,6 +41,8 @@ _BISECTIONS = 64
 
 def damping_ratio(restitution: float) -> float:
     """Share z of critical damping at which a spring and a dashpot that never pull rebound so."""
+    # Contact ends when its force is zero: -ln e = 2 z acos(z) / sqrt(1 - z^2), with acosh from z =
+    # 1 (e = 0.135) on (Schwager and Poeschel, Granular Matter 9 (2007) 465).
     low, high = 0.0, 1.0 / restitution
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
@@ -84,11 +86,6 @@ class BodyContact(SphereContact):
     pairs_per_body : int, default 48
         Mean capacity of the list of body pairs.
 
-    Raises
-    ------
-    InputError
-        A value is out of its range.
-
     Notes
     -----
     The dashpot is c = 2 z sqrt(k A m), z the damping ratio of ``restitution``, A the present area
@@ -103,11 +100,6 @@ class BodyContact(SphereContact):
     ----------
     Munjiza, The combined finite-discrete element method (2004), for the potential. Schwager and
     Poeschel, Granular Matter 9 (2007) 465, for the restitution of a dashpot that never pulls.
-
-    Examples
-    --------
-    >>> BodyContact(parts=4).parts
-    4
     """
 
     name = "body_contact"
@@ -160,11 +152,7 @@ class BodyContact(SphereContact):
         return replace(super().spheres(model), extent=model.body_radius)
 
     def declare(self, capacity: Capacity) -> None:
-        """Corners, planes (4 x 3 normals, 4 distances) and ray ends of bodies, in their frames.
-
-        incentre: weights of the corners there. volume: [m3]. face_area: of the largest face [m2].
-        far: distance from which on the rays to a face are left out at once [m].
-        """
+        """Corners, planes (4 x 3 normals, 4 distances) and ray ends of bodies, in their frames."""
         self.corner = ti.Matrix.field(4, 3, real, shape=capacity.bodies)
         self.outward = ti.Matrix.field(4, 3, real, shape=capacity.bodies)
         self.plane = ti.Vector.field(4, real, shape=capacity.bodies)
@@ -322,10 +310,8 @@ class BodyContact(SphereContact):
 
 
 def _corners(model):
-    """Corners of all bodies in their frames, (n, 4, 3) [m]."""
     return model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
 
 
 def _outward(mesh):
-    """Area vectors of all faces of all bodies, (n, 4, 3) [m2]."""
     return area_vectors(mesh.points, all_faces(mesh.tetrahedra)).reshape(-1, 4, 3)

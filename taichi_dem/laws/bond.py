@@ -1,9 +1,4 @@
-"""The paper's law of bonds: softening in tension, Coulomb slip, both together, and dashpots.
-
-Source: Konno et al., section 2.1, eq. 1 and 2, Fig. 2 to 4; Table 1.
-
-And Coulomb slip of bonds whose cohesion falls with the slip (linear slip weakening).
-"""
+"""The paper's law of bonds (Konno et al., section 2.1, Table 1), and linear slip weakening."""
 
 from typing import Any
 
@@ -32,17 +27,13 @@ NORMAL, TANGENTIAL = 1, 2
 
 @ti.data_oriented
 class Softening(Effect):
-    """Beyond the tensile strength a unit softens along a straight line and fails at zero traction.
+    """Beyond the strength a unit softens along a straight line to zero (Konno et al., Fig. 2).
 
     Notes
     -----
     Unloading goes to the origin and the elastic limit moves to where it began; compression keeps
     the full stiffness. One failed unit releases the whole face. Strength and fracture energy are
     those of the material.
-
-    References
-    ----------
-    Konno et al., section 2.1, Fig. 2.
     """
 
     role = "tension"
@@ -120,16 +111,12 @@ class Softening(Effect):
 
 @ti.data_oriented
 class ShearSlip(Effect):
-    """Shear traction is bounded by cohesion + friction * pressure; beyond it the unit slips.
+    """Shear traction is bounded by cohesion + friction * pressure (Konno et al., eq. 1 and 2).
 
     Notes
     -----
     The pressure is the spring's part alone and lowers the limit in tension, never below zero.
     Cohesion does not degrade, and slip alone never releases a face.
-
-    References
-    ----------
-    Konno et al., section 2.1, eq. 1 and 2, Fig. 3.
     """
 
     role = "shear"
@@ -185,12 +172,7 @@ class ShearSlip(Effect):
 
 @ti.data_oriented
 class BondDamping(Effect):
-    """Normal and tangential dashpots of bonds, at full strength until the face is released.
-
-    References
-    ----------
-    Konno et al., section 2.1 and Table 1.
-    """
+    """Normal and tangential dashpots of bonds, at full strength until the face is released."""
 
     role = "dashpot"
     activation = "bonds are strained at a rate"
@@ -213,11 +195,7 @@ class BondDamping(Effect):
 
 @ti.data_oriented
 class Separable:
-    """A normal and a tangential law that share only the pressure, as in the paper.
-
-    tension, shear: bound effects of these roles. The rest is as of the role bond.
-    Source: Konno et al., section 2.1.
-    """
+    """A normal and a tangential law that share only the pressure, as in the paper."""
 
     def __init__(self, tension: Any, shear: Any):
         self.tension, self.shear = tension, shear
@@ -296,11 +274,6 @@ class SlipWeakening(ShearSlip):
         Fracture energy G_II of mode II [J/m^2], the area under the cohesion over the slip. A scene
         refuses one of c^2 / (2 shear stiffness) or less, with which a unit would fail at once.
 
-    Raises
-    ------
-    InputError
-        The energy is not positive.
-
     Notes
     -----
     The cohesion c of the material is gone at the critical slip d_c = 2 G_II / c; the friction of
@@ -312,11 +285,6 @@ class SlipWeakening(ShearSlip):
     References
     ----------
     Ida, J. Geophys. Res. 77 (1972) 3796; Andrews, J. Geophys. Res. 81 (1976) 3575.
-
-    Examples
-    --------
-    >>> SlipWeakening(fracture_energy=500.0).fracture_energy
-    500.0
     """
 
     name = "slip_weakening"

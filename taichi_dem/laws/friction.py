@@ -13,12 +13,7 @@ from taichi_dem.state.pair_store import PairStore
 
 @ti.data_oriented
 class Friction(Effect):
-    """Sliding friction of contacts with the material's coefficient; no tangential spring.
-
-    References
-    ----------
-    Konno et al., section 2.2.
-    """
+    """Sliding friction of contacts, without a tangential spring (Konno et al., section 2.2)."""
 
     role = "friction"
     activation = "bodies that touch slide"
@@ -54,23 +49,9 @@ class StickingFriction(Friction):
         Ratio of the stiffness of the spring to that along the normal, from 1e-6 to 1; spheres of
         a Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
 
-    Raises
-    ------
-    InputError
-        The ratio is out of range.
-
-    Notes
-    -----
-    The effect is not in the paper.
-
     References
     ----------
     Cundall and Strack, Geotechnique 29 (1979) 47.
-
-    Examples
-    --------
-    >>> StickingFriction(stiffness_ratio=0.85).stiffness_ratio
-    0.85
     """
 
     name = "sticking_friction"
@@ -113,6 +94,7 @@ class StickingFriction(Friction):
     @ti.func
     def slip(self, m, k, limit, way):
         """Shorten the spring of sphere pair k to a limit [N]; return the energy dissipated [J]."""
+        # Work of the stretch at the mean force = energy stored + energy dissipated by slipping.
         trial = self.stretch[k]
         stiffness = self.stiffness(m, k)
         longest = limit / stiffness

@@ -30,11 +30,6 @@ class MixedMode(Effect):
     exponent : float, default 2.0
         Exponent of the law of mixed modes [-], a whole number of quarters from 0.25 to 8.
 
-    Raises
-    ------
-    InputError
-        A number is not positive, or the exponent is no quarter or too large.
-
     Notes
     -----
     Strengths of pure opening and pure sliding are the tensile strength and the cohesion of the
@@ -47,11 +42,6 @@ class MixedMode(Effect):
     ----------
     Benzeggagh and Kenane, Compos. Sci. Technol. 56 (1996) 439; Turon et al., Composites A 37 (2006)
     1; Camanho and Davila, NASA/TM-2002-211737.
-
-    Examples
-    --------
-    >>> MixedMode(shear_energy=300.0, exponent=1.5).exponent
-    1.5
     """
 
     role = "bond"
@@ -114,6 +104,8 @@ class MixedMode(Effect):
     @ti.func
     def _raised(self, m, u, stiffness, jump):
         """Damage of a unit at a jump, noted with the energy that it spends."""
+        # From strength to zero the secant stiffness is 1 - d of the first, d = (1 - sqrt(e_0 / e))
+        # / (1 - e_0 / e_1), of twice the energy e and its limits e_0, e_1.
         unit = self.unit[u]
         energy, begin, end = self._limits(m, stiffness, jump)
         if energy > begin:

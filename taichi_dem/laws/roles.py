@@ -1,11 +1,8 @@
-"""Members that an effect must have, by its role, and checks of them.
+"""Members that an effect must have, by its role, and checks of them; laws that "auto" chooses.
 
 All are ``ti.func`` methods of the bound effect, but for attributes, which are written without
 arguments, and functions of the model. b is a bond, u one of its three contact units (3 b, 3 b + 1,
-3 b + 2), i a body, k a sphere pair, m a pair of materials, whose numbers a law reads as
-``self.law[m, 0]`` and on.
-
-Also the laws that effects="auto" and "all" take from the material of a scene.
+3 b + 2), i a body, k a sphere pair, m a pair of materials (``self.law[m, 0]`` and on).
 """
 
 from collections.abc import Iterable
@@ -227,10 +224,7 @@ def chosen_effects(
 ) -> ChosenEffects:
     """Effects for a word, "auto" or "all": laws that any of the materials needs, and those given.
 
-    given: loads, supports, and laws in place of the usual ones. Bodies may touch at outer faces
-    from the start where the mesh has several parts, else once something has broken. Raises
-    InputError for an unknown word, or, with "auto", a law whose author does not say when it begins
-    to act.
+    Raises InputError for an unknown word, or, with "auto", a law that does not say when it acts.
     """
     if word not in WORDS:
         raise InputError(

@@ -31,7 +31,7 @@ def _outer_faces(value: Any) -> bool | str:
 
 @ti.data_oriented
 class SphereContact(Effect):
-    """Spheres inscribed behind free faces repel each other, without attraction.
+    """Spheres inscribed behind free faces repel each other (Konno et al., section 2.2).
 
     Parameters
     ----------
@@ -51,20 +51,6 @@ class SphereContact(Effect):
     spheres_per_body : int, default 160
         Mean capacity of the list of sphere contacts, with those of the next search, before those
         that they replace are freed.
-
-    Raises
-    ------
-    InputError
-        A value is out of its range.
-
-    References
-    ----------
-    Konno et al., section 2.2.
-
-    Examples
-    --------
-    >>> SphereContact(outer_faces=False).face_spheres
-    6
     """
 
     role = "contact"
