@@ -13,13 +13,11 @@ WAITING, ENDING = 1, 2
 
 @ti.data_oriented
 class Breaks:
-    """What breaks have set free, for the contact search.
+    """What breaks have set free, for the contact search: spheres on free faces, and their corners.
 
-    Spheres touch on free faces, broken or outer ones. Bodies can touch others at every corner of a
-    free face: around it lie bodies that reach the surface with an edge or a corner only.
-    corner: number of a body's corners, 4 a body; is_open: 1 for a corner of a free face.
-    newest: last tick at which a face of a body was set free, negative for none; latest: of all.
-    fresh: 1 when that has been since the last search, whose injection is booked.
+    Around a free face lie bodies that reach the surface with an edge or a corner only. newest,
+    latest: last tick at which a face of a body, of any body, was set free; fresh: since the last
+    search.
     """
 
     constant_fields = ("corner",)

@@ -1,7 +1,4 @@
-"""Cell grid over the centres of bodies.
-
-And the positions at which bodies were listed, with the distances that they may move from there.
-"""
+"""Cell grid over the centres of bodies, and how far bodies may move from where they were listed."""
 
 from collections.abc import Callable
 from typing import Any
@@ -28,10 +25,9 @@ _FAR = 1e30
 class Reach:
     """The positions for which the Verlet list knows the neighbours of each body.
 
-    placed_at: position at which a body was listed [m]. reach: distance that it may move from there,
-    its body skin included [m]; ball: radius of the ball around all that it may touch with then [m].
-    escaped: bodies that have left their reach since, escaped_count of them; left: 1 for them. They
-    are listed again one by one, as a few fragments are faster than all others.
+    reach: distance that a body may move from there, its skin included [m]; ball: radius of all that
+    it may touch with then [m]. Escaped bodies are listed again one by one: a few fragments are
+    fast.
     """
 
     def __init__(self, contacts: Contacts):
@@ -76,11 +72,9 @@ class Reach:
 
 @ti.data_oriented
 class CellGrid:
-    """Sorts all bodies by cell, so that neighbours are sought in the cells nearby only.
+    """Sorts bodies by cell, so that neighbours are sought in the cells nearby only.
 
-    number: function that gives the bodies to sort, all where the next search does so, else none.
-    ball: radius of the ball around a body within which others are near whose balls it meets [m].
-    member: bodies, cell by cell.
+    number: gives the bodies to sort, all where the next search does so, else none.
     """
 
     scratch_fields = (

@@ -29,11 +29,9 @@ AWAY = 1e30
 class Contacts:
     """Pairs of bodies that may touch soon; p: a slot of the ``PairStore``, called store.
 
-    free: 1 for bodies that others can touch. path: bound of the way that any point of such a body
-    has gone [m]; horizon: path up to which its pairs are known [m], body_skin ahead of where it was
-    visited last. skin: least of that, twice [m]. pace: largest step [s], and steps of a body by
-    which its contacts are counted before they touch. search_requested: 1 when a path comes near its
-    horizon. outer_waits: WAITING while outer faces wait for the first break.
+    path: bound of the way that any point of a free body has gone [m]; horizon: path up to which its
+    pairs are known [m]: a search is requested before a path reaches it. skin: twice the least body
+    skin.
     """
 
     def __init__(self, tables: Tables, state: State):
@@ -99,6 +97,7 @@ class Contacts:
     @ti.func
     def leverage(self, met, pushed, push):
         """Forces on the second body times their arms from the first [N m], where bodies meet."""
+        # A pressed face also has a couple; its part along the normal changes no stress.
         found = pushed.outer_product(met.arm)
         if ti.static(self.law.meets_bodies):
             found += met.normal.outer_product(cross(met.normal, push * met.couple))
@@ -200,6 +199,7 @@ class Contacts:
     @ti.func
     def moved(self, i, velocity, spin, elapsed):
         """Add to the displacement of body i; request a search once it may exceed the body skin."""
+        # A body that leaps too far in one step for its contacts to be followed is out of bounds.
         if self.free[i] == 1:
             speed = self._speed(i, velocity, spin)
             if elapsed * speed > FARTHEST * self.tables.extent[i]:
@@ -212,6 +212,7 @@ class Contacts:
     @ti.func
     def set_body_skin(self, i):
         """Set the body skin of body i: half the skin, or more where it is fast."""
+        # A few fragments are much faster than the rest and would cause most of the searches.
         speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
         way = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])
         self.body_skin[i] = ti.max(0.5 * self.skin[i], way)

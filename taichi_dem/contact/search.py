@@ -42,12 +42,8 @@ _CAPACITIES = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 class BroadPhase:
     """Finds the pairs that are near and their spheres, for the store of a ``Contacts``.
 
-    pair_phases: phases that take in the pairs of a search. limits: ``StabilityLimits`` that are
-    told of pairs, None where no step needs them.
-    everywhere: 1 when the next search compares all pairs, as is needed once bodies have been moved
-    by hand. mark: FREE, VISITED or COMPARED for each body, 0 for one within a solid; free: those
-    marked, in order; searched: tick of the last search. searches: their number. full: the list
-    without capacity, an index into ``_CAPACITIES``.
+    everywhere: 1 when the next search compares all pairs, as after bodies were moved by hand.
+    limits: ``StabilityLimits`` that are told of pairs, or None. full: the list without capacity.
     """
 
     scratch_fields = ("free", "free_count", "mark")
@@ -205,7 +201,6 @@ class BroadPhase:
 
     @ti.func
     def _mark_free(self, i):
-        """Mark a body that others can touch."""
         self.mark[i] = self.breaks.is_free(i)
         self.contacts.free[i] = self.mark[i]
 

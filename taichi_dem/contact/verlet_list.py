@@ -1,8 +1,6 @@
 """Verlet list of the contact search: bodies that are near each other, within several skins.
 
 It contains all bodies, free or not, so one list serves many searches.
-
-Of its pairs those that are near are visited, in order.
 """
 
 import taichi as ti
@@ -28,14 +26,10 @@ MOST_ESCAPED = 1024
 class VerletList:
     """For each body the bodies of higher index near it, in order.
 
-    first[i] .. last[i]: row of body i, followed by spare entries. Of an entry: body: the second of
-    the two; slot: of the pair in the store, -1 while it is not near; until: sum of the paths of
-    both up to which nothing of them can touch but what the pair holds [m]; found: number of its
-    contacts; is_new: 1 while they are not written yet. changed: 1 for a row whose near pairs may
-    have changed.
-    reach: the ``Reach`` that bodies may not leave. stale: STALE when all rows are to be rebuilt.
-    limit: entries that the scene allows. full: 1 when they are exceeded. wanted: entries that the
-    row of each body is to have.
+    first[i] .. last[i]: row of body i, then spare entries. slot: of the pair in the store, -1 while
+    it is not near; until: sum of both paths up to which the pair has no other contacts than it
+    holds [m]. stale: STALE when all rows are to be rebuilt; wanted: entries that each row is to
+    have.
     """
 
     scratch_fields = ("wanted",)
@@ -110,7 +104,6 @@ class VerletList:
 
     @ti.func
     def _allot(self, i, before, value):
-        """Allot a row of the list to body i."""
         self.first[i], self.last[i] = before[0], before[0]
 
     @ti.func
@@ -151,6 +144,8 @@ class VerletList:
     @ti.func
     def amend(self, i):
         """List the escaped bodies at their present positions, among the neighbours of body i."""
+        # Outdated entries stay while there is room: they cost one comparison. A full row makes the
+        # list stale.
         escaped, count = self.reach.left[i] == 1, self.reach.escaped_count[None]
         if escaped:
             count = self.tables.body_count[None] - i - 1
@@ -180,6 +175,7 @@ class VerletList:
     @ti.func
     def _drop_far(self, i):
         """Drop entries that are no longer near body i when its row is full."""
+        # Pairs that were near stay until they have lost their slot.
         if self.last[i] == self.first[i + 1]:
             place = self.first[i]
             for k in range(self.first[i], self.last[i]):
@@ -239,12 +235,10 @@ class VerletList:
 
     @ti.func
     def _forget(self, k):
-        """Forget the last search of entry k: it has to be compared."""
         self.found[k], self.is_new[k], self.until[k] = 0, 0, 0.0
 
     @ti.func
     def _move(self, k, place):
-        """Move entry k to another place."""
         self.body[place], self.slot[place] = self.body[k], self.slot[k]
         self.found[place], self.is_new[place] = self.found[k], self.is_new[k]
         self.until[place] = self.until[k]
@@ -261,11 +255,8 @@ class VerletList:
 class NearPairs:
     """Sorts the near pairs of a ``PairStore``: those with sphere pairs, or with a pending impulse.
 
-    neighbours: the ``VerletList``, whose rows are in order. Of body i: row: slots of its near
-    pairs, from neighbours.first[i] on; row_count: their number; row_spheres: number of their sphere
-    pairs; row_is_new: 1 where they may have changed; wanted: slots that it takes, places of sphere
-    pairs that it takes, and slots that it frees, then those of all bodies before; total: of all.
-    full: 1 or 2 when there is no capacity for pairs or for sphere pairs.
+    row: slots of the near pairs of body i, from neighbours.first[i] on. wanted: slots and places of
+    sphere pairs that a body takes, and slots that it frees, then those of all bodies before.
     """
 
     scratch_fields = ("row_is_new", "wanted", "total")
@@ -296,6 +287,7 @@ class NearPairs:
     @ti.func
     def count_row(self, i):
         """Count near pairs of which body i is the first, and what they want where it changes."""
+        # Pairs that only hold a pending impulse leave at the next search.
         self.row_is_new[i] = self.neighbours.changed[i]
         self.wanted[i] = ivec3(0)
         if self.row_is_new[i] == 1:
