@@ -14,8 +14,7 @@ _MOST_ENTRIES = 2**31 - 1
 class Capacity(NamedTuple):
     """Room of an engine: bodies, and for each of them spheres on a face and entries of lists.
 
-    face_spheres: spheres on a face. pairs, pair_spheres, neighbours: entries for each body, on
-    average, of the contact pairs, their sphere pairs, and the neighbours; 0 without contact.
+    pairs, pair_spheres, neighbours: mean entries of a body; 0 without contact.
     """
 
     bodies: int

@@ -28,6 +28,8 @@ ROLES = (*SINGLE, *MANY)
 
 def names_of(effects: Iterable[Any]) -> list[str]:
     """Name of each effect in reports, tables and pictures: its kind, and the group it acts on."""
+    # Two effects of one kind and group must differ as columns of a table: the later one is
+    # numbered.
     names: list[str] = []
     taken = {""}
     for effect in effects:
@@ -47,15 +49,11 @@ def column_of(name: str) -> str:
 
 
 class Model:
-    """Constant arrays of a scene and its effects by role; NumPy only.
+    """Constant arrays of a scene and its effects by role; NumPy only (Konno et al., section 2).
 
-    mesh: of the scene. materials: of its bodies, a ``BodyMaterials``. material: the first of them,
-    with the numbers that its contacts have in the mesh.
-    topology: its faces and bonds. body_mass [kg], centre [m] and body_inertia [kg m^2], body_radius
-    [m] (of the ball around a body): an entry a body. by_role: lists of effects; loads, supports and
-    ground: those of these roles. contact: the effect of this role, None without. holes: monitors of
-    holes by group, see ``hole_monitor.hole_of``.
-    Source: Konno et al., section 2.
+    material: the first of the bodies' materials, with the numbers that its contacts have in the
+    mesh. body_mass [kg], centre [m], body_inertia [kg m^2], body_radius [m] of the ball around a
+    body.
     """
 
     def __init__(self, mesh: Mesh, material: AnyMaterial, effects: Iterable[Any]):

@@ -56,22 +56,13 @@ class Columns:
 class PairStore:
     """Slots of near pairs of bodies, their sphere pairs, and the order in which pairs are visited.
 
-    Of a slot: body: the two bodies, first < second; first .. last: places in sphere of the sphere
-    pairs that a search has found; waiting: 1 for a side with a pending impulse; impulse[2 p +
-    side]: pending impulse [N s] and moment about the body's centre [N m s], read only if waiting is
-    1, as most pairs do not touch. heat: energy into dashpots, friction, and injected [J], until the
-    first body takes it. deepest: overlap as a share of the distance at which the spheres touch.
-    is_new: 1 until the limits of a step include the pair; sphere_place: new place of its sphere
-    pairs while a search writes them.
-    Of a sphere pair: sphere: the two spheres; owner: slot of the pair, where its places begin.
-    slot_limit, sphere_limit: largest numbers for the scene; fields have the capacity of the engine.
-    columns, sphere_columns: declared by others. A column is zero when its pair comes near, or its
-    sphere pair is found, and keeps its value as long as that lasts.
+    body: the two bodies of a slot, first < second; first .. last: places of its sphere pairs;
+    impulse[2 p + side]: pending impulse [N s] and moment about the body's centre [N m s], valid
+    where waiting is 1; heat: of dashpots, friction and injected [J], until the first body takes it.
+    Columns of others are zero when their pair comes near, or their sphere pair is found.
 
-    Pairs are visited by (first body, second body), whatever the order of slots, so sums have one
-    order that does not depend on the history of searches. near_count: number of near pairs.
-    near_slot: their slots, in order. first_of[i]: place there of the first pair whose first body is
-    i; second_slot: from second_start[i] on, slots of the pairs whose second body is i.
+    Pairs are visited by (first body, second body), whatever the order of slots, so that sums do not
+    depend on the history of searches: first_of[i], second_start[i]: where those of body i begin.
     """
 
     scratch_fields = ("sphere_place",)
@@ -194,6 +185,7 @@ class PairStore:
     @ti.func
     def replace_spheres(self, p, count):
         """Replace the sphere pairs of a pair by those at its new places."""
+        # Sphere pairs that were present keep their columns; those of new ones are zero.
         start = self.sphere_place[p]
         end = start + count
         if ti.static(len(self.sphere_columns) > 0):

@@ -1,7 +1,6 @@
 """Everything that changes in a run; checkpoints hold this and the effects' own state.
 
-A unit whose bond never came near a limit has the traction stiffness times opening, to the bit, so
-the law and its memory are not touched. A law says by ``begins`` where a unit comes near.
+The law of a unit is evaluated only once its bond has come near a limit (``begins`` of the law).
 """
 
 import numpy as np
@@ -34,9 +33,8 @@ _GIVEN = ("position", "orientation", "velocity", "spin")
 class Activity:
     """Where the law of a bond acts: since when, and how often it was evaluated.
 
-    since: tick at which a unit of a bond first came near the limit of each part of its law, NEVER
-    before. evaluated: evaluations of the law, units of a bond together. touched: tick from which
-    contact and friction acted on each body, LATER before.
+    since: tick at which a bond first came near the limit of each part of its law, or NEVER;
+    touched: tick from which contact and friction acted on each body, or LATER.
     """
 
     def __init__(self, tables: Tables):
@@ -74,12 +72,10 @@ class Activity:
 
 @ti.dataclass
 class BodyMotion:
-    """A body at the beginning of its step, in world axes.
+    """A body at the beginning of its step, in world axes; velocity and spin of half a step before.
 
-    position: of the centre [m]. rotation: from the body frame to the world. velocity [m/s] and spin
-    [rad/s]: those of the leapfrog, half a step before. time [s]; step: length of the step [s].
-    since, until: times [s] from and up to which a load that varies acts by its mean; those of a
-    body's steps follow each other without a gap.
+    since, until: times [s] over which a varying load acts by its mean; those of a body's steps
+    follow each other without a gap.
     """
 
     position: vec3
@@ -106,33 +102,16 @@ def unserved_limits(model: Model) -> np.ndarray:
 
 @ti.data_oriented
 class State:
-    """Motion of the bodies, pending impulses, fracture and the energy account.
+    """Motion of the bodies, pending impulses, fracture and the energy account, in SI units.
 
-    position [m], velocity [m/s], orientation (unit quaternion, scalar first), angular_momentum [kg
-    m^2/s] in world axes; spin [rad/s] follows from them and is stored so that neighbours need not
-    compute it. A body's motion is that of its own last tick.
-    level: step dt0 / 2^level. bound: its criterion, an index into ``step_control.CRITERIA``.
-    last_tick: when the body was last advanced. lag: time [s] by which what it has taken of each
-    load is behind its position.
-    slot: impulse [N s] and its moment about the body's centre [N m s] that face f of body i has
-    gathered since then, or in the last substep where all bonds act in each, entry 4 i + f.
-    broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
-    carries contact spheres; with contact only.
-    bond_drag: energy taken from each bond by its dashpots [J], bond_heat: by slip and by release;
-    where bonds have dashpots, or a law. The first changes in every step, the second seldom.
-    contact_heat: energy taken by sphere dashpots and by friction, and energy injected by releases
-    [J], booked to the first body of a pair; with contact only. injected_tick: last tick whose
-    releases have been booked there.
-    load_work: work [J], one component a load, one for all supports, one a ground; load_impulse:
-    total impulse of all of them on a body (linear, and angular about the origin); impulse_sizes:
-    sums of the sizes of both. tick: present time.
-    bad_body: lowest body out of bounds, body_count if none.
-    active_effects: bits of each body: of the loads, then the supports, then the ground that changed
-    its motion, CONTACT, RUBBED and SUNK. limits: tensile strength, cohesion [Pa] and friction
-    coefficient of each pair of materials, whose excess in a bond is noted, without bound where an
-    effect serves them; passed: ticks at which a bond first exceeded its tensile and its shear
-    limit, NEVER before. activity: the ``Activity`` of bonds whose laws act on demand, else None.
-    cut_short: 1 once the device has ended a loop too early, on devices that do.
+    A body's motion is that of its own last tick. orientation: unit quaternion, scalar first;
+    angular_momentum in world axes; spin follows from them and is stored for the neighbours.
+    lag: time [s] by which what a body has taken of each load is behind its position. slot: impulse
+    and moment about the centre that face f of body i has gathered since, entry 4 i + f.
+    bond_drag, bond_heat: energy taken from each bond by dashpots, by slip and release [J].
+    load_work: a component a load, one for all supports, one a ground; impulse_sizes: sums of sizes.
+    bad_body: lowest body out of bounds, else body_count. limits: of each pair of materials, whose
+    excess in a bond is noted in passed, unbounded where an effect serves them.
     """
 
     scratch_fields = ("cut_short",)

@@ -15,21 +15,13 @@ from taichi_dem.state.model import MANY, ROLES, Model
 
 @ti.data_oriented
 class Tables:
-    """Device side of a ``Model``, which kernels only read.
+    """Device side of a ``Model``, which kernels only read; body frames are world axes at the start.
 
-    body_count, bond_count: of the scene; fields have the capacity of the engine.
-    mass [kg] and inertia [kg m^2] with their inverses, radius (of the ball around the body, [m])
-    and, with contact, extent (of that around its spheres, [m]) have one entry a body. bond_slots
-    names the two faces of a bond as 4 * body + local face, master first; bond_frame has rows
-    normal, xi, eta in the master's body frame; bond_stiffness normal and shear [Pa/m].
-    vertex_master (face frame) and vertex_slave (body frame) [m] have one entry a contact unit,
-    unit_area [m^2] one a bond. neighbour is the body behind local face f, entry 4 * body + f, -1
-    where it is outer; face_bond the bond there. face_spheres: contact spheres on a face; those of
-    face k begin at entry k * face_spheres.
-    material: number of the material of a body. bond_pair: of the pair of materials of a bond, the
-    row of its numbers in the table of a law, as ``pair`` gives it for two bodies.
-    on_demand: whether laws are evaluated only where they act.
-    Body frames coincide with the world axes at the start. Source: Konno et al., section 2.
+    bond_slots: faces of a bond as 4 * body + local face, master first; bond_frame: rows normal, xi,
+    eta in the master's body frame; vertex_master (face frame), vertex_slave (body frame) [m]: an
+    entry a contact unit. neighbour, face_bond: behind local face f of a body, entry 4 * body + f,
+    or -1. bond_pair: row of a bond's materials in the table of a law. extent: of the ball around a
+    body's spheres [m]. on_demand: whether laws are evaluated only where they act.
     """
 
     constant_fields = (

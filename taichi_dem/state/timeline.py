@@ -1,8 +1,7 @@
-"""Time as an integer: ticks, levels, and the levels active at a tick.
+"""Time as an integer: ticks, levels, and the levels active at a tick (Konno et al., 3.1).
 
-Level k steps by dt0 / 2^k; one tick is the step of the finest level allowed. A level is active at
-the multiples of its own step, so a body may refine at any of its own times and coarsen only at
-times of the coarser grid (Konno et al., 3.1).
+Level k steps by dt0 / 2^k; a tick is the finest level's step. A level is active at multiples of its
+step: a body may refine at any of its times and coarsen only at times of the coarser grid.
 """
 
 import taichi as ti
