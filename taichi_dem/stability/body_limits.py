@@ -1,6 +1,6 @@
 """Stable steps: of springs and dashpots, of near contacts, and of each body.
 
-A body's rates change only where a bond breaks or a contact comes near or leaves. Such bodies are
+A body's rates change only where a bond breaks or a contact comes near or leaves: such bodies are
 listed, and their rates found anew at the start of the next substep.
 """
 
@@ -64,9 +64,8 @@ def largest_eigenvalue(a, b, c):
 class ContactLimits:
     """Sphere pairs that count as contacts, and the block they form on each body.
 
-    A sphere pair counts once it could touch within some steps of the finer of its bodies: it is
-    evaluated once a step, and the coarser body is woken before the next time. count: number of the
-    sphere pairs of a body pair that count. slides: 1 without friction, or where it is silent.
+    A sphere pair counts once it could touch within some steps of the finer of its bodies: the
+    coarser body is woken before. slides: 1 without friction, or where it is silent.
     """
 
     constant_fields = ("ahead", "root_mass", "root_inertia", "slides")
@@ -105,6 +104,8 @@ class ContactLimits:
     @ti.func
     def rates(self, i):
         """Rate of the dashpots [1/s] and squared rate of the springs [1/s^2] of body i."""
+        # Largest eigenvalue of M^-1/2 (sum of J^T D J) M^-1/2 over near contacts, partners at rest;
+        # D is 1 with friction, whose dashpot acts along all axes, n n^T without.
         a, b, c = mat3(0.0), mat3(0.0), mat3(0.0)
         largest = ti.Vector([0.0, 0.0])
         first, second = self.store.first_of[i], self.store.second_start[i]
@@ -161,12 +162,15 @@ class ContactLimits:
 
 def dashpot_step(rate: ArrayLike) -> np.ndarray:
     """Largest step [s] at which dashpots are stable that slow a body at a rate [1/s]."""
+    # Two equal bodies move against each other at twice the rate; Euler is stable to 2 / (2 rate).
     with np.errstate(divide="ignore"):
         return 1.0 / np.asarray(rate)
 
 
 def spring_step(rate2: ArrayLike) -> np.ndarray:
     """Largest step [s] at which springs are stable that hold a body at a squared rate [1/s2]."""
+    # Two equal bodies have twice the squared rate; symplectic Euler is stable to 2 / sqrt(2
+    # omega^2).
     with np.errstate(divide="ignore"):
         return 2.0 / np.sqrt(2.0 * np.asarray(rate2))
 
@@ -187,35 +191,10 @@ def spring_limit(rate2):
 class StabilityLimits(Places):
     """Rates of every body, and the list of bodies whose rates must be updated.
 
-    dashpot_table, spring_table: largest eigenvalue of the bonds' block by the set of intact
-    bonds, [1/s] and [1/s^2]. bond_damping, contact_damping: rates of a body's dashpots [1/s].
-    limit_level, limit_by: level of the longest stable step, and the criterion that sets it.
-    displacement, turn, leap: levels for speed, spin and acceleration. listed, listed_count: bodies
-    to look at; events: why, as bits. woken: how many were brought to the present between their
-    times. controlled: not by a method that only limits dashpots. rule: dt0 [s],
-    safety and dashpot floor [s]. jump: levels between neighbours, where they are limited.
-
-    Limited dashpots share 1.7 by need. With X = 2 dt rate for bonds (b) and contacts (c) of a body
-    at its step, bonds keep min(X_b, 1.7 - min(X_c, 0.5)) of X_b and contacts min(X_c, 1, 1.7 -
-    what the bonds keep) of X_c, and a pair the smaller share of its two. A body's rates never
-    add up to more than 1.7 / (2 dt), as the eigenvalue of a sum is no larger than the sum of
-    both: no step makes them unstable. Bonds come first, as their dashpots are most of the physics
-    here; contacts need little, for X_c is ten to a hundred and any c stops what meets, if it stops
-    it in a few steps, and not more than 1, since 1 - X < 0 throws it back.
-    One common share min(1, 1.7 / (X_b + X_c)) starves the bonds: +45 % at 1e-8 s, and from 2e-8 s
-    on fragments pass through each other.
-    The paper's block, one step for all, hole at 3e-4 s against 13.735 mm, residual of the energy
-    balance:
-
-        dt     least  most
-        1e-8   0.5    1.0    +0.1 %   0.004
-        2e-8   0.5    1.0    +0.3 %   0.004
-        4e-8   0.1    1.0    +1.1 %   0.004
-        4e-8   0.5    1.0    +1.1 %   0.004
-        4e-8   1.0    1.0    +2.1 %   0.005
-        4e-8   0.5    1.7    +1.0 %   0.007
-        6e-8   0.5    1.0    +1.6 %   0.005
-        2e-7   0.5    1.0     +39 %   0.004
+    dashpot_table, spring_table: largest eigenvalue of the bonds' block by the set of intact bonds,
+    [1/s] and [1/s^2]. limit_level, limit_by: level of the longest stable step, and what sets it.
+    events: why a body is listed, as bits. jump: levels between neighbours, where they are limited.
+    controlled: not by a method that only limits dashpots.
     """
 
     constant_fields = ("dashpot_table", "spring_table")
@@ -288,6 +267,8 @@ class StabilityLimits(Places):
     @ti.func
     def notice_listed(self, p, entered, fresh):
         """Count contacts of a pair that a search lists; entered, fresh: nonzero for the reason."""
+        # Entering the list does not change a body's limits, as results must not depend on the reach
+        # of a search; but spheres that a break has just exposed may touch already.
         event = HIT
         if fresh != 0:
             event = RELEASE
@@ -339,6 +320,7 @@ class StabilityLimits(Places):
     @ti.func
     def wanted(self, i, now):
         """Wanted level of body i at a time [s], and its criterion."""
+        # A body asks at every step: squares and tables spare it roots and quotients.
         level, by = self.limit_level[i], self.limit_by[i]
         if ti.static(self.has_distance):
             speed2 = self.state.velocity[i].norm_sqr()
@@ -353,6 +335,8 @@ class StabilityLimits(Places):
     @ti.func
     def _push2(self, i, now):
         """Square of the acceleration of body i by the loads alone [m^2/s^4]."""
+        # The larger of now and one largest step ahead, for loads that set in before the next
+        # update.
         push2, step = 0.0, self.rule[0]
         for ahead in ti.static(range(2)):
             time = now + ahead * step
@@ -366,6 +350,9 @@ class StabilityLimits(Places):
     @ti.func
     def bond_share(self, i, step):
         """Share of its bonds' dashpots that is stable at a step [s] of body i."""
+        # A sum of blocks has no larger eigenvalue than the sum of theirs: with rates up to LIMITED
+        # / (2 dt) no step is unstable. Bonds come first: a common share would starve them (+45 % at
+        # 1e-8 s).
         return self._bonds_get(i, step) / ti.max(2.0 * step * self.bond_damping[i], 1e-200)
 
     @ti.func
@@ -377,6 +364,5 @@ class StabilityLimits(Places):
 
     @ti.func
     def _bonds_get(self, i, step):
-        """Part of LIMITED that the bonds take."""
         contacts = ti.min(FOR_CONTACTS, 2.0 * step * self.contact_damping[i])
         return ti.min(2.0 * step * self.bond_damping[i], LIMITED - contacts)

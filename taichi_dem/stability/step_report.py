@@ -67,15 +67,12 @@ class StepReport:
 
     @property
     def binding(self) -> np.ndarray:
-        """Name of the criterion that binds each body's explicit step, array (body_count,).
-
-        "nothing" for a body whose step nothing limits.
-        """
+        """Criterion that binds the explicit step of each body, (body_count,); or "nothing"."""
         place = np.argmin([*self.limits.values()], axis=0)
         return np.where(np.isfinite(self.step_s), np.array([*self.limits])[place], "nothing")
 
     def borne(self, dashpots: str, link: str = "bond") -> np.ndarray:
-        """Largest stable step of each body under a method.
+        """Largest stable step [s] of each body under a method; infinite where nothing limits it.
 
         A step is stable that is below both that of the bonds and that of the contacts.
 
@@ -86,11 +83,6 @@ class StepReport:
             ``"solved"``, which leaves the limit of the springs.
         link : str, default "bond"
             ``"bond"``, or ``"contact"`` for all of the worst face in one contact.
-
-        Returns
-        -------
-        ndarray
-            Steps [s], shape (body_count,); infinite where nothing limits them.
         """
         return stable_steps(self.limits, dashpots, link)
 
@@ -150,6 +142,8 @@ def stable_steps(limits: dict[str, np.ndarray], dashpots: str, link: str = "bond
 
 def stable_together(springs: ArrayLike, drags: ArrayLike) -> np.ndarray:
     """Largest explicit step [s] at which springs and dashpots of a body are stable together."""
+    # v += -dt (w^2 x + c v) with v of half a step ago is stable while c dt + (w dt)^2 / 2 <= 2,
+    # which is dt / drags + (dt / springs)^2 <= 1.
     with np.errstate(divide="ignore"):
         rate = 1.0 / np.asarray(drags)
         return 2.0 / (rate + np.sqrt(rate**2 + (2.0 / np.asarray(springs)) ** 2))
@@ -168,20 +162,11 @@ def step_report(scene: Scene) -> StepReport:
     StepReport
         Largest stable step of each body by criterion and method. Print it for a table.
 
-    Raises
-    ------
-    InputError
-        The argument is no Scene.
-
     Notes
     -----
     Limits hold for a pair of equal bodies that move against each other: no mesh has a smaller
     limit, and none more than twice the limit. Of contacts with bodies of several materials the
     stiffest counts.
-
-    Examples
-    --------
-    >>> print(step_report(Scene(read_mesh(PAPER_BLOCK), CONCRETE)))  # doctest: +SKIP
     """
     mesh, material = instance("scene", scene, Scene).mesh, scene.body_materials
     effects = map(scene.effect, ("dashpot", "friction", "contact"))
@@ -296,16 +281,6 @@ def elastic_report(scene: Scene) -> ElasticReport:
     ----------
     scene : Scene
         Scene to judge.
-
-    Returns
-    -------
-    ElasticReport
-        Print it for the table.
-
-    Raises
-    ------
-    InputError
-        The argument is no Scene, or the springs cannot be solved.
 
     Notes
     -----
