@@ -190,6 +190,7 @@ def plot_film(
     result: Any, path: FileName, *, magnify: float = 5.0, axis: Sequence[float] = ALONG_Z
 ) -> None:
     """Write the deforming block, coloured by speed, as a GIF below a megabyte."""
+    # One palette, no dithering and few colours keep 40 frames below a megabyte.
     drawing(path)
     view, model, frames = View(axis), result.model, result.frames
     broken_time = result.broken_time

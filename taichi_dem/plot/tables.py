@@ -58,7 +58,6 @@ def plot_columns(
 
 
 def _draw(axes, time, table, names, unit):
-    """A panel of columns of one unit, scaled to one that is readable."""
     largest = max(float(np.abs(table[name]).max(initial=0.0)) for name in names)
     # Numbers take no prefix, and what has one in its name keeps it.
     factor, words = scale(largest, unit) if unit in _SCALED else (1.0, unit)
@@ -98,6 +97,7 @@ def plot_energy_shares(result: Any, *, path: FileName | None = None) -> Figure:
 
 def plot_fragments(result: Any, frame: int = -1, *, path: FileName | None = None) -> Figure:
     """Draw the share of the mass that passes a sieve over its opening, in a frame."""
+    # Shaded: sizes of single bodies, where the mesh decides and not the material.
     fragments = arrays_of(result.fragments(frame))
     order = np.argsort(fragments["sieve_m"], kind="stable")
     size, mass = 1e3 * fragments["sieve_m"][order], fragments["mass_kg"][order]
@@ -121,6 +121,7 @@ def plot_rose(
     result: Any, axis: Sequence[float] = ALONG_Z, *, sectors: int = 36, path: FileName | None = None
 ) -> Figure:
     """Draw crack area by direction in a plane; arguments as of ``Result.rose``."""
+    # A crack direction has no sense: both ends are shown.
     table = result.rose(axis, sectors)
     rose, parallel_m2 = arrays_of(table), table.attrs["parallel_m2"]
     angle, width = np.radians(rose["angle_deg"]), np.radians(table.attrs["width_deg"])
@@ -159,6 +160,7 @@ def plot_attenuation(
     result: Any, group: str | None = None, *, nearest: float = 4.0, path: FileName | None = None
 ) -> Figure:
     """Draw peak velocities over the distance from a hole, with a power law."""
+    # In a thin plate too few bodies are nearer to the hole than to a side: then all are fitted.
     attenuation, nearest = result.attenuation(group), positive("nearest", nearest)
     distance, speed, inner = attenuation.distance, attenuation.speed, attenuation.inner
     slope, level = attenuation.power_law(nearest)

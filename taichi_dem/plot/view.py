@@ -1,7 +1,6 @@
 """Parts of all pictures of a block: a view along an axis, its faces from back to front.
 
-Bodies are coloured by a value, lines by another, a mesh before a run by its groups. Corners are
-world positions (body_count, 4, 3) [m], as ``record.body_corners`` gives.
+Corners are world positions (body_count, 4, 3) [m], as ``record.body_corners`` gives.
 """
 
 from collections.abc import Mapping, Sequence
@@ -49,10 +48,9 @@ _STROKE = "#000000"
 
 
 class View:
-    """Projection along an axis.
+    """Projection along an axis; right, up, toward (3,): unit vectors of the picture.
 
-    axis: direction from the block to the viewer, any length. right, up, toward (3,): unit vectors
-    of the picture, right-handed; looking down a coordinate axis, the next two are right and up.
+    Looking down a coordinate axis, the next two are right and up.
     """
 
     def __init__(self, axis: Sequence[float] = (0.0, 0.0, 1.0)):
@@ -118,7 +116,6 @@ def first_breaks(
 
 
 def _edges(triangles):
-    """The three edges of every triangle, (3 n, 2)."""
     return triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
 
 
@@ -158,6 +155,7 @@ def draw_stone(axes: Any, view: View, model: Model) -> None:
 
 def draw_lines(axes: Any, segments: np.ndarray, values: np.ndarray, **look: Any) -> Any:
     """Draw lines (n, points, 2) coloured by a value each; look: of the ``LineCollection``."""
+    # Not up to light yellow, which vanishes on the colour of stone.
     lines = LineCollection(segments, **{"cmap": shades("plasma", 0.0, 0.88), **look})
     lines.set_array(values)
     lines.set_capstyle("round")
@@ -231,7 +229,6 @@ def picture_of_groups(
 
 
 def _keys(masks, names, member, acting, strokes):
-    """Lines of the legend."""
     keys = [
         area_key(
             _label(name, masks[name].sum(), acting),
@@ -260,6 +257,7 @@ def _masks(mesh, outer, bodies):
 
 def _coloured(masks, acting):
     """Names of the groups for the legend, and the place of that of each outer face, -1 for none."""
+    # Groups that something acts on come first, so that the legend has all of them.
     order = sorted(masks, key=lambda name: (name in acting, -masks[name].sum()))
     last = np.full(len(next(iter(masks.values()), ())), -1)
     for k, name in enumerate(order):
@@ -281,7 +279,6 @@ class ObliqueView(View):
 
 
 def _draw(axes, mesh, outer, member, view):
-    """Faces that are seen, from back to front, the darker the more they lean away."""
     triangles = mesh.points[outer]
     seen = view.facing(triangles)
     palette = np.array([to_rgb(colour) for colour in (*_COLOURS, _NONE)])
@@ -305,7 +302,6 @@ def _draw_strokes(axes, triangles, view, hatch):
 
 
 def _draw_axes(axes, view):
-    """Directions of x, y and z above the upper right corner."""
     middle = np.array(_TRIAD)
     fixed = {"xycoords": "axes fraction", "textcoords": "offset points", "annotation_clip": False}
     for name, along in zip("xyz", view.project(np.eye(3))):
