@@ -89,7 +89,6 @@ def _motion(model: Model, frames: Sequence[Frame], bodies: np.ndarray, time: Any
 
 
 def _shape(model: Model, bodies: np.ndarray) -> Any:
-    """Corners of the bodies and extent of the block at rest."""
     corners = model.mesh.tetrahedra[bodies]
     used, places = np.unique(corners, return_inverse=True)
     points = model.mesh.points[used]
@@ -123,7 +122,6 @@ def _magnification(model: Model, frame: Frame) -> float:
 
 
 def _broken_curve(broken_time: np.ndarray, frames: Sequence[Frame], time: Any) -> Any:
-    """Number of broken faces over time."""
     counts = [int((broken_time <= frame.time_s).sum()) for frame in frames]
     times = [time[1] * frame.time_s for frame in frames]
     curve = {"name": "", "colour": "", "times": times, "values": counts}
