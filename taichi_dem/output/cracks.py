@@ -41,6 +41,8 @@ def apertures_of(model: Model, frame: Frame) -> np.ndarray:
 
 def cracks_of(model: Model, broken_time: np.ndarray, aperture: np.ndarray) -> Any:
     """Tabulate the broken faces in the order in which they broke."""
+    # Geology, z up and y north: strike clockwise from north, the face dipping to its right, dip
+    # from the horizontal; strike 0 for a horizontal face.
     bond = np.flatnonzero(np.isfinite(broken_time))
     bond = bond[np.argsort(broken_time[bond], kind="stable")]
     points, corners = model.mesh.points, model.topology.vertices[bond]
@@ -75,6 +77,7 @@ def rose_of(
     model: Model, broken: np.ndarray, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36
 ) -> Any:
     """Sum up the area of cracks by the direction of their traces in a plane."""
+    # Cracks that lie in the plane have no direction there: ``parallel_m2`` holds their area.
     axis, sectors = unit_vector("axis", axis), whole("sectors", sectors, 2, 360)
     bond = np.flatnonzero(broken)
     trace = np.cross(axis, unit_normals(model.mesh.points, model.topology.vertices[bond]))

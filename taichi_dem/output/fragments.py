@@ -1,7 +1,4 @@
-"""Fragments: bodies that unbroken bonds still join, as one rigid piece each.
-
-Also values by which bodies are coloured, by name.
-"""
+"""Fragments: bodies that unbroken bonds still join, as rigid pieces; values to colour bodies by."""
 
 from typing import Any
 
@@ -35,6 +32,8 @@ def fragment_of_body(model: Model, broken: np.ndarray) -> np.ndarray:
 
 def fragments_of(model: Model, frame: Frame, of_body: np.ndarray) -> dict[str, np.ndarray]:
     """Tabulate the fragments in a frame, the heaviest first."""
+    # ``sieve_m``, the sieve that a fragment just passes: the middle edge of the cuboid of equal
+    # volume and principal moments. Kinetic energy beyond translation and rotation is vibration.
     mass = sums(of_body, model.body_mass)
     volume = sums(of_body, signed_volumes(model.mesh.points, model.mesh.tetrahedra))
     return {
@@ -91,13 +90,14 @@ def _middle_edges(model, of_body, mass):
 
 
 def _steiner(mass, arm):
-    """Inertia of masses (n,) at the ends of arms (n, 3), (n, 3, 3) [kg m^2]."""
     square = (arm**2).sum(axis=1)[:, None, None] * np.eye(3)
     return mass[:, None, None] * (square - arm[:, :, None] * arm[:, None, :])
 
 
 def quaternions_of(rotation: np.ndarray) -> np.ndarray:
     """Unit quaternions x, y, z, w of rotation matrices (n, 3, 3); (n, 4)."""
+    # Divides by the largest component (S. W. Shepperd, J. Guidance and Control 1, 1978, 223-224).
+    # SciPy's Rotation takes 0.4 s to import, and every page of a run needs it.
     (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(rotation, 0, -1)
     x, y, z = h - f, c - g, d - b
     candidates = np.array(

@@ -29,10 +29,8 @@ def watched_groups(scene: Scene) -> tuple[str, ...]:
 class HoleMonitor:
     """Displacement at the wall of a hole.
 
-    axis_point (3,) [m] and axis (3,): of the hole. bodies: those with a face on it. outward
-    (n, 3): in-plane unit direction from the axis to each body's first centre. monitored: place in
-    bodies of the one that is nearest to the closest free face, at mid depth, or at mid depth alone
-    where no face along the axis is free.
+    outward: in-plane unit direction from the axis to each body's first centre. monitored: the body
+    nearest to the closest free face at mid depth, or at mid depth alone where no such face is free.
     """
 
     def __init__(self, model: Model, group: str):

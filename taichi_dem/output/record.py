@@ -98,9 +98,7 @@ class Frame:
 class Recorder:
     """Collects samples and frames of a simulation.
 
-    groups: face groups of the holes whose displacement is followed; columns of the time series
-    have their names, unless there is only one. peak_speed: the largest of each body at all samples
-    so far [m/s], (body_count,). brief: whether frames are without stress, which nobody reads.
+    groups: face groups of the holes that are followed. brief: whether frames are without stress.
     """
 
     grows = "row.", "frame."
@@ -332,21 +330,12 @@ def write_paraview(
         Times from which effects acted on each body [s], (body_count,) by name, NaN for never. Cells
         then carry NAME_acts, 1 from that time, and NAME_since_s.
 
-    Raises
-    ------
-    InputError
-        The folder cannot be written to, the name is invalid, or there is no frame.
-
     Notes
     -----
     Cells carry body_id, level, speed_m_s, displacement_m, damage, step_bound_by, the place in
     ``step_control.CRITERIA`` of what bounds a body's step, stress_Pa, nine components by rows, and
     largest_stress_Pa, the largest principal one; with several materials also material, the number
     of each body's. An earlier series of that name is removed.
-
-    Examples
-    --------
-    >>> write_paraview("results/series", result.model, result.frames)  # doctest: +SKIP
     """
     instance("model", model, Model)
     frames = several("frames", frames, lambda what, one: instance(what, one, Frame))
