@@ -1,7 +1,6 @@
 """Many scenes, run together in launches of bounded length.
 
-A batch compiles nothing where one of the same structure has run before, of whatever size and
-numbers (see ``engine/damper_engine.py``).
+Nothing is compiled where a batch of the same structure has run before, whatever its size.
 """
 
 import contextlib
@@ -101,11 +100,6 @@ class Batch(LoadedScenes):
     steps_per_cycle : ndarray
         Steps in a cycle of the base, shape (scenes,).
 
-    Raises
-    ------
-    InputError
-        The filling refuses a scene, or a step is out of range.
-
     Examples
     --------
     >>> table = SceneTable([10, 20], seed=1, dt=1e-4, base_amplitude=0.6e-3)
@@ -151,7 +145,6 @@ class Batch(LoadedScenes):
         self._take_engine(*tolerances)
 
     def _take_engine(self, rtol: float, atol: float) -> None:
-        """Borrow an engine and write the numbers of the batch to it."""
         counts = self.count, self.measured_cycles, self.recorded_samples
         kind = self.mount if self.modal is None else self.modal.structure.mode_count
         asked = self.fillings, kind, self.excitation.kind, counts, self.excitation.sizes
@@ -209,11 +202,6 @@ class Batch(LoadedScenes):
         velocity : float or array_like, default 0.0
             Velocity of the container beside that [m/s], one number or (scenes,).
 
-        Raises
-        ------
-        InputError
-            ``start`` is unknown or does not fit the excitation, or a number is not finite.
-
         Notes
         -----
         A UserWarning says where the filling is known to fail on a scene, and where samples of the
@@ -264,11 +252,6 @@ class Batch(LoadedScenes):
         ----------
         frequency : float or array_like
             Frequency of the base [Hz], one number or (scenes,).
-
-        Raises
-        ------
-        InputError
-            A cycle is not complete, or the excitation is not a single sine of the base.
         """
         check_single_sine(self.excitation, "drive")
         self._check_cycle_is_full()
@@ -286,7 +269,7 @@ class Batch(LoadedScenes):
         *,
         record_every: int = 0,
     ) -> measures.Cycles:
-        """Run whole cycles and measure the last of them.
+        """Run whole cycles and measure the last of them, as a ``measures.Cycles``.
 
         Parameters
         ----------
@@ -299,15 +282,8 @@ class Batch(LoadedScenes):
         record_every : int, default 0
             Steps between samples for ``time_series``, from the beginning of this run; 0 for none.
 
-        Returns
-        -------
-        Cycles
-            Record of the measured cycles, see ``measures.Cycles``.
-
         Raises
         ------
-        InputError
-            A number is out of range, a cycle is not complete, or the excitation ends earlier.
         SimulationDiverged
             All scenes diverged, or one with ``if_diverged="raise"``.
         """
@@ -342,8 +318,6 @@ class Batch(LoadedScenes):
 
         Raises
         ------
-        InputError
-            A number is out of range, or a cycle is not complete.
         SimulationDiverged
             All scenes diverged, or one with ``if_diverged="raise"``.
         """
@@ -366,8 +340,6 @@ class Batch(LoadedScenes):
 
         Raises
         ------
-        InputError
-            A number is negative or not whole.
         SimulationDiverged
             All scenes diverged, or one with ``if_diverged="raise"``.
         """
@@ -399,8 +371,6 @@ class Batch(LoadedScenes):
 
         Raises
         ------
-        InputError
-            A number is out of range, or the samples would be more than 32.
         SimulationDiverged
             As in ``advance``.
         """
@@ -434,11 +404,6 @@ class Batch(LoadedScenes):
         ------
         CheckpointWriter
             Writer of the checkpoint; ``save()`` saves now.
-
-        Raises
-        ------
-        InputError
-            The file cannot be read or written, or belongs to another run.
         """
         self._check_started()
         own = {"version": version_text(), "filling": identity_of(self.fillings.identity)}
@@ -474,13 +439,7 @@ class Batch(LoadedScenes):
         self.going_on = True
 
     def aside(self) -> tuple[dict[str, np.ndarray], ...]:
-        """Read the whole state, to keep it while another batch uses the engine.
-
-        Returns
-        -------
-        tuple
-            For ``take_up`` of a batch that is made with the same arguments.
-        """
+        """Read the whole state, to keep it while another batch uses the engine."""
         return self.memory.read(), self.saved()
 
     def take_up(self, aside: tuple[dict[str, np.ndarray], ...]) -> None:
@@ -497,13 +456,7 @@ class Batch(LoadedScenes):
         self._started, self.going_on = True, False
 
     def report(self) -> Report:
-        """Summarize figures and cost of the run.
-
-        Returns
-        -------
-        Report
-            Figures of all scenes since the last ``start``.
-        """
+        """Summarize figures and cost of the run."""
         particles, dt = self.table.column("particles"), self.table.column("dt")
         sprung, kind = self.mount != "base", self.fillings.kinds[0]
         return Report(
@@ -570,7 +523,6 @@ class Batch(LoadedScenes):
         return record
 
     def _aim(self, steps: np.ndarray, before_measuring: np.ndarray) -> None:
-        """Say how far every scene is to go."""
         begin = self._read_status()[0].astype(np.int64)
         if (begin + steps).max() > _MOST_STEPS:
             raise InputError(f"steps since the start must stay below {_MOST_STEPS}: run fewer")

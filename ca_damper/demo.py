@@ -138,6 +138,7 @@ def picture(decays: Mapping[str, Decay], fillings: Sequence[Any], options: Names
 
 def _batch(filling: Any, particles: Any, seeds: Any, options: Namespace) -> Batch:
     """Containers on a base at rest, let go from the amplitude asked for."""
+    # Equal room for results, so that the film runs in the engines of the other batches.
     chosen = isinstance(filling, FILLINGS[options.filling])
     dt = options.dt if chosen and options.dt else filling.default_dt
     table = SceneTable(particles, seeds, dt, Oscillator().natural_frequency, 0.0)
@@ -148,7 +149,6 @@ def _batch(filling: Any, particles: Any, seeds: Any, options: Namespace) -> Batc
 
 
 def _decay(counts: Sequence[int], batch: Batch, title: str) -> Decay:
-    """Run the decays of a filling to their end; title: of the bar."""
     every = max(1, int(batch.steps_per_cycle[0]) // SAMPLES)
     with ProgressBar(title) as progress:
         cycles = batch.run(0, CYCLES, Stages(progress, [1.0]), record_every=every)
@@ -156,7 +156,6 @@ def _decay(counts: Sequence[int], batch: Batch, title: str) -> Decay:
 
 
 def _filmed(filling: Any, options: Namespace) -> Film:
-    """The first cycles of a container."""
     batch = _batch(filling, options.particles, options.seed, options)
     steps = int(batch.steps_per_cycle[0])
     samples, frames = (max(1, steps // number) for number in (SAMPLES, FRAMES))

@@ -32,8 +32,7 @@ _EXPECTED = {
 class Decay:
     """Decays of a filling from several starts of each number of particles.
 
-    counts: numbers of particles. amplitude: of every cycle [m], x: samples over time [m], (counts x
-    starts, ...) each.
+    amplitude: of every cycle [m], x: samples over time [m], (counts x starts, ...) each.
     """
 
     counts: Sequence[int]
@@ -41,7 +40,6 @@ class Decay:
     x: np.ndarray
 
     def _of(self, array: np.ndarray, count: int) -> np.ndarray:
-        """Rows of a number of particles, (starts, ...)."""
         starts = len(array) // len(self.counts)
         first = starts * list(self.counts).index(count)
         return array[first : first + starts]

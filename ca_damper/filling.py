@@ -1,8 +1,8 @@
 """Interface of a filling of the container: its input is the motion, its output the load.
 
-A filling is a frozen dataclass of a user's options, checked when it is made (``Filling``). It binds
-itself to the scenes of an engine (``DeviceFilling``), which is compiled once and then runs every
-batch of a filling with the same ``Structure``. ``fixed_mass.py`` has a complete example.
+A filling is a frozen dataclass of a user's options (``Filling``). It binds itself to the scenes of
+an engine (``DeviceFilling``), which then runs every batch of the same ``Structure``.
+``fixed_mass.py`` has a complete example.
 """
 
 from collections.abc import Hashable
@@ -25,10 +25,9 @@ from taichi_dem.kit.validation import shown
 
 @ti.dataclass
 class Motion:
-    """The container at the beginning of a step, along x (up positive).
+    """The container at the beginning of a step, along x (up positive): x [m], v [m/s], a [m/s^2].
 
-    x: displacement [m]. v: velocity [m/s]. a: acceleration [m/s^2] by spring, dashpot, base and the
-    mass carried in the step before, without the impacts of that step, which are instantaneous.
+    a: by spring, dashpot, base and the mass carried in the step before, without its impacts.
     """
 
     x: ti.f64
@@ -100,10 +99,7 @@ class Structure:
 
 
 class Fillings:
-    """The filling of each scene of a batch: of one class and compiled structure, of any numbers.
-
-    kinds: those that differ. which: of these that each scene has, (scenes,).
-    """
+    """The filling of each scene of a batch: of one class and compiled structure, of any numbers."""
 
     def __init__(self, given: Any, scenes: int):
         """Of one filling for all scenes, or a sequence with one for each; InputError."""
@@ -159,10 +155,7 @@ class Fillings:
         return np.array([value(one) for one in self.kinds])[self.which]
 
     def write(self, field: Any, value: Any) -> None:
-        """Write what a function finds of each scene to a field, members of structs by name.
-
-        Zeros follow where it finds fewer numbers than there is room for.
-        """
+        """Write what a function finds of each scene to a field, with zeros where it finds fewer."""
         found = [value(one) for one in self.kinds]
         if hasattr(field, "field_dict"):
             for name in found[0]:
@@ -190,13 +183,11 @@ def _difference(one, other):
 
 @runtime_checkable
 class Filling(Protocol):
-    """Interface of a filling of the container.
+    """Interface of a filling of the container: options of a user, checked when they are made.
 
-    Options of a user, checked when they are made. A filling may also have ``order``, that of the
-    error in the step, for the report; choose its effects by itself, as ``activation.py`` describes;
-    and have ``clearance(particles)`` [m] above settled particles, or ``with_clearance(particles,
-    clearance)``, for ``damper_map``; and ``checked_range(driven)``, of ``checked_range.py``, for
-    the report and the warning before a run.
+    Optional members: ``order``, that of the error in the step; those of ``activation.py``;
+    ``clearance(particles)`` [m] and ``with_clearance(particles, clearance)``, for ``damper_map``;
+    ``checked_range(driven)``, for the report and the warning before a run.
     """
 
     @property
@@ -240,11 +231,6 @@ class Filling(Protocol):
             Number of particles.
         dt : float
             Step [s].
-
-        Raises
-        ------
-        InputError
-            They are out of range.
         """
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
@@ -272,24 +258,16 @@ class Filling(Protocol):
         ----------
         table : SceneFields
             Fields of the scenes.
-
-        Returns
-        -------
-        DeviceFilling
-            The filling on the device.
         """
 
 
 class DeviceFilling(Protocol):
     """A filling on the device, for all scenes of a table; data oriented.
 
-    Of its members ``load``, ``uses`` and ``snapshot`` are Python, the others ti.funcs. ``table.dt``
-    may change between two steps, when a sweep goes on to its next frequency. It may have two
-    further members for a certificate, in Python: see ``activation.py``.
-
-    A filling whose impacts depend on the recoil of the container splits ``advance``, so that boxes
-    on one structure resolve their impacts together: ``find_blows(s, step, motion)`` returns Blows,
-    and ``carry_out(s, step, motion, recoil)`` with a Recoil returns the Action.
+    ``load``, ``uses`` and ``snapshot`` are Python, the others ti.funcs. ``table.dt`` may change
+    between two steps, when a sweep goes on to its next frequency. A filling whose impacts depend on
+    the container's recoil splits ``advance`` into ``find_blows(s, step, motion)``, which returns
+    Blows, and ``carry_out(s, step, motion, recoil)``, which returns the Action.
     """
 
     def load(self, fillings: Fillings) -> None:
@@ -299,11 +277,7 @@ class DeviceFilling(Protocol):
         """Place the particles of scene s at their start, from its seed."""
 
     def advance(self, s: int, step: int, motion: Motion) -> Action:
-        """Take the particles of scene s over a step in which the container starts with ``motion``.
-
-        step: its number (i32), counted from the reset without a gap. The container takes the step
-        after this call.
-        """
+        """Take the particles of scene s over a step that starts with ``motion``."""
 
     def energy(self, s: int) -> float:
         """Kinetic and potential energy [J]; heights count from the container's floor."""
@@ -318,10 +292,7 @@ class DeviceFilling(Protocol):
         """Activity of each of the named effects, for those that can be counted."""
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
-        """Positions [m] and velocities [m/s] of the particles, (particles, 2) each, by name.
-
-        (horizontal, vertical); positions count from the container's lower left inner corner.
-        """
+        """Positions [m] from the lower left inner corner, velocities [m/s], (particles, 2) each."""
 
 
 def check_filling(filling: Any) -> Any:

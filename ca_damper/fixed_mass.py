@@ -21,16 +21,13 @@ class _Fixed:
     default_dt: ClassVar[float] = 1e-4
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
-        """Nothing that could diverge; required by the protocol."""
         return "is fixed", dt
 
     @property
     def structure(self) -> Structure:
-        """Nothing but the class: mass and gravity are numbers."""
         return Structure(())
 
     def bind(self, table: SceneFields) -> "FixedMass":
-        """The mass of a particle on the device."""
         return FixedMass(table)
 
 
@@ -60,11 +57,6 @@ class RigidMass(_Fixed):
         Mass of a particle [kg].
     gravity : float, default 9.8
         Gravity, downwards [m/s^2].
-
-    Raises
-    ------
-    InputError
-        A value is out of its range.
     """
 
     particle_mass: float = 0.2e-3

@@ -40,11 +40,6 @@ class Goal(BaseGoal):
         Frequency ratios f/f0 [-] that the goal needs; none for an ``"extreme"``, whose Response has
         at least three around the highest RMS.
 
-    Raises
-    ------
-    InputError
-        A member is of the wrong kind, or the ratios do not ascend.
-
     Examples
     --------
     >>> Goal("swing", "m", lambda found: found.amplitude[0].max(0), "extreme").kind
@@ -71,22 +66,12 @@ class Goal(BaseGoal):
         object.__setattr__(self, "ratios", ratios)
 
     def values(self, response: Response) -> np.ndarray:
-        """Values of a Response.
+        """Values of a Response, shape (seeds, places).
 
         Parameters
         ----------
         response : Response
             Response of one particle number.
-
-        Returns
-        -------
-        ndarray
-            Values, shape (seeds, places).
-
-        Raises
-        ------
-        InputError
-            The function returns another shape.
         """
         instance("response", response, Response)
         found = np.asarray(self.function(response), dtype=np.float64)
@@ -99,92 +84,55 @@ class Goal(BaseGoal):
 
 
 def peak_ratio() -> Goal:
-    """Frequency ratio f/f0 at which the RMS displacement peaks.
-
-    Returns
-    -------
-    Goal
-        The ratio [-].
-    """
+    """Frequency ratio f/f0 [-] at which the RMS displacement peaks."""
     return Goal("peak ratio", "1", lambda found: found.peaks()[0][0], "extreme")
 
 
 def peak_rms() -> Goal:
-    """Height of the peak of the RMS displacement.
-
-    Returns
-    -------
-    Goal
-        The RMS displacement [m].
-    """
+    """Height of the peak of the RMS displacement [m]."""
     return Goal("peak RMS", "m", lambda found: found.peaks()[1][0], "extreme")
 
 
 def rms_at(ratio: float) -> Goal:
-    """RMS displacement at a frequency ratio.
+    """RMS displacement [m] at a frequency ratio.
 
     Parameters
     ----------
     ratio : float
         Frequency ratio f/f0.
-
-    Returns
-    -------
-    Goal
-        The RMS displacement [m].
     """
     return _measure_at("RMS", "m", "rms", ratio)
 
 
 def loss_factor_at(ratio: float) -> Goal:
-    """Loss factor at a frequency ratio.
+    """Loss factor [-] at a frequency ratio.
 
     Parameters
     ----------
     ratio : float
         Frequency ratio f/f0.
-
-    Returns
-    -------
-    Goal
-        The loss factor [-].
     """
     return _measure_at("loss factor", "1", "loss_factor", ratio)
 
 
 def apparent_mass_at(ratio: float) -> Goal:
-    """Apparent mass of the filling at a frequency ratio.
+    """Apparent mass [kg] of the filling at a frequency ratio.
 
     Parameters
     ----------
     ratio : float
         Frequency ratio f/f0.
-
-    Returns
-    -------
-    Goal
-        The apparent mass [kg].
     """
     return _measure_at("apparent mass", "kg", "apparent_mass", ratio)
 
 
 def response_curve(ratios: Sequence[float] | np.ndarray) -> Goal:
-    """RMS displacement at each of some frequency ratios.
+    """RMS displacement [m] at each of some frequency ratios.
 
     Parameters
     ----------
     ratios : sequence of float or ndarray
         Ascending frequency ratios f/f0.
-
-    Returns
-    -------
-    Goal
-        The RMS displacements [m], one for each ratio.
-
-    Examples
-    --------
-    >>> response_curve([0.95, 0.97]).ratios
-    (0.95, 0.97)
     """
     given = several("ratios", ratios, positive)
     return Goal("response curve", "m", lambda found: found.rms[0].T, "curve", given)

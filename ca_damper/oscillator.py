@@ -34,7 +34,7 @@ def check_steady(what: str, ratio: Any, frequency: ArrayLike) -> None:
 
 @dataclass(frozen=True)
 class Oscillator:
-    """Container with its spring and dashpot, on a base that moves as y0 sin(2 pi f t).
+    """Container on a spring and dashpot, whose base moves as y0 sin(2 pi f t) (section 4.1).
 
     Parameters
     ----------
@@ -47,20 +47,6 @@ class Oscillator:
     base_amplitude : float, default 0.0006
         Amplitude y0 of the base [m]. The paper prints none; 0.6 mm lets the empty container peak at
         24.4 mm, near the +-25 mm of its Figs 9 and 10.
-
-    Raises
-    ------
-    InputError
-        Mass or stiffness is not positive, or another value is negative.
-
-    References
-    ----------
-    Komatsuzaki et al., section 4.1 and Table 1.
-
-    Examples
-    --------
-    >>> round(Oscillator().natural_frequency, 3)
-    6.029
     """
 
     mass: float = 0.086
@@ -86,7 +72,7 @@ class Oscillator:
         return self.damping / (2.0 * math.sqrt(self.stiffness * self.mass))
 
     def transfer(self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0) -> Any:
-        """Complex ratio x / y of the steady state.
+        """Complex ratio x / y [-] of the steady state.
 
         Parameters
         ----------
@@ -94,11 +80,6 @@ class Oscillator:
             Frequency of the base [Hz].
         added_mass : float or ndarray, default 0.0
             Mass that moves with the container [kg].
-
-        Returns
-        -------
-        complex or ndarray
-            Ratio of the displacements [-].
 
         Raises
         ------
@@ -129,11 +110,6 @@ class Oscillator:
             Its mass [kg].
         base_amplitude : float
             Its amplitude of the base [m].
-
-        Returns
-        -------
-        Oscillator
-            The scaled oscillator.
         """
         share = positive("mass", mass) / self.mass
         return Oscillator(mass, share * self.stiffness, share * self.damping, base_amplitude)
@@ -164,7 +140,7 @@ class Oscillator:
         return ratio, float(self.rms(ratio * self.natural_frequency, added_mass))
 
     def rms(self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0) -> Any:
-        """RMS displacement of the steady state.
+        """RMS displacement [m] of the steady state; infinite at resonance without damping.
 
         Parameters
         ----------
@@ -172,11 +148,6 @@ class Oscillator:
             Frequency of the base [Hz].
         added_mass : float or ndarray, default 0.0
             Mass that moves with the container [kg].
-
-        Returns
-        -------
-        float or ndarray
-            RMS displacement [m], infinite at the natural frequency without damping.
         """
         gain = abs(self._ratio(frequency, added_mass))
         gain = np.where(gain < UNBOUNDED, gain, np.inf)[()]
@@ -208,7 +179,7 @@ class Oscillator:
     def steady_state(
         self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0, gravity: float = 0.0
     ) -> tuple[Any, Any]:
-        """State of the steady motion when the base passes upwards through zero.
+        """State (x [m], v [m/s]) of the steady motion when the base passes upwards through zero.
 
         Parameters
         ----------
@@ -218,16 +189,6 @@ class Oscillator:
             Mass that moves with the container and hangs on the spring by its weight [kg].
         gravity : float, default 0.0
             Gravity, downwards [m/s^2].
-
-        Returns
-        -------
-        tuple of (float or ndarray, float or ndarray)
-            Displacement [m] and velocity [m/s].
-
-        Raises
-        ------
-        InputError
-            As of ``transfer``.
         """
         x = self.base_amplitude * self.transfer(frequency, added_mass)
         sag = real_numbers("gravity", gravity) * np.asarray(added_mass) / self.stiffness
@@ -236,11 +197,9 @@ class Oscillator:
 
 @ti.dataclass
 class Forcing:
-    """Acceleration terms of the container in a step; time counts from the step's beginning.
+    """Acceleration terms of the container in a step, per mass; time counts from its beginning.
 
-    stiffness [1/s^2], damping [1/s]. The base contributes drive cos(omega t) + quadrature sin(omega
-    t) [m/s^2], omega [rad/s]; constant [m/s^2] is the rest. Terms are per mass, so that the
-    right-hand side needs no division.
+    The base contributes drive cos(omega t) + quadrature sin(omega t) [m/s^2]; constant is the rest.
     """
 
     stiffness: ti.f64
@@ -254,6 +213,7 @@ class Forcing:
 @ti.pyfunc
 def sine_and_cosine(angle):
     """Of an angle up to a sixth, by their series to round-off (angle^11 / 11! < 1e-16)."""
+    # Faster than the library's, which must serve every angle.
     q = angle * angle
     sine = angle * (1 - q / 6 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72))))
     cosine = 1 - q / 2 * (1 - q / 12 * (1 - q / 30 * (1 - q / 56 * (1 - q / 90))))

@@ -1,8 +1,7 @@
 """Outputs of the damper to a tolerance, with an error bar.
 
-A pilot at a coarse step finds the frequencies that the goal needs. Scenes at two steps and with a
-few seeds then continue until their transients have ended and the bar, by cycles, seeds and step, is
-narrow enough. No scene is repeated that can continue.
+A pilot at a coarse step finds the frequencies that the goal needs. Scenes at two steps then
+continue until their transients have ended and the bar is narrow enough.
 """
 
 import math
@@ -210,7 +209,6 @@ def _stage_of(plan, filling, particles):
 
 
 def _range(ratios):
-    """(lowest, highest) of a range, or None."""
     if ratios is None:
         return None
     ends = several("ratios", ratios, positive)
@@ -275,7 +273,6 @@ def _sources(done, parts):
 
 
 def _told(goal, value, parts):
-    """Value and parts as a user gets them: arrays for a curve, else numbers where there is one."""
     if goal.kind == "curve" or len(value) > 1:
         return value, parts
     names = ("step", "chance", "sampling")
@@ -299,7 +296,6 @@ def _step_of(branches, steps, found, confidence):
 
 
 def _plan(done):
-    """Plan in words."""
     label, seeds = done.job.filling.label, counted(len(done.at.seeds), "seed")
     count = len(done.frequencies())
     several = "1 frequency" if count == 1 else f"{count} frequencies"

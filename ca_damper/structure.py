@@ -56,20 +56,9 @@ class ModalStructure:
     shapes : ndarray
         Mode shapes [kg^-1/2], shape (places, modes), with shapes^T masses shapes = 1.
 
-    Raises
-    ------
-    InputError
-        Arrays do not fit, masses or frequencies are not positive, damping is negative, or shapes
-        are not orthonormal.
-
     References
     ----------
     Craig and Kurdila, Fundamentals of Structural Dynamics, 2nd edition, chapters 10 and 11.
-
-    Examples
-    --------
-    >>> ModalStructure([2.0], [5.0], 0.01, [[2.0**-0.5]]).mode_count
-    1
     """
 
     masses: np.ndarray
@@ -173,38 +162,23 @@ class ModalStructure:
         return 1.0 - self.shapes @ self.participation
 
     def recoil(self, place: int) -> float:
-        """Speed that a unit impulse gives a place.
+        """Speed that a unit impulse gives a place [1/kg].
 
         Parameters
         ----------
         place : int
             Number of the place, from 0.
-
-        Returns
-        -------
-        float
-            Speed over impulse [1/kg].
         """
         row = self.shapes[whole("place", place, 0, self.place_count - 1)]
         return float(row @ row)
 
     def modal(self, motion: ArrayLike) -> np.ndarray:
-        """Modal coordinates p of a motion of the places.
+        """Modal coordinates p [kg^1/2 m] of a motion of the places, shape (..., modes).
 
         Parameters
         ----------
         motion : array_like
             Displacements [m], shape (..., places).
-
-        Returns
-        -------
-        ndarray
-            Modal coordinates [kg^1/2 m], shape (..., modes).
-
-        Raises
-        ------
-        InputError
-            The motion has another shape, or a value is no finite number.
         """
         return self._modal(real_numbers("motion", motion))
 
@@ -215,7 +189,7 @@ class ModalStructure:
         return moved @ self.masses @ self.shapes
 
     def transfer(self, frequency: ArrayLike, added_masses: Any = None) -> np.ndarray:
-        """Complex ratio x / y of all places in the steady state.
+        """Complex ratio x / y [-] of all places in the steady state, shape (..., places).
 
         Parameters
         ----------
@@ -223,11 +197,6 @@ class ModalStructure:
             Frequencies of the base [Hz], any shape.
         added_masses : array_like, optional
             Masses fixed to the places [kg], shape (places,).
-
-        Returns
-        -------
-        ndarray
-            Ratio of the displacements [-], shape (..., places).
 
         Raises
         ------
@@ -253,7 +222,6 @@ class ModalStructure:
 
     @property
     def _damping(self) -> np.ndarray:
-        """2 z w of each mode [1/s]."""
         return 4.0 * np.pi * self.damping_ratios * self.frequencies
 
 
@@ -275,11 +243,6 @@ class Box:
     filling : Filling, optional
         Its own filling, of the class, rules and effects of the others: grains and box of another
         size. None: that of the run.
-
-    Raises
-    ------
-    InputError
-        A value is out of its range.
     """
 
     place: int

@@ -36,10 +36,10 @@ _ZERO = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class SeedValues:
-    """A goal's values at one step: values (seeds, places).
+    """A goal's values at one step, (seeds, places).
 
-    variance: of a seed's value by the sampling of its cycles, (places,), with freedom degrees of
-    freedom. drift: half-width by transients that are not over, (places,).
+    variance: of a seed's value by the sampling of its cycles, (places,). drift: half-width by
+    transients that are not over.
     """
 
     values: np.ndarray
@@ -60,6 +60,7 @@ class SeedValues:
     @property
     def apart(self) -> np.ndarray:
         """Standard error of the mean from seed to seed, (places,); 0 for one seed."""
+        # The spread of seeds includes the sampling of their cycles, which is not counted again.
         count = len(self.values)
         if count < 2:
             return np.zeros_like(self.variance)
@@ -77,11 +78,10 @@ class SeedValues:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """A goal's value (places,) with its error parts. levels: the values at each step, fine first.
+    """A goal's value (places,) with its error parts; levels: the values at each step, fine first.
 
-    step: what they say of the step. grid: half-width by the frequencies between which a peak lies,
-    and rounding: of the machine, by which a value that is truly zero is off at most; both are part
-    of the sampling, rounding as far as runs show it.
+    grid: half-width by the frequencies between which a peak lies. rounding: error of the machine of
+    a value that is truly zero. Both are part of the sampling.
     """
 
     goal: Goal
@@ -162,6 +162,8 @@ def estimate(
 
 def _shift(error, blur, confidence):
     """Half-width of an error that is of one sign, beside one of chance: their squares then add."""
+    # The bar must hold the bias plus chance on one side, which is more than the root of their
+    # squares.
     one_sided = max(0.5, 2.0 * confidence - 1.0)
     share = t_quantile(one_sided, math.inf) / t_quantile(confidence, math.inf)
     return np.sqrt(np.maximum((error + min(1.0, share) * blur) ** 2 - blur**2, 0.0))
@@ -188,6 +190,8 @@ class Readings:
         self, goal: Goal, ratios: Sequence[float], seeds: Sequence[int], dt: float
     ) -> SeedValues:
         """Values of a goal at a step [s], with the errors of their cycles by leaving parts out."""
+        # A goal that is not linear is biased by 1 / cycles (a peak stands where chance lifts it):
+        # leaving parts out measures the bias, which is subtracted.
         values = goal.values(self.response(ratios, seeds, dt))
         without = goal.values(self.response(ratios, seeds, dt, BATCHES))
         left = without.reshape(len(seeds), BATCHES, values.shape[1])
@@ -209,6 +213,8 @@ class Readings:
         dt: float,
     ) -> np.ndarray:
         """Half-width by the frequencies at a peak, (places,)."""
+        # The largest change of the goal with other frequencies: those of ``wide``, twice the
+        # spacing, or without one near the peak. A tenth if the peak is lost at twice the spacing.
         everywhere = sorted({*ratios, *(ratio for some in wide for ratio in some)})
         inside = [ratio for ratio in ratios if ratio not in (everywhere[0], everywhere[-1])]
         without = [[one for one in everywhere if one != ratio] for ratio in inside]
@@ -224,6 +230,7 @@ class Readings:
         self, goal: Goal, ratios: Sequence[float], seeds: Sequence[int], dt: float
     ) -> bool:
         """Whether most seeds have an extreme at the first or last of some ratios."""
+        # An extreme at an end changes without it, and nothing tells how far it goes beyond.
         whole, *without = (
             goal.values(self.response(some, seeds, dt))
             for some in (ratios, ratios[1:], ratios[:-1])

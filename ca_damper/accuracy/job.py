@@ -25,9 +25,8 @@ _BELOW, _ABOVE = 0.95, 1.04
 class Stage:
     """Which runs make an estimate; another question of the same filling may begin at it.
 
-    filling, particles: that they are of. dt: finest step [s]. window: steady cycles of each scene.
-    has_between: whether there are steps between dt and 4 dt. margin: further frequencies on either
-    side of a peak. level: of halving of the frequencies around it.
+    window: steady cycles of each scene. margin: further frequencies on either side of a peak.
+    level: halvings of the frequencies around it.
     """
 
     filling: Any
@@ -42,10 +41,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Job:
-    """A checked question. span: range of ratios or None. fixed: seeds, or None for ours.
-
-    begin: stage at which an earlier question ended, or None. listener: of progress.
-    """
+    """A checked question. span: range of ratios or None. fixed: seeds, or None for ours."""
 
     filling: Any
     particles: int

@@ -1,7 +1,7 @@
 """Scenes of one filling that continue from their state until they are steady.
 
-All seeds of one frequency and step continue for the same number of cycles: if each stopped once it
-looks steady, the quieter of several motions would be counted too often.
+All seeds continue for the same number of cycles: if each stopped once it looks steady, the quieter
+of several motions would be counted too often.
 """
 
 import math
@@ -53,10 +53,7 @@ class _Home:
 
 
 class SceneRuns:
-    """Records of scenes of a filling with a number of particles, by SceneKey.
-
-    cpu_s: CPU seconds of their runs, without compiling. steps: of all scenes.
-    """
+    """Records of scenes of a filling, by SceneKey; cpu_s: CPU seconds without compiling."""
 
     def __init__(
         self, filling: Any, particles: int, oscillator: Oscillator, progress: Listener | None
@@ -105,7 +102,6 @@ class SceneRuns:
             self._go(self._batch(home), rows, left)
 
     def _begin(self, keys):
-        """Make tables of new scenes."""
         for first in range(0, len(keys), SCENES):
             some = keys[first : first + SCENES]
             ratios, seeds, steps = (np.array(column) for column in zip(*some))
@@ -172,11 +168,7 @@ class SceneRuns:
 
 
 class SteadyRuns:
-    """Steady parts of scenes, by SceneKey.
-
-    budget_s: CPU seconds that all runs may take. further: gives series by cycle, beside RMS and
-    amplitude, that must be steady in a scene.
-    """
+    """Steady parts of scenes, by SceneKey; further: gives more series that must be steady."""
 
     def __init__(
         self,
@@ -211,6 +203,7 @@ class SteadyRuns:
 
     def _go_within_budget(self, more: dict[SceneKey, int]) -> None:
         """Let scenes go on by so many cycles; BudgetSpent where they would take too long."""
+        # The first two cycles tell the speed; a run without budget makes them too.
         if self.budget_s < math.inf:
             for _ in range(0 if self.runs.steps else 2):
                 first = {key: 1 for key, count in more.items() if count > 0}

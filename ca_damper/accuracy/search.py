@@ -40,11 +40,7 @@ _MOST_MARGIN = 5
 
 
 class Search:
-    """Runs of a job with steps of ``at.dt`` [s] and of 2 and 4 times as much.
-
-    at: the present stage. pilot_s: CPU seconds of what came before the final runs. ended: what
-    ended them, in words.
-    """
+    """Runs of a job with steps of ``at.dt`` [s] and of 2 and 4 times as much."""
 
     def __init__(self, job: Job, runs: SceneRuns, coarse: float):
         self.job, self.runs = job, runs
@@ -93,7 +89,6 @@ class Search:
         return bool(found) and all(math.isfinite(self._excess(one)) for one in found)
 
     def _find_peak(self):
-        """Find the peak, where a goal lies on it, with the first seed and the coarse step."""
         if self.job.follows_peak:
             search = PeakSearch(self._pilot_rms, *self.job.search_range(), self.job.span is None)
             self.peak, self.lattice, level = search.run()
@@ -175,7 +170,6 @@ class Search:
         return sum(self.steady.parts[key].begin for key in keys) / max(1, gone)
 
     def _estimates(self):
-        """Estimates of all goals from what has been run."""
         return [self._estimate(goal) for goal in self.job.goals]
 
     def _estimate(self, goal):
@@ -202,7 +196,6 @@ class Search:
         return self._enlarge(worst, excess)
 
     def _excess(self, found):
-        """Bar by the bar that is allowed; infinite for no number."""
         total, allowed = size_of(found.parts.total), found.allowed(self.job.tolerance)
         if not math.isfinite(total + allowed):
             return math.inf
@@ -221,7 +214,6 @@ class Search:
         return self._go_to(level=level, margin=margin)
 
     def _go_to(self, **changes: Any) -> bool:
-        """Go on to another stage."""
         self.at = replace(self.at, **changes)
         return True
 

@@ -1,9 +1,7 @@
 """Forces on the container (Komatsuzaki et al., 6.2, eq. 11: the sum of m (v - v') / dt).
 
-An accounting says which impulses of the particles act on the container: a class each, and one line
-in the table below. It books the velocity along x that particles gain, each gain once, when it
-happens. A gain that counts acts on the container with the opposite sign, times the mass of a
-particle. Gains are counted in whole quanta, so that no order of execution reaches the bits of sums.
+An accounting says which gains of velocity of the particles act on the container: a class each, and
+one line in the table below. Gains are counted in whole quanta, so that sums do not depend on order.
 """
 
 from typing import Any, ClassVar
@@ -26,11 +24,8 @@ def quanta(velocity):
 class Uncounted:
     """No impulse acts on the container: the base of the others.
 
-    labels: of an automaton without and with static contact, for tables and files. effects: counted
-    beside "landing", in words for the report. static_contact: whether particles rest on the floor
-    unless the user says otherwise. counts_all: whether every gain counts.
-
-    The ti.funcs with a ``gain`` [m/s] return the part that counts [quanta].
+    labels: of an automaton without and with static contact. effects: counted beside "landing", in
+    words. The ti.funcs with a ``gain`` [m/s] return the part that counts [quanta].
     """
 
     labels: ClassVar[tuple[str, str]] = ("ca_uncounted", "ca_uncounted_static")
@@ -73,8 +68,7 @@ class Uncounted:
 class AllImpulses(Uncounted):
     """Every impact and push counts, and so do losses to the six directions of the lattice.
 
-    The container holds the lattice, so impulses of the lattice act on it. Momentum is then
-    conserved, and the mean force is the weight.
+    Momentum is then conserved, and the mean force is the weight.
     """
 
     labels: ClassVar[tuple[str, str]] = ("ca_all", "ca_static")
@@ -97,11 +91,7 @@ class AllImpulses(Uncounted):
 class Landings(Uncounted):
     """Impacts of particles that came from another cell, as in the paper (6.2).
 
-    Only a landing counts: the first impact on a wall after a change of cell. Impacts between a heap
-    and the floor that it lies on are left out.
-
-    arrived: 1 for a particle that changed its cell since it last met a wall, shape (scenes, cells +
-    1); meaningless in cells without a particle.
+    Only the first impact on a wall after a change of cell counts; impacts within a heap do not.
     """
 
     labels: ClassVar[tuple[str, str]] = ("ca_landing", "ca_landing_static")

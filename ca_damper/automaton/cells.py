@@ -14,11 +14,8 @@ from ca_damper.scenes.scene_fields import SceneFields
 class Traversal:
     """Cells visited in a step: those on a list of particles, or all from the first to the last.
 
-    The order changes no result: rules read only data that no other cell writes, conflicts are
-    resolved by random numbers, and impulses are summed as integers.
-
-    listed: whether there is a list. cells: of particle number k. number: of the particle in a cell,
-    meaningless in the other cells. Both of shape (scenes, cells).
+    The order changes no result: rules read only data that no other cell writes, random numbers
+    resolve conflicts, and impulses are summed as integers.
     """
 
     def __init__(self, table: SceneFields, lattice: Lattice, listed: bool):
@@ -72,11 +69,9 @@ class Traversal:
 class Cells:
     """State of all cells; fields of shape (scenes, cells + 1), a scene's cells together in memory.
 
-    kind: direction of a particle, or EMPTY, WALL, HELD. speed: along that direction, >= 0 [m/s].
+    kind: direction of a particle, or EMPTY, WALL, HELD. speed along it in the room, >= 0 [m/s].
     travelled: part of the way to the next cell [m], negative while short of the own cell's centre.
-    Speed and way are zero in cells without a particle under way.
-    stair: displacement of the container in whole cells, (scenes,); offset: what is left of it [m].
-    Velocities are those of the room, not of the container. follower: what else is kept of a cell.
+    stair: displacement of the container in whole cells; offset: what is left of it [m].
     """
 
     def __init__(self, table: SceneFields, lattice: Lattice, listed: bool, follower: Any):
@@ -134,7 +129,6 @@ class Cells:
 
 
 def _named_cells(options):
-    """Numbers of the cells of which a user gave column and row."""
     geometry = geometry_of(options)
     return [geometry.cell_of(*cell) for cell in options.start]
 
@@ -143,11 +137,9 @@ def _named_cells(options):
 class Placement:
     """First cells of the particles: named by the user, or drawn from the scene's seed.
 
-    A full row would fall as one lump. Each cell is taken with the probability needed / left, so
-    that every choice of them is equally likely (selection sampling, Knuth, The Art of Computer
-    Programming 2, 3.4.2).
-
-    way: direction in which the particles head. named: cells that the user named, of each scene.
+    Drawn singly, as a full row would fall as one lump. Taking a cell with the chance needed / left
+    makes every choice equally likely (selection sampling, Knuth, The Art of Computer Programming 2,
+    3.4.2).
     """
 
     def __init__(self, table: SceneFields, cells: Cells, way: int, is_named: bool):

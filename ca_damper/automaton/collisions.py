@@ -1,9 +1,7 @@
 """Collisions of particles with each other and with walls (Komatsuzaki et al., 5.3 and 5.4).
 
-First the event of every touching particle is found from the state after the flight: it joins the
-heap, meets a wall, or approaches another particle. Events claim the particles they need, so that no
-particle takes part in two events of a step. Then the winners are carried out; no two of them
-involve the same particle.
+The event of every touching particle is found from the state after the flight. Events claim the
+particles they need, and only the winners are carried out.
 """
 
 from typing import Any
@@ -24,6 +22,8 @@ _CELL_BITS = 16
 @ti.func
 def speed_after_pair(speed, other, restitution):
     """Speed [m/s] of the particle that hits, eq. (9); ``other`` is that of the equal it meets."""
+    # Signed along the direction of the particle that hits; with the two exchanged, the speed of the
+    # one that is hit: their sum is conserved.
     return 0.5 * ((speed + other) - restitution * (speed - other))
 
 
@@ -48,9 +48,7 @@ def deflected(direction, draw):
 class Collisions(Part):
     """Judge and carry out the events of a step.
 
-    Of shape (scenes, cells), events: cell and event in one number; other: speed of what is met,
-    along the direction of the particle that meets it [m/s]; ranks: of the events among their
-    rivals. both: whether both of a pair are updated.
+    other: speed of what is met, along the direction of the particle that meets it [m/s].
     """
 
     def __init__(self, automaton: Any, both: bool):
@@ -189,6 +187,7 @@ class Collisions(Part):
     @ti.func
     def go_on(self, s, shared, cell, line, speed):
         """Set a particle's speed along a line; one that came along it is deflected if sent back."""
+        # One that came from aside leaves along the line, which keeps the momentum in it.
         kind = self.cells.at(s, cell)
         after = line if speed >= 0.0 else turned_back(line)
         if turned_back(after) == kind:

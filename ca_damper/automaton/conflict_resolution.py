@@ -1,7 +1,6 @@
-"""Resolve conflicting claims to a cell by random rank.
+"""Resolve conflicting claims to a cell by random rank: the largest does not depend on their order.
 
-The largest rank of several does not depend on their order. Ranks grow with the step, so that old
-claims never need to be cleared.
+Ranks grow with the step, so that old claims never need to be cleared.
 """
 
 from typing import Any

@@ -31,9 +31,8 @@ _BY = {name: (kind,) for name, (kind, _) in _COUNTED.items()}
 class Parameters:
     """Numbers of the options of a scene.
 
-    width of a cell [m], mass of a particle [kg], gravity downwards and sideways, to the right
-    [m/s^2], restitution of particle and wall; threshold of static contact in units of g dt;
-    friction of two particles, and wall_friction.
+    gravity downwards and sideways, to the right [m/s^2]; threshold of static contact in units of g
+    dt.
     """
 
     width: ti.f64
@@ -48,7 +47,6 @@ class Parameters:
 
 
 def _parameters(options: Any) -> dict[str, float]:
-    """Members of Parameters."""
     return {
         "width": options.width,
         "mass": options.particle_mass,
@@ -65,12 +63,9 @@ def _parameters(options: Any) -> dict[str, float]:
 class LatticeDevice:
     """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``.
 
-    Rules add ``transport`` (with follow, fly_all and move_all), ``collisions`` (with resolve,
-    recoil and strike_container), and ``motion_of(s, kind, travelled, speed)``, which returns places
-    off the centres of cells [m] and velocities [m/s] of particles under way, (cells, 2) each.
-    looks_ahead: whether rules ask for the cell ahead of a particle.
-    velocity: of the container at the beginning of the last step [m/s]. gained: velocity along x
-    that the container gave to the particles in this step [quanta]. Both (scenes,).
+    Rules add ``transport`` (follow, fly_all, move_all), ``collisions`` (resolve, recoil,
+    strike_container), and ``motion_of(s, kind, travelled, speed)``: places off the centres of cells
+    [m] and velocities [m/s] of particles under way, (cells, 2) each.
     """
 
     constant_fields = ("parameters",)

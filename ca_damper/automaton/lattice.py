@@ -1,9 +1,7 @@
 """The triangular lattice of the container (Komatsuzaki et al., 5.1, Fig. 4).
 
-One axis stands along gravity; odd columns are half a cell higher, so that the cells of floor and
-ceiling alternate. Walls are cells too: 16 rows and 10 columns inside make 18 x 12 cells. Columns
-stand one cell apart, as in the paper (10 particles in 60 mm); the angles are those of the
-triangular lattice. Cells are counted upwards, column by column: the cell above is the next one.
+One axis stands along gravity; odd columns are half a cell higher. Walls are cells too: 16 rows and
+10 columns inside make 18 x 12 cells, counted upwards, column by column.
 """
 
 from typing import Any
@@ -73,6 +71,8 @@ class Geometry:
 
     def neighbours(self) -> np.ndarray:
         """Cell ahead of a particle, by its cell and kind, shape (cells + 1, KINDS)."""
+        # Cell number ``cells`` is always empty: what does not fly looks there, so that one rule
+        # serves all.
         column, row = self.column_and_row(np.arange(self.cells))
         high = (column + 1) % 2
         steps = (
@@ -98,10 +98,7 @@ def geometry_of(options: Any) -> Geometry:
 
 @ti.dataclass
 class LatticeSize:
-    """Columns and rows inside the walls, and with them: height of a column, cells of all.
-
-    first: cell that a particle can take. end: one past the last.
-    """
+    """Columns and rows inside the walls, height of a column, and first and last cell to take."""
 
     columns: ti.i32
     rows: ti.i32
@@ -113,11 +110,7 @@ class LatticeSize:
 
 @ti.data_oriented
 class Lattice:
-    """The lattice of each scene on the device.
-
-    Of the scenes, size, and the tables of a Geometry: level, bottom, and neighbour where
-    ``looks_ahead``. cosine: between directions.
-    """
+    """The lattice of each scene on the device; cosine: between directions."""
 
     constant_fields = ("size", "neighbour", "cosine", "level", "bottom")
 

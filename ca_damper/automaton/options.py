@@ -91,20 +91,10 @@ class Automaton:
     wall_friction : float, optional
         Friction coefficient between particle and wall, likewise.
 
-    Raises
-    ------
-    InputError
-        A value is out of its range, or two options exclude each other.
-
     References
     ----------
     Komatsuzaki, Sato, Iwata, Morishita, "Modeling of granular damper using cellular automata",
     section 5.
-
-    Examples
-    --------
-    >>> Automaton(columns=12).capacity
-    192
     """
 
     accounting: str = "all"
@@ -251,17 +241,12 @@ class Automaton:
         return self.longest_dt, "a cell crossed at v_max"
 
     def clearance(self, particles: int) -> float:
-        """Distance from settled particles to the lid.
+        """Distance from settled particles to the lid [m].
 
         Parameters
         ----------
         particles : int
             Number of particles.
-
-        Returns
-        -------
-        float
-            Clearance [m].
         """
         whole("particles", particles, 0, 2**31 - 1)
         return self.width * (self.rows - particles / self.columns)
@@ -275,11 +260,6 @@ class Automaton:
             Number of settled particles.
         clearance : float
             Distance from the settled particles to the lid [m]; a whole number of cells.
-
-        Returns
-        -------
-        Automaton
-            The same options with another number of rows.
 
         Raises
         ------

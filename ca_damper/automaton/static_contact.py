@@ -1,10 +1,7 @@
 """Static contact: particles at rest on the floor move with it and load it.
 
-The paper names its absence as the reason why the response peak moves the wrong way (6.2). A
-particle that stands on the floor, or on a held one, and has almost its velocity is held: it moves
-as one with the container, which carries its mass. That lasts while the heap is pressed on the
-floor. When the container's acceleration falls below -g the heap lifts off as it stands. For moving
-particles the heap is a wall.
+The paper names its absence as the reason why the response peak moves the wrong way (6.2). Held
+particles are carried until the container's acceleration falls below -g; then the heap lifts off.
 """
 
 from typing import Any
@@ -16,11 +13,7 @@ from ca_damper.automaton.lattice import DOWN, HELD, UP, WALL
 
 @ti.data_oriented
 class StaticContact:
-    """Particles held by the container.
-
-    rests: whether any is ever held; if not, the compiler removes every question about it. held:
-    number of them, shape (scenes,).
-    """
+    """Particles held by the container; rests: whether any is ever held."""
 
     def __init__(self, automaton: Any, cells: Any, accumulator: Any, rests: bool):
         self.cells, self.accumulator, self.rests = cells, accumulator, rests

@@ -1,10 +1,8 @@
 """Transport by the rules of the paper: free flight, changes of cell (5.2), the lattice (Fig. 7).
 
-The lattice moves with the container, whose displacement is rounded to whole cells. When that
-staircase steps, moving particles stay in place in the room: one cell the other way. Those that
-touch the wall behind them, and the cluster that touches these, are pushed along: they keep their
-cell, and those slower than the wall take its velocity. A column always has room for this: a
-particle that stays has no pushed one in its way, or it would touch it and be pushed.
+The container's displacement is rounded to whole cells. When that staircase steps, moving particles
+stay in place in the room, one cell the other way; the cluster that touches the wall behind it is
+pushed along, at least at the wall's velocity. A column always has room for this.
 """
 
 from typing import Any
@@ -77,9 +75,8 @@ class Accumulator:
 class Transport(Part):
     """Flight of the particles, and how they follow the lattice.
 
-    Of shape (scenes, cells), touching: cells of particles that meet an obstacle; crossing: of those
-    that may change their cell; pushed: 1 for a cell in the cluster that a wall pushes along;
-    border: cells of the cluster still to look around. touching_count, crossing_count: (scenes,).
+    touching, crossing: cells of particles that meet an obstacle, or may change their cell; pushed:
+    1 in the cluster that a wall pushes along; border: its cells still to look around.
     """
 
     def __init__(self, automaton: Any):
@@ -112,6 +109,7 @@ class Transport(Part):
     @ti.func
     def fly(self, s, cell, dt, pull):
         """Advance the content of a cell by a step."""
+        # Empty cells and walls take the same path: their speed and pull are zero.
         kind = self.cells.at(s, cell)
         upward = self.lattice.upward(kind)
         speed = self.cells.speed[s, cell] - pull * upward
@@ -186,6 +184,7 @@ class Transport(Part):
     @ti.func
     def reach(self, s, cell, way, number):
         """Mark a particle, unless it is, and put it on the border; returns the border's size."""
+        # The floor pushes through the heap that it holds; the ceiling pushes against no heap.
         result = number
         kind = self.cells.at(s, cell)
         found = kind < DIRECTIONS or (kind == HELD and way > 0)

@@ -1,9 +1,8 @@
 """Effects that a batch computes: those listed, or those that its scenes need; its certificate.
 
-A filling takes part by two methods, both optional: ``activated(particles)`` returns the filling
-with the effects that at most so many particles call for, and an Estimate for each effect that it
-decided on; ``left_out(particles)`` returns an Estimate for each effect that it does not compute.
-Its device may have ``first_steps(effects)`` and ``audit()``, as that of the spheres.
+A filling may have ``activated(particles)``, which returns the filling with the effects that so many
+particles call for and an Estimate of each, and ``left_out(particles)``, Estimates of effects that
+it does not compute; its device ``first_steps(effects)`` and ``audit()``.
 """
 
 from typing import Any
@@ -79,7 +78,6 @@ def periods_of(cycles: Cycles) -> Periods | None:
 
 
 def _most_particles(table: Any) -> int:
-    """Most particles of a scene."""
     return int(table.column("particles").max())
 
 

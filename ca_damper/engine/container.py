@@ -1,10 +1,9 @@
 """Motion of the container: on its spring, driven by base and filling, or fixed to the base.
 
-All have ``load`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``,
-``motion(s)`` at the beginning of a step, with ``base(s)``, the base's displacement [m],
-``recoil(s)``, the speed that a unit impulse gives it [1/kg], ``renew(s)`` where the base has
-changed its motion, between two frequencies of a sweep, and ``advance(s, action)`` over the step,
-which returns the attempts of the integration, or -1.
+All have ``load`` for the numbers of a batch, and the ti.funcs ``start``, ``motion`` and ``base`` at
+the beginning of a step, ``recoil``, the speed that a unit impulse gives it [1/kg], ``renew`` where
+the base changes its frequency, and ``advance``, which returns the attempts of the integration, or
+-1.
 """
 
 from typing import Any
@@ -39,11 +38,7 @@ class Container:
 
 @ti.data_oriented
 class IntegratedContainer(Container):
-    """Base of containers that RK45 moves on under the action of the filling.
-
-    impulse [N s] and carried [kg] in the present step. tolerance: local error allowed, rtol and
-    atol, the latter in m and m/s.
-    """
+    """Base of containers that RK45 moves on under the action of the filling."""
 
     def __init__(self, table: SceneFields):
         self.table = table
@@ -60,10 +55,8 @@ class SpringContainer(IntegratedContainer):
     """Base of integrated containers with one spring and dashpot each.
 
     They have ``_begin(s)``, ``_load(s, action)`` over a step, ``_slope(s, load)`` at its beginning
-    and ``_integrated(s, load)``: state and slope at its end, and attempts.
-
-    state, slope: displacement and speed, and their change. impulse_velocity: share of the present
-    acceleration that is due to impacts [m/s^2].
+    and ``_integrated(s, load)``: state and slope at its end, and attempts. impulse_velocity: share
+    of the acceleration that is due to impacts [m/s^2].
     """
 
     def __init__(self, table: SceneFields):
@@ -92,7 +85,6 @@ class SpringContainer(IntegratedContainer):
 
     @ti.func
     def _set_action(self, s, action):
-        """Take over what acts from now on."""
         self.impulse[s], self.carried[s] = action.impulse, action.carried
         self.slope[s] = self._slope(s, self._load(s, action))
 
@@ -181,10 +173,7 @@ class SprungContainer(SpringContainer):
 
 @ti.dataclass
 class Load:
-    """Numbers of scene s over a step that begins at ``start`` [s], per mass [1/kg] of all it moves.
-
-    stiffness [1/s^2], damping [1/s]; constant [m/s^2]: by impacts and the weight carried.
-    """
+    """Numbers of scene s over a step from ``start`` [s], per mass of all it moves."""
 
     scene: ti.i32
     start: ti.f64
@@ -198,9 +187,7 @@ class Load:
 class ExcitedContainer(SpringContainer):
     """The container on its spring, its base and a force moving as an Excitation says.
 
-    elapsed: steps since the start, as an excitation is a function of time. lifts: whether it lies
-    on the base by its weight, and spring and dashpot push but never pull; x = 0 is where it just
-    touches a base at rest.
+    lifts: whether it lies on the base by its weight, and spring and dashpot push but never pull.
     """
 
     def __init__(self, table: SceneFields, excitation: DeviceExcitation, lifts: bool):
@@ -222,7 +209,6 @@ class ExcitedContainer(SpringContainer):
 
     @ti.func
     def _load(self, s, action):
-        """Load over the step that begins now."""
         per_mass = 1.0 / (self.table.mass[s] + action.carried)
         heavy = action.carried
         if ti.static(self.lifts):

@@ -1,7 +1,7 @@
 """The step of a coupled scene: filling, container, measures, clock; and the loop over all scenes.
 
-One scene a thread, the whole time loop inside the kernel. All state is stored in fields between
-launches, so that neither their number nor other scenes in the batch change a bit.
+One scene a thread, the whole time loop inside the kernel. State is stored in fields between
+launches, so that neither their number nor other scenes change a bit.
 """
 
 import math
@@ -36,11 +36,8 @@ _F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 class MomentumAccount:
     """Expected momentum of the fillings: the initial one, less that given to container and gravity.
 
-    Counted from the end of the first step, when all carried particles move along.
-
-    expected: momentum that a filling should have [kg m/s]. late: part of it that the carried mass
-    takes over at its next step [kg m/s]. exchanged: sum of the magnitudes of the impulses on the
-    container [N s].
+    Counted from the end of the first step, when all carried particles move along. late: part that
+    the carried mass takes over at its next step; exchanged: sum of impulses' magnitudes [kg m/s].
     """
 
     def __init__(self, table: SceneFields):
@@ -76,8 +73,7 @@ class MomentumAccount:
 class Coupling:
     """Filling, container and clock of all scenes, tied together.
 
-    device: what ``filling.bind`` gave. account: a MomentumAccount. recorder: a Recorder. record: of
-    the measured cycles, shape (scenes, cycles, columns of ``measures.COLUMNS``).
+    record: of the measured cycles, shape (scenes, cycles, columns of ``measures.COLUMNS``).
     """
 
     def __init__(
@@ -157,7 +153,6 @@ class Coupling:
 
     @ti.func
     def _advance_step(self, s):
-        """The order of a step: filling, container, clock, measures, divergence."""
         before = self.container.motion(s)
         self._record(s, before)
         action = self.device.advance(s, self.step[s], before)
@@ -166,13 +161,11 @@ class Coupling:
 
     @ti.func
     def _record(self, s, before):
-        """Take a sample at the beginning of a step if one is due."""
         since = self.step[s] - self.begin[s]
         self.recorder.note(s, since, before, self.force[s], self._present)
 
     @ti.func
     def _present(self, s, motion):
-        """Quantities of ``measures.SAMPLE`` between two steps."""
         y, energy, momentum = self.container.base(s), self.device.energy(s), self.device.momentum(s)
         return motion.x, motion.v, motion.a, y, self.force[s], energy, momentum
 
@@ -216,6 +209,7 @@ class Coupling:
     @ti.func
     def _measure(self, s, motion, now, middle):
         """Add the sums of ``measures.SUMS``; the force of a step belongs to its middle."""
+        # Not by +=, which would be an atomic sum here.
         x, v, f = motion.x, motion.v, self.force[s]
         sine, cosine, fs, fc = now[0], now[1], f * middle[0], f * middle[1]
         more = ti.Vector([x, x * x, x * cosine, x * sine, v * cosine, v * sine, f, fc, fs])

@@ -28,11 +28,7 @@ _MOST_PLACES, _MOST_RECORDS = 2**25, 2**23
 
 @dataclass(frozen=True)
 class EngineStructure:
-    """Compiled structure of a batch: key of its filling's structure, mount, names of sizes.
-
-    mount: its word, or the number of modes. excitation: kind of it. filling: one of that structure,
-    which declares the fields.
-    """
+    """Compiled structure of a batch: its filling's structure, mount, excitation, names of sizes."""
 
     key: Hashable
     mount: Hashable

@@ -13,9 +13,8 @@ from ca_damper.scenes.scene_fields import SceneFields
 class GroupCoupling(Coupling):
     """Fillings of a group, in order, then their structure; as ``Coupling`` for one container.
 
-    container: a ModalContainer. order[g]: first scene of the g-th group. before: motion of each
-    place at the beginning of a step. wait: whether the fillings take a step in two parts, so that
-    the blows of all boxes are resolved together.
+    order[g]: first scene of the g-th group. wait: whether fillings step in two parts, so that the
+    blows of all boxes are resolved together.
     """
 
     def __init__(self, table: SceneFields, *parts: Any):
@@ -53,7 +52,6 @@ class GroupCoupling(Coupling):
 
     @ti.func
     def _advance_step(self, s):
-        """A step of the group that begins with scene s."""
         end = s + self.container.group[None]
         for each in range(s, end):
             motion = self.container.motion(each)

@@ -14,10 +14,8 @@ LAUNCH_SECONDS = 0.15
 class Launches:
     """Progress of the present run in launches that advance every scene by the same share.
 
-    A launch lasts about a sixth of a second, so that Ctrl-C, progress and the check for diverged
-    scenes are prompt. done: share of the run that is done. seconds: spent on it. run_seconds,
-    scene_steps, particle_steps: of all runs. pace: scene-steps that a launch may have; most_steps:
-    those of one scene.
+    A launch lasts about a sixth of a second, so that Ctrl-C, progress and checks are prompt. pace,
+    most_steps: scene-steps that a launch may have, and steps of one scene.
     """
 
     def __init__(self, scenes: int):

@@ -1,8 +1,4 @@
-"""Scenes on an engine: their numbers, and access to their state between two steps.
-
-The engine is that of their structure: more or larger scenes, or other numbers, run in the same one
-and compile nothing, once its last owner is gone.
-"""
+"""Scenes on an engine: their numbers, and access to their state between two steps."""
 
 import warnings
 from typing import Any
@@ -32,10 +28,7 @@ _LOST_IN_WORDS = "has a container whose motion is not a finite number"
 class LoadedScenes:
     """Fillings and a table of scenes on an engine, put there by a Batch.
 
-    fillings, numbers: of the scenes, as Fillings and SceneNumbers. time_origin: when step 0 would
-    have been at the present step [s], (scenes,). _told: scenes of which a warning has told that
-    they diverged. _recording: steps of the last run if it was recorded, those between samples, and
-    number of samples.
+    time_origin: when step 0 would have been at the present step [s], (scenes,).
     """
 
     fillings: Fillings
@@ -76,10 +69,7 @@ class LoadedScenes:
 
     @property
     def engine(self) -> DamperEngine:
-        """Fields and kernels of this batch.
-
-        Raises InputError for a session that has been stopped or cleared, and on another thread.
-        """
+        """Fields and kernels of this batch; InputError once the session has been stopped."""
         self._engine.check(self)
         return self._engine
 
@@ -126,11 +116,6 @@ class LoadedScenes:
             Arrays (samples, scenes) by name: time_s [s]; x [m], v [m/s] of the container; y [m] of
             the base; force [N] of the filling on the container, mean since the sample before. All
             of a scene that has diverged are NaN.
-
-        Raises
-        ------
-        InputError
-            Nothing was recorded.
         """
         if self._recording is None:
             raise InputError("record_every of a run must be at least 1 before time_series, got 0")
@@ -165,6 +150,8 @@ class LoadedScenes:
 
     def _recorded(self, begin: np.ndarray, steps: int, every: int, late: int) -> dict[str, Any]:
         """Samples of a run of so many steps from steps ``begin`` on, as those of ``sample``."""
+        # A scene that diverged stopped at a step of its own: NaN from there on, and its time stands
+        # still.
         marks = begin + np.arange(-late % every, steps, every)[:, None]
         read = self.engine.recorder.read(-(-late // every), -(-(late + steps) // every))
         now, lost = self._read_status()[0], self.diverged
@@ -190,13 +177,7 @@ class LoadedScenes:
         return self.device.snapshot(whole("s", s, 0, self.count - 1))
 
     def attempts(self) -> np.ndarray:
-        """Steps that RK45 has tried since the start; one a step unless some failed.
-
-        Returns
-        -------
-        ndarray
-            Counts, shape (scenes,).
-        """
+        """Steps (scenes,) that RK45 has tried since the start; one a step unless some failed."""
         engine = self.engine
         return engine.table.in_use(engine.coupling.attempts)
 
@@ -241,13 +222,7 @@ class LoadedScenes:
             raise self.divergences()[0]
 
     def divergences(self) -> list[SimulationDiverged]:
-        """Tell which scenes have diverged, and when and why.
-
-        Returns
-        -------
-        list of SimulationDiverged
-            An exception for each, the first in time first; they are not raised.
-        """
+        """A SimulationDiverged for each scene that has diverged, the first in time first."""
         step, _, status = self._read_status()
         # Scenes stop where they diverge.
         time_s, of, table = self.time_s, self.fillings.of, self.table

@@ -1,8 +1,7 @@
 """Boxes at places of a structure given by its modes; interface as that of ``container.py``.
 
-The modes of a group belong to its first scene, and RK45 takes them over a step at once: between
-``set_action`` of every scene and the motion after ``advance``. Blows that wait for those of other
-boxes come before: ``set_blows`` of every box, then ``resolve``, then ``recoil_of`` each.
+The modes of a group belong to its first scene. A step: ``set_blows`` of every box, ``resolve``,
+``recoil_of`` each, ``set_action`` of every scene, ``advance``.
 """
 
 import numpy as np
@@ -21,16 +20,10 @@ from taichi_dem.kit.allocation import assign
 class ModalContainer(IntegratedContainer):
     """Boxes of all groups, and their modes in metres as ``ModalMount`` counts them.
 
-    Of the batch: group, boxes: scenes of a group, and those of them with a box; mass [kg],
-    stiffness [N/m], damping [N s/m] of each mode, share: of the base's motion, pushed: by the force
-    of the excitation. Of a scene: shape at its place; lift: what motion of the place adds to the
-    modes; residual; home: number in the group of the first scene at its place; seen: motion of the
-    place. Of a group, at its first scene: state, slope: modal
-    coordinates and speeds, and their change; inverse of the modal masses [1/kg] with all that is
-    carried; constant [N]: forces of the fillings on the modes, lag [kg]: by the acceleration of the
-    base; elapsed: steps since the start; changed: whether slope and inverse are out of date;
-    scratch for forces on the modes (pull), their accelerations (gain) and motion (tried). Of a box,
-    of the blows of a step: struck, rubbed [kg] of ``Blows``, speed_gain [m/s] and shared by all.
+    Of a scene, lift: what motion of its place adds to the modes; home: number in the group of the
+    first scene at its place. Of a group, at its first scene, inverse: of the modal masses with all
+    that is carried [1/kg]; constant, lag: forces of the fillings on the modes [N], and by the
+    acceleration of the base [kg]; changed: whether slope and inverse are out of date.
     """
 
     def __init__(self, table: SceneFields, excitation: DeviceExcitation, modes: int):
@@ -129,6 +122,8 @@ class ModalContainer(IntegratedContainer):
     @ti.func
     def resolve(self, first):
         """Resolve the blows of all boxes of a group together."""
+        # Floors and ceilings first, as if all that is struck were carried; then side walls, where
+        # no grain may drag others on.
         some, end = 0.0, first + self.boxes[None]
         for s in range(first, end):
             some += self.struck[s] + self.rubbed[s]
@@ -216,7 +211,6 @@ class ModalContainer(IntegratedContainer):
 
     @ti.func
     def _set_gain(self, first):
-        """Accelerations of the modes by the forces ``pull``."""
         for i in range(self.modes):
             gain = 0.0
             for j in range(self.modes):
@@ -230,6 +224,8 @@ class ModalContainer(IntegratedContainer):
     @ti.func
     def _renew_inverse(self, first):
         """Inverse of m + sum carried shape shape^T."""
+        # With g = inverse shape, place by place: inverse - c g g^T / (1 + c shape.g) (Sherman and
+        # Morrison, Ann. Math. Stat. 21 (1950) 124).
         for i in range(self.modes):
             for j in range(self.modes):
                 self.inverse[first, i, j] = 0.0
@@ -239,7 +235,6 @@ class ModalContainer(IntegratedContainer):
 
     @ti.func
     def _renew_load(self, first):
-        """Forces on the modes, and the inverse of their masses."""
         self._renew_inverse(first)
         for i in range(self.modes):
             self.constant[first, i], self.lag[first, i] = 0.0, 0.0

@@ -1,7 +1,6 @@
 """Boxes on structures given by modes, as scenes in groups: one structure a group, one box a scene.
 
-A group begins with the boxes; each place without a box follows as a scene without particles, so
-that the motion of every place is measured and recorded.
+Each place without a box follows the boxes as a scene without particles, to be measured too.
 """
 
 from collections.abc import Sequence
@@ -24,12 +23,8 @@ _SHARED = ("frequency", "base_amplitude", "dt")
 class ModalMount:
     """What the scenes of each group hang on: a ModalStructure, with boxes at places.
 
-    places: of the boxes. scene_places: those of all scenes of a group. force_place: where the force
-    of the excitation acts, or None. Raises InputError for places that the structure has not.
-
-    Inside, mode k is counted in metres of the place where it moves most: shapes are divided by
-    their largest magnitude, ``sizes``, so that the tolerances of RK45 keep their unit, and a
-    structure of one place is integrated as an Oscillator.
+    Mode k is counted in metres of the place where it moves most (``sizes``), so that the tolerances
+    of RK45 keep their unit, and one place is integrated as an Oscillator.
     """
 
     def __init__(

@@ -1,8 +1,6 @@
-"""Counter-based random numbers: a hash of (seed, step, cell, purpose).
+"""Counter-based random numbers: a hash of (seed, step, cell, purpose), whatever the order.
 
-The same four numbers give the same result, so nothing depends on the order of execution, on the
-number of threads or on other scenes. The hash is the output permutation of PCG (O'Neill 2014,
-RXS-M-XS, 32 bits) used as a mixer.
+The output permutation of PCG (O'Neill 2014, RXS-M-XS, 32 bits) used as a mixer.
 """
 
 import taichi as ti

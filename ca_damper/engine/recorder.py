@@ -18,10 +18,8 @@ LATEST, ROOM = ("a", "force", "energy", "momentum"), 32
 class Recorder:
     """Samples of every scene, every so many steps of a run.
 
-    every: steps between samples, 0 for none. late: steps before the run since the last sample was
-    due; the first of the run is then in place 1. series: (scenes, places) of SERIES; the mean force
-    in a sample at the beginning of the run is that of the step before. latest: (scenes, ROOM) of
-    LATEST. pushed: sum of the forces since the last sample, but for that of the last step [N].
+    late: steps before the run since the last sample was due. series: (scenes, places) of SERIES.
+    pushed: sum of the forces since the last sample, but for that of the last step [N].
     """
 
     def __init__(self, table: SceneFields):
@@ -67,11 +65,7 @@ class Recorder:
 
 @ti.data_oriented
 class EventCounts:
-    """Events since the reset and the step of the first, shape (scenes, kinds of event).
-
-    kinds: number of them. by: kinds by the name of the effect that acts by them. step: the present
-    one, (scenes,).
-    """
+    """Events since the reset and the step of the first, shape (scenes, kinds of event)."""
 
     def __init__(self, table: SceneFields, kinds: int, by: Mapping[str, tuple[int, ...]]):
         self.table, self.kinds, self.by, self.step = table, kinds, by, table.field(ti.i32)

@@ -1,13 +1,8 @@
-"""Dormand-Prince 5(4) for any right-hand side, in Python and inside kernels alike.
+"""Dormand-Prince 5(4) for any right-hand side, in Python and inside kernels alike (ti.pyfunc).
 
-Every function here is a ``ti.pyfunc``: called from a kernel it is compiled into it,
-called from Python it runs as it stands, on NumPy vectors. So the formulas are written once. ``rhs``
-is called as ``rhs(context, t, y)`` and returns dy/dt; in a kernel it is a ti.func or a bound method
-of a data-oriented object, ``context`` whatever it needs (a scene number, a struct), and ``y`` a
-ti.Vector. Three things are kept apart: the step, what error it may make, and how long the next is.
-
-Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; step sizes after Hairer, Norsett
-and Wanner, Solving Ordinary Differential Equations I, section II.4.
+``rhs(context, t, y)`` returns dy/dt; in a kernel it is a ti.func, ``y`` a ti.Vector. Source:
+Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; step sizes: Hairer, Norsett and Wanner,
+Solving Ordinary Differential Equations I, section II.4.
 """
 
 import taichi as ti
@@ -21,6 +16,7 @@ _SMALLEST_SHARE = 1e-15
 @ti.pyfunc
 def step(rhs: ti.template(), context, t, y, slope, h):
     """One step of length h from y at t, where dy/dt is ``slope``."""
+    # Fifth order; dy/dt at the end is the next step's slope, so that a step costs six evaluations.
     t2, t3, t4, t5 = t + h * (1 / 5), t + h * (3 / 10), t + h * (4 / 5), t + h * (8 / 9)
     return stages(rhs, context, t2, t3, t4, t5, t + h, y, slope, h)
 
@@ -28,6 +24,7 @@ def step(rhs: ti.template(), context, t, y, slope, h):
 @ti.pyfunc
 def stages(rhs: ti.template(), context, t2, t3, t4, t5, t_end, y, slope, h):
     """The step of ``step`` for given times of its stages, t + h (1/5, 3/10, 4/5, 8/9, 1)."""
+    # rhs gets these times as they are, so that what it needs of them can be computed before.
     k1 = slope
     k2 = rhs(context, t2, y + h * (1 / 5 * k1))
     k3 = rhs(context, t3, y + h * (3 / 40 * k1 + 9 / 40 * k2))
@@ -46,6 +43,7 @@ def stages(rhs: ti.template(), context, t2, t3, t4, t5, t_end, y, slope, h):
 @ti.pyfunc
 def scaled_norm(vector, y, y_new, rtol, atol):
     """Euclidean length of a vector in units of atol + rtol max(|y|, |y_new|), by component."""
+    # A sum of squares, as a maximum would let a NaN pass.
     ratio = vector / (atol + rtol * ti.max(abs(y), abs(y_new)))
     return ti.sqrt((ratio * ratio).sum())
 
@@ -53,6 +51,7 @@ def scaled_norm(vector, y, y_new, rtol, atol):
 @ti.pyfunc
 def growth(error):
     """By how much the next step is longer, for an error in units of the tolerance."""
+    # The local error grows with the fifth power of the step; 0.9 aims short; NaN shrinks the step.
     factor = 0.2
     if error < 1e3:
         factor = min(5.0, max(0.2, 0.9 / fifth_root(max(error, 1e-10))))
@@ -78,6 +77,7 @@ def attempt(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol):
 @ti.pyfunc
 def integrate(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol, most_attempts):
     """Take y from t to t_end >= t with steps chosen by the error."""
+    # attempts is -1 when most_attempts did not suffice or the step fell to nothing, as at a NaN.
     now, state, change, length, attempts = 1.0 * t, y, slope, 1.0 * h, 0
     error = 1.0
     while now < t_end and attempts >= 0:

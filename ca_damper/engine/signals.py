@@ -1,9 +1,7 @@
 """Excitation on the device: what moves the base and what pushes the container, at any time.
 
-Bases and forces have ``load(excitation)`` for the numbers of a batch and the ti.func
-``at(s, start, t)``: value and two derivatives of the displacement of a base [m] or of a force [N]
-at a time t after the beginning of a step, which begins at ``start`` [s]. Bases have ``now(s,
-start)``, the same at the beginning.
+Each has ``load(excitation)`` and the ti.func ``at(s, start, t)``: value and two derivatives of a
+displacement [m] or force [N] at t after the beginning of a step at ``start`` [s].
 """
 
 from typing import Any
@@ -22,11 +20,7 @@ from taichi_dem.kit.elementary import sine_and_cosine
 
 @ti.data_oriented
 class DeviceSignal:
-    """A Signal on the device.
-
-    role: "base" or "force". nodes: value and second derivative. last: number of its last interval.
-    step: between nodes [s].
-    """
+    """A Signal on the device, the "base" or "force"; nodes: value and second derivative."""
 
     # Written by ``load``, so that a checkpoint leaves them out.
     constant_fields = ("nodes", "last", "step")

@@ -29,16 +29,6 @@ class SineForce:
         Frequency [Hz].
     phase : float, default 0.0
         Phase [rad].
-
-    Raises
-    ------
-    InputError
-        A number is not finite, or the frequency is not positive.
-
-    Examples
-    --------
-    >>> SineForce(amplitude=0.1, frequency=6.0)
-    SineForce(amplitude=0.1, frequency=6.0, phase=0.0)
     """
 
     amplitude: float
@@ -63,11 +53,6 @@ class Excitation:
         at rest).
     force : SineForce or Signal, optional
         Force on the container [N], upwards; None for no force.
-
-    Raises
-    ------
-    InputError
-        A member is of another kind.
     """
 
     base: Signal | None = None
@@ -104,24 +89,12 @@ class Excitation:
         return min((one.duration for one in self.signals.values()), default=math.inf)
 
     def identity(self) -> str:
-        """Words that are the same for equal excitations, whatever their labels.
-
-        Returns
-        -------
-        str
-            Digest of base and force.
-        """
+        """Words that are the same for equal excitations, whatever their labels."""
         signals = {role: (one.step, one.value, one.bend) for role, one in self.signals.items()}
         return identity_of({"base": self.base, "force": self.force, **signals})
 
     def in_words(self) -> tuple[str, ...]:
-        """Motion of the base and force, and the treatment of samples.
-
-        Returns
-        -------
-        tuple of str
-            A part of a sentence for each Signal and for a SineForce.
-        """
+        """Motion of the base and force, and the treatment of samples."""
         both = (("base", self.base, "m"), ("force", self.force, "N"))
         return tuple(
             f"{role} {one.in_words(unit) if isinstance(one, Signal) else shown(one)}"

@@ -104,7 +104,7 @@ def from_csv(
 def from_at2(
     path: FileName, *, correct_baseline: bool = False, resample: float | None = None
 ) -> Signal:
-    """Signal from a record of the PEER ground motion database, an acceleration in g.
+    """Displacement [m] from a record of the PEER ground motion database, an acceleration in g.
 
     Parameters
     ----------
@@ -114,16 +114,6 @@ def from_at2(
         As in ``from_csv``.
     resample : float, optional
         As in ``from_samples``.
-
-    Returns
-    -------
-    Signal
-        Displacement [m].
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or holds another number of samples than it says.
     """
     name = path_name("path", path)
     try:

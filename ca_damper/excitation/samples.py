@@ -103,7 +103,6 @@ def from_samples(
 
 
 def _integrated(step, samples, of, correct_baseline):
-    """Signal of which the samples are ``of``, and what was done to it in words."""
     if of == "value":
         return spline(step, samples, "samples"), ""
     fine, (value, _, bend) = _refined(step, samples)
@@ -152,7 +151,6 @@ def _resampled(times, samples, step):
 
 
 def _of_velocity(step, samples):
-    """Signal whose derivative has these samples, zero at first; exact for a cubic spline."""
     from scipy.interpolate import CubicSpline
 
     times = step * np.arange(len(samples))
@@ -197,6 +195,8 @@ def _check_spectrum(step, samples, longest):
 
 def _at_rest_again(step, samples):
     """Double integral less that of the line a + b t that lets it end at rest in zero, and words."""
+    # At the end T the line a + b t has the speed a T + b T^2 / 2 and the place a T^2 / 2 + b T^3 /
+    # 6.
     rough = integral(step, samples, "samples")
     total, speed, place = rough.duration, end_slope(rough), float(rough.value[-1])
     slope = 6.0 * (speed * total - 2.0 * place) / total**3

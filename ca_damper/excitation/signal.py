@@ -57,11 +57,6 @@ class Signal:
     gap : float, default 0.0
         Longest time between two of these samples [s].
 
-    Raises
-    ------
-    InputError
-        The arrays are not finite or differ in length.
-
     References
     ----------
     de Boor, A Practical Guide to Splines, chapter IV ("not a knot").
@@ -123,16 +118,6 @@ class Signal:
         ----------
         factor : float
             Factor; ``treated`` stays the same.
-
-        Returns
-        -------
-        Signal
-            The scaled signal.
-
-        Raises
-        ------
-        InputError
-            The factor is not finite.
         """
         between("factor", factor, -LARGEST, LARGEST)
         label, times = f"{factor:g} times {self.label}", float(factor)
@@ -145,11 +130,6 @@ class Signal:
         ----------
         unit : str
             Unit of the value.
-
-        Returns
-        -------
-        str
-            A part of a sentence.
         """
         values, slopes, _ = self.at(np.array([0.0, self.duration]))
         size = _ROUNDING * np.abs(self.value).max()
@@ -166,6 +146,8 @@ def _unless_tiny(values, size):
 
 def spline(step: float, value: np.ndarray, label: str) -> Signal:
     """Signal through values at the nodes."""
+    # m[k-1] + 4 m[k] + m[k+1] = 6 (y[k-1] - 2 y[k] + y[k+1]) / h^2 = r[k] inside; "not a knot"
+    # makes the third derivative continuous at the first and last inner node, where 6 m = r.
     value = nodes("value", value)
     right = (6.0 * (value[:-2] - 2.0 * value[1:-1] + value[2:]) / step**2).tolist()
     bend = np.empty(len(value))

@@ -42,8 +42,7 @@ _SMALL |= dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "legend.fontsize"
 class Box:
     """Inside of the container: width and height [m], and the diameter of a particle [m].
 
-    The automaton's box is ``staggered``: every other column, the first of them too, stands half a
-    cell higher. By the rules of the paper it moves ``by_cells``.
+    The automaton's box is ``staggered``: every other column, the first too, is half a cell higher.
     """
 
     width: float
@@ -187,10 +186,7 @@ def animate_films(
 
 @dataclass(frozen=True)
 class Hanging:
-    """A container in a film: its name, its Box, its frames, and the colour of its curve.
-
-    curve: times [s] and displacements [m], where it is drawn finer than its frames.
-    """
+    """A container in a film: its name, its Box, its frames, and the curve beside it."""
 
     title: str
     box: Box
@@ -246,7 +242,6 @@ class _Hung:
         axes.update_datalim([(left, below - 14.0), (left + width, self.top + _HANGS)])
 
     def show(self, frame):
-        """Draw a ``record.Frame``."""
         self.drawn.show(frame)
         top = self.top + _HANGS + 1e3 * frame.y
         bottom = self.top + 1e3 * self.drawn.box.lift(frame.x)

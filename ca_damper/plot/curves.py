@@ -61,7 +61,6 @@ def _draw_curves(axis, response, rows=None):
 
 
 def _draw_empty(axis, oscillator, ratios):
-    """The empty container over the range of the ratios; labels of both axes."""
     fine = np.linspace(min(ratios), max(ratios), _FINE)
     look = {"color": STYLES["empty"].colour, "ls": ":", "label": STYLES["empty"].label}
     axis.plot(fine, 1e3 * oscillator.rms(fine * oscillator.natural_frequency), **look)
@@ -82,7 +81,6 @@ def _bars(axis, x, values, middle, style, size):
 
 
 def _columns(figure, handles):
-    """Columns of a legend over the figure: as many as it has room for."""
     return max(1, min(5, len(handles), int(figure.get_figwidth() / 1.8)))
 
 
@@ -142,7 +140,6 @@ def picture_measures(path: FileName, responses: Mapping[str, Any], particle_mass
 
 
 def _narrow(label):
-    """A label in lines that a column of four has room for."""
     return textwrap.fill(label, 20)
 
 
@@ -185,11 +182,7 @@ def _draw_ways(axis, sweep, k):
 
 
 class ResponsePlots:
-    """Pictures of a response.
-
-    Each function returns a matplotlib figure, which a notebook shows, and writes it as PNG where a
-    ``path`` is given (InputError where it cannot).
-    """
+    """Pictures of a response, as matplotlib figures; written as PNG where a ``path`` is given."""
 
     def __init__(self, response: Any):
         self._response = response
@@ -248,9 +241,8 @@ class SweepPlots:
 class FilmMeasures:
     """Measures of the particles in every frame of filmed cycles; arrays (cycles, frames).
 
-    height_mm: mean over the particles, in the room, less that of particles at rest on the floor of
-    a container in its middle. above_floor_mm: the same over the container's floor. floor, ceiling:
-    share of the particles less than half a diameter away from it. phase: of the frames [cycles].
+    height_mm: mean height in the room, less that at rest on the floor of a container in its middle.
+    floor, ceiling: share of the particles less than half a diameter away.
     """
 
     phase: np.ndarray

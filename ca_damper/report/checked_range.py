@@ -39,9 +39,8 @@ class CheckedRange:
 class Driven(NamedTuple):
     """What is known of scenes before they run, (scenes,) each.
 
-    particles: numbers. mass: of what a blow moves [kg], infinite for a container that is driven.
-    amplitude [m] and acceleration [m/s^2] of a container that moves as a sine of its base, NaN of
-    others.
+    mass: of what a blow moves, infinite for a driven container. amplitude, acceleration: of a
+    container that moves as a sine of its base, NaN of others.
     """
 
     particles: np.ndarray

@@ -76,48 +76,33 @@ class Cycles:
     __repr__ = by_fields
 
     def mean_of(self, name: str) -> np.ndarray:
-        """Mean of a column over cycles.
+        """Mean of a column over cycles, shape (scenes,).
 
         Parameters
         ----------
         name : str
             Name of a column, one of COLUMNS.
-
-        Returns
-        -------
-        ndarray
-            Means, shape (scenes,).
         """
         choice("name", name, COLUMNS)
         return self.record[:, :, COLUMNS.index(name)].mean(axis=1)
 
     def per_step(self, name: str) -> np.ndarray:
-        """Mean of a summed quantity over steps and cycles.
+        """Mean of a summed quantity over steps and cycles, shape (scenes,).
 
         Parameters
         ----------
         name : str
             Name of a column, one of SUMS.
-
-        Returns
-        -------
-        ndarray
-            Means, shape (scenes,).
         """
         return self.mean_of(name) / self.steps
 
     def harmonic(self, name: str) -> np.ndarray:
-        """Complex amplitude of the first harmonic.
+        """Complex amplitude of the first harmonic, shape (scenes,).
 
         Parameters
         ----------
         name : str
             ``"x"`` [m], ``"v"`` [m/s] or ``"f"`` [N].
-
-        Returns
-        -------
-        ndarray
-            Amplitudes, shape (scenes,).
         """
         choice("name", name, ("x", "v", "f"))
         amplitude = 2.0 * (self.per_step(f"{name}_cos") - 1j * self.per_step(f"{name}_sin"))
@@ -127,17 +112,12 @@ class Cycles:
         return amplitude / (np.array([sine_and_cosine(a)[0] for a in half.tolist()]) / half)
 
     def harmonic_by_cycle(self, name: str) -> np.ndarray:
-        """Complex amplitude of the first harmonic in every cycle.
+        """Complex amplitude of the first harmonic in every cycle, shape (scenes, cycles).
 
         Parameters
         ----------
         name : str
             ``"x"`` [m] or ``"v"`` [m/s].
-
-        Returns
-        -------
-        ndarray
-            Amplitudes, shape (scenes, cycles).
         """
         choice("name", name, ("x", "v"))
         cosine, sine = (
@@ -157,10 +137,7 @@ class Cycles:
 
     @property
     def rms_about_all(self) -> np.ndarray:
-        """Root mean square of x about its mean over all cycles [m].
-
-        It counts motions slower than a cycle, which ``rms`` loses with the mean of each cycle.
-        """
+        """Root mean square of x about its mean over all cycles [m], slow motions included."""
         # Variance within cycles, and that of their means: no difference of large numbers.
         means = self.record[:, :, COLUMNS.index("x")] / np.asarray(self.steps)[:, None]
         return np.sqrt(self._variance.mean(axis=1) + means.var(axis=1))
@@ -303,6 +280,7 @@ class Cycles:
 
 def first_harmonic(phase: ArrayLike, values: ArrayLike) -> tuple[float, float]:
     """Amplitude of a quantity over a cycle, and its lag [degrees] behind sin(2 pi phase)."""
+    # Least squares, so that phases need no even spacing.
     angle = 2.0 * np.pi * np.asarray(phase)
     columns = np.column_stack([np.ones_like(angle), np.sin(angle), np.cos(angle)])
     _, sine, cosine = np.linalg.lstsq(columns, np.asarray(values), rcond=None)[0]
@@ -311,6 +289,8 @@ def first_harmonic(phase: ArrayLike, values: ArrayLike) -> tuple[float, float]:
 
 def peak(frequency_ratio: ArrayLike, response: ArrayLike) -> tuple[float, float]:
     """Where a response curve peaks and how high it is there: (ratio, response), floats."""
+    # A parabola of 1 / response^2 over ratio^2 is exact for a linear oscillator up to (2 damping
+    # ratio)^2. If it misses the next points it goes through noise: then one of the response itself.
     x, y = np.asarray(frequency_ratio, dtype=float), np.asarray(response, dtype=float)
     k = -1 if np.isnan(y).all() else int(np.nanargmax(y))
     if not 0 < k < len(y) - 1 or not (y[k] > 0.0 and y[k - 1] == y[k - 1] and y[k + 1] == y[k + 1]):

@@ -56,11 +56,7 @@ class PeakOutside(InputError):
 
 
 class PeakSearch:
-    """Search of a peak in [lowest, highest] f/f0.
-
-    rms_at: gives the RMS [m] at each of some ratios. may_extend: whether the range may grow.
-    finest: spacing that resolves every peak there can be, 0 if unknown. found: RMS by ratio.
-    """
+    """Search of a peak in [lowest, highest] f/f0; finest: spacing that resolves every peak."""
 
     def __init__(
         self,

@@ -26,11 +26,7 @@ class BatchProgress(Progress):
 
 
 class Stages:
-    """Passes the progress of stages on as that of the whole.
-
-    progress: called with a BatchProgress, or None for nobody. ends: ascending shares of the whole
-    at which the stages end.
-    """
+    """Passes the progress of stages on as that of the whole, at whose shares ``ends`` they end."""
 
     def __init__(self, progress: Listener | None, ends: Sequence[float]):
         self.progress, self.ends, self.stage = progress, ends, 0
@@ -39,6 +35,7 @@ class Stages:
 
     def __call__(self, progress: Progress) -> None:
         """Take note of the present stage's progress; the stage ends with a share of 1."""
+        # Progress of compiling belongs to no stage.
         if not isinstance(progress, BatchProgress):
             return self._pass_on(progress)
         begin, end = self.before.share, self._end()
@@ -52,7 +49,6 @@ class Stages:
             self._pass_on(whole)
 
     def _end(self):
-        """Share at which the present stage ends."""
         return self.ends[self.stage]
 
     def _pass_on(self, progress):

@@ -124,13 +124,7 @@ class Report:
         return "; ".join(parts)
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file.
-
-        Returns
-        -------
-        dict
-            Figures by name.
-        """
+        """All figures, for a JSON file."""
         figures = asdict(self)
         figures["acted"] = figures.pop("effect_activity")
         if self.certificate is not None:
@@ -145,30 +139,22 @@ class Report:
         ----------
         path : path
             JSON file; it is replaced as a whole.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
         """
         write_text(path, json.dumps(self.as_dict(), indent=1))
 
     def _certified(self):
-        """Lines of the certificate."""
         found = self.certificate
         if found is None:
             return []
         return [*(f"acted: {line}" for line in found.acted()), *found.left_out_lines()]
 
     def _bound(self):
-        """Bound of the step, and the step relative to it."""
         if self.step_bound is None:
             return ""
         most, why = self.step_bound
         return f"{why}: {most:.3g} s, {self.bound_taken:.2g} of it taken"
 
     def _rows(self):
-        """All lines by name."""
         gone = f"{len(self.diverged):,} of them; nan for these and all on one structure with them"
         checked = self.checked
         acted = (f"{use.effect}: {use}" for use in self.effect_activity)
@@ -192,13 +178,7 @@ class Report:
         }
 
     def details(self) -> str:
-        """All figures.
-
-        Returns
-        -------
-        str
-            A table of about twelve lines, and one for each effect and signal.
-        """
+        """All figures."""
         return in_lines(self._rows())
 
     def __str__(self):
@@ -235,23 +215,9 @@ def needed_effects(result: object, tolerance: float = 1e-3) -> Advice:
         Share of the energy taken (friction) or in motion (rotation) below which an effect is
         negligible, from 0 to 1.
 
-    Returns
-    -------
-    Advice
-        Print it, or read its ``droppable``.
-
-    Raises
-    ------
-    InputError
-        The result is of another kind, or the tolerance is out of range.
-
     Notes
     -----
     Spheres are checked every few steps: an effect that may have acted between two checks is kept.
-
-    Examples
-    --------
-    >>> print(needed_effects(response))  # doctest: +SKIP
     """
     report: Report = instance("result", getattr(result, "report", result), Report)
     return Advice(report.effect_activity, (), fraction("tolerance", tolerance))

@@ -1,12 +1,9 @@
 """End of the transient, and error of the mean, from values cycle by cycle.
 
-The beginning is cut off where the standard error of the mean of the rest is least (the rule MSER of
-simulation practice). The halves of the rest are then compared by a t test; the spread of their
-means is that from seed to seed where there are enough of them. Of few seeds it is that of an
-autoregressive series of first order, estimated from values less their trend, so that a drift cannot
-hide itself. Where they differ, the means of three thirds give the limit of an exponential approach
-and how far it is. Seeds that change or differ by more than their cycles tell go on. A change that
-takes longer than the series is not seen.
+The beginning is cut off where the standard error of the rest is least (rule MSER). A t test then
+compares the halves of the rest, by the spread of the seeds, or of few seeds by that of an
+autoregressive series without its trend. Where they differ, three thirds give the limit of an
+exponential approach. A change that takes longer than the series is not seen.
 """
 
 import math
@@ -45,10 +42,8 @@ _MOST_CORRELATED = 0.98
 class SteadyPart:
     """The steady part of a series, from cycle ``begin`` on.
 
-    is_steady: whether it is one. mean: over it. error: standard error of the mean, with its degrees
-    of freedom. drift: how far the mean is from the limit of a slow approach, infinite where no
-    limit can be seen; where none shows, how far that of the later half is off, of enough seeds.
-    more: cycles to go on by before asking again.
+    error: standard error of the mean. drift: distance of the mean from the limit of a slow
+    approach, infinite where no limit can be seen. more: cycles to go on by before asking again.
     """
 
     is_steady: bool
@@ -64,6 +59,8 @@ def steady_part(
     series: np.ndarray, allowed: float = 0.0, false_alarms: float = FALSE_ALARMS
 ) -> SteadyPart:
     """Steady part of values of successive cycles, (cycles,), or of their mean over seeds."""
+    # At most the share ``false_alarms`` of steady series (128 cycles or more, correlated by up to
+    # 0.5 from cycle to cycle) is sent on; twice as many at 0.8.
     rows = np.atleast_2d(np.asarray(series, dtype=np.float64))
     x = rows.mean(axis=0)
     if len(x) < LEAST_CYCLES:
@@ -156,6 +153,8 @@ def _halves_differ(rows, false_alarms):
 
 def _seeds_wander(rows, allowed):
     """Whether seeds change from half to half, each its own way, by more than their cycles tell."""
+    # Seeds that change motion so slowly show few motions in their cycles: means of more seeds would
+    # miss what comes later.
     changes = _means_of_halves(rows) @ [-1.0, 1.0]
     known = [_error_off_trend(half) for half in _halves(rows)]
     square = sum(error**2 for error, _ in known) / len(rows)
@@ -201,6 +200,8 @@ def _halves(rows):
 
 def _error_of_change(rows, changes):
     """Standard error of the mean change from half to half, and its degrees of freedom."""
+    # From seed to seed where there are enough: a seed may leave a motion at any time, of which its
+    # earlier cycles tell nothing.
     count = len(rows)
     if count >= LEAST_SEEDS:
         return float(changes.std(ddof=1)) / math.sqrt(count), count - 1
@@ -247,6 +248,7 @@ def _approach(x, allowed):
 
 def _limit(x):
     """(limit, its standard error, time constant in cycles) of the means of three thirds."""
+    # Means that go to and fro have as limit the farthest of them from the last.
     (a, b, c), length = batch_means(x, 3)
     if abs(c - b) <= ROUNDING * abs(c):
         return c, 0.0, 1.0

@@ -51,10 +51,7 @@ _KINDS = (Automaton, Spheres)
 
 @dataclass(frozen=True)
 class Value:
-    """Mean over seeds [m] and half-width of its bar of 95 % [m], infinite of one seed.
-
-    The bar holds chance, what has not settled and the spacing of frequencies.
-    """
+    """Mean over seeds and half-width of its bar of 95 % [m], infinite of one seed."""
 
     mean: float
     error: float
@@ -141,13 +138,7 @@ class BestDamper(Tabulated):
         return tuple(found)
 
     def columns(self) -> dict[str, Any]:
-        """A row a box of the first look.
-
-        Returns
-        -------
-        dict
-            Columns by name, which ends in the unit.
-        """
+        """A row a box of the first look."""
         boxes, values = zip(*self.tried)
         return {
             "particles": [one.particles for one in boxes],
@@ -213,11 +204,6 @@ def best_damper(
     progress : callable or str or None, default "auto"
         As in ``frequency_response``.
 
-    Returns
-    -------
-    BestDamper
-        The best box, with bars.
-
     Raises
     ------
     InputError
@@ -263,7 +249,6 @@ def _searched(case, filling, boxes, seeds):
 
 
 def _rank(value):
-    """A value, or infinity where scenes of a box have diverged."""
     return math.inf if math.isnan(value) else value
 
 
@@ -279,10 +264,7 @@ def _confirmed(case, filling, best, seeds, tolerance):
 
 
 class _Case:
-    """Structure, motion, and what of its motion is to be small.
-
-    mass: of all grains [kg]. tell: is told of the progress of each run.
-    """
+    """Structure, motion, and what of its motion is to be small; mass: of all grains [kg]."""
 
     def __init__(self, structure: Any, motion: Any, mass: Any, goal: Any, cycles: Any):
         self.structure = instance("structure", structure, Oscillator)
@@ -319,7 +301,6 @@ class _Case:
         return search.run(low, _ABOVE, *((0,) if brief else ()))
 
     def fixed(self) -> float:
-        """The same with all grains fixed [m]."""
         if self.signal is None:
             return self.structure.peak(self.mass)[1]
         job = {"oscillator": self.structure, "particles": 1, "seeds": 1, "progress": None}

@@ -130,13 +130,7 @@ class DamperMap(Result):
         return {**found, "gap": (("clearance", "particles"), self.gaps, "m")}
 
     def columns(self) -> dict[str, Any]:
-        """A row a scene: its place on the axes, measures, and where there is one the theory.
-
-        Returns
-        -------
-        dict
-            Columns by name, which ends in the unit.
-        """
+        """A row a scene: its place on the axes, measures, and where there is one the theory."""
         names = "clearance_m", "particles", "amplitude_m", "frequency_Hz", "seed"
         axes = dict(zip(names, (getattr(self, name) for name, _ in _AXES.values())))
         columns: dict[str, Any] = {"filling": [self.label] * self.loss.size} | scenes_over(**axes)
@@ -193,15 +187,8 @@ def damper_map(
     progress : callable or str or None, default "auto"
         As in ``frequency_response``.
 
-    Returns
-    -------
-    DamperMap
-        Measures over all axes.
-
     Raises
     ------
-    InputError
-        An argument is out of its range, or the filling has no box to change.
     SimulationDiverged
         All scenes diverged. If only some do, a warning names them, and their results are nan.
 
@@ -244,7 +231,6 @@ def damper_map(
 
 
 def _jobs(filling, particles, clearances):
-    """(filling, particle numbers) of each batch."""
     if clearances == (None,):
         return [(filling, particles)]
     pairs = itertools.product(clearances, particles)

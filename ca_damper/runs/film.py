@@ -71,15 +71,6 @@ class Film:
         -------
         WebPage
             Path of the page. As the last line of a notebook's cell it shows the page there.
-
-        Raises
-        ------
-        InputError
-            Without frames, for a scene that is not there, and when the file cannot be written.
-
-        Examples
-        --------
-        >>> film(batch, 2000, frame_every=20).show("damper.html")  # doctest: +SKIP
         """
         # Imported here, so that matplotlib loads only where something is shown.
         from ca_damper.plot.containers import MOST_SCENES, show_film
@@ -130,21 +121,10 @@ def film(
     progress : callable or str or None, default "auto"
         As in ``frequency_response``.
 
-    Returns
-    -------
-    Film
-        Samples of all scenes, and frames with the positions of the particles.
-
     Raises
     ------
-    InputError
-        The batch was not started, its scenes have several fillings, or a number is out of range.
     SimulationDiverged
         All scenes diverged.
-
-    Examples
-    --------
-    >>> shot = film(batch, steps=2000, frame_every=100)  # doctest: +SKIP
     """
     if not hasattr(batch, "sample") or isinstance(batch, type):
         raise InputError(f"batch must be a Batch that has been started, got {shown(batch)}")

@@ -1,7 +1,6 @@
 """Sweeps up and down through the frequencies with continued state, to show hysteresis.
 
-The frequency changes at the end of a cycle, when the base passes its middle: it keeps its place and
-takes up its new speed at once.
+The frequency changes as the base passes its middle: it keeps its place and takes its new speed.
 """
 
 import math
@@ -67,11 +66,10 @@ class Sweep:
 
     @property
     def hysteresis_error(self) -> np.ndarray:
-        """Half-width of the mean of ``hysteresis`` over the seeds [-], (particles, ratios).
+        """Half-width of the mean of ``hysteresis`` over the seeds, (particles, ratios), at 95 %.
 
-        It holds at all frequencies of a particle number together, with a confidence of 95 %: that
-        from seed to seed, or by the cycles of the means where it is larger. Infinite where a mean
-        still changes, or was not measured in ``LEAST_TESTED`` cycles or two seeds.
+        It holds at all frequencies of a particle number together. Infinite where a mean still
+        changes, or was measured in too few cycles (``LEAST_TESTED``) or seeds.
         """
         count, places = len(self.up.seeds), len(self.up.ratios)
         by_cycles = np.sqrt((self._share_by_cycles**2).sum(axis=2)) / count
@@ -95,13 +93,7 @@ class Sweep:
         return np.hypot(self.up_error, self.down_error) / size
 
     def to_xarray(self) -> Any:
-        """As ``Response.to_xarray``, over direction ("up", "down") too.
-
-        Returns
-        -------
-        xarray.Dataset
-            Units in the attributes of each variable.
-        """
+        """As ``Response.to_xarray``, over direction ("up", "down") too."""
         return stacked((self.up, self.down), "direction", ["up", "down"])
 
     @property
@@ -157,15 +149,8 @@ def sweep_up_and_down(
     resume : path, optional
         Checkpoint to go on from.
 
-    Returns
-    -------
-    Sweep
-        Responses of both directions.
-
     Raises
     ------
-    InputError
-        An argument is out of its range.
     SimulationDiverged
         All scenes diverged. If only some do, a warning names them, and their results are nan.
     """
@@ -211,15 +196,12 @@ class _Ways:
         self.done += 1
 
     def saved(self):
-        """Data for a checkpoint, arrays by name."""
         return {"done": np.array(self.done), "steps": self.steps, **self.values}
 
     def resume(self, saved):
-        """Restore the data that ``saved`` returned."""
         self.done, self.steps = int(saved["done"]), saved["steps"]
         self.values = {name: saved[name] for name in self.values}
 
     def response(self, way):
-        """All of one direction."""
         measures = {name: self.values[name][way] for name in MEASURE_UNITS}
         return self.grid.response(self.steps[way], measures)

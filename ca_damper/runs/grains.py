@@ -78,6 +78,7 @@ def boxes_of(
 
 def shifted(best: Grains, share: float) -> Iterator[tuple[str, Grains]]:
     """Boxes with an error of manufacture, and its name, where the grains still fit."""
+    # Balls of one density weigh by the cube of their size.
     for sign in (1.0, -1.0):
         by = 1.0 + sign * share
         taller = best.height + sign * share * best.clearance
@@ -91,5 +92,4 @@ def shifted(best: Grains, share: float) -> Iterator[tuple[str, Grains]]:
 
 
 def _change(factor):
-    """A factor as a change in words."""
     return f"{100.0 * (factor - 1.0):+.3g} %"

@@ -35,7 +35,6 @@ class History(Result):
     _dimensions: ClassVar[tuple[str, str]]
 
     def _containers(self) -> str:
-        """Containers in words."""
         raise NotImplementedError
 
     def _names(self) -> dict[str, Any]:
@@ -54,13 +53,7 @@ class History(Result):
         return self.x - self.base[:, None, None]
 
     def columns(self) -> dict[str, Any]:
-        """A row a sample: time, base, x of each place and force on each container, by seed.
-
-        Returns
-        -------
-        dict
-            Columns by name, which ends in the unit.
-        """
+        """A row a sample: time, base, x of each place and force on each container, by seed."""
         columns = {"time_s": self.time_s, "base_m": self.base}
         for values, (head, names) in zip((self.x, self.force), self._names().items()):
             for (i, one), (j, seed) in itertools.product(enumerate(names), enumerate(self.seeds)):
@@ -122,9 +115,8 @@ class TimeHistory(History):
     def added_damping(self) -> np.ndarray:
         """Coefficient of a dashpot on the base that takes the filling's work [N s/m].
 
-        -int F dx / int (x' - y')^2 dt over the run, (particles, seeds); NaN where the container
-        never moves on the base. Between samples the force counts by its mean and the speed as even,
-        so that they must be close together.
+        -int F dx / int (x' - y')^2 dt over the run; samples must be close together. NaN without
+        motion.
         """
         work = -(self.force[1:] * np.diff(self.x, axis=0)).sum(axis=0)
         stretch = np.diff(self.relative, axis=0) ** 2
@@ -164,8 +156,5 @@ class StructureHistory(History):
 
     @property
     def modal(self) -> np.ndarray:
-        """Modal coordinates of the motion from the base [kg^1/2 m], (samples, modes, seeds).
-
-        They are p - G y of ``structure``, and ``relative`` is the sum of shapes times these.
-        """
+        """Modal coordinates p - G y of the motion from the base, (samples, modes, seeds)."""
         return np.moveaxis(self.structure._modal(np.moveaxis(self.relative, 1, -1)), -1, 1)

@@ -111,13 +111,7 @@ class Response(Result):
         return in_brief(self, self.axes_in_words(), highest)
 
     def axes_in_words(self) -> str:
-        """Filling, particles, ratios and seeds in words.
-
-        Returns
-        -------
-        str
-            Words for titles.
-        """
+        """Filling, particles, ratios and seeds in words."""
         axes = f"particles {listed(self.particles)}, f/f0 {listed(self.ratios)}"
         return f"{self.label}, {axes}, {counted(len(self.seeds), 'seed')}"
 
@@ -183,18 +177,7 @@ class Response(Result):
         return {name: (dims, getattr(self, name), unit) for name, unit in self.units.items()}
 
     def to_xarray(self) -> Any:
-        """As of ``Result``, over particles, frequency and seed; ``ratio`` is along frequency.
-
-        Returns
-        -------
-        xarray.Dataset
-            Units in the attributes of each variable, the filling in its own.
-
-        Raises
-        ------
-        InputError
-            Where xarray is not installed.
-        """
+        """As of ``Result``, over particles, frequency and seed; ``ratio`` is along frequency."""
         ratio = "frequency", self.ratios, {"units": "1"}
         return super().to_xarray().assign_coords(ratio=ratio)
 
@@ -207,13 +190,7 @@ class Response(Result):
         return ResponsePlots(self)
 
     def columns(self) -> dict[str, Any]:
-        """Columns of equal length with a row a scene, as they are written.
-
-        Returns
-        -------
-        dict
-            Columns by name, which ends in the unit.
-        """
+        """Columns of equal length with a row a scene, as they are written."""
         columns: dict[str, Any] = {"filling": [self.label] * self.rms.size}
         columns |= scenes_over(particles=self.particles, ratio=self.ratios, seed=self.seeds)
         columns["frequency_Hz"] = columns["ratio"] * self.oscillator.natural_frequency
@@ -264,13 +241,7 @@ class AmplitudeResponse(Tabulated):
         return np.stack(ratio), np.stack(rms)
 
     def columns(self) -> dict[str, Any]:
-        """A row a scene, as of ``Response.columns``, with its amplitude in front.
-
-        Returns
-        -------
-        dict
-            Columns by name, which ends in the unit.
-        """
+        """A row a scene, as of ``Response.columns``, with its amplitude in front."""
         columns = [one.columns() for one in self.responses]
         sizes = [len(one["filling"]) for one in columns]
         joined = {name: np.concatenate([one[name] for one in columns]) for name in columns[0]}
@@ -278,13 +249,7 @@ class AmplitudeResponse(Tabulated):
         return {"base_amplitude_m": amplitude, **joined}
 
     def to_xarray(self) -> Any:
-        """As ``Response.to_xarray``, over base_amplitude [m] too.
-
-        Returns
-        -------
-        xarray.Dataset
-            Units in the attributes of each variable.
-        """
+        """As ``Response.to_xarray``, over base_amplitude [m] too."""
         return stacked(self.responses, "base_amplitude", list(self.amplitudes), units="m")
 
 
@@ -348,8 +313,6 @@ def frequency_response(
 
     Raises
     ------
-    InputError
-        An argument is out of its range, or the filling refuses a scene.
     SimulationDiverged
         All scenes diverged. If only some do, a warning names them, and their results are nan.
 

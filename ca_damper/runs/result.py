@@ -16,11 +16,9 @@ class Result(Tabulated):
     label: str
 
     def _axes(self) -> dict[str, Any]:
-        """(values, unit) of each axis, by its dimension."""
         raise NotImplementedError
 
     def _variables(self) -> dict[str, Any]:
-        """(dimensions, values, unit) of all values, by name."""
         raise NotImplementedError
 
     def to_xarray(self) -> Any:

@@ -1,9 +1,7 @@
 """Peak of a structure under sines of its base, however little the structure itself damps.
 
-Scenes begin near the steady state of the grains as a fixed mass. What is left of a start decays
-with the whole damping, which may take thousands of cycles: harmonics of successive cycles then obey
-X[n + 1] = q X[n] + c, with the limit c / (1 - q). While grains lie still that limit is the steady
-state; once they move it is a reason to go on until the motion has come near it.
+Scenes begin near the steady state of the grains as a fixed mass. Harmonics of successive cycles
+then obey X[n + 1] = q X[n] + c, which tells the limit c / (1 - q) long before it is reached.
 """
 
 from typing import Any
@@ -24,10 +22,7 @@ _NEAR = 0.5
 
 
 class SteadyPeak:
-    """Search of the peak of a box on a structure, (seeds,) values.
-
-    cycles: before those that are measured, and these. scenes: what a Grid takes beside ratios.
-    """
+    """Search of the peak of a box on a structure, (seeds,) values."""
 
     def __init__(self, filling: Any, cycles: tuple[int, int], progress: Any, **scenes: Any):
         self.filling, self.progress, self.scenes = filling, progress, scenes
@@ -114,7 +109,6 @@ def limit_of(harmonic: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _top(ratios, curve):
-    """Peak of a curve; its highest value where that stands at an end."""
     found = peak(ratios, curve)[1]
     return float(curve.max()) if np.isnan(found) else found
 

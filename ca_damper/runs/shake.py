@@ -95,15 +95,8 @@ def shake(
     resume : path, optional
         As in ``frequency_response``.
 
-    Returns
-    -------
-    TimeHistory
-        Motion and force over time.
-
     Raises
     ------
-    InputError
-        An argument is out of its range.
     SimulationDiverged
         All scenes diverged. If only some do, a warning names them, and their results are nan.
 
@@ -191,15 +184,8 @@ def shake_structure(
     resume : path, optional
         As in ``frequency_response``.
 
-    Returns
-    -------
-    StructureHistory
-        Motion of all places and force on all boxes over time.
-
     Raises
     ------
-    InputError
-        An argument is out of its range, or the step is too long for the highest mode.
     SimulationDiverged
         All scenes diverged. If only some do, a warning names them, and their results are nan.
     """

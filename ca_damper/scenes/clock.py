@@ -40,8 +40,7 @@ def automatic_dt(default_dt: float, highest: float) -> float:
 class Clock:
     """Phase of the base of every scene, as a count of steps in the cycle, with sine and cosine.
 
-    Sine and cosine are turned on by one step's angle; each cycle begins anew with 0 and 1, so that
-    rounding stays below steps a cycle x 1e-16 and a cycle ends exactly.
+    Each cycle begins anew with 0 and 1, so that rounding stays below steps a cycle x 1e-16.
     """
 
     def __init__(self, table: SceneFields):

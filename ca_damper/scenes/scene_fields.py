@@ -1,8 +1,4 @@
-"""Numbers and state of the scenes of a batch on the device, with room for batches of other sizes.
-
-Fields are allocated once, with a capacity. How many scenes are in use, and how much of each, is
-read from fields at run time, so that a batch of another size compiles nothing.
-"""
+"""Numbers and state of the scenes of a batch on the device, with room for larger batches."""
 
 import functools
 from collections.abc import Mapping
@@ -22,11 +18,7 @@ Length = int | str
 
 @dataclass(frozen=True, eq=False)
 class SceneField:
-    """A field of the scenes.
-
-    lengths: of its axes after that of the scenes. flat: whether the first of them and the scenes
-    share one axis, places of a scene side by side.
-    """
+    """A field of the scenes; flat: scenes share its first axis, places of a scene side by side."""
 
     field: ti.Field
     lengths: tuple[Length, ...]
@@ -44,15 +36,9 @@ class Part:
 class SceneFields:
     """Parameters of each scene of a batch; fields of shape (capacity,).
 
-    particles [-], seed [-] (cast to u32 for hashing), dt [s], frequency [Hz] and base_amplitude [m]
-    of the base motion, and the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
-    Of its filling, gravity: along the motion [m/s^2]; weight: of a particle along it [N].
-    recoil: speed that a unit impulse gives the container [1/kg], 1 / mass on a spring and 0 for one
-    whose motion is prescribed; written at the start of a run.
-
-    capacity: most scenes. sizes: most places that a scene can have, by name. scenes: number of
-    scenes in use, shape (); scene_count: the same in Python. Whatever a scene does depends on its
-    own row only (on its seed, not on its index), so that no bit depends on what else is in a batch.
+    seed is cast to u32 for hashing. gravity: along the motion [m/s^2]; weight: of a particle along
+    it [N]; recoil: speed that a unit impulse gives the container [1/kg], 0 for a prescribed motion.
+    A scene depends on its own row only, so that no bit depends on what else is in a batch.
     """
 
     def __init__(self, capacity: int, sizes: dict[str, int]):
@@ -74,6 +60,7 @@ class SceneFields:
 
     def structs(self, kind: Any, *lengths: int) -> ti.StructField:
         """Declare structs of given numbers; members lie apart, which kernels find faster."""
+        # Given numbers are no state: a class lists them in its ``constant_fields``.
         return kind.field(shape=(self.capacity, *lengths), layout=ti.Layout.SOA)
 
     def _made(self, make: Any, lengths: tuple[Length, ...], flat: bool) -> ti.Field:
@@ -112,11 +99,7 @@ class SceneFields:
 
 
 class SceneMemory:
-    """Reads and writes the state of a batch, for checkpoints that another session can go on from.
-
-    engine: of the batch. sizes: places that a scene of it uses, by name. Arrays of the scenes are
-    cut to what is in use, as engines differ in capacity.
-    """
+    """State of a batch for checkpoints; arrays are cut to what its scenes use of the engine."""
 
     def __init__(self, engine: Any, sizes: dict[str, int]):
         self.engine, self.sizes = engine, sizes

@@ -14,13 +14,7 @@ _STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
 
 
 class SceneNumbers:
-    """A table of its own, whose steps are shortened so that a whole number of them makes a cycle.
-
-    fillings: of the scenes, as Fillings. largest_dt: the steps asked for [s]. steps_per_cycle: of
-    each scene. Both (scenes,). has_box: scenes whose number of particles their filling checks, None
-    for all. Plain NumPy. Raises InputError for a scene that its filling refuses or a step out of
-    range.
-    """
+    """A table whose steps are shortened so that a whole number of them makes a cycle."""
 
     def __init__(self, fillings: Any, table: SceneTable, has_box: np.ndarray | None = None):
         self.fillings, self.table = fillings, table.copy()

@@ -45,16 +45,6 @@ class SceneTable:
     ----------
     count : int
         Number of scenes.
-
-    Raises
-    ------
-    InputError
-        A value is out of its range, or the numbers of rows differ.
-
-    Examples
-    --------
-    >>> SceneTable([10, 20, 30], seed=1, dt=1e-4).count
-    3
     """
 
     COLUMNS = (
@@ -86,13 +76,7 @@ class SceneTable:
         self._host = {name: _kept(column, self.count) for name, column in columns.items()}
 
     def copy(self) -> "SceneTable":
-        """Return a table of the same numbers.
-
-        Returns
-        -------
-        SceneTable
-            The copy.
-        """
+        """Return a table of the same numbers."""
         return SceneTable(**self._host)
 
     def __repr__(self) -> str:
@@ -139,17 +123,12 @@ class SceneTable:
         self.change(frequency=frequency, dt=dt)
 
     def column(self, name: str) -> np.ndarray:
-        """Column of the table by name.
+        """Column of the table by name, shape (scenes,); read-only, see ``change``.
 
         Parameters
         ----------
         name : str
             Name of the column.
-
-        Returns
-        -------
-        ndarray
-            Values, shape (scenes,); read-only, see ``change``.
         """
         return self._host[choice("name", name, self.COLUMNS)]
 
@@ -160,18 +139,12 @@ class SceneTable:
         ----------
         s : int
             Number of the scene, from 0.
-
-        Returns
-        -------
-        dict
-            Numbers by the name of the column.
         """
         whole("s", s, 0, self.count - 1)
         return {name: self._host[name][s].item() for name in self.COLUMNS}
 
 
 def _kept(column: np.ndarray, count: int) -> np.ndarray:
-    """A copy of a column for so many scenes, which refuses to be written."""
     kept = np.broadcast_to(column, count).copy()
     kept.flags.writeable = False
     return kept
@@ -197,6 +170,7 @@ def _checked(name: str, value: Any) -> np.ndarray:
 
 def dealt(cost: np.ndarray, threads: int) -> np.ndarray:
     """Scene numbers in an order that gives each thread the same cost, (scenes,) i32."""
+    # A thread takes a contiguous part of the loop: scenes are dealt out in turn by falling cost.
     dear_first = np.argsort(-cost, kind="stable")
     hands = [dear_first[k::threads] for k in range(threads)]
     return np.concatenate(hands)

@@ -24,9 +24,8 @@ vec2 = ti.types.vector(2, ti.f64)
 class Body:
     """Numbers of all spheres of a scene: radius of the largest [m], mean mass [kg], box [m].
 
-    pull: acceleration by gravity, to the left and downwards [m/s^2], as a vector that the compiler
-    does not take apart: both components are then divided and subtracted by one instruction.
-    columns, rows: of the spheres that fit into the box.
+    pull: acceleration by gravity [m/s^2], as a vector that the compiler does not take apart: both
+    components are then divided and subtracted by one instruction.
     """
 
     radius: ti.f64
@@ -39,7 +38,6 @@ class Body:
 
 
 def _body(options: Any) -> dict[str, Any]:
-    """Members of a Body."""
     across, down = options.fall
     columns, rows = options.lattice
     sphere = {"radius": options.radius, "mass": options.particle_mass, "pull": (0.0 - across, down)}
@@ -51,12 +49,10 @@ def _body(options: Any) -> dict[str, Any]:
 class Bodies:
     """State of the spheres; sphere k of scene s has the index i = s * stride + k.
 
-    position [m] and velocity [m/s], (horizontal, vertical), in the frame at rest. Horizontal
-    positions count from the middle of the box, so that a mirrored run has the same bits; vertical
-    ones from where the floor is at x = 0. Positions run ``lead`` [s] ahead of the velocities, half
-    a step in a run. force [N]: of the contacts of this step. floor: where the container's floor is
-    at the time of the velocities [m], as foreseen by the last step. kind: size of each sphere,
-    where there are several; radii [m], masses [kg] and counts of the spheres of each.
+    (horizontal, vertical), in the frame at rest. Horizontal positions count from the middle of the
+    box, so that a mirrored run has the same bits. Positions run ``lead`` [s] ahead of the
+    velocities, half a step in a run. floor: where it is at the time of the velocities [m], as
+    foreseen by the last step.
     """
 
     constant_fields = ("body",)
@@ -202,13 +198,14 @@ class Bodies:
 
     @ti.func
     def _put(self, s, i, place, velocity):
-        """Put a sphere at a place [m] counted from the lower left corner."""
         self.position[i] = place - vec2(0.5 * self.body[s].width, 0.0)
         self.velocity[i], self.force[i] = velocity, vec2(0.0)
 
     @ti.func
     def _scatter(self, s):
         """Put the spheres on random sites of a grid as wide as they leave room for."""
+        # Selection sampling: taking a site with the chance "still wanted / still to come" makes
+        # every choice equally likely. Spheres move at random within wider sites and cannot overlap.
         body, count, seed = self.body[s], self.table.particles[s], self.table.seed[s]
         columns, rows = self._sites(s, count)
         pitch = vec2(body.width / columns, body.height / rows)
@@ -226,6 +223,8 @@ class Bodies:
     @ti.func
     def _choose_kinds(self, s):
         """Choose the size of each sphere: in their order for given places, else at random."""
+        # With the chance "left of this size / left of all": ``_scatter`` fills sites from the floor
+        # up.
         count = self.table.particles[s]
         for k in range(count):
             drawn = ti.cast(k, ti.f64)

@@ -40,12 +40,10 @@ _BISECTIONS = 40
 class Contact:
     """Numbers of one kind of contact.
 
-    stiffness: k [N/m^(3/2)]. damping: c [N s/m^(1+p)]. friction: Coulomb's coefficient [-].
-    reach: distance of a centre from the other, or from the wall, when they touch [m].
-    yielding: half a step over the effective mass [s/kg]. grip: most friction per slip [N s/m].
-    Of friction with history: shear, tangential stiffness over the root of the overlap [N/m^(3/2)];
-    shear_damping: tangential over normal dashpot [-]; shear_yielding: half a step over the mass
-    that resists a tangential impulse [s/kg]; since: time that positions have moved on [s]. dt [s].
+    reach: distance of a centre from the other, or from the wall, when they touch [m]. yielding:
+    half a step over the effective mass [s/kg]. grip: most friction per slip [N s/m]. shear:
+    tangential stiffness over the root of the overlap [N/m^(3/2)]. since: time that positions have
+    moved on [s].
     """
 
     stiffness: ti.f64
@@ -80,6 +78,7 @@ def shear_ratio(young: float, poisson: float, other_young: float, other_poisson:
 
 def contact_duration(mass: float, stiffness: float, speed: float) -> float:
     """Time [s] that bodies of an effective mass [kg] touch, undamped, at an impact speed [m/s]."""
+    # Hertz (1882): 2.943 D / v, D the deepest overlap, from k D^(5/2) 2/5 = m v^2 / 2.
     root = fifth_root(1.25 * mass * speed * speed / stiffness)
     return _HERTZ * root * root / speed
 
@@ -151,6 +150,8 @@ def damping_number(restitution: float, power: float) -> float:
 
 def restitution_of(alpha: float, power: float) -> float:
     """Speed of parting over speed of impact for a dashpot of number alpha."""
+    # Integrates y = overlap^(1/4) over a time in which y' is the speed: all terms are then smooth,
+    # as overlap^(1/4) is not (classical Runge-Kutta method).
     y, u = 0.0, 1.0
     while True:
         rate = _rate(y, u, alpha, power)
@@ -192,10 +193,7 @@ def _runge_kutta(y, u, alpha, power):
 
 @ti.data_oriented
 class ContactLaw:
-    """Forces of a contact under one of the two damping laws.
-
-    name: "tsuji" (p = 1/4) or "printed" (p = 1/2).
-    """
+    """Forces of a contact under a damping law: "tsuji" (p = 1/4) or "printed" (p = 1/2)."""
 
     def __init__(self, name: str):
         self.printed = name == "printed"
@@ -203,6 +201,7 @@ class ContactLaw:
     @ti.func
     def damping_ratio(self, share):
         """Ratio of damping for the same restitution with a share of the effective mass."""
+        # Damping grows with the power 1 - 2 (1 + p) / 5 of the mass.
         ratio = ti.sqrt(share)
         if ti.static(self.printed):
             root = fifth_root(share)
@@ -221,6 +220,8 @@ class ContactLaw:
     @ti.func
     def normal(self, contact, overlap, approach):
         """Repulsion [N] at a positive overlap [m] that grows by approach [m/s]; never a pull."""
+        # The dashpot acts on the approach at mid-step, which the force has slowed already: this
+        # keeps the order of the leapfrog.
         dashpot = self.dashpot(contact, ti.sqrt(overlap))
         force = self.elastic(contact, overlap) + dashpot * approach
         return ti.max(0.0, force) / (1.0 + dashpot * contact.yielding)

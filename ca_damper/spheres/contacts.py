@@ -1,9 +1,7 @@
 """Numbers of the contacts of two spheres, and of spheres and walls, by the sizes of the spheres.
 
-The container moves along x only. A blow on floor or ceiling accelerates sphere and container, so
-that the effective mass is m M / (m + M), with M the container's mass; across, the container is
-guided, and a blow on a side wall meets m. Friction there acts along x, again on both. M is a number
-of the scene, and infinite for a container whose motion is prescribed.
+The container moves along x only: a blow on floor or ceiling meets m M / (m + M), with M its mass, a
+blow on a side wall m.
 """
 
 from typing import Any
@@ -103,10 +101,10 @@ class PairContacts(Part):
 
 @ti.data_oriented
 class WallContacts(Part):
-    """Contacts of a sphere with the walls.
+    """Contacts of a sphere with the walls, by scene and size of spheres.
 
-    Of each scene and size of spheres, contact: with a wall that does not recoil; recoiling: damping
-    and yielding of floor and ceiling, and grip of the side walls.
+    contact: with a wall that does not recoil; recoiling: damping and yielding of floor and ceiling,
+    and grip of the side walls.
     """
 
     constant_fields = ("contact",)

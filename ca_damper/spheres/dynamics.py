@@ -1,13 +1,8 @@
 """One step of the spheres: contacts, walls, motion; and readings between steps.
 
-Time integration is the leapfrog, with velocities at the times t_n of the given motion of the
-container, and positions half a step ahead. In a step, forces are evaluated at the positions of its
-middle, change the velocities over the whole step, and these move the positions on. It is of second
-order, symplectic without dissipation, and needs one evaluation of the contacts. As the forces
-belong to the middle of the step over which they act on the container, they do not lag.
-
-Spheres move in the frame at rest, not in the container's: their gain of momentum is that from
-contacts and gravity, to round-off, and the impacts on the container are its exact counterpart.
+Leapfrog with positions half a step ahead of velocities: second order, symplectic without
+dissipation, and forces do not lag. Spheres move in the frame at rest, so that their gain of
+momentum is the exact counterpart of the impacts on the container.
 """
 
 import math
@@ -54,11 +49,8 @@ FORGOTTEN = 1.0 / 256.0
 class DeviceSpheres:
     """The spheres of all scenes of a table, on the device; see ``ca_damper.filling``.
 
-    crushed: whether spheres of a scene lay in each other by a radius when ``divergence_code``
-    looked last. given: work of the walls on the spheres [J]. lost: most energy that contacts have
-    taken up to a look of late [J], but for a constant. allowed: gain that errors of the impacts of
-    late explain [J]. held: energy of the pairs that touch [J], as of a look. speed: of the
-    container at the end of the last step [m/s].
+    given: work of the walls [J]. lost: most energy that contacts had taken up at a recent look [J].
+    allowed: gain that errors of recent impacts explain [J].
     """
 
     def __init__(self, options: Any, table: SceneFields):
@@ -183,7 +175,6 @@ class DeviceSpheres:
 
     @ti.func
     def _own_energy(self, s, i):
-        """Kinetic and potential energy of a sphere and that of its contacts with walls [J]."""
         body = self.bodies.body[s]
         velocity, place = self.bodies.velocity[i], self.bodies.position_in_box(s, i)
         mass, contact = self.bodies.mass(s, i), self.wall_contacts.at_rest(s, i)
@@ -247,6 +238,7 @@ class DeviceSpheres:
     @ti.func
     def _gains(self, s):
         """Whether contacts have created a good part of the energy of late, which is impossible."""
+        # Seen from the container, as spheres at rest in the room meet a wall that comes to them.
         body, speed = self.bodies.body[s], self.speed[s]
         weight = self.table.particles[s] * body.mass * body.pull[1]
         energy, shift = self.held[s], 0.0

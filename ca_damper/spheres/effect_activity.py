@@ -2,14 +2,6 @@
 
 Activity is sampled when a scene is checked for divergence: in every step it would cost a fifth
 more. The first action of each effect is noted in the step itself.
-
-Rotation: a blow at 45 degrees with friction f and restitution e changes the tangential speed v by
-f (1 + e) v as long as it slides, and by 2/7 v at most, when it sticks. A tangential impulse J gives
-a solid sphere the energy 5/4 J^2 / m of turning. For a small f this adds up from blow to blow: it
-is called negligible only if a thousand blows that all turn the sphere the same way leave it so.
-
-Air: a sphere that crosses the box displaces air of its cross-section times the way; at Reynolds
-numbers of some hundreds its drag coefficient is below 1.
 """
 
 import math
@@ -49,8 +41,8 @@ _LIMITS = (1e-3, 1e-2)
 class EffectActivity(EventCounts):
     """Sums over the checks since the reset, by scene.
 
-    touches: of two spheres, or of a sphere and a wall. power: into dashpots and into friction of
-    sphere on sphere [W]. motion: energy of going and of turning [J].
+    power: into dashpots and into friction of sphere on sphere [W]. motion: translation and rotation
+    [J].
     """
 
     def __init__(self, table: SceneFields):

@@ -1,11 +1,7 @@
 """Expected contacts: pairs and spheres at walls that may touch before a lower bound of the time.
 
-All others need no test until the spheres have come nearer to each other, or to a wall, by a
-margin. How much nearer is summed from what moved in each step: the spread of the velocities of the
-spheres, and the floor. So it holds whatever moves them: gravity, contacts, a given motion.
-
-An audit makes all tests of some spheres in some steps, chosen by a counter so that it is one in
-about a thousand of all tests, and counts the contacts that the lists lack. It changes nothing else.
+All others need no test until the spheres have come nearer by a margin, which is summed from what
+moved in each step; so it holds whatever moves them.
 """
 
 import taichi as ti
@@ -41,14 +37,9 @@ _AUDIT_EVERY, _CHANCE, _MOST_CHOSEN = 8, 2**24, 128
 class ExpectedContacts:
     """Lists of the pairs and of the spheres at walls that are tested in every step.
 
-    pair, pair_count; sphere, sphere_count: the lists; pair[s, EXPECTED] is that of a scene, and
-    pair[s, TOUCHING] has places for those of them that touch in a step. most_touch: whether nearly
-    all of them do, so that they are evaluated without a test. margin: how far apart two spheres,
-    and a sphere and a wall, are listed [m]. nearer: by how much they may have come nearer since
-    [m]. least, most: bounds of the way of the spheres in the last step [m]. floor: where the floor
-    was then [m]. tightness: share of the margin that is listed, 1 but in tests of the audit.
-    unlisted: pairs and spheres that are not listed. skipped, audited, misses: tests not needed,
-    made all the same, and contacts that these found.
+    pair[s, EXPECTED] is the list of a scene, pair[s, TOUCHING] has places for those that touch.
+    most_touch: whether nearly all do, so that no test is made. margin: how far apart two spheres,
+    and a sphere and a wall, are listed [m]; nearer: by how much they may have come nearer [m].
     """
 
     def __init__(self, table: SceneFields, bodies: Bodies):
@@ -131,7 +122,6 @@ class ExpectedContacts:
 
     @ti.func
     def _list_pairs(self, s, margin):
-        """List pairs that may touch before they come nearer by a margin [m]."""
         reach, count = 2.0 * self.bodies.body[s].radius, vec2i(0)
         self.cells.each_pair(s, vec2(reach, reach + self._reach(s, margin)), self._list_pair, count)
         self.pair_count[s] = count[0]

@@ -1,9 +1,7 @@
 """Forces of two spheres on each other, and of the container's walls on those that touch them.
 
-Pairs are evaluated eight at a time and added one by one. Arithmetic of vectors is one instruction
-for two to eight numbers, and rounds as that of single numbers does: roots and divisions, which take
-most of the time of a contact, cost half. Forces are added in the order of the pairs, so that no bit
-depends on which contacts are evaluated together.
+Pairs are evaluated eight at a time, which rounds as single numbers do and halves the time of roots
+and divisions, and added one by one in their order.
 """
 
 from typing import Any
@@ -18,11 +16,7 @@ from ca_damper.spheres.effect_activity import FRICTION
 
 @ti.data_oriented
 class PairForces(Part):
-    """Contacts of two spheres in the present step, by scene.
-
-    force_x, force_y: of a vector of contacts, on their first spheres [N]; torque: on both by their
-    shares [N m]; spring, root: of their friction.
-    """
+    """Contacts of two spheres in the present step, by scene."""
 
     scratch_fields = ("force_x", "force_y", "torque", "spring", "root")
 
@@ -52,7 +46,6 @@ class PairForces(Part):
 
     @ti.func
     def _push(self, s, pair, lane: ti.template()):
-        """Add the force of a contact to both spheres."""
         if ti.static(self.history.remembers):
             self.history.store_pair(s, pair, vec2(self.spring[s][lane], self.root[s][lane]))
         force = vec2(self.force_x[s][lane], self.force_y[s][lane])
@@ -74,7 +67,6 @@ class PairForces(Part):
 
     @ti.func
     def _friction(self, s, contact, overlap, push, slip):
-        """Friction of a vector of contacts [N]."""
         if ti.static(self.history.remembers):
             way, kept, last_root = contact.since * slip, self.spring[s], self.root[s]
             drag, spring, root = self.history.force(
@@ -183,7 +175,6 @@ class WallForces(Part):
 
     @ti.func
     def _friction(self, s, i, wall, contact, overlap, push, slip, tangent):
-        """Friction of sphere i at a wall [N]."""
         if ti.static(self.history.remembers):
             return self.history.at_wall(s, i, wall, contact, overlap, push, slip, tangent)
         return self.law.friction(contact, push, slip)

@@ -1,13 +1,8 @@
 """Friction with tangential history: springs that live as long as their contacts touch.
 
-Cundall and Strack (1979): slip stretches a spring, whose force is limited by Coulomb's law. Its
-stiffness is that of Mindlin (1949), 8 G* sqrt(R* d), and follows the overlap d. As in Thornton,
+Cundall and Strack (1979), limited by Coulomb's law; stiffness of Mindlin (1949). As in Thornton,
 Cummins and Cleary (2013) a contact that grows keeps its force, and one that shrinks loses it in
-proportion, so that no change of the overlap makes energy F^2 / (2 k). A dashpot of the normal one's
-damping ratio acts beside the spring.
-
-Pairs come in one order in every step, so that what was kept is found by going through both lists
-at once, and neither the search nor a renewed list changes a bit.
+proportion, so that no change of the overlap makes energy.
 """
 
 from typing import Any
@@ -26,11 +21,8 @@ _LONG_AGO = -2
 class FrictionHistory(Part):
     """Springs of the contacts of the last step: force [N] and root of the overlap [m^(1/2)].
 
-    remembers: whether there are any; else friction depends on the present slip only.
-    pair, pair_spring, pair_count: pairs that touched, in the order of the search. recalled: of the
-    pairs of the present step, zero for new ones. wall_spring: of a sphere at each wall, 2 axis +
-    side. wall_step: step in which a sphere last touched a wall. step, speed: the last one, and the
-    container's speed at its beginning, then at its end [m/s].
+    recalled: those of the pairs of the present step, zero for new ones. wall_spring: of a sphere at
+    each wall, 2 axis + side.
     """
 
     def __init__(self, spheres: Any, remembers: bool):
@@ -91,6 +83,7 @@ class FrictionHistory(Part):
     @ti.func
     def at_wall(self, s, i, wall, contact, overlap, push, slip, tangent):
         """Friction of a sphere at a wall [N]; keeps its spring."""
+        # Positions move on by the velocities as they are; slip belongs to the middle of the step.
         kept, lever = self.wall_spring[i, wall], contact.reach - overlap
         relative = self.bodies.velocity[i] - vec2(0.0, self.speed[s])
         way = contact.since * self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
@@ -128,6 +121,7 @@ class FrictionHistory(Part):
     @ti.func
     def of_pairs(self, s):
         """Energy of the springs of all pairs [J], and the power that they take [W]."""
+        # At the time of the velocities, half a step after the force.
         total, power = 0.0, 0.0
         for k in range(self.pair_count[s]):
             i, j = self.pair[s, k][0], self.pair[s, k][1]

@@ -104,20 +104,6 @@ class Spheres:
         (number, diameter [m]) of each size; the box holds as many as there would be of the largest.
     start_velocity : array_like, optional
         Velocities of the spheres relative to the container [m/s], shape (particles, 2).
-
-    Raises
-    ------
-    InputError
-        A value is out of its range, or the box holds too few or too many spheres.
-
-    References
-    ----------
-    Komatsuzaki et al., section 4.
-
-    Examples
-    --------
-    >>> Spheres(width=0.03).capacity
-    80
     """
 
     damping: str = "tsuji"
@@ -207,11 +193,6 @@ class Spheres:
         particles : int
             Largest number of spheres.
 
-        Returns
-        -------
-        tuple of (Spheres, tuple)
-            The spheres, and an Estimate of each effect that was decided.
-
         Notes
         -----
         Friction is computed unless its coefficients are zero; rotation unless it is negligible.
@@ -221,17 +202,12 @@ class Spheres:
         return chosen, (estimate,)
 
     def left_out(self, particles: int) -> tuple[Estimate, ...]:
-        """Size of the effects that are not computed.
+        """Estimates of the effects that are not computed.
 
         Parameters
         ----------
         particles : int
             Number of spheres.
-
-        Returns
-        -------
-        tuple of Estimate
-            An estimate of each.
         """
         found = () if self.rotation else (rotation_estimate(self, particles),)
         return (*found, air_estimate(self))
@@ -273,17 +249,12 @@ class Spheres:
         return self.lattice[0] * self.lattice[1]
 
     def clearance(self, particles: int) -> float:
-        """Distance from settled spheres to the lid.
+        """Distance from settled spheres to the lid [m].
 
         Parameters
         ----------
         particles : int
             Number of spheres.
-
-        Returns
-        -------
-        float
-            Clearance [m].
         """
         whole("particles", particles, 0, 2**31 - 1)
         return self.height - self.diameter * particles / self.lattice[0]
@@ -297,22 +268,13 @@ class Spheres:
             Number of settled spheres.
         clearance : float
             Distance from the settled spheres to the lid [m].
-
-        Returns
-        -------
-        Spheres
-            The same options with another height.
         """
         layers = whole("particles", particles, 0, 2**31 - 1) / self.lattice[0]
         free = positive("clearance", clearance, zero_allowed=True)
         return replace(self, height=self.diameter * layers + free)
 
     def check(self, particles: int, dt: float) -> None:
-        """Refuse an invalid number of spheres or step [s].
-
-        A step too long for the contacts is not refused: how long it may be depends on how fast the
-        spheres come to move. Such a run ends as diverged.
-        """
+        """Refuse an invalid number of spheres or step [s]; too long a step diverges in the run."""
         whole("particles", particles, 0, self.capacity)
         positive("dt", dt)
         for name, what in (("start", "places"), ("start_velocity", "velocities")):
@@ -330,13 +292,7 @@ class Spheres:
         return DIVERGENCES[code], min(self.safe_step(), 0.5 * dt)
 
     def safe_step(self) -> float:
-        """Step that resolves the contact of two spheres that fell through the box.
-
-        Returns
-        -------
-        float
-            Step [s].
-        """
+        """Step [s] that resolves the contact of two spheres that fell through the box."""
         smallest = min(range(len(self.radii)), key=self.radii.__getitem__)
         numbers = pair_numbers(self, smallest, smallest)
         across, down = self.fall

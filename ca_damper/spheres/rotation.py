@@ -11,9 +11,7 @@ from taichi_dem.kit.allocation import values
 class Rotation:
     """Turning of solid spheres in the plane, of moment of inertia 2/5 m r^2; or no trace of it.
 
-    turns: whether there is any. spin: angular velocity [rad/s], anticlockwise. torque: of this step
-    [N m]. Shape: one a sphere. tangential_share: of the effective mass that resists a tangential
-    impulse.
+    tangential_share: of the effective mass that resists a tangential impulse.
     """
 
     def __init__(self, bodies: Bodies, turns: bool):

@@ -1,7 +1,6 @@
 """Pairs of spheres: all of them, or those near each other by a cell grid.
 
-Both name the pairs (i, j), i < j, in the same order, so that the forces on a sphere are summed by
-ascending partner and both give the same bits.
+Both name the pairs (i, j), i < j, in the same order: forces are summed to the same bits.
 """
 
 from typing import Any
@@ -23,8 +22,7 @@ EXPECTED, TOUCHING = range(2)
 class Grid:
     """Numbers of the search of a scene.
 
-    skin: how far apart spheres are listed [m]; it changes the time taken and no result. columns,
-    rows: of the cells. pairs: places in the list of a scene.
+    skin: how far apart spheres are listed [m]; it changes the time taken and no result.
     """
 
     skin: ti.f64
@@ -35,10 +33,7 @@ class Grid:
 
 @ti.data_oriented
 class AllPairs:
-    """Test every pair and every sphere in every step, as the paper does.
-
-    pair[s, TOUCHING]: those that touch. sphere, sphere_count, full: as of ``ExpectedContacts``.
-    """
+    """Test every pair and every sphere in every step, as the paper does."""
 
     def __init__(self, table: SceneFields, bodies: Bodies):
         self.table, self.bodies = table, bodies
@@ -104,10 +99,9 @@ class AllPairs:
 class CellList:
     """List of pairs within a skin of touching, found by cells; renewed when the skin is used up.
 
-    grid: of each scene. cell_first, next: chains of the spheres in a cell, the first and each one's
-    next. pair: the list; that of a scene fills its places from the end, at ``_list_end``,
-    back to pair_first. full: whether more spheres lay near each other than spheres that do not
-    interpenetrate can. travel: by how much two spheres may have come nearer since the search [m].
+    cell_first, next: chains of the spheres in a cell. The list of a scene fills its places of pair
+    from the end back to pair_first. full: more spheres near each other than can lie side by side.
+    travel: by how much two spheres may have come nearer since the search [m].
     """
 
     constant_fields = ("grid",)
@@ -130,7 +124,6 @@ class CellList:
 
     @ti.func
     def _list_end(self, s):
-        """One past the last place of the list of scene s."""
         return s * self.list_stride + self.grid[s].pairs
 
     @ti.func
@@ -155,6 +148,7 @@ class CellList:
     @ti.func
     def refresh(self, s):
         """Renew the list if spheres may have crossed the skin; returns whether it did."""
+        # "not" so that NaN searches too.
         used_up = not (self.travel[s] < self.grid[s].skin)
         if used_up:
             self._search(s)

@@ -53,7 +53,6 @@ def checked_sizes(sizes: Any) -> tuple:
 
 
 def _radii(options: Any, count: int) -> np.ndarray:
-    """Radius of each sphere whose place is given [m], (count,)."""
     if options.sizes is None:
         return np.full(count, options.radius)
     numbers = [number for number, _ in options.sizes]

@@ -9,10 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Fall:
-    """Fall from a height [m] with rebounds of one restitution, in closed form.
-
-    gravity [m/s^2]. The particle begins at rest at time zero.
-    """
+    """Fall from a height [m] at rest, with rebounds of one restitution, in closed form."""
 
     height: float
     restitution: float
@@ -46,10 +43,7 @@ class Fall:
 
 @dataclass(frozen=True, eq=False)
 class RecordedFall:
-    """A particle that fell: samples while it flew, its impacts [s] and the apexes after them [m].
-
-    fall: its closed form.
-    """
+    """A particle that fell: samples while it flew, its impacts [s] and apexes after them [m]."""
 
     fall: Fall
     time_s: np.ndarray
@@ -60,6 +54,8 @@ class RecordedFall:
     @classmethod
     def of(cls, history: Mapping[str, np.ndarray], fall: Fall, mass: float) -> "RecordedFall":
         """From the history of a ``film`` of one particle; mass: of it [kg]."""
+        # Height and velocity follow from energy and momentum; the parabolas before and after an
+        # impact, of equal gravity, cross where the particle turned.
         free = history["force"] == 0.0
         time, velocity = history["time_s"][free], history["momentum"][free] / mass
         height = history["energy"][free] / (mass * fall.gravity) - 0.5 * velocity**2 / fall.gravity

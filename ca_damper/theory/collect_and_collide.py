@@ -75,11 +75,6 @@ def collect_and_collide(amplitude: ArrayLike, gap: ArrayLike) -> CollectAndColli
     CollectAndCollide
         Dimensionless loss, apparent mass and energy, of the shape of the arguments.
 
-    Raises
-    ------
-    InputError
-        The arguments are not positive numbers.
-
     Notes
     -----
     The motion exists for A >= gap / pi. The phase p of the impact follows from p - sin p = gap / A.
@@ -107,7 +102,6 @@ def collect_and_collide(amplitude: ArrayLike, gap: ArrayLike) -> CollectAndColli
 
 
 def _phase(ratio):
-    """Solution of p - sin p = ratio in (0, pi], by bisection to the last bit."""
     low, high = np.zeros_like(ratio), np.full_like(ratio, np.pi)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)

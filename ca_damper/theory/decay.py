@@ -58,7 +58,6 @@ def logarithmic_decrement(x: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _extremes(series: np.ndarray) -> np.ndarray:
-    """Values at the maxima and minima in turn, as long as they are well apart."""
     step = np.diff(series)
     turns = 1 + np.flatnonzero(step[:-1] * step[1:] < 0.0)
     near = np.flatnonzero(np.diff(turns) < _LEAST_SAMPLES)

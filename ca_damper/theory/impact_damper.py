@@ -57,11 +57,6 @@ class ImpactDamper:
     frequency : float
         Frequency of the base [Hz].
 
-    Raises
-    ------
-    InputError
-        A value is out of its range, or the oscillator is not underdamped.
-
     References
     ----------
     Masri, J. Acoust. Soc. Am. 47 (1970) 229; Bapat and Sankar, J. Sound Vib. 99 (1985) 85.
@@ -133,17 +128,12 @@ class ImpactDamper:
         return np.array([[a, -0.5 * self.clearance], [b, 0.0]])
 
     def free(self, t: float) -> np.ndarray:
-        """Matrix of the free motion over a time.
+        """Matrix (2, 2) that takes (x [m], v [m/s]) of the free container on by a time.
 
         Parameters
         ----------
         t : float
             Time [s].
-
-        Returns
-        -------
-        ndarray
-            Matrix (2, 2) that takes (x [m], v [m/s]) of the container on by that time.
         """
         own = self.oscillator
         decay, square = 0.5 * own.damping / own.mass, own.stiffness / own.mass
@@ -153,7 +143,7 @@ class ImpactDamper:
         return math.exp(-decay * t) * np.array([[c + decay * s, s], [-square * s, c - decay * s]])
 
     def motion(self, u: float, t: float) -> np.ndarray:
-        """Motion of the container at a time after the impact on the ceiling.
+        """Displacement [m] and velocity [m/s] of the container, a time after a blow on the ceiling.
 
         Parameters
         ----------
@@ -161,11 +151,6 @@ class ImpactDamper:
             Speed of the grain [m/s].
         t : float
             Time, from 0 to half a cycle [s].
-
-        Returns
-        -------
-        ndarray
-            Displacement [m] and velocity [m/s].
         """
         u, t = between("u", u, -LARGEST, LARGEST), between("t", t, -LARGEST, LARGEST)
         free = 2.0 * self.particle_mass * u * self.free(t) @ self._after
@@ -178,7 +163,7 @@ class ImpactDamper:
         return np.array([sine * c + cosine * s, self.omega * (cosine * c - sine * s)])
 
     def position(self, u: float, t: float) -> float:
-        """Position of the grain at that time.
+        """Position of the grain at that time [m], from where the middle of the box is at x = 0.
 
         Parameters
         ----------
@@ -186,27 +171,17 @@ class ImpactDamper:
             Speed of the grain [m/s].
         t : float
             Time since the impact on the ceiling [s].
-
-        Returns
-        -------
-        float
-            Position [m], counted from where the middle of the box is at x = 0.
         """
         u, t = between("u", u, -LARGEST, LARGEST), between("t", t, -LARGEST, LARGEST)
         return 0.5 * u * self.half_cycle - u * t
 
     def start(self, u: float) -> Any:
-        """State of container and grain as the base passes zero upwards.
+        """(x [m], v [m/s]) of container and grain as the base passes zero upwards, shape (2, 2).
 
         Parameters
         ----------
         u : float
             Speed of the grain [m/s].
-
-        Returns
-        -------
-        ndarray
-            (x [m], v [m/s]) of the container and of the grain, shape (2, 2).
 
         Notes
         -----
@@ -237,17 +212,12 @@ class ImpactDamper:
         return found[np.argsort(-np.abs(found), kind="stable")]
 
     def is_stable(self, u: float) -> bool:
-        """Whether small changes of the motion die away.
+        """Whether small changes of the motion die away: all ``multipliers`` in the unit circle.
 
         Parameters
         ----------
         u : float
             Speed of the grain [m/s].
-
-        Returns
-        -------
-        bool
-            True where all ``multipliers`` lie inside the unit circle.
         """
         return bool(np.abs(self.multipliers(u)).max() < 1.0)
 
@@ -270,17 +240,12 @@ class ImpactDamper:
         return float(free - self.omega**2 * forced[0])
 
     def rms(self, u: float) -> float:
-        """RMS displacement of the container over a cycle, by Simpson's rule.
+        """RMS displacement of the container over a cycle [m], by Simpson's rule.
 
         Parameters
         ----------
         u : float
             Speed of the grain [m/s].
-
-        Returns
-        -------
-        float
-            RMS of x [m].
         """
         times = np.linspace(0.0, self.half_cycle, _POINTS)
         squares = np.array([self.motion(u, t)[0] ** 2 for t in times])

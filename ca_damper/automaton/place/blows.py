@@ -33,8 +33,8 @@ from ca_damper.scenes.scene_fields import Part
 class Collisions(Part):
     """Carry out the collisions of a step; no two of them change the same grain.
 
-    Of a step, (scenes,): count: of the grains that meet the container, ends: of them on floor and
-    ceiling, approaches: their velocities seen from it [quanta].
+    approaches: velocities, seen from the container, of the grains that meet floor or ceiling
+    [quanta].
     """
 
     def __init__(self, automaton: Any):
@@ -136,6 +136,7 @@ class Collisions(Part):
     @ti.func
     def since(self, s, cell):
         """Time [s] between a blow on floor, heap or ceiling and the end of the step."""
+        # Zero if the grain is farther beyond the wall than it can have gone in a step.
         approach = self.cells.speed[s, cell] - self.cells.container[s]
         beyond = self.cells.travelled[s, cell] - self.cells.offset[s]
         result = 0.0
@@ -154,6 +155,7 @@ class Collisions(Part):
     @ti.func
     def rebound(self, s, cell, after):
         """Leave floor or ceiling; after: velocity of the container after all blows [m/s]."""
+        # The grain has been on its way back since the blow, and its place accounts for that.
         approach, since = self.approach(s, cell), self.since(s, cell)
         share = self.parameters.wall[s]
         gain = after - self.cells.container[s] - (1.0 + share) * approach

@@ -35,6 +35,7 @@ _MOST_RATE = _NEAR * 4.0 / LEAST_WIDTH
 @ti.func
 def contact_rate(approach, rise, free_width):
     """Rate of blows [1/s] of two grains in neighbouring columns."""
+    # Rods on a line meet in inverse proportion to the free width (Tonks 1936).
     return 2.0 * approach / (1.0 + rise * rise) * 2.0 / ti.max(free_width, LEAST_WIDTH)
 
 
@@ -47,6 +48,7 @@ def chord(rise):
 @ti.func
 def line_of_centres(draw):
     """Line between two discs that meet in a column, (across, up), for a draw in [0, 1)."""
+    # As in a gas of discs, all impact parameters are equally likely.
     across = 2.0 * draw - 1.0
     return ti.Vector([across, chord(across)])
 
@@ -74,12 +76,15 @@ def speed_change(relative, line, restitution, friction):
 @ti.func
 def common_velocity(velocity, approaches, blows, recoil, restitution):
     """Velocity of the container after all blows of a step on floor and ceiling [m/s]."""
+    # V' = (M V + m sum(v + e (v - V))) / (M + n m) in any order of blows; grains leave with V' - e
+    # (v - V).
     return velocity + recoil * (1.0 + restitution) * approaches / (1.0 + blows * recoil)
 
 
 @ti.func
 def most_drag(slip, share):
     """Largest friction [m/s] of one of n grains at the side walls: with more they would drag on."""
+    # At this limit all sliding grains and the container end with one velocity.
     return ti.abs(slip) / (1.0 + share)
 
 
@@ -87,9 +92,8 @@ def most_drag(slip, share):
 class Contacts(Part):
     """Find the events of a step and the grains that each of them needs.
 
-    events: cell, second cell and kind in one number; ranks: of their claims; shape (scenes, cells,
-    SLOTS), filled from the first. shared: hash of seed and step, (scenes,): read where an event is
-    noted, it keeps the compiler from computing ranks of all cells ahead.
+    shared: hash of seed and step, read where an event is noted: it keeps the compiler from
+    computing ranks of all cells ahead.
     """
 
     def __init__(self, automaton: Any):
@@ -215,6 +219,7 @@ class Contacts(Part):
     @ti.func
     def partners(self, s, lowest, kind):
         """Which of four cells hold a grain that one of a kind may meet, a bit each."""
+        # Without a branch, which would go either way by chance.
         result = 0
         for k in ti.static(range(4)):
             other = self.cells.at(s, lowest + k)

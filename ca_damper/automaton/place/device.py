@@ -16,10 +16,7 @@ from ca_damper.scenes.scene_fields import SceneFields
 
 @ti.data_oriented
 class PlaceAutomaton(LatticeDevice):
-    """Grains fly in any direction, and collide where their positions meet.
-
-    tilted: whether gravity acts across the columns too.
-    """
+    """Grains fly in any direction, and collide where their positions meet."""
 
     def __init__(self, options: Any, table: SceneFields):
         super().__init__(table, looks_ahead=False)
@@ -49,6 +46,7 @@ class PlaceAutomaton(LatticeDevice):
     @ti.func
     def divergence_code(self, s):
         """1 when a grain would cross more than one cell a step, which no rule allows."""
+        # 2: others pushed a grain beyond floor or ceiling more often than it could turn over there.
         fastest, farthest, width = 0.0, 0.0, self.parameters.width[s]
         for cell in range(self.lattice.size.cells[s]):
             across = ti.abs(self.cells.across[s, cell])

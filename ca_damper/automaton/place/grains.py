@@ -11,13 +11,10 @@ from ca_damper.automaton.static_contact import StaticContact
 
 @ti.data_oriented
 class Grains(Cells):
-    """Cells of grains that fly any way.
+    """Cells of grains that fly any way: kind UP, speed and travelled signed, across to the right.
 
-    A grain under way has the kind UP, whatever its way; speed and travelled are signed and count
-    upwards. across: velocity to the right [m/s], (scenes, cells + 1), zero in cells without a grain
-    under way. container: its velocity [m/s], (scenes,); this and its offset are those at the end of
-    the step without blows, once all grains have flown. closing: acceleration of the container
-    towards grains that fly [m/s^2].
+    container: its velocity [m/s]; this and its offset are those at the end of the step without
+    blows. closing: acceleration of the container towards grains that fly [m/s^2].
     """
 
     def __init__(self, automaton: Any, listed: bool):

@@ -21,10 +21,7 @@ _NOWHERE = -1
 
 @ti.data_oriented
 class Transport(Part):
-    """Grains keep their places in the room when the lattice steps, and fly under full gravity.
-
-    movers, targets: cells that grains leave and enter, shape (scenes, cells).
-    """
+    """Grains keep their places in the room when the lattice steps, and fly under full gravity."""
 
     def __init__(self, automaton: Any):
         super().__init__(automaton)
@@ -35,6 +32,7 @@ class Transport(Part):
     @ti.func
     def follow(self, s, step, motion):
         """Number the cells anew when the lattice steps; nothing moves in the room or gains."""
+        # A grain whose new cell is taken keeps its cell and stands farther off its centre.
         width = self.parameters.width[s]
         way = self.cells.step_along(s, step, motion, width)
         if way != 0:
@@ -75,6 +73,8 @@ class Transport(Part):
     @ti.func
     def fall(self, s, cell, slip):
         """Fall across the columns, or lie on what stands there; returns the drag of that [m/s]."""
+        # A grain that lies presses on the bed that the container carries: all layers are dragged as
+        # one body.
         result, sideways = 0.0, self.parameters.sideways[s]
         across, pull = self.cells.across[s, cell], ti.abs(sideways)
         way = 1 if sideways > 0.0 else -1
@@ -98,6 +98,8 @@ class Transport(Part):
     @ti.func
     def hop_all(self, s, step, shared, dt):
         """Move grains to neighbouring columns."""
+        # Equally likely anywhere in its column, a grain leaves it in a step with probability |u| dt
+        # / d.
         count = 0
         for k in range(self.traversal.begin(s), self.traversal.end(s)):
             cell = self.traversal.cell(s, k)
