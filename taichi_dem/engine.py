@@ -28,8 +28,7 @@ from taichi_dem.step.solved import SolvedStep
 class Structure:
     """Compiled structure of a scene and a method: classes of effects, kind of method.
 
-    Scenes of equal structures share kernels. effects, method: those of the first scene, of which
-    engines make copies. on_demand: laws are evaluated only where they act.
+    Scenes of equal structures share kernels.
     """
 
     def __init__(self, effects: Iterable[Effect], method: Method, on_demand: bool = False):
@@ -44,11 +43,7 @@ class Structure:
 
 
 class BlastEngine(Engine):
-    """Tables, state, contact search, schedule, step and drivers of one structure.
-
-    model in its methods is a ``Model``, the scene's arrays. recording_compiled: whether all
-    kernels are that a recording needs.
-    """
+    """Tables, state, contact search, schedule, step and drivers of one structure."""
 
     advice = (
         "take a smaller mesh, or shorter contact lists (pairs_per_body, spheres_per_body, "

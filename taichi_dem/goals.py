@@ -43,11 +43,6 @@ class Goal(BaseGoal):
     check : callable or None, optional
         Function of a Scene that raises InputError where the goal needs what the scene lacks.
 
-    Raises
-    ------
-    InputError
-        A member is of the wrong kind.
-
     Examples
     --------
     >>> Goal("fastest body", "m/s", lambda result: result.peak_speed.max(), "extreme").kind
@@ -69,13 +64,7 @@ class Goal(BaseGoal):
             )
 
     def mean(self) -> "Goal":
-        """Return the goal of the mean over runs that differ by chance.
-
-        Returns
-        -------
-        Goal
-            The mean of the same output.
-        """
+        """Return the goal of the mean over runs that differ by chance."""
         return replace(self, name=f"mean {self.name}", averaged=True)
 
     def check_scene(self, scene: Scene) -> None:
@@ -85,33 +74,18 @@ class Goal(BaseGoal):
         ----------
         scene : Scene
             Scene.
-
-        Raises
-        ------
-        InputError
-            The scene lacks a group or a body.
         """
         instance("scene", scene, Scene)
         if self.check is not None:
             self.check(scene)
 
     def value(self, result: Result) -> float:
-        """Value in a result.
+        """Value in a result, in the unit of the goal.
 
         Parameters
         ----------
         result : Result
             Result with a frame at its end.
-
-        Returns
-        -------
-        float
-            Value, in the unit of the goal.
-
-        Raises
-        ------
-        InputError
-            The function gives no finite number.
         """
         found: Any = self.function(instance("result", result, Result))
         single = isinstance(found, (np.ndarray, np.generic)) and found.size == 1
@@ -125,17 +99,12 @@ class Goal(BaseGoal):
 
 
 def hole_displacement(group: str = "hole") -> Goal:
-    """Mean displacement outward from the axis of a hole, of the bodies at its wall.
+    """Mean displacement [mm] outward from the axis of a hole, of the bodies at its wall.
 
     Parameters
     ----------
     group : str, default "hole"
         Face group of the wall.
-
-    Returns
-    -------
-    Goal
-        The displacement [mm].
     """
 
     def found(result):
@@ -146,17 +115,12 @@ def hole_displacement(group: str = "hole") -> Goal:
 
 
 def displacement(group: str) -> Goal:
-    """Mean distance by which the bodies with a face in a group have moved.
+    """Mean distance [mm] by which the bodies with a face in a group have moved.
 
     Parameters
     ----------
     group : str
         Face group.
-
-    Returns
-    -------
-    Goal
-        The distance [mm].
     """
 
     def found(result):
@@ -167,78 +131,46 @@ def displacement(group: str) -> Goal:
 
 
 def body_displacement(body: int) -> Goal:
-    """Distance by which a body has moved.
+    """Distance [mm] by which a body has moved.
 
     Parameters
     ----------
     body : int
         Number of the body, from 0.
-
-    Returns
-    -------
-    Goal
-        The distance [mm].
     """
     name, check = f"displacement of body {body}", _has_body(body)
     return Goal(name, "mm", lambda result: _mean_way(result, [body]), check=check)
 
 
 def broken_faces() -> Goal:
-    """Number of released bonds.
-
-    Returns
-    -------
-    Goal
-        The number [-].
-    """
+    """Number of released bonds [-]."""
     return Goal("broken faces", "1", lambda result: result.report.broken_faces, "count")
 
 
 def kinetic_energy() -> Goal:
-    """Kinetic energy of all bodies.
-
-    Returns
-    -------
-    Goal
-        The energy [J].
-    """
+    """Kinetic energy of all bodies [J]."""
     return Goal("kinetic energy", "J", lambda result: result.series["kinetic_J"][-1])
 
 
 def peak_speed(body: int) -> Goal:
-    """Largest speed of a body in the run; shorter steps sample it more often.
+    """Largest speed of a body in the run [m/s]; shorter steps sample it more often.
 
     Parameters
     ----------
     body : int
         Number of the body, from 0.
-
-    Returns
-    -------
-    Goal
-        The speed [m/s].
     """
     name, check = f"peak speed of body {body}", _has_body(body)
     return Goal(name, "m/s", lambda result: result.peak_speed[body], "extreme", check=check)
 
 
 def energy_share(term: str) -> Goal:
-    """Term of the energy balance as a share of the energy put in.
+    """Term of the energy balance as a share [-] of the energy put in.
 
     Parameters
     ----------
     term : str
         Term of the energy balance, such as ``"friction"``.
-
-    Returns
-    -------
-    Goal
-        The share [-].
-
-    Raises
-    ------
-    InputError
-        The term is unknown.
     """
     choice("term", term, TERMS)
 
@@ -256,13 +188,7 @@ def energy_share(term: str) -> Goal:
 
 
 def largest_fragment() -> Goal:
-    """Mass of the largest fragment, as a share of the whole.
-
-    Returns
-    -------
-    Goal
-        The share [-].
-    """
+    """Mass of the largest fragment, as a share [-] of the whole."""
 
     def found(result):
         mass = result.model.body_mass

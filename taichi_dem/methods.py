@@ -49,13 +49,7 @@ class Method:
     steps_ahead: Any = 0.0
 
     def criterion(self) -> Any:
-        """Rule for the level of a body.
-
-        Returns
-        -------
-        FixedStep or Displacement
-            Rule of ``taichi_dem.step_control``.
-        """
+        """Rule for the level of a body."""
         return FixedStep() if self.distance is None else Displacement()
 
 
@@ -69,11 +63,6 @@ def structure_of(method: Any) -> Hashable:
     ----------
     method : Method
         Method.
-
-    Returns
-    -------
-    hashable
-        Key of compiled kernels.
     """
     if type(method).__module__ != __name__:
         return getattr(method, "structure", (type(method), repr(method)))
@@ -84,7 +73,7 @@ def structure_of(method: Any) -> Hashable:
 
 
 def order_of(method: Any, damped: bool, varying: bool) -> int | None:
-    """Order of the error in the step between events.
+    """Order of the error in the step between events; None where the method declares none.
 
     A class derived from a method declares its own order, or none: its ``step`` may have another.
 
@@ -96,11 +85,6 @@ def order_of(method: Any, damped: bool, varying: bool) -> int | None:
         Whether a dashpot acts.
     varying : bool
         Whether steps differ between bodies or times.
-
-    Returns
-    -------
-    int or None
-        None where the method declares none.
     """
     kind = type(method)
     declared = kind.order if kind.__module__ == __name__ else vars(kind).get("order")
@@ -139,7 +123,7 @@ class _Explicit(Method):
         return rule.ahead if rule is not None else 0.0
 
     def order(self, damped: bool, varying: bool) -> int | None:
-        """Order of the error in the step, see ``order_of``.
+        """Order of the error in the step, see ``order_of``; None where it is not known.
 
         Dashpots lag by half a step; limited ones are those of another material at each step.
 
@@ -149,11 +133,6 @@ class _Explicit(Method):
             Whether a dashpot acts.
         varying : bool
             Whether steps differ between bodies or times.
-
-        Returns
-        -------
-        int or None
-            None where no order is known.
         """
         if damped and self.dashpot == "limited":
             return None
@@ -162,7 +141,7 @@ class _Explicit(Method):
 
 @dataclass(frozen=True)
 class Uniform(_Explicit):
-    """One step for all bodies, explicit.
+    """One step for all bodies, explicit (Konno et al., sections 3.1 and 4.3).
 
     Parameters
     ----------
@@ -176,20 +155,6 @@ class Uniform(_Explicit):
     dashpot : str, default "full"
         ``"full"``, or ``"limited"``: a dashpot keeps the share of its coefficient that is stable at
         the steps of its bodies.
-
-    Raises
-    ------
-    InputError
-        A value is out of its range, or two options exclude each other.
-
-    References
-    ----------
-    Konno et al., sections 3.1 and 4.3 ("same time increment for all elements").
-
-    Examples
-    --------
-    >>> Uniform(dt0=1e-8).name
-    'uniform'
     """
 
     dt0: float = 1e-8
@@ -200,7 +165,7 @@ class Uniform(_Explicit):
 
 @dataclass(frozen=True)
 class Multirate(_Explicit):
-    """Steps that differ by powers of two from body to body, explicit, with shared impulses.
+    """Steps that differ by powers of two from body to body, explicit (Konno et al., section 3.1).
 
     Parameters
     ----------
@@ -217,20 +182,6 @@ class Multirate(_Explicit):
         As in ``Uniform``.
     dashpot : str, default "full"
         As in ``Uniform``.
-
-    Raises
-    ------
-    InputError
-        A value is out of its range, or two options exclude each other.
-
-    References
-    ----------
-    Konno et al., section 3.1, eq. 3.
-
-    Examples
-    --------
-    >>> Multirate(dt0=8e-8, neighbour="drifted").name
-    'multirate_drifted'
     """
 
     dt0: float = 1e-8
@@ -263,20 +214,6 @@ class ImplicitDashpots(Method):
         mean would oscillate).
     refresh : float, default 3e-05
         Interval between updates of the solved blocks of bonds [s].
-
-    Raises
-    ------
-    InputError
-        A value is out of its range.
-
-    Notes
-    -----
-    The method is not in the paper.
-
-    Examples
-    --------
-    >>> ImplicitDashpots(dt=2e-7).dt0
-    2e-07
     """
 
     dt: float = 4e-7
@@ -309,18 +246,5 @@ class ImplicitDashpots(Method):
         return self.dt
 
     def order(self, damped: bool, varying: bool) -> int:
-        """Order of the error in the step, see ``order_of``; that of sweeps that have converged.
-
-        Parameters
-        ----------
-        damped : bool
-            Whether a dashpot acts.
-        varying : bool
-            Whether steps differ between bodies or times.
-
-        Returns
-        -------
-        int
-            1 or 2.
-        """
+        """Order of the error in the step, 1 or 2, see ``order_of``; that of converged sweeps."""
         return 1 if varying or (damped and self.theta != 0.5) else 2

@@ -35,20 +35,6 @@ def needed_effects(result: Result, tolerance: float = ROUNDING) -> Advice:
         Largest difference of recorded values that counts as equal, as a share of the largest value,
         from 0 to 1; by default that of rounding. With a larger one, effects that took less than
         this share of the energy are tried too.
-
-    Returns
-    -------
-    Advice
-        Print it, or read its ``droppable`` and ``missing``.
-
-    Raises
-    ------
-    InputError
-        The result is of another kind, or the tolerance is out of range.
-
-    Examples
-    --------
-    >>> print(needed_effects(result))  # doctest: +SKIP
     """
     report, tolerance = instance("result", result, Result).report, fraction("tolerance", tolerance)
     uses = report.effect_activity
@@ -60,6 +46,7 @@ def needed_effects(result: Result, tolerance: float = ROUNDING) -> Advice:
 
 def _differences(result, names, tolerance):
     """Difference that each effect makes to a run, by name, as a share of what was recorded."""
+    # All are left out together first; only if that matters, one after the other.
     together = _difference(result, names)
     if together <= tolerance or len(names) == 1:
         return dict.fromkeys(names, together)
@@ -93,6 +80,7 @@ def _difference(result, names):
 
 def _without(effects, names, may_be_silent):
     """Effects of a list without those of some names; silent friction goes with its contact."""
+    # Silent copies give the same bits and compile nothing.
     kept = []
     for name, effect in zip(names_of(effects), effects):
         if name not in names:

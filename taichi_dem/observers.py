@@ -63,11 +63,6 @@ class Every:
         Wall time between calls [s]; these calls come between any two steps, when bodies may be at
         different times.
 
-    Raises
-    ------
-    InputError
-        None or several are given, or a value is out of its range.
-
     Examples
     --------
     >>> sorted(Every(steps=2).marks(last=5, dt=1e-7))
@@ -109,11 +104,6 @@ class Every:
         -------
         set of int
             Steps from 0 to ``last``.
-
-        Raises
-        ------
-        InputError
-            They are too many.
         """
         if self.wall_s is not None:
             return {last}
@@ -137,16 +127,6 @@ class At:
     ----------
     times_s : sequence of float
         Times [s].
-
-    Raises
-    ------
-    InputError
-        A time is negative or no number.
-
-    Examples
-    --------
-    >>> sorted(At([0.0, 1e-6]).marks(last=20, dt=1e-7))
-    [0, 10]
     """
 
     times_s: tuple
@@ -178,11 +158,6 @@ class At:
         -------
         set of int
             Steps from 0 to ``last``.
-
-        Raises
-        ------
-        InputError
-            A time lies after the end of the run.
         """
         for time in self.times_s:
             if round(time / dt) > last:
@@ -236,11 +211,6 @@ class Collector:
         Values by name; ``collector[name]`` is an array of them.
     view : RunView or None
         View of the last call, also of a run that diverged.
-
-    Raises
-    ------
-    InputError
-        The times are not an Every or At, or a value to read is not a function.
 
     Examples
     --------
@@ -332,43 +302,19 @@ class RunView:
         return {name: locked(array) for name, array in self._simulation.motion().items()}
 
     def energy_balance(self) -> dict:
-        """Terms of the energy balance.
-
-        Returns
-        -------
-        dict of float
-            Energies by name [J].
-        """
+        """Terms of the energy balance by name [J]."""
         return self._simulation.energy_balance.account()
 
     def frame(self) -> Frame:
-        """Snapshot of the block.
-
-        Returns
-        -------
-        Frame
-            Positions, displacements, velocities and damage.
-        """
+        """Snapshot of the block."""
         return self._recorder.frame()
 
     def report(self) -> Report:
-        """Report of the run so far.
-
-        Returns
-        -------
-        Report
-            Figures and cost.
-        """
+        """Report of the run so far."""
         return self._simulation.report()
 
     def history(self) -> dict:
-        """Samples so far; one at this step is among them.
-
-        Returns
-        -------
-        dict of ndarray
-            Columns by name, which ends in the unit.
-        """
+        """Samples so far; one at this step is among them."""
         return {name: locked(array) for name, array in self._recorder.history().items()}
 
 
@@ -411,20 +357,10 @@ class Receivers:
     when : Every or At, optional
         Times of the readings; those of the time series by default.
 
-    Raises
-    ------
-    InputError
-        A name or place is invalid.
-
     Notes
     -----
     ``result.receivers[name]`` is a ``Received``, and ``result.write`` writes receivers.csv. A
     resumed run has only what followed.
-
-    Examples
-    --------
-    >>> Receivers({"far": (1.9, 1.0, 0.1)}, when=Every(time_s=1e-6)).points
-    {'far': (1.9, 1.0, 0.1)}
     """
 
     def __init__(self, points: Mapping[str, Sequence[float]], when: Every | At | None = None):
@@ -445,11 +381,6 @@ class Receivers:
         ----------
         scene : Scene
             Scene of the run.
-
-        Raises
-        ------
-        InputError
-            A point is in no body of the mesh.
         """
         places = self.points.items()
         found = [body_at(scene.mesh, f"receiver {name}", np.array(at)) for name, at in places]
@@ -472,13 +403,7 @@ class Receivers:
         self._rows.append((view.time_s, np.stack([moved, velocity])))
 
     def received(self) -> dict[str, Received]:
-        """Return what was kept so far.
-
-        Returns
-        -------
-        dict
-            A ``Received`` by the name of its receiver.
-        """
+        """What was kept so far, a ``Received`` by the name of its receiver."""
         times = np.array([time_s for time_s, _ in self._rows])
         motion = np.array([motion for _, motion in self._rows]).reshape(-1, 2, len(self.points), 3)
         return {

@@ -127,15 +127,6 @@ class Result:
         ----------
         number : int
             From 0 on, or from -1, the last, backwards.
-
-        Returns
-        -------
-        Frame
-
-        Raises
-        ------
-        InputError
-            Where there is none of this number.
         """
         count = len(self.frames)
         if not count:
@@ -157,11 +148,6 @@ class Result:
         pandas.DataFrame
             Masses, sizes, places, velocities, spins and energies, a row a fragment, the heaviest
             first (``taichi_dem.output.fragments.fragments_of``).
-
-        Raises
-        ------
-        InputError
-            Where there is no such frame.
 
         Examples
         --------
@@ -201,11 +187,6 @@ class Result:
         -------
         pandas.DataFrame
             A row a broken face, the first first.
-
-        Raises
-        ------
-        InputError
-            Where there are frames, but none of this number.
         """
         unknown = np.full(self.model.bond_count, np.nan)
         apertures = self.apertures(frame) if self.frames else unknown
@@ -223,11 +204,6 @@ class Result:
         -------
         ndarray, shape (bond_count,)
             Mean of the three contact units [m]; negative where faces are pressed into each other.
-
-        Raises
-        ------
-        InputError
-            Where there is no such frame.
         """
         return apertures_of(self.model, self.frame(frame))
 
@@ -294,11 +270,6 @@ class Result:
         -------
         Attenuation
             ``.table``, and ``.power_law(nearest)`` for the fit.
-
-        Raises
-        ------
-        InputError
-            Where the mesh has no such group.
         """
         group = next(iter(watched_groups(self.scene)), None) if group is None else group
         if group is None:
@@ -318,11 +289,6 @@ class Result:
         ----------
         folder : path
             Folder; a leading "~" is the user's home.
-
-        Raises
-        ------
-        InputError
-            The folder cannot be written to.
         """
         folder = output_folder(folder)
         place, name = os.path.join(folder, "paraview"), series_name(folder)
@@ -354,22 +320,11 @@ class Result:
         WebPage
             Path of the page. As the last line of a notebook's cell it shows the page there.
 
-        Raises
-        ------
-        InputError
-            There are no frames, two frames exceed 30 MB, or the file cannot be written.
-
         Notes
         -----
         Displacements and rotations have 16 bits: an error of at most 1/65534 of the largest in
         their frame. A page of the paper's block with 50 frames has 1.2 MB. Beyond 30 MB frames are
         left out evenly, and the page says so.
-
-        Examples
-        --------
-        >>> method = ImplicitDashpots()
-        >>> result = simulate(scene, method=method, until=1e-4, frames=20)  # doctest: +SKIP
-        >>> result.show("blast.html")  # doctest: +SKIP
         """
         # Imported here, so that matplotlib loads only where something is shown.
         from taichi_dem.viewer.block import show_block

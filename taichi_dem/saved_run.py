@@ -54,6 +54,7 @@ def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
 
 def run_identity(scene: Scene, method: Method) -> dict[str, str]:
     """Properties that a resumed run must share with the saved one, in words by name."""
+    # Driver, threads, duration and recording may differ.
     mesh = scene.mesh
     groups = [array for name in sorted(mesh.groups) for array in (list(name), mesh.groups[name])]
     content = digest(mesh.points, mesh.tetrahedra, *groups)

@@ -156,17 +156,12 @@ class Scene(Pictured):
         return self.effects.word == AUTO
 
     def effect(self, role: str) -> Any:
-        """Effect of a role that takes one.
+        """Effect of a role that takes one; None where none is listed.
 
         Parameters
         ----------
         role : str
             Role, such as ``"contact"``.
-
-        Returns
-        -------
-        Effect or None
-            None where none is listed.
         """
         word("role", role)
         return next((effect for effect in self.effects if effect.role == role), None)
@@ -178,11 +173,6 @@ class Scene(Pictured):
         ----------
         touching : bool, default True
             Whether dashpots of contacts count.
-
-        Returns
-        -------
-        bool
-            True where one acts.
         """
         flag("touching", touching)
         roles = {effect.role for effect in self.effects if effect.name}
@@ -317,6 +307,8 @@ def remedy(contact: Any) -> str:
 
 def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     """Warnings before a run: parts of a scene that may meet and would not touch."""
+    # A solid in one piece cannot meet itself until it breaks, which the run detects. Parts without
+    # contact are not reported where they stay at rest, fall alike or are too far apart.
     contact = scene.effect("contact")
     if contact and contact.outer_faces:
         return ()
@@ -356,7 +348,6 @@ def initial_motion(mesh: Mesh, velocity: Any, spin: Any) -> dict[str, np.ndarray
 
 
 def _rows(name, given, mesh, centre) -> tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]]:
-    """A row for each body, and bodies with the vector that was given for all of them."""
     if given is None:
         return np.zeros_like(centre), []
     if isinstance(given, Mapping) and given:

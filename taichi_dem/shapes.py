@@ -52,16 +52,6 @@ def block(size: float | Sequence[float], *, element: float, scatter: int | None 
     -------
     Mesh
         Groups left, right (x), bottom, top (y), back, front (z).
-
-    Raises
-    ------
-    InputError
-        A length is no positive number, an element does not fit, or ``scatter`` is no seed.
-
-    Examples
-    --------
-    >>> sorted(block((0.4, 0.1, 0.1), element=0.05).groups)
-    ['back', 'bottom', 'front', 'left', 'right', 'top']
     """
     lengths = (size,) * 3 if finite(size) else direction("size", size)
     x, y, z = (positive("size", length) for length in lengths)
@@ -92,16 +82,6 @@ def beam(
     -------
     Mesh
         Groups left, right (its ends), bottom, top, back, front.
-
-    Raises
-    ------
-    InputError
-        A length is no positive number, an element does not fit, or ``scatter`` is no seed.
-
-    Examples
-    --------
-    >>> beam(length=1.0, width=0.1, height=0.1, element=0.1).body_count
-    60
     """
     given = {"length": length, "height": height, "width": width}
     lengths = [positive(name, value) for name, value in given.items()]
@@ -127,19 +107,9 @@ def cylinder(*, radius: float, height: float, element: float, scatter: int | Non
     Mesh
         Groups bottom, top (y), side.
 
-    Raises
-    ------
-    InputError
-        A length is no positive number, an element does not fit, or ``scatter`` is no seed.
-
     Notes
     -----
     The side is a prism of n chords: its volume lacks a share of 2 (pi / n)^2 / 3.
-
-    Examples
-    --------
-    >>> sorted(cylinder(radius=0.05, height=0.1, element=0.02).groups)
-    ['bottom', 'side', 'top']
     """
     radius, height = positive("radius", radius), positive("height", height)
     element = _element(element, min(radius, height), np.pi * radius**2 * height)
@@ -182,12 +152,6 @@ def plate(
     -------
     Mesh
         Groups left, right (x), bottom, top (y), back, front (z), and hole where it is.
-
-    Raises
-    ------
-    InputError
-        A length is no positive number, an element does not fit, a hole does not leave an element of
-        wall around it, or ``scatter`` is no seed.
 
     Examples
     --------
@@ -239,7 +203,6 @@ def from_surface(path: FileName, *, element: float, scale: float = 1.0) -> Mesh:
 
 
 def _element(element, smallest, volume):
-    """Length of an edge [m], checked against the shape."""
     element = positive("element", element)
     if element > smallest * (1.0 + _ON):
         got, most = told_apart(element, smallest)
@@ -251,17 +214,14 @@ def _element(element, smallest, volume):
 
 
 def _seed(scatter):
-    """The seed of an unstructured mesh, None for a structured one."""
     return None if scatter is None else whole("scatter", scatter, 0, _MOST_SEED)
 
 
 def _corners(x, y):
-    """Corners of a rectangle, anticlockwise from the origin."""
     return [(0.0, 0.0), (x, 0.0), (x, y), (0.0, y)]
 
 
 def _box_sides(x, y, element):
-    """Sides of a rectangle by name, for ``drawn_out``."""
     near = _ON * element
     return {
         "left": lambda p: p[..., 0] < near,

@@ -85,11 +85,6 @@ def simulate(
     observers : sequence of Observer, default ()
         Observers, called during the run with a ``RunView``; after a resume, at the remaining times.
 
-    Returns
-    -------
-    Result
-        Time series, snapshots and report.
-
     Raises
     ------
     InputError
@@ -186,10 +181,7 @@ class Call(NamedTuple):
 
 
 class _Plan:
-    """When a run is sampled, photographed, observed and reported, checked before it begins.
-
-    last: number of largest steps. receivers: those among the observers. Raises InputError.
-    """
+    """When a run is sampled, photographed, observed and reported, checked before it begins."""
 
     def __init__(
         self,
@@ -270,7 +262,6 @@ def _receivers_among(observers):
 
 
 def _started(simulation, brief=False):
-    """A simulation ready to step and its recorder, with all kernels compiled."""
     recorder = Recorder(simulation, *watched_groups(simulation.scene), brief=brief)
     simulation.start(brief)
     compiling("recording", PARTS, PARTS)

@@ -160,7 +160,6 @@ class Simulation:
         return self.engine.values(field)
 
     def _load(self):
-        """Put the scene into the engine, with its initial motion and at time zero."""
         with self._undivided("its scene was loaded"):
             numbers = self.scene.max_speed, self.scene.sleep or 0.0
             self.engine.load(self.model, self.method, *numbers)
@@ -186,11 +185,6 @@ class Simulation:
             Scene of the same structure (kinds of effects); the present one if None.
         method : Method, optional
             Method of the same kind; the present one if None.
-
-        Raises
-        ------
-        InputError
-            The structure differs, or the scene finds no room.
         """
         scene = self.scene if scene is None else instance("scene", scene, Scene)
         method = self.method if method is None else instance("method", method, Method)
@@ -232,11 +226,6 @@ class Simulation:
         ----------
         brief : bool, default False
             Whether the first sample is brief, see ``sample``.
-
-        Raises
-        ------
-        InputError
-            The simulation was interrupted before.
         """
         opened = self.energy_balance is not None
         flag("brief", brief)
@@ -386,23 +375,11 @@ class Simulation:
         self.run_seconds, self.run_cpu_seconds = saved["cost"].tolist()
 
     def evaluations(self) -> int:
-        """Bonds and contact pairs evaluated so far.
-
-        Returns
-        -------
-        int
-            Their number.
-        """
+        """Bonds and contact pairs evaluated so far."""
         return int(values(self.schedule.evaluations)[2:4].sum())
 
     def sweeps(self) -> int:
-        """Sweeps over all dashpots so far.
-
-        Returns
-        -------
-        int
-            Their number, 0 for a method that solves none.
-        """
+        """Sweeps over all dashpots so far; 0 for a method that solves none."""
         solver = self.step.solver
         return int(values(solver.total_sweeps)) if solver is not None else 0
 
@@ -413,16 +390,6 @@ class Simulation:
         ----------
         brief : bool, default False
             Whether to leave out the last comparison of all bodies, and so missing effects.
-
-        Returns
-        -------
-        Report
-            Figures and cost.
-
-        Raises
-        ------
-        InputError
-            The simulation was not started.
         """
         flag("brief", brief)
         if self.energy_balance is None:

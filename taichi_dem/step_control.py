@@ -44,11 +44,6 @@ class StepControl:
         With dashpot ``"limited"``, the shortest step that dashpots require [s]; where they need a
         shorter one they are limited instead. 0: they are never limited.
 
-    Raises
-    ------
-    InputError
-        A value is out of its range.
-
     Notes
     -----
     Stability allows 0.8 of the limits, accuracy less: a dashpot takes the velocity of half a step
@@ -56,11 +51,6 @@ class StepControl:
     block (dt0 8e-8 s, largest error of a body at the hole at 7e-5 s) they are 0.9 % at 0.8 and 0.4
     % at 0.4. One bond there opens to within 0.2 % of its failure and releases two bodies of the
     hole's wall: at 0.5 it still held, and the mean displacement of the hole was 2.4 % short.
-
-    Examples
-    --------
-    >>> StepControl(safety=0.5).safety
-    0.5
     """
 
     safety: float = 0.25
@@ -93,8 +83,8 @@ class FixedStep:
 class Displacement:
     """No body moves by more than a given distance in a step (Konno et al., 3.1).
 
-    distance: l [m], or an angle [rad] for a body that turns. dt0: step of level 0 [s]. power: 1
-    for a speed, 2 for an acceleration. The level is the lowest k with rate (dt0 / 2^k)^power <= l.
+    The level is the lowest k with rate (dt0 / 2^k)^power <= distance; power: 1 for a speed, 2 for
+    an acceleration. A distance is an angle [rad] for a body that turns.
     """
 
     constant_fields = ("rate2",)

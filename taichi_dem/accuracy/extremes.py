@@ -18,10 +18,7 @@ BEFORE = 0.9
 
 
 class Earlier:
-    """Observer of the largest speeds at a share of a run; all else is in the history of a Result.
-
-    time_s, peak_speed: its time [s] and the speeds until then [m/s], (body_count,).
-    """
+    """Observer of the largest speeds up to a share of a run."""
 
     def __init__(self, until: float):
         self.when = At((BEFORE * until,))

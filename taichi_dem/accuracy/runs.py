@@ -51,10 +51,7 @@ _FRAMES = 32
 
 @dataclass(frozen=True)
 class Job:
-    """A question. until: end of the run [s]. tolerance: error that is allowed, a share.
-
-    sources: names of those that are measured. meshes: others of the same size.
-    """
+    """A question. until: end of the run [s]. tolerance: error that is allowed, a share."""
 
     scene: Scene
     until: float
@@ -90,6 +87,7 @@ class Job:
 
     def _longest_step(self):
         """Longest step that all springs bear [s]: solved dashpots leave no other limit."""
+        # Solved dashpots limit no step. Contact springs do only where whole faces can touch.
         mesh, material = self.scene.mesh, self.scene.body_materials
         given = mesh, topology_of(mesh), material.density, springs_of(material)
         step = float(spring_step(largest_bond_rate(*given)))
@@ -99,6 +97,8 @@ class Job:
 
     def method(self, level: float, tight: bool = False, twin: int = 0) -> Method:
         """Method at a level, of the longest stable step over 2^level."""
+        # Sweeps end at differences that fall with the step: one family converges to the exact
+        # solution.
         more = 1.0 + _MORE_STEPS * math.fmod(twin * _GOLDEN, 1.0)
         step = self.until / round(self._coarsest[0] * 2.0**level * more)
         if not self.solves:
@@ -121,11 +121,9 @@ class Job:
 
 
 class Runs:
-    """Runs that were made, each once.
+    """Runs that were made, each once; seconds: CPU time of all so far, without compiling.
 
-    seconds: CPU time of all so far, without compiling [s]. count: their number. results, cost: by
-    level of the step, Result of the undisturbed run and CPU time [s] of the first. failure: the
-    sentence of the last run that diverged.
+    results, cost: by level, Result of the undisturbed run and CPU time [s] of the first.
     """
 
     def __init__(self, job: Job, listen: Listener | None):
@@ -144,6 +142,8 @@ class Runs:
 
     def value(self, level: float, twin: int = 0, tight: bool = False) -> Any:
         """Goal of a run at a level; None for one that diverged."""
+        # A twin differs by chance: it starts displaced by one rounding and makes up to 30 % more
+        # steps where the run is eventful.
         key = level, twin, tight
         if key not in self._known:
             result = self._timed(*key)
@@ -196,6 +196,7 @@ class Runs:
 
     def leap(self, coarse: float, fine: float) -> float:
         """Change of a number of broken faces between two levels that may go unseen, as a share."""
+        # Faces that broke in one of the runs only, taken to add up like steps to either side.
         first, second = (np.isnan(self.results[level].broken_time) for level in (coarse, fine))
         return math.sqrt((first != second).sum()) / max(1, int((~second).sum()))
 
@@ -205,7 +206,6 @@ class Runs:
         return np.array_equal(*broken)
 
     def _timed(self, level, twin, tight, frames=1):
-        """Result of a run, whose CPU time is added to the sum."""
         started = clock()
         brief = bool(twin or tight or not self.count or frames > 1)
         result = self._simulated(level, twin, tight, frames, brief)
@@ -248,12 +248,12 @@ def _apart(frame, finer):
 
 def _share(apart, whole, rounding):
     """Difference of a usual body as a share of a usual value."""
+    # The median, so that a few fragments that fly elsewhere do not count.
     usual = float(np.median(apart))
     return 0.0 if usual <= rounding else usual / max(float(np.median(whole)), rounding)
 
 
 def _displaced(simulation, seed):
-    """Motion at the start of a twin: arguments of ``State.set_motion``."""
     model = simulation.model
     size = _ROUNDING * np.ptp(model.mesh.points, axis=0).max()
     noise = np.random.default_rng(seed).uniform(-size, size, model.centre.shape)

@@ -37,10 +37,7 @@ _HOPELESS = 1e6
 
 
 class Search:
-    """Makes runs until the bar is narrow enough or cannot get narrower, or the budget is spent.
-
-    budget: CPU seconds after which no run is begun. first: level to begin with.
-    """
+    """Makes runs until the bar is narrow enough or cannot get narrower, or the budget is spent."""
 
     def __init__(
         self, job: Job, budget: float, listen: Callable[[Any], Any] | None, first: float = 0
@@ -102,13 +99,11 @@ class Search:
         return step, Source("chance", parts.chance, twins, 0.0)
 
     def _beside(self):
-        """What measures the sources that no step of this question mends."""
         first, report = self.levels[0], self.runs.results[self.levels[-1]].report
         affords = partial(self._affords, level=first)
         return Beside(self.job, self.runs, first, report, affords, self._eventful)
 
     def _begin(self):
-        """Find the longest step that is stable, and make the run again with a shorter one."""
         while self.runs.value(self.levels[0]) is None:
             self.levels[0] += 1
             if self.levels[0] > _MOST_COARSE:
@@ -150,7 +145,6 @@ class Search:
         return mean_and_deviation(self.twins.sample(level))[0]
 
     def _step(self, count: int | None = None) -> StepError:
-        """Error of the step, and of sweeps whose tolerance falls with it; count: of levels."""
         levels = self.levels[:count]
         values = [self._value(level) for level in levels]
         # An output that changes by less than a usual body's may do so by chance.
@@ -182,12 +176,13 @@ class Search:
         return ErrorParts(step=_beside(step, sweeps), solver=sweeps, chance=chance)
 
     def _spread(self):
-        """Half-width of the part of chance."""
         return self.twins.spread(self.levels, self._allowed, len(self.levels) > _TRIED)
 
     @property
     def _smooth(self):
         """Whether the declared order of the step's error may be trusted."""
+        # What breaks or touches does so within a step, and a largest speed depends on where samples
+        # fall: then only first order is trusted.
         return self.job.goal.kind == "value" and not self._eventful
 
     @property
@@ -268,7 +263,6 @@ class Search:
         return share_in_words(error, self._value(self.levels[-1]), self.job.goal.unit)
 
     def _doubts(self, bar):
-        """Reasons to doubt the finest run, and what would settle each."""
         first, last = self.levels[0], self.levels[-1]
         report = self.runs.results[last].report
         if self.job.goal.kind == "extreme":

@@ -32,9 +32,7 @@ _RAYS = 4.0
 class Beside:
     """Measures errors that no shorter step reduces, by runs at the coarsest level.
 
-    They are as large there, and cost least. runs: those of the question. report: of the finest one.
-    affords: whether the budget lets so many runs be made. eventful: whether anything broke, touched
-    or slipped.
+    They are as large there, and cost least.
     """
 
     job: Job
@@ -53,7 +51,6 @@ class Beside:
         yield self._left_out()
 
     def _contact(self, law):
-        """Error of the resolution of the contact law."""
         if not self.report.pair_evaluations:
             return Source("contact", 0.0, "no bodies came near", 0.0)
         finer, share = finer_law(law)
@@ -120,6 +117,8 @@ def awake_price(runs: Runs, certificate: Any) -> float:
 
 def finer_law(law: Any) -> tuple[BodyContact | None, float]:
     """A contact law of finer resolution, and the error of the given one over their difference."""
+    # Rays converge with the second power of the parts of an edge; spheres do not converge to
+    # bodies.
     if isinstance(law, BodyContact):
         parts = min(2 * law.parts, MOST_PARTS)
         if parts == law.parts:

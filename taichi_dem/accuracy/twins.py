@@ -18,11 +18,7 @@ _OF_EACH = 3
 
 
 class Twins:
-    """Twins of the run at one level.
-
-    affords: whether the budget lets so many runs at a level be made. count: twins so far. parted:
-    whether those of a level before differed by more than allowed.
-    """
+    """Twins of the run at one level; parted: whether those of a level before differed too much."""
 
     def __init__(self, job: Job, runs: Runs, affords: Callable[[float, float], bool]):
         self.job, self.runs, self.affords = job, runs, affords
@@ -39,6 +35,7 @@ class Twins:
 
     def spread(self, levels: Sequence[float], allowed: float, is_last: bool) -> float:
         """Half-width by which runs that differ by chance spread, of one or of their mean."""
+        # Twins cannot separate if half the step breaks the same faces and hardly moves bodies.
         averaged = self.job.goal.averaged
         if self.count == 0:
             if not averaged and not self.parted and self._is_calm(*levels[-2:]):

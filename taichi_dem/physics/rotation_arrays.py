@@ -47,7 +47,6 @@ def spins(orientation: np.ndarray, inertia_inverse: np.ndarray, momentum: np.nda
 
 
 def _rows(*arrays):
-    """Arrays as a kernel reads them."""
     return [np.ascontiguousarray(array, dtype=np.float64) for array in arrays]
 
 
