@@ -77,10 +77,13 @@ def figures_of(rows):
 
 
 def page_of(rows):
-    """The table in Markdown, with the reasons of the misses below."""
+    """The table in Markdown, and the reasons of the misses, to which their verdicts refer."""
     lines = ["| " + " | ".join(HEADER) + " |", "|" + "---|" * len(HEADER)]
-    lines += ["| " + " | ".join(cells(row)) + " |" for row in rows]
-    notes = [f"- {row.words}: {row.miss}." for row in rows if row.miss and not row.holds]
+    reasons = list(dict.fromkeys(row.miss for row in rows if row.miss and not row.holds))
+    for row in rows:
+        note = f" ({reasons.index(row.miss) + 1})" if row.miss and not row.holds else ""
+        lines.append("| " + " | ".join(cells(row)) + note + " |")
+    notes = [f"{k}. {reason}." for k, reason in enumerate(reasons, 1)]
     return "\n".join([*lines, "", *notes]) + "\n"
 
 
