@@ -31,7 +31,7 @@ numpydoc_class_members_toctree = False
 
 #: Parts of the list of pages. A page that no part names comes under "More".
 CONTENTS = {
-    "Start": ["docs/which_tool", "docs/experiments", "docs/site/gallery"],
+    "Start": ["docs/experiments", "docs/site/gallery"],
     "Guide": [
         "docs/tutorial",
         "docs/guide",
