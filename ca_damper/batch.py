@@ -494,7 +494,7 @@ class Batch(LoadedScenes):
 
     @property
     def certificate(self) -> Certificate:
-        """Effects that acted and since when, size of those left out, audits."""
+        """Effects that acted and since when, size of those left out."""
         return certificate_of(self)
 
     def _go(

@@ -17,7 +17,7 @@ from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.checkpoint import identity_of
 from taichi_dem.kit.display import counted
-from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.effect_table import EffectUse
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.field_memory import shape_of
 from taichi_dem.kit.validation import shown

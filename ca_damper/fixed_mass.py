@@ -8,7 +8,7 @@ import taichi as ti
 
 from ca_damper.filling import Action, Fillings, Structure
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.effect_table import EffectUse
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import plain_fields, positive, shown, whole
 

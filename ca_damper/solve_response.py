@@ -141,10 +141,8 @@ def solve_response(
         open_ended = OpenEnded(listener)
         search, estimates = _answered(replace(question, listener=open_ended))
         open_ended.end()
-    failures = search.runs.failures
     answers = tuple(
-        doubted(_answer(search, found), *failures, *search.doubts(found.goal))
-        for found in estimates
+        doubted(_answer(search, found), *search.doubts(found.goal)) for found in estimates
     )
     others = _others(question, other, answers, progress)
     answers = tuple(_with_filling(*pair, filling) for pair in zip(answers, others))

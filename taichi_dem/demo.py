@@ -106,14 +106,12 @@ def figures_of(result: Result) -> dict[str, tuple]:
 
 
 def figures_of_certificate(certificate: Certificate | None) -> dict[str, tuple]:
-    """What acted only where needed: evaluations spared, time asleep, misses of the audit."""
+    """What acted only where needed: evaluations spared, time asleep."""
     if certificate is None:
         return {}
     return {
         "fracture_evaluations_ratio": (certificate.law_ratio, "1"),
         "asleep_percent": (100.0 * certificate.asleep, "%"),
-        "audited": (sum(audit.audited for audit in certificate.audits), "1"),
-        "audit_misses": (sum(audit.misses for audit in certificate.audits), "1"),
     }
 
 

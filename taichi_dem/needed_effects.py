@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from taichi_dem.kit.effect_usage import Advice
+from taichi_dem.kit.effect_table import EffectTable
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.validation import fraction, instance
 from taichi_dem.laws.roles import ChosenEffects
@@ -21,7 +21,7 @@ from taichi_dem.state.model import names_of
 ROUNDING = 1e-9
 
 
-def needed_effects(result: Result, tolerance: float = ROUNDING) -> Advice:
+def needed_effects(result: Result, tolerance: float = ROUNDING) -> EffectTable:
     """Advice on the effects of a run: which to keep, drop and add.
 
     The run is repeated without the effects that seem to have done nothing; ``Report.advice`` makes
@@ -35,6 +35,20 @@ def needed_effects(result: Result, tolerance: float = ROUNDING) -> Advice:
         Largest difference of recorded values that counts as equal, as a share of the largest value,
         from 0 to 1; by default that of rounding. With a larger one, effects that took less than
         this share of the energy are tried too.
+
+    Returns
+    -------
+    EffectTable
+        Print it, or read its ``droppable`` and ``missing``.
+
+    Raises
+    ------
+    InputError
+        The result is of another kind, or the tolerance is out of range.
+
+    Examples
+    --------
+    >>> print(needed_effects(result))  # doctest: +SKIP
     """
     report, tolerance = instance("result", result, Result).report, fraction("tolerance", tolerance)
     uses = report.effect_activity
@@ -46,7 +60,6 @@ def needed_effects(result: Result, tolerance: float = ROUNDING) -> Advice:
 
 def _differences(result, names, tolerance):
     """Difference that each effect makes to a run, by name, as a share of what was recorded."""
-    # All are left out together first; only if that matters, one after the other.
     together = _difference(result, names)
     if together <= tolerance or len(names) == 1:
         return dict.fromkeys(names, together)
@@ -80,7 +93,6 @@ def _difference(result, names):
 
 def _without(effects, names, may_be_silent):
     """Effects of a list without those of some names; silent friction goes with its contact."""
-    # Silent copies give the same bits and compile nothing.
     kept = []
     for name, effect in zip(names_of(effects), effects):
         if name not in names:

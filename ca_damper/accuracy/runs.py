@@ -70,13 +70,6 @@ class SceneRuns:
         """Number of scenes that were started."""
         return len(self._records)
 
-    @property
-    def failures(self) -> list[str]:
-        """Why certificates of the runs do not hold, and what would settle it."""
-        homes = dict.fromkeys(home for home, _ in self._homes.values())
-        found = sorted({self._batch(home).certificate.failure for home in homes} - {""})
-        return [f"the certificate of a run does not hold, as {why}" for why in found]
-
     def cycles(self, key: SceneKey) -> int:
         """Number of cycles that a scene has gone."""
         return len(self._records[key]) if key in self._records else 0

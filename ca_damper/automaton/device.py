@@ -14,7 +14,7 @@ from ca_damper.engine.recorder import EventCounts
 from ca_damper.filling import Action, Fillings
 from ca_damper.scenes.gravity import gravity_across, gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.effect_table import EffectUse
 
 PAIRS, WALLS, PUSHES, HOLDS = range(4)
 #: Counted events by the effect that they belong to.

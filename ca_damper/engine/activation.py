@@ -1,8 +1,9 @@
 """Effects that a batch computes: those listed, or those that its scenes need; its certificate.
 
-A filling may have ``activated(particles)``, which returns the filling with the effects that so many
-particles call for and an Estimate of each, and ``left_out(particles)``, Estimates of effects that
-it does not compute; its device ``first_steps(effects)`` and ``audit()``.
+A filling takes part by two methods, both optional: ``activated(particles)`` returns the filling
+with the effects that at most so many particles call for, and an Estimate for each effect that it
+decided on; ``left_out(particles)`` returns an Estimate for each effect that it does not compute.
+Its device may have ``first_steps(effects)`` and ``skipped_tests()``, as that of the spheres.
 """
 
 from typing import Any
@@ -14,9 +15,8 @@ from ca_damper.report.certificate import Certificate, Periods
 from ca_damper.report.checked_range import checked_range
 from ca_damper.report.measures import Cycles
 from ca_damper.report.steady_state import period
-from taichi_dem.kit.certificate import Estimate
 from taichi_dem.kit.display import counted
-from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.effect_table import EffectUse, Estimate
 from taichi_dem.kit.errors import InputError
 
 #: Difference of cycles up to which they are alike, as a share of the first harmonic.
@@ -50,13 +50,12 @@ def certificate_of(batch: Any) -> Certificate:
     outside = checked.outside if checked is not None else ()
     kinds, device, most = batch.fillings.kinds, batch.device, _most_particles(batch.table)
     left_out = [one.left_out(most) for one in kinds if hasattr(one, "left_out")]
-    audit = device.audit() if hasattr(device, "audit") else None
     return Certificate(
         effects=batch.asked_effects,
         acting=_acting(batch, device) if hasattr(device, "first_steps") else (),
         left_out=_largest(left_out),
         estimates=batch.estimates,
-        audits=() if audit is None else (audit,),
+        skipped_tests=device.skipped_tests() if hasattr(device, "skipped_tests") else 0,
         periods=batch.periods,
         warnings=(
             *(f"outside of the checked range, {one}" for one in outside),
@@ -78,6 +77,7 @@ def periods_of(cycles: Cycles) -> Periods | None:
 
 
 def _most_particles(table: Any) -> int:
+    """Most particles of a scene."""
     return int(table.column("particles").max())
 
 

@@ -1,10 +1,10 @@
-"""Certificate of a run: when effects first acted, what was left out, what an audit found."""
+"""Certificate of a run: when effects first acted, what was left out, what is periodic."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from taichi_dem.kit.certificate import BaseCertificate, Estimate
 from taichi_dem.kit.display import counted
+from taichi_dem.kit.effect_table import BaseCertificate, Estimate
 
 #: Words for which effects of a filling are computed: those that its options list, or those that an
 #: estimate before the run calls for.
@@ -41,15 +41,13 @@ class Periods:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Certificate(BaseCertificate):
-    """Effects computed and left out in a run, with estimates and audits.
+    """Effects computed and left out in a run, with estimates.
 
     Parameters
     ----------
     acting : tuple of EffectUse, default ()
         For each effect that was computed, in how many scenes it acted and from when, as far as the
         filling counts it.
-    audits : tuple of Audit, default ()
-        Audit of contact tests that were skipped; none where none were.
     left_out : tuple of Estimate, default ()
         Estimated size of each effect that was not computed.
     warnings : tuple of str, default ()
@@ -60,22 +58,21 @@ class Certificate(BaseCertificate):
         Estimates of the effects that ``"auto"`` decided on.
     periods : Periods, optional
         Periodicity of the motion; None where fewer than two cycles were measured.
+    skipped_tests : int, default 0
+        Contact tests that were not needed, as no contact could come up before the next.
     """
 
     effects: str
     estimates: tuple[Estimate, ...] = ()
     periods: Periods | None = None
-
-    @property
-    def remedy(self) -> str:
-        """What makes all contact tests."""
-        return "run it with search='all_pairs', which skips no contact test"
+    skipped_tests: int = 0
 
     def left_out_lines(self) -> list[str]:
         """What was left out, and what is periodic, in lines."""
         lines = [f"estimated: {estimate}" for estimate in self.estimates]
+        skipped = [f"contact tests: {self.skipped_tests:,} skipped"] if self.skipped_tests else []
         periodic = [f"periodic: {self.periods}"] if self.periods is not None else []
-        return [*lines, *super().left_out_lines(), *periodic]
+        return [*lines, *super().left_out_lines(), *skipped, *periodic]
 
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file.
@@ -90,4 +87,5 @@ class Certificate(BaseCertificate):
             **super().as_dict(),
             "estimates": [one.as_dict() for one in self.estimates],
             "periods": self.periods and asdict(self.periods),
+            "skipped_tests": self.skipped_tests,
         }

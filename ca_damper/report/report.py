@@ -7,7 +7,7 @@ from typing import Any
 from ca_damper.report.certificate import Certificate
 from ca_damper.report.checked_range import CheckedRange
 from taichi_dem.kit.display import BRIEF, counted, in_brief, in_lines
-from taichi_dem.kit.effect_usage import Advice, EffectUse
+from taichi_dem.kit.effect_table import EffectTable, EffectUse
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.validation import FileName, fraction, instance
 
@@ -59,7 +59,7 @@ class Report:
         Number of measured cycles, and half-width of the mean of the highest RMS as a share of it,
         with a confidence of 95 %; None where unknown, as for a mean that still changes.
     certificate : Certificate, optional
-        When effects first acted, what was left out, what was audited.
+        When effects first acted, and what was left out.
     diverged : tuple of str
         A sentence for each scene that diverged, the first in time first; its results are nan.
     excitation : tuple of str, default ()
@@ -124,7 +124,13 @@ class Report:
         return "; ".join(parts)
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file."""
+        """All figures, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Figures by name.
+        """
         figures = asdict(self)
         figures["acted"] = figures.pop("effect_activity")
         if self.certificate is not None:
@@ -139,22 +145,30 @@ class Report:
         ----------
         path : path
             JSON file; it is replaced as a whole.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
         """
         write_text(path, json.dumps(self.as_dict(), indent=1))
 
     def _certified(self):
+        """Lines of the certificate."""
         found = self.certificate
         if found is None:
             return []
         return [*(f"acted: {line}" for line in found.acted()), *found.left_out_lines()]
 
     def _bound(self):
+        """Bound of the step, and the step relative to it."""
         if self.step_bound is None:
             return ""
         most, why = self.step_bound
         return f"{why}: {most:.3g} s, {self.bound_taken:.2g} of it taken"
 
     def _rows(self):
+        """All lines by name."""
         gone = f"{len(self.diverged):,} of them; nan for these and all on one structure with them"
         checked = self.checked
         acted = (f"{use.effect}: {use}" for use in self.effect_activity)
@@ -178,7 +192,13 @@ class Report:
         }
 
     def details(self) -> str:
-        """All figures."""
+        """All figures.
+
+        Returns
+        -------
+        str
+            A table of about twelve lines, and one for each effect and signal.
+        """
         return in_lines(self._rows())
 
     def __str__(self):
@@ -204,7 +224,7 @@ def _range(pair):
     return low if low == high else f"{low} to {high}"
 
 
-def needed_effects(result: object, tolerance: float = 1e-3) -> Advice:
+def needed_effects(result: object, tolerance: float = 1e-3) -> EffectTable:
     """Advice on the effects of a run of the damper.
 
     Parameters
@@ -215,9 +235,24 @@ def needed_effects(result: object, tolerance: float = 1e-3) -> Advice:
         Share of the energy taken (friction) or in motion (rotation) below which an effect is
         negligible, from 0 to 1.
 
+    Returns
+    -------
+    EffectTable
+        Print it, or read its ``droppable``.
+
+    Raises
+    ------
+    InputError
+        The result is of another kind, or the tolerance is out of range.
+
     Notes
     -----
     Spheres are checked every few steps: an effect that may have acted between two checks is kept.
+
+    Examples
+    --------
+    >>> print(needed_effects(response))  # doctest: +SKIP
     """
     report: Report = instance("result", getattr(result, "report", result), Report)
-    return Advice(report.effect_activity, (), fraction("tolerance", tolerance))
+    share = fraction("tolerance", tolerance)
+    return EffectTable(acting=report.effect_activity, tolerance=share, shown=None)

@@ -13,8 +13,7 @@ import taichi as ti
 
 from ca_damper.engine.recorder import EventCounts
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit.certificate import Estimate
-from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.effect_table import EffectUse, Estimate
 
 vec2 = ti.types.vector(2, ti.f64)
 

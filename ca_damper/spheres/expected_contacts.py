@@ -1,18 +1,16 @@
 """Expected contacts: pairs and spheres at walls that may touch before a lower bound of the time.
 
-All others need no test until the spheres have come nearer by a margin, which is summed from what
-moved in each step; so it holds whatever moves them.
+All others need no test until the spheres have come nearer to each other, or to a wall, by a
+margin. How much nearer is summed from what moved in each step: the spread of the velocities of the
+spheres, and the floor. So it holds whatever moves them: gravity, contacts, a given motion.
 """
 
 import taichi as ti
 
-from ca_damper.engine.random_numbers import bits, stream
 from ca_damper.filling import Fillings
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.search import EXPECTED, TOUCHING, AllPairs, CellList
-from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.certificate import Audit
 
 vec2i = ti.types.vector(2, ti.i32)
 
@@ -24,22 +22,19 @@ _NARROWEST = 1e-3
 _ROUNDING = 1e-6
 # Pairs are not tested where more than two thirds of those listed touch.
 _NEARLY_ALL = 3
-# Purpose of the random numbers that choose what is audited.
-_AUDIT = 7
-# Steps of which one may have a sphere audited, and the chance of that for each sphere of the scene,
-# in units of 2^-32: as a pair is tested with either of its spheres, that is one test of a pair in
-# 1024. Beyond so many spheres the chance grows no further: all tests of a sphere would cost a
-# growing share of a step.
-_AUDIT_EVERY, _CHANCE, _MOST_CHOSEN = 8, 2**24, 128
 
 
 @ti.data_oriented
 class ExpectedContacts:
     """Lists of the pairs and of the spheres at walls that are tested in every step.
 
-    pair[s, EXPECTED] is the list of a scene, pair[s, TOUCHING] has places for those that touch.
-    most_touch: whether nearly all do, so that no test is made. margin: how far apart two spheres,
-    and a sphere and a wall, are listed [m]; nearer: by how much they may have come nearer [m].
+    pair, pair_count; sphere, sphere_count: the lists; pair[s, EXPECTED] is that of a scene, and
+    pair[s, TOUCHING] has places for those of them that touch in a step. most_touch: whether nearly
+    all of them do, so that they are evaluated without a test. margin: how far apart two spheres,
+    and a sphere and a wall, are listed [m]. nearer: by how much they may have come nearer since
+    [m]. least, most: bounds of the way of the spheres in the last step [m]. floor: where the floor
+    was then [m].
+    unlisted: tests of pairs and spheres that are not listed; skipped: of all steps since the start.
     """
 
     def __init__(self, table: SceneFields, bodies: Bodies):
@@ -52,24 +47,17 @@ class ExpectedContacts:
         self.floor = table.field(ti.f64)
         for name in ("margin", "nearer", "least", "most"):
             setattr(self, name, table.vector(2, ti.f64))
-        for name in ("unlisted", "skipped", "audited", "misses"):
+        for name in ("unlisted", "skipped"):
             setattr(self, name, table.field(ti.i64))
-        self.tightness = ti.field(ti.f64, shape=())
 
     def load(self, fillings: Fillings) -> None:
         """Write the numbers of the search to the device."""
         self.cells.load(fillings)
-        self.tighten(1.0)
-
-    def tighten(self, share: float) -> None:
-        """List a share of what has to be listed: a fault, for tests of the audit."""
-        assign(self.tightness, share)
 
     @ti.func
     def clear(self, s):
         """Nothing has been skipped yet."""
-        for field in ti.static((self.skipped, self.audited, self.misses)):
-            field[s] = ti.cast(0, ti.i64)
+        self.skipped[s] = ti.cast(0, ti.i64)
         self.pair_count[s], self.sphere_count[s] = 0, 0
 
     @ti.func
@@ -117,11 +105,12 @@ class ExpectedContacts:
 
     @ti.func
     def _reach(self, s, margin):
-        """A margin with what rounding may add up to; the lists hold less in tests of the audit."""
-        return self.tightness[None] * margin + _ROUNDING * self.bodies.body[s].radius
+        """A margin with what rounding may add up to."""
+        return margin + _ROUNDING * self.bodies.body[s].radius
 
     @ti.func
     def _list_pairs(self, s, margin):
+        """List pairs that may touch before they come nearer by a margin [m]."""
         reach, count = 2.0 * self.bodies.body[s].radius, vec2i(0)
         self.cells.each_pair(s, vec2(reach, reach + self._reach(s, margin)), self._list_pair, count)
         self.pair_count[s] = count[0]
@@ -169,54 +158,13 @@ class ExpectedContacts:
         self.cells.each_pair(s, contact, visit, count)
 
     @ti.func
-    def audit(self, s, step, low, high, reach):
-        """Count the tests that a step skips; of a sphere that a counter chooses, make them all."""
+    def count_skipped(self, s):
+        """Count the tests that a step skips."""
         self.skipped[s] = self.skipped[s] + self.unlisted[s]
-        if step % _AUDIT_EVERY == 0:
-            shared = stream(self.table.seed[s], step)
-            count = ti.cast(self.table.particles[s], ti.u32)
-            if bits(shared, 0, _AUDIT) < ti.min(count, _MOST_CHOSEN) * ti.u32(_CHANCE):
-                chosen = ti.cast(bits(shared, 1, _AUDIT) % count, ti.i32)
-                self._audit(s, self.bodies.first(s) + chosen, low, high, reach)
 
-    @ti.func
-    def _audit(self, s, i, low, high, reach):
-        """Make all tests of sphere i; a contact that no list holds is a miss."""
-        tests, contacts = self.table.particles[s], self._is_at_wall(i, low, high)
-        for j in range(self.bodies.first(s), self.bodies.last(s)):
-            if j != i:
-                contacts += self._touching(s, i, j, reach)
-        for k in range(self.pair_count[s]):
-            pair = self.pair[s, EXPECTED, k]
-            if pair[0] == i or pair[1] == i:
-                tests -= 1
-                contacts -= self._touching(s, pair[0], pair[1], reach)
-        for k in range(self.sphere_count[s]):
-            if self.sphere[s, k] == i:
-                tests -= 1
-                contacts -= self._is_at_wall(i, low, high)
-        self.audited[s] = self.audited[s] + tests
-        self.misses[s] = self.misses[s] + contacts
-
-    @ti.func
-    def _touching(self, s, i, j, reach):
-        """1 for two spheres that touch, else 0; reach: distance at which the largest do [m]."""
-        branch = self.bodies.position[j] - self.bodies.position[i]
-        touching = reach - self.bodies.short_of_reach(s, i, j)
-        return ti.cast(branch.norm_sqr() < touching * touching, ti.i32)
-
-    @ti.func
-    def _is_at_wall(self, i, low, high):
-        """1 for a sphere that touches a wall, else 0."""
-        place = self.bodies.position[i]
-        return ti.cast((place < low).any() or (place > high).any(), ti.i32)
-
-    def found(self) -> Audit:
-        """Outcome of the audit, over all scenes since their start."""
-        skipped, audited, misses = (
-            int(self.table.in_use(one).sum()) for one in (self.skipped, self.audited, self.misses)
-        )
-        return Audit(skipped, audited, misses, "contact tests")
+    def all_skipped(self) -> int:
+        """Tests that all scenes have skipped since their start."""
+        return int(self.table.in_use(self.skipped).sum())
 
 
 #: What is tested for contact, by the name of the search.

@@ -18,7 +18,7 @@ from ca_damper.spheres.start_values import (
     checked_start,
     checked_start_velocity,
 )
-from taichi_dem.kit.certificate import NEGLIGIBLE, Estimate
+from taichi_dem.kit.effect_table import NEGLIGIBLE, Estimate
 from taichi_dem.kit.engine_pool import power_of_two
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import BOX, GRAIN, GRAIN_MASS, MODULUS, in_unit

@@ -11,17 +11,16 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.allocation import values
-from taichi_dem.kit.certificate import Audit, BaseCertificate
-from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.effect_table import BaseCertificate, EffectUse
 from taichi_dem.mesh.topology import parts_of
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.report.energy_balance import EnergyBalance, energy_put_in
 from taichi_dem.report.estimates import AIR, BENDS, WEIGHT, PartScales
-from taichi_dem.report.missing_effects import MissingEffect, bond_rounding
+from taichi_dem.report.missing_effects import bond_rounding
 from taichi_dem.report.readings import Run
 from taichi_dem.state.model import names_of
 from taichi_dem.state.state import LATER
-from taichi_dem.state.timeline import MACRO_TICKS, NEVER
+from taichi_dem.state.timeline import NEVER
 from taichi_dem.step.sleeping import ROUNDINGS
 
 _EPSILON = np.finfo(np.float64).eps
@@ -168,8 +167,6 @@ class Certificate(BaseCertificate):
     ----------
     acting : tuple of EffectUse
         Activity, onset and evaluations of each effect.
-    audits : tuple of Audit
-        Audit of what sleeps.
     left_out : tuple of Estimate
         Estimate of each effect that no law of the scene serves.
     warnings : tuple of str
@@ -191,7 +188,6 @@ class Certificate(BaseCertificate):
     asleep: float
     impulse: float
     energy: float
-    missing: tuple[MissingEffect, ...] = ()
 
     @property
     def law_evaluations(self) -> int:
@@ -208,21 +204,13 @@ class Certificate(BaseCertificate):
         """Factor by which evaluations of the law of bonds are fewer than with effects="all"."""
         return self.all_law_evaluations / max(1, self.law_evaluations)
 
-    def _faults(self) -> list[str]:
-        """Misses of audits, more left out than asked, and effects that are missed."""
-        faults = super()._faults()
-        if not self.impulse <= self.sleep:
-            faults.append(
-                f"sleep left out {self.impulse:.2g} of a part's impulse, {self.sleep:g} allowed"
-            )
-        return [*faults, *(one.what for one in self.missing)]
-
     @property
-    def remedy(self) -> str:
-        """Remedy of a fault."""
-        if self.missing:
-            return f"list {', '.join(one.effect for one in self.missing)}"
-        return "run the scene with effects='all'"
+    def faults(self) -> tuple[str, ...]:
+        """More left out than asked, and effects that are missed."""
+        if self.impulse <= self.sleep:
+            return super().faults
+        left = f"sleep left out {self.impulse:.2g} of a part's impulse, {self.sleep:g} allowed"
+        return left, *super().faults
 
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file.
@@ -257,22 +245,16 @@ class Certificate(BaseCertificate):
 def certificate_of(simulation: Any, report: Any) -> Certificate:
     """Certificate of a run so far."""
     run, now = simulation.parts, simulation.time_s
-    schedule = run.schedule
     awake = np.nan_to_num(on_demand(run)[0]["awake"], nan=now)
-    links = np.stack([run.model.topology.master, run.model.topology.slave])
-    # Evaluations of bonds that sleep has spared, at the largest step.
-    until = awake[links].max(axis=0, initial=0.0)
-    asleep = int(until.sum() / (schedule.tick_seconds * MACRO_TICKS))
     scales = PartScales(run.model, parts_of(run.model.mesh))
     energy = _energy(run, simulation.energy_balance, scales)
     impulse, left_energy = _left_out(run, simulation.energy_balance, scales, energy)
     return Certificate(
         acting=report.effect_activity,
-        sleep=float(values(schedule.sleeping.share)),
+        sleep=float(values(run.schedule.sleeping.share)),
         asleep=float(awake.mean() / now) if now > 0.0 else 0.0,
         impulse=impulse,
         energy=left_energy,
-        audits=(Audit(asleep, 0, 0, "bonds asleep"),),
         left_out=_not_served(simulation, scales, energy),
         missing=report.missing_effects,
         warnings=report.needs[len(report.missing_effects) :],

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.certificate import LIMITS, Estimate
+from taichi_dem.kit.effect_table import LIMITS, Estimate
 from taichi_dem.kit.validation import instance, positive
 from taichi_dem.mesh.topology import may_meet, part_boxes, parts_of, parts_under
 from taichi_dem.scene import Scene

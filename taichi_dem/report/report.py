@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from taichi_dem.kit.display import BRIEF, counted, in_brief, in_lines
-from taichi_dem.kit.effect_usage import Advice
+from taichi_dem.kit.effect_table import EffectTable
 from taichi_dem.methods import order_of
 from taichi_dem.report.effects import Certificate
 from taichi_dem.report.energy_balance import given_and_held, injected_words, put_in_words
@@ -168,7 +168,9 @@ class Report:
         whole = "the energy held" if held > given + self.round_off_J else "the energy put in"
         return f"{100.0 * self.energy_residual_fraction:.3g} % of {whole}"
 
-    def advice(self, tolerance: float = 0.0, shown: Mapping[str, float] | None = None) -> Advice:
+    def advice(
+        self, tolerance: float = 0.0, shown: Mapping[str, float] | None = None
+    ) -> EffectTable:
         """Advice on the effects, of which runs without some have shown a difference, by name.
 
         Parameters
@@ -180,13 +182,19 @@ class Report:
 
         Returns
         -------
-        Advice
+        EffectTable
             Print it, or read its ``table()``.
         """
         slipped = (slip for slip in self.bond_slip if slip.count and not slip.weakens)
         missing = *self.missing_effects, *slipped
         left_out = self.certificate.left_out if self.certificate else ()
-        return Advice(self.effect_activity, missing, tolerance, shown or {}, left_out)
+        return EffectTable(
+            acting=self.effect_activity,
+            missing=missing,
+            left_out=left_out,
+            tolerance=tolerance,
+            shown=shown or {},
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file.

@@ -4,12 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from taichi_dem.kit.bars.answer import branches_of
 from taichi_dem.kit.bars.chance import clusters_of, f_outside, t_outside, t_quantile
 from taichi_dem.kit.bars.step import SAFETY, step_error, step_part
-from taichi_dem.kit.certificate import Audit
 
 SEEDS = tuple(range(1, 13))
 STEPS = ([1.0, 0.5, 0.25], [1.0, 0.25, 0.125], [1.0, 0.5, 0.125], [3.0, 1.0, 0.5])
@@ -25,13 +23,6 @@ def test_quantiles_are_those_of_the_tables_in_textbooks(confidence, freedom, wan
     assert t_quantile(confidence, freedom) == pytest.approx(wanted, abs=6e-4)
     assert t_outside(t_quantile(confidence, freedom), freedom) == pytest.approx(1.0 - confidence)
     assert f_outside(4.256, 2, 9) == pytest.approx(0.05, rel=1e-3)
-
-
-@pytest.mark.parametrize(("misses", "audited"), [(0, 10), (9, 10), (120, 900)])
-def test_so_few_misses_have_a_chance_of_five_percent_at_the_bound(misses, audited):
-    bound = Audit(1000, audited, misses).misses_bound
-    assert stats.binom.cdf(misses, audited, bound) == pytest.approx(0.05, rel=1e-9)
-    assert Audit(9, 0, 0).misses_bound == Audit(9, 7, 7).misses_bound == 1.0
 
 
 def test_two_motions_are_told_apart_with_their_shares():

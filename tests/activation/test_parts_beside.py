@@ -1,12 +1,14 @@
 """With effects="auto" a part beside another of any scale has the bits that it has alone."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from taichi_dem import Scene
 from taichi_dem.mesh.shapes import bar, placed_together
+from taichi_dem.output.cracks import apertures_of
 from taichi_dem.state.timeline import NEVER
 from tests.activation.late_scenes import (
     MATERIAL,
@@ -20,6 +22,8 @@ from tests.activation.late_scenes import (
 )
 
 UNTIL, CELLS, APART = 3e-4, 5, 5.0
+#: Sixteen roundings of a coordinate of up to 2 m [m].
+ROUNDING = 16.0 * 2.0 * np.finfo(float).eps
 BONDS = ("normal_stiffness", "shear_stiffness", "normal_damping", "shear_damping")
 TOUCH = ("contact_stiffness", "contact_damping")
 
@@ -89,3 +93,25 @@ def test_each_part_has_the_bits_that_it_has_alone(seed):
     assert np.array_equal(broken, np.concatenate([each[1] for each in alone]))
     assert certificate.holds and certificate.asleep > 0.0
     assert certificate.impulse == max(each[2].impulse for each in alone)
+
+
+@pytest.mark.filterwarnings("ignore:.*is read in .* likely")
+@pytest.mark.parametrize("seed", range(4))
+def test_no_sleeping_bond_is_open_by_more_than_it_may_be(seed):
+    """After every step: by the share of the opening at which its law begins, but for rounding."""
+    part = drawn(seed)[0]
+    late = Late("tension", part.mesh, loads(part.pull), 0.0)
+    run = simulation(late, Scene(part.mesh, part.material, "auto", loads=late.loads))
+    model, slept = run.model, 0
+    bonds, ends = slice(model.bond_count), [model.topology.master, model.topology.slave]
+    onset = part.material.tensile_strength / model.bond_stiffness[:, 0]
+    for step in range(1, round(UNTIL / METHOD.dt0)):
+        run.advance_to(step)
+        asleep = (run.values(run.schedule.sleeping.awake)[: model.body_count] == 0)[ends].any(
+            axis=0
+        )
+        asleep &= run.values(run.state.broken_tick)[bonds] == NEVER
+        opening = np.abs(apertures_of(model, SimpleNamespace(**run.motion())))
+        assert (opening <= run.scene.sleep * onset + ROUNDING)[asleep].all()
+        slept += asleep.sum()
+    assert slept > 0

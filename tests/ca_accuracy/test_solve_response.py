@@ -19,9 +19,7 @@ from ca_damper import (
 )
 from ca_damper.accuracy.estimate import SeedValues, estimate
 from ca_damper.accuracy.runs import SceneKey, SceneRuns
-from ca_damper.report.certificate import Certificate
 from ca_damper.report.peak_search import PeakSearch
-from taichi_dem.kit.certificate import Audit
 from tests.paper import paper
 
 PAPER = Oscillator()
@@ -147,13 +145,6 @@ def test_scenes_go_on_from_where_they_are_each_as_far_as_asked():
         square, mean = (whole.record[s, :, k] / whole.steps[s] for k in (1, 0))
         assert np.array_equal(found["rms"], np.sqrt(np.maximum(square - mean**2, 0.0)))
     assert runs.steps == int(70 * whole.steps.sum()) and runs.runs == 2
-
-
-def test_a_certificate_that_does_not_hold_is_never_reached(monkeypatch):
-    audit = Audit(10_000, 100, 1, "contact tests")
-    monkeypatch.setattr(Batch, "certificate", Certificate(effects="listed", audits=(audit,)))
-    answer = solve_response(RigidMass(), particles=30, goal=goals.rms_at(1.0), **QUIET)
-    assert not answer.reached and "skips no contact test" in answer.shortfall
 
 
 class Curve:

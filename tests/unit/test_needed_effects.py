@@ -27,8 +27,7 @@ from taichi_dem import (
 )
 from taichi_dem.engine import ENGINES
 from taichi_dem.kit.allocation import assign, values
-from taichi_dem.kit.certificate import NEEDED
-from taichi_dem.kit.effect_usage import SMALL, TRY, Advice, EffectUse
+from taichi_dem.kit.effect_table import NEEDED, SMALL, TRY, EffectTable, EffectUse
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.report.effects import effect_uses
 from taichi_dem.report.energy_balance import TERMS, energy_put_in
@@ -125,7 +124,7 @@ def made_up(**members):
     hold = EffectUse(
         "hold", "bodies held", 1, share=0.0, steers=True, kept="it defines the problem"
     )
-    return Advice((EffectUse("break", "bonds broken", 0), *uses, hold), (), 0.0, **members)
+    return EffectTable(acting=(EffectUse("break", "bonds broken", 0), *uses, hold), **members)
 
 
 def test_effects_stand_in_the_order_of_their_influence():

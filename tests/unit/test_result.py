@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, Uniform, read_mesh, simulate, write_paraview
 from taichi_dem.kit.display import BRIEF
-from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.effect_table import EffectUse
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.plot.block import TITLES
 from tests.figures import clipped_words
