@@ -281,7 +281,6 @@ class Simulation:
         return {
             "energy balance": self.energy_balance,
             "missing effects": self.missing_effects,
-            "creep": self.missing_effects.creep,
             "shared volume": self.shared_volume,
             "step resolution": self.step_resolution,
             "hops": self.hops,

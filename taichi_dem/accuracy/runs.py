@@ -35,7 +35,7 @@ _LESS = 1.0 - 1e-9
 #: Sweeps of a step at most, and by how much better they agree to see their error.
 _MOST_SWEEPS, _TIGHT = 1000, 8
 #: Rows of the time series of the coarsest run in which an extreme is looked for, of any run, and of
-#: one without an extreme whose report is read: it finds at them what is missing or creeps.
+#: one without an extreme whose report is read: it finds at them what is missing.
 _ROWS, _MOST_ROWS, _LOOKS = 100, 6400, 2
 _EPSILON = np.finfo(np.float64).eps
 #: How far a twin's bodies are displaced at the start, as a share of the size of the solid.
