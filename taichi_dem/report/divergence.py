@@ -12,7 +12,7 @@ from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.physics.sphere_pair import CONTACT, DEEPEST_SHARE, SUNK
 from taichi_dem.report.energy_balance import EnergyBalance, unexplained_share
 from taichi_dem.report.readings import Run
-from taichi_dem.report.resolution import ROUNDING, is_bounded, limits_of, way_of
+from taichi_dem.report.resolution import ROUNDING, is_bounded, limits_of, present_steps, way_of
 from taichi_dem.report.shared_volume import SharedVolume
 from taichi_dem.step.drivers import CALL_SECONDS
 
@@ -142,14 +142,14 @@ class DivergenceCheck:
 
     def _error(self, body, what, remedy):
         """SimulationDiverged that says what is wrong with a body, and what to change."""
-        schedule, level = self.run.schedule, int(values(self.run.state.level)[body])
-        step = f"its step was {schedule.dt0 / 2.0**level:.3g} s (level {level})"
+        schedule, own = self.run.schedule, present_steps(self.run)[body]
+        step = f"its step was {own:.3g} s (level {math.log2(schedule.dt0 / own):.0f})"
         words, advice = f"body {body} {what}; {step}, {remedy[0]}", remedy[1]
         above = self._above_limit() if values(self.run.state.tick) else None
         if above:
             found, (shorter, advised) = above
-            own = "" if "step" in advice else f"; {step}, {remedy[0]}"
-            words, advice = f"{found}{shorter}; body {body} {what}{own}", {**advice, **advised}
+            more = "" if "step" in advice else f"; {step}, {remedy[0]}"
+            words, advice = f"{found}{shorter}; body {body} {what}{more}", {**advice, **advised}
         error = SimulationDiverged(f"diverged at t = {schedule.time_s:.6g} s: {words}")
         error.advice = advice
         return error
@@ -158,10 +158,8 @@ class DivergenceCheck:
         """The body whose step is farthest above its limit, in words; a shorter step as remedy."""
         if not is_bounded(self.run):
             return None
-        limits = self._limits()
+        limits, present = self._limits(), present_steps(self.run)
         steps = np.stack([*limits.values()])
-        level = values(self.run.state.level, slice(self.run.model.body_count))
-        present = self.run.schedule.dt0 / 2.0**level
         over = present / steps
         k, body = np.unravel_index(int(over.argmax()), over.shape)
         if over[k, body] <= 1.0 + ROUNDING:
@@ -210,8 +208,8 @@ class DivergenceCheck:
 
     def _taken(self):
         """Largest steps [s] that each body may have taken of late, (body_count,)."""
-        schedule, level = self.run.schedule, values(self.run.state.level)
-        return schedule.dt0 / 2.0 ** (level[: self.run.model.body_count] * schedule.has_limits)
+        present, schedule = present_steps(self.run), self.run.schedule
+        return present if schedule.has_limits else np.full_like(present, schedule.dt0)
 
     def _limits(self):
         """Largest stable explicit steps [s] by criterion, arrays (body_count,)."""

@@ -61,6 +61,11 @@ def way_of(run: Run) -> str:
     return "solved" if run.step.solver else "limited" if run.step.bonds.limited else "full"
 
 
+def present_steps(run: Run) -> np.ndarray:
+    """Step of every body now [s], (body_count,)."""
+    return run.schedule.dt0 / 2.0 ** values(run.state.level, slice(run.model.body_count))
+
+
 def is_bounded(run: Run) -> bool:
     """Whether the limits of stability of its steps are known, and no control keeps below them."""
     controlled = run.schedule.has_limits and run.schedule.limits.controlled
@@ -148,11 +153,7 @@ class StepResolution(Kept):
 
     def _over_now(self):
         """Present steps over the longest ones that are stable, (2, body_count)."""
-        return self._step_now() / self.longest
-
-    def _step_now(self):
-        level = values(self.run.state.level, slice(self.run.model.body_count))
-        return self.run.schedule.dt0 / 2.0**level
+        return present_steps(self.run) / self.longest
 
     def _linked(self):
         """Whether a bond of each body holds, and whether it ever touched, (2, body_count)."""
@@ -191,7 +192,7 @@ class StepResolution(Kept):
 
     def _note_partners(self, contacts):
         """Remember steps and light partners: few contacts last until a recording."""
-        self.step = np.minimum(self.step, self._step_now())
+        self.step = np.minimum(self.step, present_steps(self.run))
         pairs, _, _ = contacts.store.near_table()
         for one, other in (pairs.T, pairs.T[::-1]):
             np.maximum.at(self.fastest, one, self.rate[other])
