@@ -1,4 +1,4 @@
-"""Pictures of a result: columns, shares, fragments, cracks, the block."""
+"""Pictures of a result: columns, fragments, directions of cracks, attenuation, the block."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,7 +13,6 @@ from taichi_dem.kit.display import scale
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, SPARE_COLOURS, area_key, picture
 from taichi_dem.kit.validation import FileName, choice, positive, unit_vector
 from taichi_dem.output.fragments import COLOURS, body_values, scale_end
-from taichi_dem.plot.series import ENERGY_TERMS
 from taichi_dem.plot.view import ALONG_Z, JOINT, View, draw_bodies, frame_block
 
 #: Fragments of a colour of their own; lighter ones are grey.
@@ -33,11 +32,6 @@ def plot_history(
         moved = [name for name in _AT_HOLE if name in history] or ["largest_speed_m_s"]
         names = [*moved, "broken_faces", "smallest_step_s"]
     return plot_columns(path, history, names)
-
-
-def plot_crack_area(result: Any, *, path: FileName | None = None) -> Figure:
-    """Draw the area of all cracks over time."""
-    return plot_columns(path, arrays_of(result.crack_area()), ["crack_area_m2"])
 
 
 def plot_columns(
@@ -72,27 +66,6 @@ def _draw(axes, time, table, names, unit):
     else:
         axes.set(ylabel=f"{_KINDS.get(unit, 'value')} [{words}]")
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-
-
-def plot_energy_shares(result: Any, *, path: FileName | None = None) -> Figure:
-    """Draw every term of the energy balance as a share of the energy given, over time."""
-    shares = arrays_of(result.energy_shares())
-    factor, unit = scale(float(shares["time_s"].max(initial=0.0)), "s")
-    looks = {key.replace("_J", "_share"): look for key, look in ENERGY_TERMS.items()}
-    terms = {name: look for name, look in looks.items() if name in shares and shares[name].any()}
-    given = np.isfinite(shares["given_J"]) & (shares["given_J"] > 0.0)
-    with picture(path, size=(6.8, 3.6)) as (figure, axes):
-        values = [100.0 * shares[name][given] for name in terms]
-        labels, colours = ([look[k] for look in terms.values()] for k in (0, 1))
-        look = {"colors": colours, "labels": labels, "edgecolor": "white", "linewidth": 0.3}
-        if terms:
-            axes.stackplot(factor * shares["time_s"][given], values, **look)
-        axes.set(xlabel=f"time [{unit}]", ylabel="share of the energy given [%]")
-        axes.set(ylim=(0.0, 100.0))
-        axes.margins(x=0.0)
-        handles, labels = axes.get_legend_handles_labels()
-        figure.legend(handles[::-1], labels[::-1], loc="outside right upper")
-    return figure
 
 
 def plot_fragments(result: Any, frame: int = -1, *, path: FileName | None = None) -> Figure:
