@@ -20,8 +20,7 @@ from ca_damper.engine.recorder import ROOM
 from ca_damper.excitation.excitation import Excitation
 from ca_damper.filling import Filling, Fillings
 from ca_damper.report import measures
-from ca_damper.report.certificate import EFFECTS, Certificate, Periods
-from ca_damper.report.checked_range import checked_range, warn_outside
+from ca_damper.report.certificate import EFFECTS, Certificate, Periods, checked_range, warn_outside
 from ca_damper.report.progress import BatchProgress
 from ca_damper.report.report import RK45_STAGES, Report
 from ca_damper.scenes.checks import (

@@ -6,7 +6,7 @@ from functools import partial
 import pytest
 
 from ca_damper import Automaton
-from ca_damper.report.checked_range import checked_range
+from ca_damper.report.certificate import checked_range
 
 #: An Automaton with other options than the rules.
 paper = partial(Automaton, rules="paper")

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.report.checked_range import CheckedRange, Driven
+from ca_damper.report.certificate import CheckedRange, Driven
 from ca_damper.scenes.gravity import gravity_across
 
 _G = 9.81

@@ -11,7 +11,7 @@ from ca_damper.automaton.paper import PaperAutomaton
 from ca_damper.automaton.place.device import PlaceAutomaton
 from ca_damper.automaton.transport import READINGS
 from ca_damper.filling import Structure
-from ca_damper.report.checked_range import CheckedRange, Driven
+from ca_damper.report.certificate import CheckedRange, Driven
 from ca_damper.scenes.gravity import checked_gravity, gravity_across
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from ca_damper.filling import Fillings
-from ca_damper.report.certificate import Certificate, Periods
-from ca_damper.report.checked_range import checked_range
+from ca_damper.report.certificate import Certificate, Periods, checked_range
 from ca_damper.report.measures import Cycles
 from ca_damper.report.steady_state import period
 from taichi_dem.kit.display import counted

@@ -4,8 +4,7 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ca_damper.report.certificate import Certificate
-from ca_damper.report.checked_range import CheckedRange
+from ca_damper.report.certificate import Certificate, CheckedRange
 from taichi_dem.kit.display import BRIEF, counted, in_brief, in_lines
 from taichi_dem.kit.effect_table import EffectTable, EffectUse
 from taichi_dem.kit.files import write_text

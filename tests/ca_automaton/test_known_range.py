@@ -3,7 +3,7 @@
 import pytest
 
 from ca_damper import Automaton, Batch, SceneTable
-from ca_damper.report.checked_range import checked_range
+from ca_damper.report.certificate import checked_range
 from tests.paper import paper
 
 #: A scene of the paper: 30 grains near resonance.
