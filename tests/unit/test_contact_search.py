@@ -3,19 +3,18 @@
 Pairs that stay near keep their memory through every search.
 """
 
+from functools import cache
+
 import numpy as np
 import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, Scene, Uniform, effects
-from taichi_dem.contact.contacts import FARTHEST, STEPS
-from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.allocation import FieldTree, assign, values
 from taichi_dem.mesh.shapes import bar
 from tests.again import Again
 
 DT = 1e-9
-#: Scale of the motion by which bodies come near and part [m]; the skin is a twentieth of it.
-SPREAD = 0.02
 
 
 @ti.data_oriented
@@ -29,21 +28,21 @@ class Marked(effects.SphereContact):
         self.of_spheres = store.sphere_column("sphere_mark", ti.i32)
 
 
-def loose(law):
-    """A bar, to be thrown about."""
-    return Again(Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [law]), Uniform(DT))
-
-
 @pytest.fixture(scope="module")
-def again():
+def bars():
+    """A bar to be thrown about, of bodies that touch with spheres or whole, each made once."""
+
+    @cache
+    def loose(law):
+        return Again(Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [law()]), Uniform(DT))
+
+    return loose
+
+
+@pytest.fixture
+def again(bars):
     """One of bodies that touch with spheres."""
-    return loose(Marked())
-
-
-@pytest.fixture(scope="module", params=[Marked, effects.BodyContact])
-def either(request):
-    """One of spheres, or of bodies, that touch."""
-    return loose(request.param())
+    return bars(Marked)
 
 
 def scattered(again, skin, spread, seed=2):
@@ -82,28 +81,24 @@ def listed(simulation):
 
 
 def expected(simulation, skin):
-    """Every pair of exposed spheres of two unbonded bodies with a gap below the skin [m].
-
-    The skin may be a number, or what each of the two adds to it, (body_count,).
-    """
+    """Every pair of exposed spheres of two unbonded bodies with a gap below the skin [m]."""
     model, motion = simulation.model, simulation.state.motion()
-    part = np.broadcast_to(0.5 * skin if np.ndim(skin) == 0 else skin, model.body_count)
-    size = model.spheres.per_face
+    size, top = model.spheres.per_face, simulation.model.topology
     sphere = simulation.values(simulation.tables.sphere)
     body = np.arange(len(sphere)) // (4 * size)
     turned = np.einsum("nij,nj->ni", motion["rotation"][body], sphere[:, :3])
     place = turned + motion["position"][body]
     shown = np.flatnonzero(simulation.values(simulation.state.exposed_tick).repeat(size) >= 0)
     intact = simulation.values(simulation.state.broken_tick) < 0
-    top = model.topology
-    bonded = set(zip(top.master[intact].tolist(), top.slave[intact].tolist()))
+    bonded = np.zeros((model.body_count,) * 2, dtype=bool)
+    bonded[tuple(np.sort([top.master[intact], top.slave[intact]], axis=0))] = True
     pairs = set()
     for a in shown:
         later = shown[body[shown] > body[a]]
+        later = later[~bonded[body[a], body[later]]]
         gap = np.linalg.norm(place[later] - place[a], axis=1) - sphere[later, 3] - sphere[a, 3]
-        wide = part[body[later]] + part[body[a]]
-        pairs |= {(int(a), int(b)) for b in later[gap < wide]}
-    return {(a, b) for a, b in pairs if (int(body[a]), int(body[b])) not in bonded}
+        pairs |= {(int(a), int(b)) for b in later[gap < skin]}
+    return pairs
 
 
 def slot_of_pair(store):
@@ -134,48 +129,14 @@ def test_waiting_impulses_survive_a_search(again):
         assert before.get(pair, p) == p
 
 
-def overlap_energy(simulation, born_after):
-    """Elastic energy [J] of the overlaps of listed spheres of which one is younger than a tick."""
-    model, motion = simulation.model, simulation.state.motion()
-    size, sphere = model.spheres.per_face, simulation.values(simulation.tables.sphere)
-    exposed, energy = simulation.values(simulation.state.exposed_tick), 0.0
-    for pair in listed(simulation):
-        body = [one // (4 * size) for one in pair]
-        place = [
-            motion["position"][i] + motion["rotation"][i] @ sphere[one, :3]
-            for i, one in zip(body, pair)
-        ]
-        gap = np.linalg.norm(place[1] - place[0]) - sphere[list(pair), 3].sum()
-        if max(exposed[one // size] for one in pair) > born_after:
-            energy += 0.5 * CONCRETE.contact_stiffness * max(0.0, -gap) ** 2
-    return energy
-
-
-def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
-    """Faces that break now bring k d^2 / 2 an overlap; a second search at the tick nothing."""
-    simulation = scattered(again, 2e-4, 0.02)
-    state, store = simulation.state, simulation.contacts.store
-    assert not values(store.heat, near_slots(store)).any()
-    exposed = simulation.values(state.exposed_tick)
-    free = np.flatnonzero(exposed < 0)
-    exposed[free[: len(free) // 2]] = 7
-    assign(state.exposed_tick, exposed)
-    state.tick[None] = 7
-    simulation.broad_phase.search()
-    wanted = overlap_energy(simulation, 0)
-    assert 0.0 < wanted < 0.9 * overlap_energy(simulation, -1)
-    for _ in range(2):
-        injected = values(store.heat, near_slots(store))[:, 2].sum()
-        assert injected == pytest.approx(wanted, rel=1e-9)
-        simulation.broad_phase.search()
-
-
 @ti.data_oriented
 class AllPairs:
     """Overlaps of all pairs of bodies, by the law of their contact."""
 
     def __init__(self, contacts, count):
-        self.contacts, self.reach = contacts, ti.field(ti.f64, shape=(count, count))
+        self.contacts = contacts
+        with FieldTree():
+            self.reach = ti.field(ti.f64, shape=(count, count))
 
     @ti.kernel
     def find(self):
@@ -194,14 +155,16 @@ def overlapping(simulation, pairs):
     free = np.isin(corner, on_free).any(axis=1)
     pairs.find()
     top, holds = simulation.model.topology, ~simulation.state.broken()
-    meets = np.triu(np.outer(free, free)) & (pairs.reach.to_numpy() > 0.0)
+    meets = np.triu(np.outer(free, free)) & (values(pairs.reach) > 0.0)
     bonded = np.sort([top.master[holds], top.slave[holds]], axis=0)
     meets[tuple(bonded)] = False
     return set(zip(*np.nonzero(meets)))
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_all_that_touches_is_listed_however_seldom_a_pair_is_looked_at(either, seed):
+@pytest.mark.parametrize(
+    ("law", "seed"), [(Marked, 0), (Marked, 1), (effects.BodyContact, 0), (effects.BodyContact, 1)]
+)
+def test_all_that_touches_is_listed_however_seldom_a_pair_is_looked_at(bars, law, seed):
     """Bodies drift and turn, each its own way, by up to a share of the skin between two searches.
 
     A search leaves out the pairs that cannot meet yet, by how far their bodies have gone; half the
@@ -209,7 +172,7 @@ def test_all_that_touches_is_listed_however_seldom_a_pair_is_looked_at(either, s
     the skin, and no others.
     """
     skin, far, turn, random = 2e-3, 0.2, 5e-4, np.random.default_rng(seed)
-    simulation = scattered(either, skin, 0.03, seed)
+    simulation = scattered(bars(law), skin, 0.03, seed)
     broad, contacts = simulation.broad_phase, simulation.contacts
     pairs = None
     if contacts.law.meets_bodies:
@@ -240,140 +203,63 @@ def test_all_that_touches_is_listed_however_seldom_a_pair_is_looked_at(either, s
     assert max(found) > min(found) + 20
 
 
-def test_a_fast_body_has_a_skin_for_some_steps(again):
-    """Each goes STEPS largest steps at its speed, spin included, between half a skin and a cap.
-
-    Spheres are candidates where their gap is below the body skin of both; no search is asked for
-    until one has used up its own.
-    """
-    skin, random = 2e-3, np.random.default_rng(3)
-    simulation = scattered(again, skin, 0.03)
-    contacts, model = simulation.contacts, simulation.model
-    motion, horizon = simulation.state.motion(), STEPS * simulation.schedule.dt0
-    extent = simulation.values(simulation.tables.extent)
-    velocity, spin = random.standard_normal((2, model.body_count, 3))
-    velocity *= 10.0 ** random.uniform(4, 6.5, (model.body_count, 1))
-    spin *= 10.0 ** random.uniform(4, 6.5, (model.body_count, 1))
-    simulation.state.set_motion(motion["position"], motion["orientation"], velocity, spin)
-    simulation.broad_phase.search()
-    speed = np.linalg.norm(velocity, axis=1) + np.linalg.norm(spin, axis=1) * extent
-    wanted = np.maximum(0.5 * skin, np.minimum(horizon * speed, FARTHEST * extent))
-    exposed = simulation.values(contacts.free) == 1
-    found = simulation.values(contacts.body_skin)
-    assert found[exposed] == pytest.approx(wanted[exposed], rel=1e-12)
-    for low, high in [(0.0, 0.6 * skin), (0.6 * skin, 0.24 * extent), (0.24 * extent, np.inf)]:
-        assert ((found >= low) & (found < high) & exposed).sum() > 10
-    assert set(listed(simulation)) == expected(simulation, found)
-    assert contacts.search_requested[None] == 0
+def spheres_of(store):
+    """Places of the sphere pairs of the near pairs, by spheres."""
+    first, last = values(store.first), values(store.last)
+    places = [k for p in near_slots(store) for k in range(first[p], last[p])]
+    return {tuple(pair): k for pair, k in zip(values(store.sphere, places).tolist(), places)}
 
 
-@ti.data_oriented
-class Thrown:
-    """A bar of loose bodies that are put somewhere else again and again."""
-
-    def __init__(self):
-        scene = Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [Marked(outer_faces=True)])
-        self.again = Again(scene, Uniform(1e-9))
-        self.simulation, self.state = self.again.simulation, self.again.state
-        self.store, self.law = self.simulation.contacts.store, self.simulation.tables.contact
-        self.fields = self.law.vector, self.law.of_spheres
-        self.first_place = self.simulation.model.centre
-        assign(self.simulation.contacts.skin, SPREAD / 20)
-
-    def start(self):
-        """Break all bonds, let all faces carry spheres, and search anew."""
-        self.again.restart(1e-9)
-        assign(self.state.broken_tick, 0)
-        assign(self.state.exposed_tick, 0)
-        self.state.injected_tick[None] = 0
-        self.again.search_anew()
-
-    def throw(self, seed, share=1.0, spread=SPREAD):
-        """Move a share of the bodies to random places near where they began, and search."""
-        random, motion = np.random.default_rng(seed), self.state.motion()
-        count = len(self.first_place)
-        moved = random.permutation(count) < share * count
-        way = spread * random.standard_normal(self.first_place.shape)
-        place = np.where(moved[:, None], self.first_place + way, motion["position"])
-        self.state.set_motion(place, motion["orientation"])
-        self.simulation.broad_phase.search()
-
-    def spheres(self):
-        """Places of the sphere pairs of the near pairs, by spheres."""
-        first, last = values(self.store.first), values(self.store.last)
-        places = [k for p in near_slots(self.store) for k in range(first[p], last[p])]
-        return {
-            tuple(pair): k for pair, k in zip(values(self.store.sphere, places).tolist(), places)
-        }
-
-    @ti.kernel
-    def pack(self):
-        """Pack the sphere pairs."""
-        for _ in range(1):
-            self.store.pack_spheres()
-
-    def mark(self):
-        """Give all columns of what is near numbers that tell the pair; they by pair, by spheres."""
-        pairs, spheres = slot_of_pair(self.store), self.spheres()
-        vector, of_spheres = self.columns()
-        for (i, j), p in pairs.items():
-            vector[p] = [i, j, 1.0]
-        for (a, b), k in spheres.items():
-            of_spheres[k] = 10000 * a + b
-        for field, array in zip(self.fields, (vector, of_spheres)):
-            assign(field, array)
-        return pairs, spheres
-
-    def columns(self):
-        """The columns as arrays."""
-        return [values(field) for field in self.fields]
+def marked(simulation):
+    """Give all columns of what is near numbers that tell the pair; they by pair, by spheres."""
+    store, law = simulation.contacts.store, simulation.tables.contact
+    pairs, spheres = slot_of_pair(store), spheres_of(store)
+    vector, of_spheres = values(law.vector), values(law.of_spheres)
+    for (i, j), p in pairs.items():
+        vector[p] = [i, j, 1.0]
+    for (a, b), k in spheres.items():
+        of_spheres[k] = 10000 * a + b
+    assign(law.vector, vector)
+    assign(law.of_spheres, of_spheres)
+    return pairs, spheres
 
 
-@pytest.fixture(scope="module")
-def thrown():
-    """One for all tests, compiled once."""
-    return Thrown()
+@ti.kernel
+def _pack(store: ti.template()):
+    for _ in range(1):
+        store.pack_spheres()
 
 
-@pytest.mark.parametrize("share", [0.05, 1.0])
-def test_pairs_keep_their_slots_and_columns(thrown, share):
-    """Whether few bodies are listed anew or all: new pairs begin with zeros, also those that left.
-
-    No two near pairs share a slot, whatever has been freed.
-    """
-    thrown.start()
-    stayed, came, left = 0, 0, set()
-    for seed in range(12):
-        before, _ = thrown.mark()
-        thrown.throw(seed, share)
-        after = slot_of_pair(thrown.store)
-        assert len(set(after.values())) == len(after)
-        left |= set(before) - set(after)
-        vector, _ = thrown.columns()
-        for pair, p in after.items():
-            assert before.get(pair, p) == p
-            assert vector[p].tolist() == ([*pair, 1.0] if pair in before else [0.0] * 3)
-        stayed += len(set(before) & set(after))
-        came += len(left & (set(after) - set(before)))
-    assert stayed > 100 and came > 5
-
-
+@pytest.mark.parametrize(("share", "way"), [(0.05, 1.0), (1.0, 1.0), (0.1, 0.1)])
 @pytest.mark.parametrize("packed", [False, True])
-def test_sphere_pairs_that_stay_keep_their_columns(thrown, packed):
-    """Matched by their spheres, wherever these lie after a search, packed or not."""
-    thrown.start()
-    stayed, came, moved = 0, 0, 0
-    for seed in range(8):
-        _, before = thrown.mark()
+def test_what_stays_near_keeps_its_slot_and_its_columns(again, share, way, packed):
+    """Whether few bodies are listed anew or all, by large ways or small, and lists are packed.
+
+    New pairs begin with zeros, also those that left. No two near pairs share a slot. Sphere pairs
+    are matched by their spheres, wherever these lie after a search.
+    """
+    simulation, stayed, moved = scattered(again, 1e-3, 0.02), 0, 0
+    store, law, left = simulation.contacts.store, simulation.tables.contact, set()
+    for seed in range(6):
+        before = marked(simulation)
         if packed:
-            thrown.pack()
-            assert thrown.store.sphere_end[None] == len(before)
-        thrown.throw(seed, 0.1, 0.1 * SPREAD)
-        after, of_spheres = thrown.spheres(), thrown.columns()[1]
-        for (a, b), k in after.items():
-            wanted = 10000 * a + b if (a, b) in before else 0
-            assert of_spheres[k] == wanted
-        stayed += len(set(before) & set(after))
-        came += len(set(after) - set(before))
-        moved += sum(before.get(spheres, k) != k for spheres, k in after.items())
-    assert stayed > 1000 and came > 100 and moved > 100
+            _pack(store)
+            assert store.sphere_end[None] == len(before[1])
+        random, motion = np.random.default_rng(seed), simulation.state.motion()
+        thrown = random.random(len(motion["position"])) < share
+        place = motion["position"] + 0.01 * way * random.standard_normal((len(thrown), 3))
+        place = np.where(thrown[:, None], place, motion["position"])
+        simulation.state.set_motion(place, motion["orientation"])
+        simulation.broad_phase.search()
+        pairs, spheres = slot_of_pair(store), spheres_of(store)
+        assert len({*pairs.values()}) == len(pairs)
+        vector, of_spheres = values(law.vector), values(law.of_spheres)
+        for pair, p in pairs.items():
+            assert before[0].get(pair, p) == p
+            assert vector[p].tolist() == ([*pair, 1.0] if pair in before[0] else [0.0] * 3)
+        for (a, b), k in spheres.items():
+            assert of_spheres[k] == (10000 * a + b if (a, b) in before[1] else 0)
+        left |= {*before[0]} - {*pairs}
+        stayed += len({*before[0]} & {*pairs})
+        moved += sum(before[1].get(one, k) != k for one, k in spheres.items())
+    assert stayed > 100 and left and moved

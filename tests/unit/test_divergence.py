@@ -5,7 +5,6 @@ import pytest
 
 from taichi_dem import (
     CONCRETE,
-    Multirate,
     Scene,
     Simulation,
     SimulationDiverged,
@@ -15,13 +14,14 @@ from taichi_dem import (
     step_report,
 )
 from taichi_dem.mesh.shapes import bar, placed_together
+from tests.structures import filled
 
 STEP, UNTIL = 1e-6, 2e-4
 
 
 def run(step, output=None):
     """A small damped bar, pressed at its left end."""
-    listed = [effects.BondDamping(), effects.GasPressure("left", peak=1e5, rise=1e-5)]
+    listed = filled("bonds", effects.BondDamping(), effects.GasPressure("left", 1e5, 1e-5))
     scene = Scene(bar(0.1, 0.05, (2, 1, 1)), CONCRETE, listed)
     return simulate(scene, method=Uniform(step), until=UNTIL, samples=20, output=output)
 
@@ -54,7 +54,8 @@ def test_what_is_above_its_limit_is_named_before_what_flies():
     velocity = np.zeros((mesh.body_count, 3))
     velocity[: block.body_count, 2] = 50.0
     velocity[block.body_count, 0] = 0.1
-    scene = Scene(mesh, CONCRETE, [effects.BondDamping()], velocity=velocity)
+    listed = filled("bonds", effects.BondDamping(), group="block_left")
+    scene = Scene(mesh, CONCRETE, listed, velocity=velocity)
     limits = step_report(scene).limits["bond_dashpot"]
     limit = limits[block.body_count :].min()
     assert 1.4 * limit < limits[: block.body_count].min()
@@ -69,8 +70,8 @@ def test_what_is_above_its_limit_is_named_before_what_flies():
 
 def test_an_idle_scene_does_not_diverge_however_long_it_rests():
     """The energy that rounding gives it grows with the steps, and stays round-off."""
-    scene = Scene(bar(0.4, 0.1, (4, 1, 1)), CONCRETE, [effects.Fixed("left")])
-    report = simulate(scene, method=Multirate(), until=1e-3, samples=4, progress=None).report
+    scene = Scene(bar(0.4, 0.1, (4, 1, 1)), CONCRETE, filled("bonds", effects.BondDamping()))
+    report = simulate(scene, method=Uniform(1e-8), until=1e-4, samples=4, progress=None).report
     assert 0.0 < report.energy_balance["kinetic"] < report.round_off_J
     assert "round-off" in report.unexplained
 

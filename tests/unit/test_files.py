@@ -1,15 +1,32 @@
-"""Files are whole, what killed processes leave of them goes, and tables are no programs."""
+"""Files are whole or refused, whatever ends a run from outside, and tables are no programs."""
 
 import csv
 import os
+import signal
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from taichi_dem import CONCRETE, Checkpoint, Collector, Every, InputError, Scene, Uniform, simulate
+import ca_damper
+import taichi_dem
+from taichi_dem import (
+    CONCRETE,
+    At,
+    Checkpoint,
+    Collector,
+    Every,
+    InputError,
+    Scene,
+    Uniform,
+    simulate,
+)
 from taichi_dem.kit import files
-from taichi_dem.kit.checkpoint import write_checkpoint
+from taichi_dem.kit.checkpoint import Interrupted, read_checkpoint, write_checkpoint
+from taichi_dem.kit.field_memory import without_end
 from taichi_dem.kit.files import output_folder, renamed_when_done, write_csv
 from taichi_dem.mesh.shapes import pair
 from tests.scenes import ROOT
@@ -27,6 +44,19 @@ with renamed_when_done(sys.argv[1]) as name:
         sys.stdin.readline()
         file.write("whole")
 """
+#: A short run of two bodies, and how often it is sampled.
+JOB = {"method": Uniform(1e-8), "until": 1e-6, "samples": 4, "progress": None}
+
+
+def flying():
+    return Scene(pair(), CONCRETE, [], velocity=(1, 0, 0), spin=(0, 0, 9))
+
+
+def assert_same(first, second):
+    """Series of two results have the same bits."""
+    assert first.series.keys() == second.series.keys()
+    for name, column in first.series.items():
+        assert column.tobytes() == second.series[name].tobytes(), name
 
 
 @pytest.fixture
@@ -79,8 +109,7 @@ def test_a_part_of_another_machine_is_left_for_a_day(tmp_path, monkeypatch, age_
     """Its number may name a process here, or none, and tells nothing."""
     with monkeypatch.context() as there:
         there.setattr(files, "_here", lambda: "0a1b2c3d")
-        killed = renamed_when_done(tmp_path / "theirs.csv")
-        name = killed.__enter__()
+        name = renamed_when_done(tmp_path / "theirs.csv").__enter__()
     with open(name, "w"):
         then = os.stat(name).st_mtime - age_s
     os.utime(name, (then, then))
@@ -101,12 +130,56 @@ def test_text_of_a_table_is_no_formula_and_numbers_stay(tmp_path):
     assert [row[-1] for row in rows] == ["'=1", "-7"]
 
 
-#: A short run of two bodies, and how often it is sampled.
-JOB = {"method": Uniform(1e-8), "until": 1e-6, "samples": 4, "progress": None}
+@given(
+    shape=st.tuples(st.integers(0, 3000), st.integers(1, 5), st.integers(1, 3)),
+    share=st.floats(0.0, 1.0),
+    kind=st.sampled_from([np.int32, np.float64]),
+    gap=st.booleans(),
+)
+@settings(derandomize=True, database=None, deadline=None)
+def test_a_checkpoint_leaves_out_zeros_at_the_end_to_the_bit(shape, share, kind, gap):
+    """Not before the smallest number, a negative zero, and also where entries lie apart."""
+    array = np.zeros((shape[0], shape[1] + gap, shape[2]), dtype=kind)[:, : shape[1]]
+    used = int(share * len(array))
+    if used:
+        array[used - 1, -1, -1] = -0.0 if kind is np.float64 else 1
+    assert len(without_end(array)) == used
+    assert np.array_equal(array[:used], without_end(array))
 
 
-def flying():
-    return Scene(pair(), CONCRETE, [], velocity=(1, 0, 0))
+#: Whose representation tells a checkpoint which run it is of.
+IDENTIFYING = (
+    taichi_dem.CONCRETE,
+    taichi_dem.Uniform(distance=1e-8),
+    taichi_dem.Multirate(control=taichi_dem.StepControl()),
+    taichi_dem.ImplicitDashpots(),
+    ca_damper.Automaton(),
+    ca_damper.Spheres(),
+    ca_damper.Oscillator(),
+)
+
+
+@pytest.mark.parametrize("thing", IDENTIFYING, ids=lambda thing: type(thing).__name__)
+def test_what_identifies_a_run_is_shown_in_full(thing):
+    """Evaluated, it is the object again: two of them that differ have different words."""
+    assert eval(repr(thing), {**vars(taichi_dem), **vars(ca_damper)}) == thing
+
+
+def flipped(data):
+    """One bit within the numbers of the first array."""
+    middle = len(data) // 2
+    return data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :]
+
+
+@pytest.mark.parametrize(
+    "harm", [lambda data: data[:-40], flipped, lambda data: b"PK stranger"], ids=str
+)
+def test_damaged_and_foreign_checkpoints_are_refused(tmp_path, harm):
+    path = tmp_path / "run.checkpoint"
+    write_checkpoint(path, {}, {"field/a.b": np.arange(12.0).reshape(4, 3)})
+    path.write_bytes(harm(path.read_bytes()))
+    with pytest.raises(InputError, match="must be a complete checkpoint"):
+        read_checkpoint(path, {})
 
 
 class FullDisk:
@@ -133,23 +206,25 @@ def test_a_full_disk_at_the_end_does_not_lose_the_result(tmp_path, monkeypatch, 
     with pytest.raises(InputError, match="No space left") as refused:
         simulate(flying(), frames=2, **kept, **JOB)
     found = refused.value.result
-    assert found.series.keys() == whole.series.keys()
-    for name, column in whole.series.items():
-        assert column.tobytes() == found.series[name].tobytes(), name
+    assert_same(whole, found)
     assert len(found.frames) == len(whole.frames)
     assert not found.diverged
 
 
-def test_a_checkpoint_that_finds_no_room_leaves_the_result_up_to_there(tmp_path, monkeypatch):
+def test_a_checkpoint_that_finds_no_room_leaves_the_one_before_and_the_result(tmp_path):
     """What the run has so far is also written, where there is room for that."""
-    checkpoint = Checkpoint(tmp_path / "run.checkpoint", every_steps=25)
-    FullDisk(monkeypatch, ".checkpoint", after=2)
-    with pytest.raises(InputError, match="holds the run at t = 5e-07 s") as refused:
-        simulate(flying(), checkpoint=checkpoint, output=tmp_path / "out", **JOB)
+    path = tmp_path / "run.checkpoint"
+    saved = {"checkpoint": Checkpoint(path, every_steps=25), "output": tmp_path / "out"}
+    with pytest.MonkeyPatch.context() as change:
+        FullDisk(change, ".checkpoint", after=2)
+        with pytest.raises(InputError, match="holds the run at t = 5e-07 s") as refused:
+            simulate(flying(), **saved, **JOB)
     times = refused.value.result.series["time_s"]
     assert times == pytest.approx([0.0, 2.5e-7, 5e-7, 7.5e-7], rel=1e-12)
     with open(tmp_path / "out" / "history.csv", encoding="utf-8") as file:
         assert len([*csv.reader(file)]) == 1 + len(times)
+    assert sorted(os.listdir(tmp_path)) == ["out", "run.checkpoint"]
+    assert_same(simulate(flying(), **JOB), simulate(flying(), resume=path, **JOB))
 
 
 def test_what_an_observer_raises_carries_the_result_up_to_there():
@@ -161,3 +236,13 @@ def test_what_an_observer_raises_carries_the_result_up_to_there():
         simulate(flying(), observers=[Collector(Every(samples=1), mine=fail)], **JOB)
     assert failed.value.result.series["time_s"][-1] == pytest.approx(5e-7)
     assert not failed.value.result.diverged
+
+
+def test_a_signal_saves_the_run_which_goes_on_with_the_bits_of_one_never_stopped(tmp_path):
+    def end(view):
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    path, observers = tmp_path / "run.checkpoint", [Collector(At((5e-7,)), end=end)]
+    with pytest.raises(Interrupted, match="interrupted at t = "):
+        simulate(flying(), checkpoint=Checkpoint(path), observers=observers, **JOB)
+    assert_same(simulate(flying(), **JOB), simulate(flying(), resume=path, **JOB))

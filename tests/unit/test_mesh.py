@@ -2,25 +2,13 @@
 
 Bonds, outer faces and mass properties of bodies are those of the mesh, whatever its order.
 Contact spheres against their definition, face by face (Konno et al., 2.2, Fig. 5).
-Colours of bonds: links of one colour share no body.
-Faces may lie on each other without a bond, and then touch: joints of blocks, cracks in one.
 """
 
 import numpy as np
 import pytest
 
 from _meshes import group_area
-from taichi_dem import (
-    CONCRETE,
-    PAPER_BLOCK,
-    InputError,
-    Scene,
-    Simulation,
-    Uniform,
-    effects,
-    join,
-    read_mesh,
-)
+from taichi_dem import PAPER_BLOCK, InputError, join, read_mesh
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import checked_mesh, volumes
@@ -37,11 +25,7 @@ from tests.turns import matrix, quaternion
 POINTS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, 1], [0.2, 0.2, -1]]
 BODIES = [[0, 1, 2, 3], [0, 2, 1, 4]]
 BAR = bar(0.2, 0.1, (2, 1, 1))
-MESHES = {"bar": bar(1.0, 0.2, (5, 2, 3)), "block": read_mesh(PAPER_BLOCK)}
-EACH = pytest.mark.parametrize("name", MESHES)
 EPS = np.finfo(float).eps
-#: A tetrahedron has four faces, so no body has more links.
-DEGREE = 4
 
 
 def built(points=POINTS, bodies=BODIES, groups=None, **options):
@@ -161,18 +145,15 @@ def test_meshes_that_touch_are_bonded_only_where_asked():
     assert group_area(bonded, "left") == pytest.approx(0.01)
 
 
-@EACH
-def test_both_bodies_of_a_bond_own_its_face(name):
-    mesh, top = MESHES[name], topology_of(MESHES[name])
+@pytest.mark.parametrize(
+    "mesh", [bar(1.0, 0.2, (5, 2, 3)), read_mesh(PAPER_BLOCK)], ids=["bar", "block"]
+)
+def test_both_bodies_of_a_bond_own_its_face_and_its_normal_points_from_master_to_slave(mesh):
+    top = topology_of(mesh)
     of_master = face_vertices(mesh, top.master, top.master_face)
     of_slave = face_vertices(mesh, top.slave, top.slave_face)
     assert np.array_equal(of_master, top.vertices)
     assert np.array_equal(np.sort(of_slave, axis=1), np.sort(top.vertices, axis=1))
-
-
-@EACH
-def test_bond_normal_points_from_master_to_slave(name):
-    mesh, top = MESHES[name], topology_of(MESHES[name])
     normal = geometry.area_vectors(mesh.points, top.vertices)
     middle = mesh.points[top.vertices].mean(axis=1)
     centre = mesh.points[mesh.tetrahedra].mean(axis=1)
@@ -194,13 +175,6 @@ def test_bodies_of_a_box_add_up_to_its_inertia(cells):
     assert total == pytest.approx(mass.sum() / 12.0 * np.diag(moments), abs=1e-12 * mass.sum())
 
 
-@pytest.fixture(scope="module")
-def block():
-    """Mesh of the paper's block and the centres of its bodies."""
-    mesh = read_mesh(PAPER_BLOCK)
-    return mesh, mesh.points[mesh.tetrahedra].mean(axis=1)
-
-
 def plane_distances(mesh, points):
     """Distance of points (n, 4, k, 3) of every body from its four faces, inside positive.
 
@@ -217,13 +191,14 @@ def plane_distances(mesh, points):
     return np.stack(distances, axis=-1)
 
 
-def test_spheres_touch_their_face_and_another_and_stay_inside(block):
+def test_spheres_touch_their_face_and_another_and_stay_inside():
     """Distance r from the own face, at least r from the others, r from one of them.
 
     Distances are differences of coordinates of 2 m; the radius divides by 1 - m_f . m_g, which in
     this mesh is above 0.01.
     """
-    mesh, centre = block
+    mesh = read_mesh(PAPER_BLOCK)
+    centre = mesh.points[mesh.tetrahedra].mean(axis=1)
     spheres = spheres_of_faces(mesh, centre, 5)
     error = 16 * EPS * 2.0 / 0.01
     distance = plane_distances(mesh, spheres.centre + centre[:, None, None, :])
@@ -234,107 +209,22 @@ def test_spheres_touch_their_face_and_another_and_stay_inside(block):
     assert spheres.radius.min() > 1e6 * error
 
 
-def test_spheres_sit_at_the_crossings(block):
-    """The touching point, a radius inward of which the sphere sits, divides the face in fifths."""
-    mesh, centre = block
-    spheres = spheres_of_faces(mesh, centre, 5)
-    corners = mesh.points[mesh.tetrahedra]
-    place = spheres.centre + centre[:, None, None, :]
-    for f in range(4):
-        face = corners[:, [k for k in range(4) if k != f]]
-        normal = np.cross(face[:, 1] - face[:, 0], face[:, 2] - face[:, 0])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        normal *= -np.sign(np.einsum("nx,nx->n", corners[:, f] - face[:, 0], normal))[:, None]
-        touch = place[:, f] + spheres.radius[:, f, :, None] * normal[:, None]
-        solved = np.linalg.pinv(face.transpose(0, 2, 1)) @ touch.transpose(0, 2, 1)
-        fifths = 5.0 * solved.transpose(0, 2, 1)
-        # Faces in a plane through the origin do not give back the share of every corner.
-        whole = np.abs(np.linalg.det(face)) > 1e-4 * np.abs(face).max() ** 2
-        assert whole.sum() > 100
-        assert np.abs(fifths - np.round(fifths))[whole].max() < 1e-6
-
-
-def is_proper(links, colours):
-    """Whether no body has two links of one colour."""
-    links, colours = np.asarray(links), np.asarray(colours)
-    seen = np.concatenate([1000 * links[:, 0] + colours, 1000 * links[:, 1] + colours])
-    return len(np.unique(seen)) == len(seen)
-
-
 def test_the_block_of_the_paper_takes_five_colours_at_most():
+    """No body has two bonds of one colour; it has four faces, and so no more bonds."""
     mesh = read_mesh(PAPER_BLOCK)
     top = topology_of(mesh)
     links = np.stack([top.master, top.slave], axis=1)
     colours = edge_colours(links, mesh.body_count)
-    assert is_proper(links, colours)
-    assert DEGREE <= colours.max() + 1 <= 5
-
-
-EDGE = 0.05
-CUBE = bar(EDGE, EDGE, (1, 1, 1))
-BLOCKS = {"left": (CUBE, (0.0, 0.0, 0.0)), "right": (CUBE, (EDGE, 0.0, 0.0))}
-
-
-def cracked():
-    """A bar of two by two boxes, a crack across its lower half: points, bodies and their welding.
-
-    The bodies right of the middle take new points for those below the tip.
-    """
-    whole = bar(2 * EDGE, 2 * EDGE, (2, 2, 1))
-    on_crack = np.isclose(whole.points[:, 0], EDGE) & (whole.points[:, 1] < EDGE - 1e-6)
-    old = np.flatnonzero(on_crack)
-    points = np.vstack([whole.points, whole.points[old]])
-    new = np.arange(len(whole.points))
-    new[old] = len(whole.points) + np.arange(len(old))
-    bodies = whole.tetrahedra.copy()
-    right = whole.points[bodies].mean(axis=1)[:, 0] > EDGE
-    bodies[right] = new[bodies[right]]
-    return whole, points, bodies
+    seen = np.concatenate([1000 * links[:, k] + colours for k in (0, 1)])
+    assert len(np.unique(seen)) == len(seen)
+    assert 4 <= colours.max() + 1 <= 5
 
 
 def test_blocks_that_touch_are_refused_unless_kept_apart():
+    cube = bar(0.05, 0.05, (1, 1, 1))
+    blocks = {"left": (cube, (0.0, 0.0, 0.0)), "right": (cube, (0.05, 0.0, 0.0))}
     with pytest.raises(InputError, match=r"weld_tolerance=.* or keep_coincident=True"):
-        placed_together(BLOCKS)
-    made = placed_together(BLOCKS, keep_coincident=True)
+        placed_together(blocks)
+    made = placed_together(blocks, keep_coincident=True)
     assert made.point_count == 16
-    assert topology_of(made).bond_count == 2 * topology_of(CUBE).bond_count
-
-
-def test_a_crack_has_two_free_faces_for_each_bond_it_cuts():
-    whole, points, bodies = cracked()
-    made = checked_mesh(points, bodies, {}, keep_coincident=True)
-    before, after = topology_of(whole), topology_of(made)
-    cut = before.bond_count - after.bond_count
-    assert cut == 2 and after.outer_count == before.outer_count + 2 * cut
-
-
-def touching_blocks(speed):
-    """Simulation of two blocks that touch, the left one moving along x."""
-    mesh = placed_together(BLOCKS, keep_coincident=True)
-    listed = [effects.BondDamping(), effects.SphereContact(outer_faces=True)]
-    velocity = np.zeros((12, 3))
-    velocity[:6, 0] = speed
-    return Simulation(Scene(mesh, CONCRETE, listed, velocity=velocity), Uniform(2e-9))
-
-
-def test_blocks_at_rest_stay_and_blocks_that_part_go_free():
-    """Spheres touch at a gap of zero: what rounding overlaps pushes less than 1e-12 m/s."""
-    resting = touching_blocks(0.0)
-    resting.advance_to(500)
-    assert np.abs(resting.values(resting.state.velocity)).max() < 1e-12
-    parting = touching_blocks(-0.5)
-    parting.advance_to(500)
-    velocity = parting.values(parting.state.velocity)
-    assert np.abs(velocity[6:]).max() < 1e-12
-    assert np.abs(velocity[:6, 0] + 0.5).max() < 1e-12
-
-
-def test_a_block_pushes_the_one_it_touches():
-    """Half of the momentum has gone over when both are as fast; none is lost."""
-    simulation = touching_blocks(0.5)
-    simulation.advance_to(5000)
-    velocity, mass = simulation.values(simulation.state.velocity), simulation.model.body_mass
-    momentum = mass[:, None] * velocity
-    assert momentum[6:, 0].sum() > 0.4 * 0.5 * mass[:6].sum()
-    assert momentum[:, 0].sum() == pytest.approx(0.5 * mass[:6].sum(), rel=1e-12)
-    assert simulation.report().missing_effects == ()
+    assert topology_of(made).bond_count == 2 * topology_of(cube).bond_count

@@ -5,9 +5,7 @@ Estimates before a run judge each connected part by its own stress and motion.
 """
 
 import re
-import sys
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,9 +27,7 @@ from taichi_dem.engine import ENGINES
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.effect_table import NEEDED, SMALL, TRY, EffectTable, EffectUse
 from taichi_dem.mesh.shapes import bar, pair
-from taichi_dem.report.effects import effect_uses
-from taichi_dem.report.energy_balance import TERMS, energy_put_in
-from taichi_dem.report.readings import Run
+from taichi_dem.report.energy_balance import energy_put_in
 from taichi_dem.state.model import Model
 from tests.probe import BondProbe
 
@@ -40,7 +36,6 @@ STEP, UNTIL = 1e-7, 1e-5
 GENTLE = effects.BondDamping, effects.Softening, effects.Gravity
 LAWS = effects.Softening, effects.ShearSlip, effects.BondDamping
 METHOD = Uniform(1e-7)
-module = sys.modules[needed_effects.__module__]
 
 
 def ran(*listed):
@@ -75,25 +70,6 @@ def test_weight_of_all_is_all_the_work(gentle):
     assert use.events == use.of == 2
     assert use.share == pytest.approx(1.0, rel=1e-12)
     assert use.energy_J == pytest.approx(0.5 * mass * (9.81 * UNTIL) ** 2, rel=1e-9)
-
-
-def used(listed, bits=0, marked=0, heat=0.0, **account):
-    """What is said of effects whose account holds these terms [J]; every effect by its name.
-
-    bits: of ``State.active_effects``, of the first body. marked: bonds softened and slipped.
-    heat: in each bond [J].
-    """
-    model = Model(pair(), CONCRETE, listed)
-    simulation = Simulation(Scene(pair(), CONCRETE), Uniform(STEP))
-    state, schedule = simulation.state, simulation.schedule
-    assign(state.active_effects, [bits, 0])
-    assign(schedule.evaluations, [100])
-    balance = SimpleNamespace(start_energy=0.0, works=lambda: np.zeros((2, 4)))
-    bonds = {"active_bonds": np.full((1, 2), marked > 0), "bonds": np.full((1, 5), heat)}
-    readings = SimpleNamespace(**{name: lambda one=one: one for name, one in bonds.items()})
-    filled = {**dict.fromkeys(TERMS, 0.0), **account}
-    run = Run(model, state, schedule, None, readings, None)
-    return {use.effect: use for use in effect_uses(run, balance, filled)}
 
 
 def test_energy_that_bodies_have_at_the_start_is_put_in():
@@ -140,18 +116,12 @@ def test_effects_stand_in_the_order_of_their_influence():
     assert list(measured["advice"][["rub", "drag", "break"]]) == ["keep", "drop", TRY]
 
 
-@pytest.mark.parametrize("place", range(3))
-def test_every_load_and_support_has_a_bit_of_its_own(place):
-    """Loads first, in the order of the list, then supports."""
-    listed = [effects.Gravity(), effects.GasPressure("left"), effects.Fixed("right")]
-    found = used(listed, 1 << place)
-    assert [use.events for use in found.values()] == [int(k == place) for k in range(3)]
-
-
 def pulled(*listed, speed=2.0):
     """A bar whose end is pulled until it breaks where it can."""
     drive = effects.PrescribedMotion("right", (speed, 0.5 * speed, 0.0), 900.0)
-    return Scene(bar(0.2, 0.1, (2, 1, 1)), CONCRETE, [*listed, effects.Fixed("left"), drive])
+    loads = effects.Gravity(), effects.GasPressure("left", start=1.0)
+    acting = [*listed, *loads, effects.Fixed("left"), drive]
+    return Scene(bar(0.2, 0.1, (2, 1, 1)), CONCRETE, acting)
 
 
 def result_of(scene):
@@ -165,9 +135,9 @@ def scene(taichi_session):
 
 def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(scene):
     assert result_of(scene).report.broken_faces > 0
-    before = len(ENGINES._engines)
+    before = ENGINES.count
     silent = result_of(pulled(*(law().silent() for law in LAWS)))
-    assert len(ENGINES._engines) == before
+    assert ENGINES.count == before
     without = result_of(pulled())
     for key, column in silent.series.items():
         assert column.tobytes() == without.series[key].tobytes(), key
@@ -175,6 +145,12 @@ def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(scene
         assert frame.position.tobytes() == other.position.tobytes()
     assert silent.report.effects == without.report.effects
     assert silent.report.energy_balance == without.report.energy_balance
+
+
+def test_every_load_and_support_is_judged_by_its_own_bodies(scene):
+    """Weight acts on all, a gas that never comes on none, supports on those that they move."""
+    found = {use.effect: use.events for use in result_of(scene).report.effect_activity}
+    assert list(found.values())[len(LAWS) :] == [12, 0, 2, 2]
 
 
 def test_what_steers_is_judged_by_a_run_without_it(scene):
@@ -191,8 +167,11 @@ BLOCK = shapes.block(0.1, element=0.1)
 HALVES = join(BLOCK, BLOCK.moved(by=(0.101, 0.0, 0.0)), names=["left", "right"])
 
 
-def passed(probe):
-    return [tick >= 0 for tick in values(probe.state.passed)[0]]
+@pytest.fixture(scope="module")
+def probes(taichi_session):
+    """The pair with elastic bonds, and with bonds that soften and slip."""
+    laws = effects.Softening(), effects.ShearSlip()
+    return BondProbe(pair(EDGE), []), BondProbe(pair(EDGE), laws)
 
 
 @pytest.mark.parametrize(
@@ -207,18 +186,18 @@ def passed(probe):
         (0.5, 0.70, [False, False]),
     ],
 )
-def test_limits_are_those_of_the_laws(pull, slide, expected):
+def test_limits_are_those_of_the_laws(probes, pull, slide, expected):
     """Tension and slip are noted where Softening and ShearSlip would have acted, unit by unit.
 
     Strength and cohesion of concrete are one number; the limit in shear is c - 0.58 of the pull.
     """
+    elastic, acting = probes
     tractions = CONCRETE.tensile_strength * np.array([pull, slide, 0.0])
-    probe = BondProbe(pair(EDGE), [])
-    opening = tractions / probe.model.bond_stiffness[0][[0, 1, 1]]
-    probe.open(opening)
-    assert passed(probe) == expected
-    acting = BondProbe(pair(EDGE), [effects.Softening(), effects.ShearSlip()])
-    acting.open(opening)
+    for probe in probes:
+        probe.reset()
+        assign(probe.state.passed, -1)
+        probe.open(tractions / probe.model.bond_stiffness[0][[0, 1, 1]])
+    assert [tick >= 0 for tick in values(elastic.state.passed)[0]] == expected
     assert list(acting.simulation.readings.active_bonds()[0]) == expected
 
 

@@ -77,12 +77,3 @@ def test_points_of_a_turning_bar_move_on_their_circles(result):
         )
         assert not got.displacement[0].any()
         np.testing.assert_allclose(got.velocity[0], V + np.cross(W, arm), rtol=1e-12)
-
-
-def test_a_callback_hears_of_the_run_to_its_end():
-    told = []
-    scene = Scene(bar(0.4, 0.1, (4, 1, 1)), CONCRETE, [])
-    simulate(scene, method=Uniform(1e-6), until=1e-3, progress=told.append)
-    shares = [progress.share for progress in told if progress.phase == "stepping"]
-    assert shares == sorted(shares)
-    assert (told[-1].share, told[-1].seconds_left) == (1.0, 0.0)

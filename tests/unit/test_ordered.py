@@ -5,7 +5,7 @@ import pytest
 import taichi as ti
 
 from taichi_dem.kit import ordered
-from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.allocation import FieldTree, assign, values
 from taichi_dem.kit.ordered import CountingSort, Grouping, RunningSums, Some, side_by_side
 
 MOST, KEYS = 6000, 7
@@ -88,12 +88,15 @@ class Lists:
         return 2 * a
 
 
-@pytest.fixture(params=[(1024, 64), (1, 64), (5, 2000)], ids=str)
-def lists(request, monkeypatch):
+@pytest.fixture(scope="module", params=[(1024, 64), (1, 64), (5, 2000)], ids=str)
+def lists(request, taichi_session):
     """The lists in chunks of some size, each phase a parallel loop."""
-    monkeypatch.setattr(ordered, "_CPU", request.param)
-    monkeypatch.setattr(ordered, "_SERIAL_UP_TO", 0)
-    return Lists()
+    with pytest.MonkeyPatch.context() as change:
+        change.setattr(ordered, "_CPU", request.param)
+        change.setattr(ordered, "_SERIAL_UP_TO", 0)
+        with FieldTree():
+            made = Lists()
+        yield made
 
 
 @pytest.mark.parametrize("count", [1, 2, 63, 1024, 1025, 5999])

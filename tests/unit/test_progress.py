@@ -12,12 +12,12 @@ from taichi_dem.kit.progress import Progress
 from taichi_dem.mesh.shapes import bar
 from tests.terminal import phases_of
 
-SCENE = Scene(bar(0.4, 0.1, (4, 1, 1)), CONCRETE, [])
 HOUR = 3600.0
 
 
 def run(**options):
-    simulate(SCENE, method=Uniform(1e-6), until=1e-4, samples=2, **options)
+    scene = Scene(bar(0.4, 0.1, (4, 1, 1)), CONCRETE, [])
+    simulate(scene, method=Uniform(1e-6), until=1e-4, samples=2, **options)
 
 
 @pytest.fixture(autouse=True)
@@ -39,18 +39,17 @@ def lines(capsys):
     return capsys.readouterr().err.splitlines()
 
 
-def test_a_run_of_a_users_own_script_writes_a_line_a_phase(capsys):
+def test_a_run_writes_a_line_a_phase_and_none_where_a_listener_hears_or_none_is_wanted(capsys):
     run(title="mine")
     phases, others = phases_of(capsys.readouterr().err)
     assert [line.split(": ")[1] for line in phases][-1].startswith("stepping")
     assert {line.split()[1] for line in phases} >= {"compiling", "stepping"} and others == []
-
-
-def test_no_listener_hears_of_compiling_twice_and_none_is_silent(capsys):
     told = []
     run(progress=told.append)
     run(progress=None)
     assert "compiling" in {one.phase for one in told} and lines(capsys) == []
+    shares = [one.share for one in told if one.phase == "stepping"]
+    assert shares == sorted(shares) and (shares[-1], told[-1].seconds_left) == (1.0, 0.0)
 
 
 def test_the_phases_of_a_bar_below_another_are_said_of_the_outer_one(capsys):
@@ -74,10 +73,10 @@ def test_a_long_phase_is_spoken_of_now_and_then(capsys, clock):
     assert 20 < len(said) < 80
 
 
-@pytest.mark.parametrize("seconds", [1e-3, 1.0, 30.0])
+@pytest.mark.parametrize("seconds", [1e-3, 30.0])
 def test_many_runs_write_few_lines(capsys, clock, seconds):
-    """100,000 runs, each with a title and two phases of its own."""
-    for k in range(100_000):
+    """10,000 runs, each with a title and two phases of its own."""
+    for k in range(10_000):
         with ProgressBar(f"run {k}") as shown:
             for phase in ("compiling", "stepping"):
                 shown(Progress(0.0, 0.0, phase))
@@ -85,21 +84,11 @@ def test_many_runs_write_few_lines(capsys, clock, seconds):
     assert 2 <= len(lines(capsys)) < 300
 
 
-def test_a_second_compilation_is_told_after_a_silence(capsys, clock):
-    for _ in range(2):
-        with ProgressBar("same") as shown:
-            shown(Progress(0.0, 0.0, "compiling", "1 of 5"))
-            clock.now += 5.0
-    assert len(lines(capsys)) == 2
-
-
 def test_a_run_ends_well_where_its_lines_cannot_be_written(monkeypatch):
     class Left(io.StringIO):
         def write(self, text):
             raise BrokenPipeError(32, "Broken pipe")
 
-    closed = io.StringIO()
-    closed.close()
-    for stream in (Left(), closed, None):
+    for stream in (Left(), None):
         monkeypatch.setattr(sys, "stderr", stream)
         run()

@@ -1,4 +1,7 @@
-"""Taichi starts once in a process, stops, starts anew, and finds its compiled kernels again."""
+"""Taichi starts once in a process, stops, starts anew, and finds its compiled kernels again.
+
+What a device lacks, refuses or loses is one sentence.
+"""
 
 import json
 import os
@@ -7,9 +10,14 @@ import sys
 import time
 
 import pytest
+import taichi as ti
+from taichi._snode.fields_builder import FieldsBuilder
+from taichi.lang import impl
 
 from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, runtime
 from taichi_dem.kit import backend
+from taichi_dem.kit.allocation import CapacityError, FieldTree, assign, values
+from taichi_dem.kit.launch import Launch
 from taichi_dem.mesh.shapes import bar
 from tests.scenes import ROOT
 
@@ -50,22 +58,23 @@ print(json.dumps(said))
 """
 
 
-def answers(tmp_path, text=_SCRIPT, **environment):
-    """What a script says as JSON, run without HOME and with a misleading TI_ARCH."""
-    script = tmp_path / "script.py"
-    script.write_text(text)
-    variables = {k: v for k, v in os.environ.items() if k != "HOME"}
-    variables.update(PYTHONPATH=ROOT, TI_ARCH="cuda", **environment)
-    done = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, cwd=tmp_path, env=variables
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+def run(text, **environment):
+    """A program in a process of its own."""
+    variables = {**os.environ, "PYTHONPATH": ROOT, **environment}
+    variables = {name: value for name, value in variables.items() if value is not None}
+    line = [sys.executable, "-c", text]
+    return subprocess.run(line, capture_output=True, text=True, env=variables)
+
+
+def answers(text, **environment):
+    """What a program says as JSON, run without HOME and with a misleading TI_ARCH."""
+    done = run(text, **{"HOME": None, "TI_ARCH": "cuda", **environment})
+    assert (done.returncode, done.stderr) == (0, "")
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def test_sessions_start_once_and_say_why_they_refuse(tmp_path):
-    said = answers(tmp_path)
+def test_sessions_start_once_and_say_why_they_refuse():
+    said = answers(_SCRIPT)
     assert "call runtime.start() first" in said["not started"]
     assert said["same"] and said["untouched"]
     assert "already runs" in said["other"] and "call stop()" in said["other"]
@@ -92,15 +101,15 @@ def test_only_a_lock_left_by_a_killed_process_is_removed(tmp_path, age_s, remove
     lock.touch()
     left_at = time.time() - age_s
     os.utime(lock, (left_at, left_at))
-    answers(tmp_path, _SILENT_START, TI_OFFLINE_CACHE_FILE_PATH=str(tmp_path))
+    answers(_SILENT_START, TI_OFFLINE_CACHE_FILE_PATH=str(tmp_path))
     assert lock.exists() != removed
     # With the lock free, the next process finds this one's kernels compiled.
     assert bool(list(lock.parent.glob("*.tic"))) == removed
 
 
 @pytest.mark.parametrize("package", ["taichi_dem", "ca_damper"])
-def test_importing_a_package_imports_nothing_that_few_runs_need(package, tmp_path):
-    loaded = answers(tmp_path, f"import json, sys, {package}; print(json.dumps([*sys.modules]))")
+def test_importing_a_package_imports_nothing_that_few_runs_need(package):
+    loaded = answers(f"import json, sys, {package}; print(json.dumps([*sys.modules]))")
     assert not {"scipy", "pandas", "matplotlib", "rich", "argparse"} & {*loaded}
 
 
@@ -108,10 +117,7 @@ def test_importing_a_package_imports_nothing_that_few_runs_need(package, tmp_pat
 def test_a_machine_without_a_device_is_told_what_it_lacks():
     """A loader of Vulkan that finds no driver stands for a machine without one."""
     program = 'from taichi_dem import runtime; runtime.start("gpu")'
-    environment = {**os.environ, "PYTHONPATH": ROOT, "VK_ICD_FILENAMES": os.devnull}
-    line = [sys.executable, "-c", program]
-    done = subprocess.run(line, capture_output=True, text=True, env=environment)
-    said = done.stderr.splitlines()[-1]
+    said = run(program, VK_ICD_FILENAMES=os.devnull).stderr.splitlines()[-1]
     assert "'gpu'" in said
     assert "no CUDA device and no Vulkan driver" in said
 
@@ -125,3 +131,41 @@ def test_a_scene_that_a_device_cannot_hold_is_refused_with_the_number_that_fits(
     monkeypatch.setattr(backend, "most_bytes", lambda: whole.tree.bytes - 1)
     with pytest.raises(InputError, match=f"about {bodies - 1} bodies fit"):
         Simulation(scene, Uniform(1e-8))
+
+
+class Lost:
+    """A program, and a context of a launch, of a device that has gone."""
+
+    def set_arg_int(self, place, value):
+        """Take an argument."""
+
+    def launch_kernel(self, compiled, context):
+        """Find no device."""
+        raise RuntimeError("CUDA_ERROR_LAUNCH_FAILED:\n unspecified launch failure")
+
+
+@pytest.mark.parametrize("call", [Launch.__call__, Launch.queue])
+def test_a_lost_device_is_told_with_what_to_do(call, monkeypatch):
+    monkeypatch.setattr(impl.get_runtime(), "prog", Lost())
+    monkeypatch.setattr(backend, "is_cpu", lambda: False)
+    launch = Launch(None)
+    launch._ready = (impl.get_runtime().prog, None, Lost, [0], True)
+    with pytest.raises(InputError, match=r"^the device no longer answers .*checkpoint, or"):
+        call(launch, 1)
+
+
+def test_memory_that_a_device_refuses_is_told_with_its_size(monkeypatch):
+    """Nothing of the tree is left: the next one is allocated."""
+
+    def refuse(self, raise_warning):
+        raise RuntimeError("out of memory")
+
+    with monkeypatch.context() as change:
+        change.setattr(FieldsBuilder, "finalize", refuse)
+        with pytest.raises(CapacityError, match=r"^this needs .* GB, .*\(out of memory\): smaller"):
+            with FieldTree("smaller"):
+                ti.field(ti.f64, shape=1000)
+    with FieldTree():
+        field = ti.field(ti.f64, shape=3)
+    assign(field, [1.0, 2.0, 3.0])
+    assert values(field).tolist() == [1.0, 2.0, 3.0]

@@ -131,38 +131,23 @@ def test_bodies_that_overlap_at_the_start_are_told_at_once_and_rest_as_they_are(
 
 
 SIZE, CELL = 3.0, 0.3
+BLOCK = bar(5 * CELL, 3 * CELL, (5, 3, 3))
+TOP = BLOCK.points.max(axis=0) * [0.5, 1.0, 0.5]
 
 
-class Sunk(Looked):
-    """A vertex of a regular tetrahedron of 3 m above the middle of a block of elements of 0.3 m."""
+def sunk(depth, aside=(0.0, 0.0)):
+    """A vertex of a tetrahedron of 3 m at a depth [m] in a block of elements of 0.3 m.
 
-    def __init__(self):
-        block, large = bar(5 * CELL, 3 * CELL, (5, 3, 3)), single(SIZE)
-        parts = {"block": (block, (0, 0, 0)), "large": (large, (0, 20.0, 0))}
-        super().__init__(placed_together(parts), effects.BodyContact(outer_faces=True))
-        top = self.model.mesh.points[: len(block.points)]
-        self.top = np.array([0.5 * np.ptp(top[:, 0]), top[:, 1].max(), 0.5 * np.ptp(top[:, 2])])
-        self.top += [top[:, 0].min(), 0.0, top[:, 2].min()]
-        arms = self.volume.arms[-1]
-        down = arms[0] / np.linalg.norm(arms[0])
-        # Turned by the shortest way, so that its first corner is the lowest.
-        axis = np.cross(down, [0.0, -1.0, 0.0])
-        self.turn = np.array([1.0 - down[1], *axis])
-        self.turn /= np.linalg.norm(self.turn)
-        self.reach = np.linalg.norm(arms[0])
-
-    def at(self, depth, aside=(0.0, 0.0)):
-        """Figures of the vertex at a depth [m] and a place from the middle [m]."""
-        place, still = (
-            self.model.centre.copy(),
-            np.tile([1.0, 0, 0, 0], (len(self.model.centre), 1)),
-        )
-        place[-1] = self.top + np.array([aside[0], self.reach - depth, aside[1]])
-        still[-1] = self.turn
-        # Looks anew, with nothing before it.
-        self.volume = SharedVolume(self.simulation.parts)
-        self.shares(place, still, 1.0)
-        return self.volume.worst, self.volume.findings()
+    aside: its place from the middle of the block's top [m]. Returns the worst of all pairs, what is
+    told, and the least height of the elements [m].
+    """
+    up = [[0.0, 0.0, 0.0], [0.6, 0.8, 0.0], [-0.3, 0.8, 0.5], [-0.3, 0.8, -0.5]]
+    corners = TOP + [aside[0], -depth, aside[1]] + SIZE * np.array(up)
+    large = checked_mesh(corners, [[0, 1, 2, 3]], {})
+    parts = {"block": (BLOCK, (0, 0, 0)), "large": (large, (0, 0, 0))}
+    looked = Looked(placed_together(parts), effects.BodyContact(outer_faces=True))
+    looked.shares(looked.model.centre, time_s=1.0)
+    return looked.volume.worst, looked.volume.findings(), looked.volume.height[:-1].min()
 
 
 def test_a_vertex_deep_in_bonded_bodies_is_told_with_its_depth():
@@ -171,39 +156,32 @@ def test_a_vertex_deep_in_bonded_bodies_is_told_with_its_depth():
     In the middle of a face, less deep than half of the way to its border, its depth is the way that
     parts the two; beside a border of elements one of them parts by less, and never by more.
     """
-    sunk, random = Sunk(), np.random.default_rng(1)
-    corners = sunk.model.mesh.points[all_faces(sunk.model.mesh.tetrahedra[:-1])]
-    upper = np.isclose(corners[..., 1], sunk.top[1]).all(axis=1)
-    middles = (corners[upper].mean(axis=1) - sunk.top)[:, [0, 2]]
-    least = sunk.volume.height[:-1].min()
-    for depth, aside in zip(random.uniform(0.02, 0.03, 6), middles):
-        worst, told = sunk.at(depth, aside)
+    random = np.random.default_rng(1)
+    corners = BLOCK.points[all_faces(BLOCK.tetrahedra)]
+    upper = np.isclose(corners[..., 1], TOP[1]).all(axis=1)
+    middles = (corners[upper].mean(axis=1) - TOP)[:, [0, 2]]
+    for depth, aside in zip(random.uniform(0.02, 0.03, 4), middles):
+        worst, told, _ = sunk(depth, aside)
         assert worst.depth_m == pytest.approx(depth, rel=1e-9)
         assert any(f"{1e3 * depth:.3g} mm" in words for words in told)
-    for depth in random.uniform(0.06, 0.12, 12):
-        worst, told = sunk.at(depth, random.uniform(-0.3, 0.3, 2))
-        assert worst.deepest[1] == len(sunk.model.centre) - 1 and worst.share < 0.1
+    for depth in random.uniform(0.06, 0.12, 6):
+        worst, told, least = sunk(depth, random.uniform(-0.3, 0.3, 2))
+        assert worst.deepest[1] == BLOCK.body_count and worst.share < 0.1
         assert DEPTH * least < worst.depth_m <= depth * (1.0 + 1e-9) and told
     for depth in (-1e-3, 0.9 * DEPTH * least):
-        worst, told = sunk.at(depth)
+        worst, told, _ = sunk(depth)
         assert not (worst.depth_share or told)
 
 
-def test_bodies_side_by_side_are_not_deep_in_each_other():
+@pytest.mark.parametrize("scale", [(1, 1, 1), (0.025, 1, 1), (1, 0.025, 0.025)])
+@pytest.mark.parametrize("mesh", [bar(1.0, 1.0, (2, 2, 2)), pair(1.0)], ids=["bar", "pair"])
+def test_bodies_side_by_side_are_not_deep_in_each_other(mesh, scale):
     """Bonded or not, with a rounding between them, flat, or long and thin."""
-    random = np.random.default_rng(3)
-    for scale in ([1.0, 1.0, 1.0], [1.0 / 40.0, 1.0, 1.0], [1.0, 1.0 / 40.0, 1.0 / 40.0]):
-        for mesh in (bar(1.0, 1.0, (2, 2, 2)), pair(1.0)):
-            whole = mesh.moved(by=(0.0, 0.0, 0.0))
-            flat = checked_mesh(whole.points * scale, whole.tetrahedra, {})
-            cut = checked_mesh(
-                flat.points[flat.tetrahedra].reshape(-1, 3),
-                np.arange(4 * flat.body_count).reshape(-1, 4),
-                {},
-                keep_coincident=True,
-            )
-            for one in (flat, cut):
-                looked = Looked(one, effects.BodyContact(outer_faces=True))
-                noise = 1e-15 * random.standard_normal(looked.model.centre.shape)
-                looked.shares(looked.model.centre + noise, time_s=1.0)
-                assert not looked.volume.worst.depth_share and not looked.volume.findings()
+    flat = checked_mesh(mesh.points * scale, mesh.tetrahedra, {})
+    loose = flat.points[flat.tetrahedra].reshape(-1, 3)
+    bodies = np.arange(len(loose)).reshape(-1, 4)
+    for one in (flat, checked_mesh(loose, bodies, {}, keep_coincident=True)):
+        looked = Looked(one, effects.BodyContact(outer_faces=True))
+        noise = 1e-15 * np.random.default_rng(3).standard_normal(looked.model.centre.shape)
+        looked.shares(looked.model.centre + noise, time_s=1.0)
+        assert not looked.volume.worst.depth_share and not looked.volume.findings()

@@ -8,14 +8,11 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections import Counter
+from functools import partial
 from pathlib import Path
-
-import pytest
 
 from tests.docs.pages import FOLDER
 from tests.mutants import faults, table
-from tests.processes import users_environment
 
 ROOT = Path(__file__).resolve().parents[2]
 # A module imports from its own layer and those before it; a folder counts as one module.
@@ -146,58 +143,29 @@ def test_taichi_starts_in_one_place():
     assert "fast_math=False" in text_of(paths[0])
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
-    """The wheel, made without the network of nothing but its sources."""
-    folder = tmp_path_factory.mktemp("wheel")
-    ignored = shutil.ignore_patterns("__pycache__")
+def test_the_wheel_carries_all_files_of_both_packages_and_no_others(tmp_path):
+    """Made without the network, of nothing but its sources."""
+    whole = partial(shutil.copytree, ignore=shutil.ignore_patterns("__pycache__"))
     for name in SOURCES:
-        if (FOLDER / name).is_file():
-            shutil.copy(FOLDER / name, folder / name)
-        else:
-            shutil.copytree(FOLDER / name, folder / name, ignore=ignored)
+        copy = shutil.copy if (FOLDER / name).is_file() else whole
+        copy(FOLDER / name, tmp_path / name)
     line = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--no-index"]
     line += ["--no-deps", "--no-build-isolation", "--wheel-dir", "made", "."]
-    done = subprocess.run(line, cwd=folder, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stdout + done.stderr
-    (path,) = (folder / "made").glob("*.whl")
-    return zipfile.ZipFile(path)
-
-
-def test_the_wheel_carries_all_files_of_both_packages_and_no_others(wheel):
+    (path,) = (tmp_path / "made").glob("*.whl")
     expected = {
         path.relative_to(FOLDER).as_posix()
         for package in ("taichi_dem", "ca_damper")
         for path in (FOLDER / package).rglob("*")
         if path.is_file() and path.suffix != ".pyc"
     }
-    assert {name for name in wheel.namelist() if ".dist-info/" not in name} == expected
-
-
-def test_libraries_of_pictures_and_mesh_files_are_imported_where_they_are_used():
-    """They take half of a second, of a program that draws nothing too."""
-    named = "import blast_fracture, demo_damper, sys"
-    text = f"{named}; print(*{{'matplotlib', 'PIL', 'meshio'}} & {{*sys.modules}})"
-    options = {"capture_output": True, "text": True, "cwd": FOLDER / "experiments"}
-    environment = users_environment(PYTHONPATH=str(FOLDER))
-    done = subprocess.run([sys.executable, "-c", text], env=environment, **options)
-    assert (done.stdout, done.stderr) == ("\n", "")
-
-
-LEAST = {
-    **{"bond laws": 15, "stepping and levels": 15, "solved dashpots": 12, "contact and search": 15},
-    **{"loads and supports": 8, "account and certificate": 10, "meshes and materials": 8},
-    **{"automaton": 12, "spheres": 8, "coupling and rk45": 7, "bars": 10},
-}
+    found = zipfile.ZipFile(path).namelist()
+    assert {name for name in found if ".dist-info/" not in name} == expected
 
 
 def test_every_mutant_can_be_made_and_names_tests_that_are_there():
     assert [fault for mutant in table() for fault in faults(mutant)] == []
-
-
-def test_no_area_of_the_physics_is_forgotten():
-    count = Counter(mutant.area for mutant in table())
-    assert {area: count[area] for area in LEAST if count[area] < LEAST[area]} == {}
 
 
 #: Functions that no device has in doubles, or each in bits of its own: ``kit.elementary`` has some.

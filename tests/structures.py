@@ -1,0 +1,35 @@
+"""Structures that tests compile: sets of effects by name, each with the question it answers.
+
+Every set of effects and kind of method has kernels of its own, which take seconds to compile. A
+test takes one of these sets, with its own effects in it; the others of the set do nothing, to the
+bit. A test that needs another set adds a row and says what it is for.
+"""
+
+from taichi_dem import effects
+
+#: Effects by name of the set, in their order.
+STRUCTURES = {
+    # What follows from motion and from elastic or damped, breaking or slipping bonds.
+    "bonds": (effects.BondDamping, effects.Softening, effects.ShearSlip, effects.GasPressure),
+    # The same with contact of spheres: the paper's block, and all that has its bits.
+    "paper": (
+        *(effects.BondDamping, effects.Softening, effects.ShearSlip),
+        *(effects.SphereContact, effects.Friction, effects.GasPressure),
+    ),
+}
+
+
+def filled(name, *own, group="left"):
+    """Effects of a set: own ones, and for the others some that never act.
+
+    group: of faces, which the gas that never comes would push on.
+    """
+    given = {type(one): one for one in own}
+    made = [given.pop(kind, None) or _idle(kind, group) for kind in STRUCTURES[name]]
+    assert not given, f"not in the set {name}: {[*given]}"
+    return made
+
+
+def _idle(kind, group):
+    """An effect that never acts."""
+    return kind(group, start=1.0) if kind is effects.GasPressure else kind().silent()
