@@ -20,6 +20,7 @@ results/damper_demo/; with --all-pictures also view.html, which plays the film; 
 neither picture nor film.
 """
 
+import textwrap
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -49,7 +50,6 @@ from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.kit.study.entries import Entry
-from taichi_dem.kit.terminal import show_paragraph
 
 NAME = "damper_demo"
 FILLINGS = {"automaton": Automaton, "spheres": Spheres}
@@ -117,7 +117,7 @@ def let_go(options: Namespace, name: str) -> None:
     report.write(at("report.json"))
     write_text(at("caption.txt"), " ".join(words) + "\n")
     for sentence in words:
-        show_paragraph(sentence)
+        print(textwrap.fill(sentence, 100))
     study.show_report(options, report)
     draw = partial(picture, decays, (rigid, shown), options)
     study.finish(options, name, figures_of(decays, options), reports.values(), draw=draw)

@@ -1,4 +1,8 @@
-"""Lists of the contents of a package, made from its modules and their docstrings."""
+"""Lists of the contents of a package, made from its modules and their docstrings.
+
+``python -m taichi_dem`` and ``python -m ca_damper`` print them; names are dotted, as ``import`` and
+``python -m pydoc`` take them.
+"""
 
 import argparse
 import ast
@@ -9,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from taichi_dem.kit.terminal import lasting_output, show_heading, show_names
+from taichi_dem.kit.terminal import aligned, lasting_output, show_heading
 from taichi_dem.kit.validation import shown
 from taichi_dem.kit.version import __version__
 
@@ -36,35 +40,42 @@ def run(
     parser.parse_args(given)
     with lasting_output():
         show_heading(f"{package.__name__} {__version__}: {_first_line(package.__doc__)}")
-        for title, module in parts.items():
-            show_names(title, _rows(module))
-        show_names("Scenes, runs and results", _rows(package))
-        show_names("Demonstration", [(f"python -m {package.__name__} demo", demo)])
-        show_names(f"Experiments, in {_ROOT}", _experiments())
+        for title, module in {**parts, "Scenes, runs and results": package}.items():
+            _show(title, _rows(module))
+        _show("Demonstration", [(f"python -m {package.__name__} demo", demo)])
+        if _IS_CHECKOUT:
+            _show(f"Experiments, in {_ROOT}", _experiments())
     return 0
 
 
+def _show(title, rows):
+    """Print a title and, below it, names with a line on each."""
+    show_heading(f"\n{title}")
+    print(*aligned([(f"  {name}", line) for name, line in rows]), sep="\n")
+
+
 def _rows(module):
-    own = [
-        name
-        for name, thing in vars(module).items()
-        if not name.startswith("_") and getattr(thing, "__module__", "") == module.__name__
-    ]
+    """Rows of the public names of a module: of its ``__all__``, or of what it itself defines."""
+    own = [name for name, thing in vars(module).items() if _is_own(name, thing, module)]
     for name in getattr(module, "__all__", own):
         thing = getattr(module, name)
         documented = inspect.isclass(thing) or inspect.isroutine(thing) or inspect.ismodule(thing)
-        yield (
-            f"{module.__name__}.{name}",
-            _first_line(thing.__doc__) if documented else shown(thing),
-        )
+        line = _first_line(thing.__doc__) if documented else shown(thing)
+        yield f"{module.__name__}.{name}", line
+
+
+def _is_own(name, thing, module):
+    return name[0] != "_" and getattr(thing, "__module__", "") == module.__name__
 
 
 def _experiments():
-    paths = sorted((_ROOT / "experiments").glob("[a-z]*.py")) if _IS_CHECKOUT else ()
-    return [(f"python experiments/{path.name}", _docstring(path)) for path in paths]
+    """Rows of the scripts of a checkout; they are read, not run."""
+    for path in sorted((_ROOT / "experiments").glob("[a-z]*.py")):
+        yield f"python experiments/{path.name}", _docstring(path)
 
 
 def _docstring(path):
+    """First line of the docstring of a script."""
     return _first_line(ast.get_docstring(ast.parse(path.read_bytes())))
 
 

@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from datetime import timedelta
 
 from taichi_dem.kit.validation import FileName
 
@@ -47,19 +48,10 @@ class Progress:
         """Phase, percent done, time left and words in one line."""
         if self.phase in _UNTIMED:
             return f"{self.phase} {self.words}"
-        done = f"{self.phase} {100.0 * self.share:3.0f} %"
-        return ", ".join(part for part in (done, time_left(self.seconds_left), self.words) if part)
-
-
-def time_left(seconds: float) -> str:
-    """Remaining time [s] in words, no finer than it is known; "" if unknown."""
-    if not math.isfinite(seconds):
-        return ""
-    if seconds < 90.0:
-        return f"{seconds:.0f} s left"
-    if seconds < 5400.0:
-        return f"{seconds / 60.0:.0f} min left"
-    return f"{seconds / 3600.0:.1f} h left"
+        done, left = f"{self.phase} {100.0 * self.share:3.0f} %", ""
+        if math.isfinite(self.seconds_left):
+            left = f"{timedelta(seconds=round(self.seconds_left))} left"
+        return ", ".join(part for part in (done, left, self.words) if part)
 
 
 class Pace:

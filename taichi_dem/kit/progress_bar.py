@@ -1,12 +1,13 @@
 """A progress bar on a terminal and in Jupyter; elsewhere a line a phase."""
 
 import contextlib
+import functools
 import html
 import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from taichi_dem.kit.progress import Listener, Pace, Progress, listening
@@ -14,15 +15,13 @@ from taichi_dem.kit.validation import fraction, instance, progress_option, shown
 
 #: Least time between two updates of a cell in Jupyter [s].
 _NOTEBOOK_SECONDS = 0.2
-#: Columns of a terminal below which there is no room for the bar beside its words.
-_NARROW = 70
-#: Bars that are shown now; a second one below the first would garble both.
-_open_bars: list["ProgressBar"] = []
-#: Silence after which there is another line: of a phase that begins again, and of one that goes
-#: on [s]; and its least share of the time since the first line, so that long jobs have few.
-_BEGINS, _GOES_ON, _SHARE = 0.5, 30.0, 0.1
+#: Silence after which a phase has another line [s], and its least share of the time since the first
+#: line, so that long jobs have few.
+_SILENCE, _SHARE = 30.0, 0.1
 #: Most titles and phases that have a line as they begin, however short the silence.
 _MOST_SAID = 100
+#: Bars that are shown now; a second one below the first would garble both.
+_open_bars: list["ProgressBar"] = []
 
 
 class ProgressBar:
@@ -48,7 +47,7 @@ class ProgressBar:
     def __init__(self, title: str):
         self.title = instance("title", title, str)
         self._opened, self._started = contextlib.ExitStack(), time.perf_counter()
-        self._show: Callable[[Progress], object] = _ignore
+        self._show: Listener | None = None
 
     def __repr__(self):
         return f"ProgressBar({self.title!r})"
@@ -56,7 +55,7 @@ class ProgressBar:
     def __enter__(self) -> "ProgressBar":
         self._started = time.perf_counter()
         if not _open_bars:
-            self._show = self._opened.enter_context(_display()(self.title))
+            self._show = self._opened.enter_context(_display(self.title))
             self._opened.enter_context(listening(self))
         _open_bars.append(self)
         return self
@@ -65,7 +64,8 @@ class ProgressBar:
         """Show a Progress. Raises TypeError for anything else, watched or not."""
         if not isinstance(progress, Progress):
             raise TypeError(f"a progress bar takes a Progress, got {shown(progress)}")
-        self._show(progress)
+        if self._show:
+            self._show(progress)
 
     def at(self, share: float) -> None:
         """Show the progress of a job that knows only its share.
@@ -96,7 +96,20 @@ class ProgressBar:
     def __exit__(self, *error):
         _open_bars.remove(self)
         self._opened.close()
-        self._show = _ignore
+        self._show = None
+
+
+@contextlib.contextmanager
+def reporting(progress: Listener | str | None, title: str) -> Iterator[Listener | None]:
+    """Listener to the Progress of a job for its argument ``progress``; None for silence."""
+    if progress_option("progress", progress) is None:
+        yield None
+    elif callable(progress):
+        with listening(progress):
+            yield progress
+    else:
+        with ProgressBar(title) as bar:
+            yield bar
 
 
 class _Lines:
@@ -106,12 +119,11 @@ class _Lines:
         self.shown, self._said = shown, set[tuple[str, str]]()
         self._first, self._last = math.inf, -math.inf
 
-    def write(self, title: str, progress: Progress, begins: bool) -> None:
-        """Write a line unless there was one of late; begins: whether the phase does so now."""
+    def write(self, title: str, progress: Progress) -> None:
+        """Write a line as a phase begins, and again where there was none of late."""
         phase, now = (title, progress.phase), time.perf_counter()
         new = phase not in self._said and len(self._said) < _MOST_SAID
-        least = max(_BEGINS if begins else _GOES_ON, _SHARE * (now - self._first))
-        if new or now - self._last >= least:
+        if new or now - self._last >= max(_SILENCE, _SHARE * (now - self._first)):
             self._said.add(phase)
             self._first, self._last = min(self._first, now), now
             with contextlib.suppress(OSError, ValueError):
@@ -139,95 +151,56 @@ def hide_bars() -> None:
     _lines_of[-1].shown = False
 
 
-@contextlib.contextmanager
-def reporting(progress: Listener | str | None, title: str) -> Iterator[Listener | None]:
-    """Listener to the Progress of a job for its argument ``progress``; None for silence."""
-    if progress_option("progress", progress) is None:
-        yield None
-    elif callable(progress):
-        with listening(progress):
-            yield progress
-    else:
-        with ProgressBar(title) as bar:
-            yield bar
-
-
-def _display():
-    """How progress is shown here: a context that gives a function of a Progress, by its title."""
-    if not _lines_of[-1].shown or getattr(sys.stderr, "closed", True):
-        return _nothing
+def _display(title):
+    """How progress is shown here: a context that gives a function of a Progress, or None."""
+    lines = _lines_of[-1]
+    if not lines.shown or getattr(sys.stderr, "closed", True):
+        return contextlib.nullcontext()
     python = sys.modules.get("IPython")
     if python is not None and hasattr(python.get_ipython(), "kernel"):
-        return _notebook
+        return _notebook(title, python.display)
     # A dumb terminal cannot move its cursor.
-    return _terminal if sys.stderr.isatty() and os.environ.get("TERM") != "dumb" else _lines
-
-
-def _ignore(progress):
-    """Show nothing."""
-
-
-@contextlib.contextmanager
-def _nothing(title):
-    yield _ignore
-
-
-@contextlib.contextmanager
-def _lines(title):
-    lines, last = _lines_of[-1], ""
-
-    def show(progress):
-        nonlocal last
-        begins, last = progress.phase != last, progress.phase
-        lines.write(title, progress, begins)
-
-    yield show
+    if sys.stderr.isatty() and os.environ.get("TERM") != "dumb":
+        return _terminal(title)
+    return contextlib.nullcontext(functools.partial(lines.write, title))
 
 
 @contextlib.contextmanager
 def _terminal(title):
+    """A bar on a terminal, by rich."""
+    from rich import progress as bars
     from rich.console import Console
-    from rich.progress import BarColumn, SpinnerColumn, TextColumn
-    from rich.progress import Progress as Bar
 
-    console = Console(stderr=True)
-    narrow = console.width < _NARROW
-    # A title is no markup; dots of Braille are not in every encoding.
-    spinner = SpinnerColumn("dots" if console.encoding.startswith("utf") else "line")
-    name, words = (TextColumn(f"{{task.{f}}}", markup=False) for f in ("description", "fields[w]"))
-    columns = (spinner, name, words) if narrow else (spinner, name, BarColumn(None), words)
+    # A title is no markup.
+    texts = "{task.description}", "{task.fields[words]}"
+    name, words = (bars.TextColumn(text, markup=False) for text in texts)
     # Prints go where they would go without the bar.
     redirect = sys.stdout is not None and sys.stdout.isatty()
-    options: Any = {"transient": True, "expand": not narrow, "redirect_stdout": redirect}
-    with Bar(*columns, console=console, **options) as bar:
-        task = bar.add_task(title, total=1.0, w="")
+    options: Any = {"transient": True, "expand": True, "redirect_stdout": redirect}
+    columns = bars.SpinnerColumn("line"), name, bars.BarColumn(None), words
+    with bars.Progress(*columns, console=Console(stderr=True), **options) as bar:
+        task = bar.add_task(title, total=1.0, words="")
 
         def show(progress):
             # Rich's own thread redraws ten times a second, but not while Taichi compiles a kernel.
-            at_once, parts = progress.phase == "compiling", str(progress).split(", ")
-            text = ", ".join(parts[:2] if narrow else parts)
-            bar.update(task, completed=progress.share, w=text, refresh=at_once)
+            at_once = progress.phase == "compiling"
+            bar.update(task, completed=progress.share, words=str(progress), refresh=at_once)
 
         yield show
 
 
 @contextlib.contextmanager
-def _notebook(title):
+def _notebook(title, display):
     """A bar below the cell of a Jupyter notebook that is running, gone at its end."""
-    pace, show_new = Pace(_NOTEBOOK_SECONDS), sys.modules["IPython"].display.display
-
-    def drawn(share, words):
-        bar = f'<progress value="{share:.3f}" max="1"></progress>'
-        marked = f"{html.escape(title)} {bar} {html.escape(words)}"
-        return {"text/plain": f"{title}: {words}", "text/html": marked}
-
-    handle = show_new(drawn(0.0, ""), raw=True, display_id=True)
+    pace, handle = Pace(_NOTEBOOK_SECONDS), display.display(display.HTML(""), display_id=True)
 
     def show(progress):
         if pace.should_report(progress.phase == "compiling"):
-            handle.update(drawn(progress.share, str(progress)), raw=True)
+            bar = f'<progress value="{progress.share:.3f}" max="1"></progress>'
+            words = f"{html.escape(title)} {bar} {html.escape(str(progress))}"
+            handle.update(display.HTML(words))
 
     try:
         yield show
     finally:
-        handle.update({"text/plain": "", "text/html": ""}, raw=True)
+        handle.update(display.HTML(""))

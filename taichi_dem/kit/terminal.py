@@ -3,31 +3,18 @@
 import contextlib
 import os
 import sys
-import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-#: Most columns of a paragraph.
-_WIDE = 100
 #: Cells of a table that say nothing.
 _BLANK = ("", "None", "nan")
-#: Blanks between two columns.
-_GAP = 2
 
 
 def show_heading(text: str) -> None:
     """Print a line that heads what follows."""
-    console = _console()
-    if console is None:
-        print(text)
-    else:
-        console.print(text, style="bold", markup=False)
+    from rich.console import Console
 
-
-def show_paragraph(text: str) -> None:
-    """Print a text in lines of at most 100 characters, or as many as the terminal has columns."""
-    console = _console()
-    print(textwrap.fill(text, _WIDE if console is None else min(_WIDE, console.width)))
+    Console(highlight=False).print(text, style="bold", markup=False, soft_wrap=True)
 
 
 def print_table(rows: Sequence[Sequence[Any]], header: Sequence[str]) -> None:
@@ -38,25 +25,9 @@ def print_table(rows: Sequence[Sequence[Any]], header: Sequence[str]) -> None:
 
 def aligned(cells: Sequence[Sequence[str]]) -> list[str]:
     """Lines of rows of cells, columns as wide as they need to be."""
-    widths, gap = [max(map(len, column)) for column in zip(*cells)], " " * _GAP
+    widths = [max(map(len, column)) for column in zip(*cells)]
     padded = ([cell.ljust(width) for cell, width in zip(row, widths)] for row in cells)
-    return [gap.join(row).rstrip() for row in padded]
-
-
-def show_names(title: str, rows: Iterable[tuple[str, str]]) -> None:
-    """Print a title and, below it, names with a line on each; nothing where there are none."""
-    rows = [(f"  {name}", line) for name, line in rows]
-    if rows:
-        show_heading(f"\n{title}")
-        print(*aligned(rows), sep="\n")
-
-
-def _console():
-    if sys.stdout is None or not sys.stdout.isatty():
-        return None
-    from rich.console import Console
-
-    return Console(file=sys.stdout, highlight=False)
+    return ["  ".join(row).rstrip() for row in padded]
 
 
 @contextlib.contextmanager
@@ -81,11 +52,13 @@ class _LastingOutput:
         self._stream = stream
 
     def write(self, text):
+        """Write text, or drop it."""
         with self._dropping():
             self._stream.write(text)
         return len(text)
 
     def flush(self):
+        """Flush the buffer, or drop its contents."""
         with self._dropping():
             self._stream.flush()
 
