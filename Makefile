@@ -98,7 +98,7 @@ bench: $(STAMP) ## measure speed
 coverage: $(STAMP) ## ask 120 questions, and count the error bars that hold the truth
 	$(BIN)/python experiments/bar_coverage.py $(COVERAGE_OPTIONS)
 
-gallery: $(STAMP) ## run all experiments and show them on one page (GALLERY_OPTIONS=--quick: minutes)
+gallery: $(STAMP) ## run all experiments (GALLERY_OPTIONS=--quick: minutes)
 	$(BIN)/python experiments/gallery.py $(GALLERY_OPTIONS)
 
 docs: $(DOCS_STAMP) ## build these pages with API, gallery and search as a site, in results/docs

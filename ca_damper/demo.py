@@ -15,9 +15,9 @@ structure's own damping is left. Try other numbers of particles and other amplit
 Figures are medians over nine starts, five in a quick run. An amplitude is sqrt(2) times the RMS
 displacement of a cycle of the empty container.
 
-Writes damper.gif, decay.png, decay.csv, caption.txt, report.json and summary.json to
-results/damper_demo/; with --all-pictures also view.html, which plays the film; with --no-pictures
-neither picture nor film.
+Writes damper.gif, decay.png, decay.csv, report.json and summary.json to results/damper_demo/;
+with --all-pictures also view.html, which plays the film; with --no-pictures neither picture nor
+film.
 """
 
 import textwrap
@@ -47,7 +47,6 @@ from ca_damper.runs.film import Film, film
 from ca_damper.scenes.table import SceneTable
 from ca_damper.spheres import Spheres
 from taichi_dem.kit import study
-from taichi_dem.kit.files import write_text
 from taichi_dem.kit.progress_bar import ProgressBar
 from taichi_dem.kit.study.entries import Entry
 
@@ -115,7 +114,6 @@ def let_go(options: Namespace, name: str) -> None:
     write_decays(at("decay.csv"), decays)
     words, report = sentences(decays, shown, options), reports[shown.label]
     report.write(at("report.json"))
-    write_text(at("caption.txt"), " ".join(words) + "\n")
     for sentence in words:
         print(textwrap.fill(sentence, 100))
     study.show_report(options, report)

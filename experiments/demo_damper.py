@@ -21,7 +21,7 @@ spheres with friction); "listed", the default, takes the fillings as they are.
 ``python -m ca_damper demo`` is the same job for an installed package; ca_damper/demo.py has the
 scene and the measures.
 
-Writes damper.gif, decay.png, decay.csv, caption.txt, report.json and summary.json to
+Writes damper.gif, decay.png, decay.csv, report.json and summary.json to
 results/demo_damper/; with --all-pictures also view.html, which plays the film; with --no-pictures
 neither picture nor film.
 """

@@ -1,13 +1,12 @@
-"""Run every experiment, each in a process of its own, and show all of them on one static page.
+"""Run every experiment, each in a process of its own, and keep what the pages show of them.
 
     make gallery                                       # times are in docs/experiments.md
     make gallery GALLERY_OPTIONS=--quick               # smaller jobs
-    python experiments/gallery.py --reuse              # the page from present results
-    python experiments/gallery.py --only demo_damper   # one again, others as they are
+    python experiments/gallery.py --only demo_damper   # one of them
 
-Open results/index.html, or with --quick results/quick/index.html: it needs no server. The exit code
-is 1, with a list, if an experiment failed or is missing from the page. A new experiment gets an
-entry in _gallery_pages.txt; --readme then updates the table of docs/experiments.md. --pictures
+Results go to results/NAME, or with --quick to results/quick/NAME; `make docs` shows all experiments
+on the page Gallery. The exit code is 1, with a list, if an experiment failed. A new experiment gets
+an entry in _gallery_pages.txt; --readme then updates the table of docs/experiments.md. --pictures
 copies small pictures and figures of full runs into docs, and CPU times of runs with --cold, full
 and quick ones, into _gallery_pages.txt; --readme writes these into the pages.
 """
@@ -16,32 +15,28 @@ import json
 import os
 import re
 import sys
+import tempfile
 from pathlib import Path
 from types import SimpleNamespace
 
 from taichi_dem import InputError
+from taichi_dem.kit import children
 from taichi_dem.kit.files import output_folder, write_text
 from taichi_dem.kit.study import add_out, bare_parser, main_of_tool, several
 from taichi_dem.kit.study.entries import ENTRIES, read_entries, with_time
-from taichi_dem.kit.study.results_page import (
-    RUN,
-    markdown_table,
-    read_json,
-    run_entries,
-    shrink_picture,
-    write_page,
-)
 
 HERE = Path(__file__).resolve().parent
 PAGES = read_entries(HERE / ENTRIES)
 #: Scripts that are no experiment of their own, and why.
 TOOLS = {
     "bench": "measures speed, `make bench`",
-    "gallery": "builds the page",
+    "gallery": "runs the others",
     "make_meshes": "makes the meshes, `make mesh`",
 }
 #: Small pictures for the repository: widest side [pixels] and colours.
-SMALL_PICTURES, SMALL = "docs/pictures", (960, 256)
+SMALL_PICTURES, SIDE, COLOURS = "docs/pictures", 960, 256
+#: CPU seconds of a first run, beside its output.
+CPU_TIME = "cpu_seconds.txt"
 #: Figures by experiment, lines of the table that it writes for a page, if any, and the command, the
 #: machine and the versions of its run.
 KEPT = "docs/figures.json"
@@ -50,8 +45,7 @@ _MARK = re.compile(
 )
 _TABLE = re.compile(r"(<!-- table: (\w+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 FLAGS = {
-    "quick": "run smaller jobs, with results and a page of their own",
-    "reuse": "run only experiments without a result",
+    "quick": "run smaller jobs",
     "cold": "compile all kernels in each: its CPU time is that of a first run",
     "readme": "update the table of experiments and the figures in all pages, run nothing",
     "pictures": f"update {SMALL_PICTURES} and the figures for the pages, run nothing",
@@ -72,56 +66,55 @@ def _work(options):
     if options.readme:
         return renew_readme(HERE.parent)
     if options.pictures:
-        keep_figures(options.out, HERE.parent, [page.name for page in pages()])
+        keep_figures(options.out, HERE.parent)
         keep_times(options.out, HERE / ENTRIES)
-        return print("\n".join(shrink_pictures(options.out, HERE.parent / SMALL_PICTURES)))
-    amiss = build(options)
-    if amiss:
-        print("\n".join(["Without a result:", *amiss]), file=sys.stderr)
-    return 1 if amiss else 0
-
-
-def pages():
-    """The entries whose script is there, in order."""
-    return tuple(page for page in PAGES if (HERE / f"{page.name}.py").is_file())
-
-
-def build(options):
-    """Run the experiments asked for and write the page; returns a line for each thing amiss."""
-    known = {page.name: page for page in pages()}
+        return keep_pictures(options.out, HERE.parent / SMALL_PICTURES)
+    known = {page.name: page for page in PAGES}
     for name in options.only or ():
         if name not in known:
             raise InputError(f"only must name experiments out of {', '.join(known)}, got {name!r}")
-    out = output_folder(options.out)
-    wanted = [known[name] for name in options.only or known]
-    asked = {name: getattr(options, name) for name in ("quick", "reuse", "cold")}
-    failed = run_entries(HERE, wanted, out, **asked)
-    items = write_page(out, pages(), failed)
-    print(f"The page is {os.path.join(out, 'index.html')}: open it in any browser.")
-    return [
-        *(f"{one.page.name}: {one.failed}" for one in items if one.failed and one.page in wanted),
-        *(f"{name}: has no entry in _gallery_pages.txt" for name in without_entry()),
-    ]
+    failed = []
+    for name in options.only or known:
+        words = run_experiment(known[name], options.out, options.quick, options.cold)
+        print(f"{name}: {words or 'done'}", flush=True)
+        failed += [f"{name}: {words}"] if words else []
+    if failed:
+        print("\n".join(["Without a result:", *failed]), file=sys.stderr)
+    return 1 if failed else 0
 
 
-def without_entry():
-    """Names of experiments that the page would not show."""
-    names = {path.stem for path in HERE.glob("*.py") if not path.stem.startswith("_")}
-    return sorted(names - set(TOOLS) - {page.name for page in pages()})
+def run_experiment(entry, out, quick, cold):
+    """Run an experiment into out/NAME; returns why it failed, or ""."""
+    folder = Path(output_folder(os.path.join(out, entry.name)))
+    # None of an earlier run shall pass for this one's.
+    for name in ("summary.json", CPU_TIME, *entry.pictures):
+        (folder / name).unlink(missing_ok=True)
+    line = [sys.executable, str(HERE / f"{entry.name}.py"), *entry.options.split()]
+    line += ["--out", str(folder), *(["--quick"] if quick else [])]
+    before = os.times()
+    with tempfile.TemporaryDirectory() as empty:
+        own = {"TI_OFFLINE_CACHE_FILE_PATH": empty} if cold else {}
+        done = children.run(line, env={**os.environ, **own})
+    if done.returncode != 0:
+        said = done.stderr.strip().splitlines() or ["it printed nothing"]
+        return f"exit code {done.returncode}: {said[-1]}"
+    if cold:
+        write_text(folder / CPU_TIME, str(sum(os.times()[2:4]) - sum(before[2:4])))
+    return ""
 
 
-def keep_figures(out, root, names):
+def keep_figures(out, root):
     """Keep the figures of full runs in out/NAME for the pages."""
     path = Path(root, KEPT)
-    kept = read_json(path)
-    for name in names:
-        summary = read_json(Path(out, name, "summary.json"))
-        if summary and not summary["quick"]:
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    for found in Path(out).glob("*/summary.json"):
+        summary, name = json.loads(found.read_text(encoding="utf-8")), found.parent.name
+        if name in {page.name for page in PAGES} and not summary["quick"]:
             values = {key: one["value"] for key, one in summary["figures"].items()}
             made_by = {key: summary[key] for key in ("command", "machine", "versions")}
             # Where its files lay is of no use to a reader.
             made_by["command"] = made_by["command"].partition(" --out ")[0]
-            for page in Path(out, name).glob("*.md"):
+            for page in found.parent.glob("*.md"):
                 made_by["table"] = page.read_text(encoding="utf-8").splitlines()
             kept[name] = {"figures": values, **made_by}
     write_text(path, json.dumps(kept, indent=1, sort_keys=True) + "\n")
@@ -131,11 +124,25 @@ def keep_times(out, path):
     """Write CPU times of first runs, full ones in out and quick ones in out/quick, to entries."""
     text = path.read_text(encoding="utf-8")
     for field, folder in (("time", Path(out)), ("quick", Path(out, "quick"))):
-        for page in pages():
-            note = read_json(folder / page.name / RUN)
-            if note.get("cold") and (folder / page.name / "summary.json").is_file():
-                text = with_time(text, page.name, field, note["cpu_s"])
+        for note in folder.glob(f"*/{CPU_TIME}"):
+            text = with_time(text, note.parent.name, field, float(note.read_text()))
     write_text(path, text)
+
+
+def keep_pictures(out, folder):
+    """Write a small copy of each experiment's first picture, of a film its last image."""
+    from PIL import Image
+
+    for page in PAGES:
+        source = Path(out, page.name, page.pictures[0])
+        if source.is_file():
+            with Image.open(source) as image:
+                image.seek(getattr(image, "n_frames", 1) - 1)
+                small = image.convert("RGB")
+            small.thumbnail((SIDE, SIDE))
+            # With too few colours, or without the means, thin lines take those of their neighbours.
+            small = small.quantize(COLOURS, kmeans=3, dither=Image.Dither.NONE)
+            small.save(Path(folder, f"{page.name}.png"), optimize=True)
 
 
 def fill_figures(text, root):
@@ -143,7 +150,7 @@ def fill_figures(text, root):
 
     Raises InputError where a mark names one that is not kept.
     """
-    kept = read_json(Path(root, KEPT))
+    kept = json.loads(Path(root, KEPT).read_text(encoding="utf-8"))
     names = {name: SimpleNamespace(**one["figures"]) for name, one in kept.items()}
 
     def fill(mark):
@@ -166,14 +173,15 @@ def fill_figures(text, root):
     return _TABLE.sub(fill_table, _MARK.sub(fill, text))
 
 
-def shrink_pictures(out, folder):
-    """Small copies of each experiment's first picture for the repository; the names written."""
-    return list(filter(None, (shrink_picture(page, out, folder, *SMALL) for page in pages())))
-
-
 def table_of_experiments():
-    """All experiments as a table for a page of the docs."""
-    return markdown_table(pages(), HERE.parent / "docs", Path(SMALL_PICTURES).name)
+    """All experiments as a table for a page of the docs, each with its picture if there is one."""
+    lines = ["| question | command | time | with `--quick` | picture |", "|---|---|---|---|---|"]
+    for page in PAGES:
+        small = f"pictures/{page.name}.png"
+        link = f"[picture]({small})" if (HERE.parent / "docs" / small).is_file() else ""
+        times = " | ".join(page.expected_time(quick) for quick in (False, True))
+        lines.append(f"| {page.question} | `{page.command}` | {times} | {link} |")
+    return "\n".join(lines) + "\n"
 
 
 def renew_readme(root):

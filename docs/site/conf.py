@@ -71,8 +71,9 @@ def experiments():
     """Each experiment with its question, picture, command and what to see."""
     for entry in read_entries(ROOT / "experiments/_gallery_pages.txt"):
         picture = f"![](/docs/pictures/{entry.name}.png)"
-        lines = (f"## {entry.question}", picture, entry.look, f"`{entry.command}`, {entry.time}\n")
-        yield "\n\n".join(lines)
+        paper = f"In the paper: {entry.paper}" if entry.paper else ""
+        how = f"`{entry.command}`, {entry.expected_time(quick=False)}\n"
+        yield "\n\n".join(filter(None, (f"## {entry.question}", picture, entry.look, paper, how)))
 
 
 def with_lists(app, name, source):

@@ -1,15 +1,13 @@
-"""The page of all experiments shows what was run: failures are named, without old figures."""
+"""The gallery runs experiments: failures are named, without old figures."""
 
 import json
-import re
 from pathlib import Path
 
 import pytest
 
 import gallery
 from taichi_dem.kit import runtime, study
-from taichi_dem.kit.study.entries import ENTRIES
-from taichi_dem.kit.study.results_page import RUN, Entry
+from taichi_dem.kit.study.entries import ENTRIES, Entry
 
 #: A stand-in for an experiment: writes what one writes, or fails as one fails.
 SCRIPT = """
@@ -41,12 +39,6 @@ def stand_ins(tmp_path, monkeypatch):
     return make
 
 
-def card(out, name):
-    """What the page shows of an experiment."""
-    page = (out / "index.html").read_text(encoding="utf-8")
-    return re.search(rf'<article[^>]*id="{name}".*?</article>', page, re.DOTALL)[0]
-
-
 def test_a_failed_experiment_is_named_and_leaves_no_old_figures(stand_ins, capsys):
     out = stand_ins("good", "bad")
     (out / "bad").mkdir(parents=True)
@@ -54,8 +46,7 @@ def test_a_failed_experiment_is_named_and_leaves_no_old_figures(stand_ins, capsy
     assert gallery.main(["--out", str(out)]) == 1
     said = capsys.readouterr().err
     assert "bad: exit code 1: diverged at t = 1 s" in said and "good" not in said
-    assert "No result: exit code 1" in card(out, "bad") and "&lt;it&gt;" in card(out, "bad")
-    assert "1.93" in card(out, "good") and not (out / "bad" / "summary.json").exists()
+    assert (out / "good" / "summary.json").exists() and not (out / "bad" / "summary.json").exists()
 
 
 def contents(folder):
@@ -71,7 +62,6 @@ def test_a_quick_gallery_leaves_the_results_of_the_full_one(stand_ins, tmp_path,
     after = contents(out)
     assert {path: after[path] for path in before} == before
     assert json.loads(after[out / "quick" / "good" / "summary.json"])["quick"] is True
-    assert out / "quick" / "index.html" in after
 
 
 def test_a_quick_study_leaves_the_results_of_the_full_one(tmp_path, monkeypatch):
@@ -97,7 +87,8 @@ def test_cpu_times_of_first_runs_become_those_of_the_entries(stand_ins, tmp_path
     gallery.main(["--out", str(out), "--only", "good,bad", "--cold"])
     gallery.main(["--out", str(out / "quick"), "--only", "fine", "--quick"])
     gallery.keep_times(out, path)
-    made, cpu_s = gallery.read_entries(path), json.loads((out / "good" / RUN).read_text())["cpu_s"]
+    cpu_s = float((out / "good" / gallery.CPU_TIME).read_text())
+    made = gallery.read_entries(path)
     assert [one.time.isdecimal() for one in made] == [False, True, False]
     # To two digits, in whole seconds.
     assert float(made[1].time) == pytest.approx(cpu_s, abs=0.5 + 0.05 * cpu_s)
