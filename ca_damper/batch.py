@@ -164,12 +164,11 @@ class Batch(LoadedScenes):
         too_few: tuple[str, ...] = ()
         if self.modal is not None:
             self.modal.check(numbers.table)
-            modes = self.modal.structure.frequencies
-            too_few = sampling_found(self.excitation, modes, float(modes.min()))
+            too_few = sampling_found(self.excitation, self.modal.structure.frequencies)
         elif self.mount == "spring":
             stiffness, mass = map(numbers.table.column, ("stiffness", "mass"))
             natural = np.sqrt(stiffness / mass) / (2.0 * np.pi)
-            too_few = sampling_found(self.excitation, natural, float(natural.max()))
+            too_few = sampling_found(self.excitation, natural)
         self.too_few = too_few
         return numbers
 

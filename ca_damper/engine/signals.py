@@ -15,7 +15,6 @@ from ca_damper.oscillator import sine_and_cosine as of_small
 from ca_damper.scenes.clock import Clock, added
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.elementary import sine_and_cosine
 
 
 @ti.data_oriented
@@ -99,30 +98,8 @@ class NoForce:
         return ti.Vector([0.0, 0.0, 0.0])
 
 
-@ti.data_oriented
-class DeviceSineForce:
-    """A force that is a sine of its own frequency; wave: amplitude [N], omega [rad/s], phase."""
-
-    constant_fields = ("wave",)
-
-    def __init__(self, *parts: Any):
-        self.wave = ti.Vector.field(3, ti.f64, shape=())
-
-    def load(self, excitation: Excitation) -> None:
-        """Take over the numbers of a batch."""
-        force: Any = excitation.force
-        assign(self.wave, [force.amplitude, 2.0 * np.pi * force.frequency, force.phase])
-
-    @ti.func
-    def at(self, s, start, t):
-        """Of the sine."""
-        amplitude, omega, phase = self.wave[None]
-        sine, cosine = sine_and_cosine(omega * (start + t) + phase)
-        return amplitude * ti.Vector([sine, omega * cosine, -omega * omega * sine])
-
-
 _BASES = {"sine": SineBase, "signal": DeviceSignal}
-_FORCES = {"none": NoForce, "sine": DeviceSineForce, "signal": DeviceSignal}
+_FORCES = {"none": NoForce, "signal": DeviceSignal}
 
 
 @ti.data_oriented

@@ -1,10 +1,12 @@
 """Excitation of the structure: motions of its base and forces on it, over time.
 
-``Batch`` and ``shake`` take a Signal for the motion of the base [m], or an Excitation for base and
+``sines``, ``sweep``, ``random_vibration``, ``from_samples``, ``from_csv`` and ``from_at2`` make a
+Signal, which is a base displacement [m] or a force [N].
+``Batch`` and ``shake`` take a Signal for the motion of the base, or an Excitation for base and
 force.
 """
 
-from ca_damper.excitation.excitation import Excitation, SineForce
+from ca_damper.excitation.excitation import Excitation
 from ca_damper.excitation.generators import random_vibration, sines, sweep
 from ca_damper.excitation.records import from_at2, from_csv
 from ca_damper.excitation.samples import from_samples
@@ -13,7 +15,6 @@ from ca_damper.excitation.signal import Signal
 __all__ = [
     "Excitation",
     "Signal",
-    "SineForce",
     "from_at2",
     "from_csv",
     "from_samples",

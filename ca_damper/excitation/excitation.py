@@ -7,39 +7,14 @@ from typing import Any, NamedTuple
 from ca_damper.excitation.signal import Signal
 from taichi_dem.kit.checkpoint import identity_of
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import LARGEST, between, instance, plain_fields, positive, shown
+from taichi_dem.kit.validation import instance, shown
 
 
 class ExcitationKind(NamedTuple):
-    """Compiled structure of an excitation: base "sine" or "signal"; force "none" or as base."""
+    """Compiled structure of an excitation: base "sine" or "signal"; force "none" or "signal"."""
 
     base: str = "sine"
     force: str = "none"
-
-
-@dataclass(frozen=True)
-class SineForce:
-    """Force on the container, amplitude * sin(2 pi frequency t + phase), upwards.
-
-    Parameters
-    ----------
-    amplitude : float
-        Amplitude [N].
-    frequency : float
-        Frequency [Hz].
-    phase : float, default 0.0
-        Phase [rad].
-    """
-
-    amplitude: float
-    frequency: float
-    phase: float = 0.0
-
-    def __post_init__(self) -> None:
-        plain_fields(self)
-        positive("frequency", self.frequency)
-        for name in ("amplitude", "phase"):
-            between(name, getattr(self, name), -LARGEST, LARGEST)
 
 
 @dataclass(frozen=True)
@@ -51,32 +26,29 @@ class Excitation:
     base : Signal, optional
         Displacement of the base [m]; None for the sine of the scenes' table (in ``shake``: a base
         at rest).
-    force : SineForce or Signal, optional
+    force : Signal, optional
         Force on the container [N], upwards; None for no force.
     """
 
     base: Signal | None = None
-    force: SineForce | Signal | None = None
+    force: Signal | None = None
 
     def __post_init__(self) -> None:
-        if self.base is not None:
-            instance("base", self.base, Signal)
-        if self.force is not None:
-            instance("force", self.force, (SineForce, Signal))
+        for role in ("base", "force"):
+            if getattr(self, role) is not None:
+                instance(role, getattr(self, role), Signal)
 
     @property
     def kind(self) -> ExcitationKind:
         """Kind of base motion and force, which is compiled."""
-        base = "sine" if self.base is None else "signal"
-        if isinstance(self.force, SineForce):
-            return ExcitationKind(base, "sine")
-        return ExcitationKind(base, "none" if self.force is None else "signal")
+        base, force = ("signal" if role in self.signals else "" for role in ("base", "force"))
+        return ExcitationKind(base or "sine", force or "none")
 
     @property
     def signals(self) -> dict[str, Signal]:
         """Signals that there are, by "base" and "force"."""
         both = {"base": self.base, "force": self.force}
-        return {role: one for role, one in both.items() if isinstance(one, Signal)}
+        return {role: one for role, one in both.items() if one is not None}
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -94,13 +66,15 @@ class Excitation:
         return identity_of({"base": self.base, "force": self.force, **signals})
 
     def in_words(self) -> tuple[str, ...]:
-        """Motion of the base and force, and the treatment of samples."""
-        both = (("base", self.base, "m"), ("force", self.force, "N"))
-        return tuple(
-            f"{role} {one.in_words(unit) if isinstance(one, Signal) else shown(one)}"
-            for role, one, unit in both
-            if one is not None
-        )
+        """Motion of the base and force, and the treatment of samples.
+
+        Returns
+        -------
+        tuple of str
+            A part of a sentence for each Signal.
+        """
+        units = {"base": "m", "force": "N"}
+        return tuple(f"{role} {one.in_words(units[role])}" for role, one in self.signals.items())
 
 
 def excitation_of(value: Any) -> Excitation:

@@ -23,10 +23,8 @@ from taichi_dem.kit.validation import (
     whole,
 )
 
-#: Nodes in a cycle of the highest frequency, unless the user gives a step.
+#: Nodes in a cycle of the highest frequency.
 NODES_A_CYCLE = 40
-# Least number of them: a spline then follows to 0.06 %.
-_LEAST_NODES = 8
 WAYS = ("linear", "logarithmic")
 
 
@@ -37,7 +35,6 @@ def sines(
     *,
     phases: Any = 0.0,
     of: str = "value",
-    step: float | None = None,
 ) -> Signal:
     """Sum of sines, amplitude * sin(2 pi frequency t + phase).
 
@@ -54,8 +51,16 @@ def sines(
     of : str, default "value"
         ``"value"`` or ``"acceleration"``: what the amplitudes belong to. The value has the
         amplitude of the acceleration over -(2 pi frequency)^2.
-    step : float, optional
-        Step between nodes [s], at most an eighth of the shortest cycle; a fortieth if None.
+
+    Returns
+    -------
+    Signal
+        Sum of the sines.
+
+    Raises
+    ------
+    InputError
+        Numbers do not broadcast, or a number is out of range.
 
     Examples
     --------
@@ -72,7 +77,7 @@ def sines(
         raise InputError(
             f"frequencies, amplitudes and phases must be one or as many as each other, got {counts}"
         ) from None
-    time = _grid(duration, max(lists[0]), step)
+    time = _grid(duration, max(lists[0]))
     value = np.zeros(len(time))
     for frequency, amplitude, phase in zip(*(row.tolist() for row in rows)):
         omega = 2.0 * math.pi * frequency
@@ -89,7 +94,6 @@ def sweep(
     *,
     way: str = "linear",
     of: str = "value",
-    step: float | None = None,
 ) -> Signal:
     """Sine whose frequency goes from ``low`` to ``high``, up or down.
 
@@ -108,8 +112,16 @@ def sweep(
     of : str, default "value"
         ``"value"`` or ``"acceleration"``: what keeps its amplitude, the latter but for the slow
         change of the frequency.
-    step : float, optional
-        Step between nodes [s], as in ``sines``.
+
+    Returns
+    -------
+    Signal
+        The sweep.
+
+    Raises
+    ------
+    InputError
+        A number is out of its range.
     """
     low, high, amplitude = (
         positive("low", low),
@@ -118,7 +130,7 @@ def sweep(
     )
     choice("way", way, WAYS)
     choice("of", of, OF)
-    time = _grid(duration, max(low, high), step)
+    time = _grid(duration, max(low, high))
     end = float(time[-1])
     if way == "linear" or low == high:
         frequency = low + (high - low) / end * time
@@ -139,7 +151,6 @@ def random_vibration(
     *,
     seed: int = 1,
     of: str = "acceleration",
-    step: float | None = None,
 ) -> Signal:
     """Stationary random vibration of a one-sided power spectral density.
 
@@ -157,8 +168,6 @@ def random_vibration(
         Seed of the phases.
     of : str, default "acceleration"
         ``"acceleration"`` or ``"value"``: what the density belongs to.
-    step : float, optional
-        Step between nodes [s], as in ``sines``.
 
     Notes
     -----
@@ -173,7 +182,7 @@ def random_vibration(
             "frequencies must ascend and be as many as densities, at least 2, got "
             f"{len(points)} and {len(levels)}: {shown(points.tolist())}"
         )
-    time = _grid(duration, float(points[-1]), step)
+    time = _grid(duration, float(points[-1]))
     end = float(time[-1])
     lines = np.arange(math.ceil(points[0] * end - 1e-9), math.floor(points[-1] * end + 1e-9) + 1)
     if not len(lines):
@@ -202,16 +211,9 @@ def _between(points, levels, frequency):
     return np.exp(np.interp(np.log(inside), np.log(points), np.log(levels)))
 
 
-def _grid(duration, highest, step):
-    """Times of the nodes [s]: an even number of equal steps, none longer than asked for."""
-    duration = positive("duration", duration)
-    step = 1.0 / (NODES_A_CYCLE * highest) if step is None else positive("step", step)
-    longest = 1.0 / (_LEAST_NODES * highest)
-    if step > longest * (1.0 + 1e-12):
-        got, most = told_apart(step, longest)
-        raise InputError(
-            f"step must be at most {most} s, {_LEAST_NODES} to the shortest cycle, got {got}"
-        )
+def _grid(duration, highest):
+    """Times of the nodes [s]: an even number of equal steps."""
+    duration, step = positive("duration", duration), 1.0 / (NODES_A_CYCLE * highest)
     if duration / step > MOST_NODES - 3:
         got, most = told_apart(duration, (MOST_NODES - 3) * step)
         raise InputError(f"duration must be at most {most} s in steps of {step:.3g} s, got {got}")

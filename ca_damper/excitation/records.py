@@ -12,33 +12,21 @@ from ca_damper.excitation.signal import Signal
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, choice, path_name, shown
 
-#: SI units in 1 of the unit of each quantity that a column can hold, spelled without signs.
+#: Units of a time: seconds in 1 of each.
+_TIMES = {"s": 1.0, "sec": 1.0, "ms": 1e-3}
+#: Units of a motion or force, spelled without signs: what a column of it holds, and SI units in 1.
 UNITS = {
-    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3},
-    "displacement": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
-    "velocity": {"m_s": 1.0, "cm_s": 1e-2, "mm_s": 1e-3},
-    "acceleration": {
-        **{"m_s2": 1.0, "cm_s2": 1e-2, "mm_s2": 1e-3},
-        **{"g": 9.80665, "gal": 1e-2},
-    },
-    "force": {"N": 1.0, "kN": 1e3},
+    **{unit: ("value", size) for unit, size in (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3))},
+    **{unit: ("value", size) for unit, size in (("um", 1e-6), ("N", 1.0), ("kN", 1e3))},
+    **{unit: ("velocity", size) for unit, size in (("m_s", 1.0), ("cm_s", 1e-2), ("mm_s", 1e-3))},
+    **{"m_s2": ("acceleration", 1.0), "cm_s2": ("acceleration", 1e-2)},
+    **{"mm_s2": ("acceleration", 1e-3), "gal": ("acceleration", 1e-2)},
+    "g": ("acceleration", 9.80665),
 }
-#: Beginnings of names by quantity, in small letters.
-_NAMES = {
-    "time": ("time", "t"),
-    "displacement": ("displacement", "disp", "d"),
-    "velocity": ("velocity", "vel", "v"),
-    "acceleration": ("acceleration", "accel", "acc", "a"),
-    "force": ("force", "f"),
-}
-#: What from_samples makes of a quantity.
-_OF = {"displacement": "value", "force": "value"}
-_HEADER = re.compile(r"([a-zA-Z]+)[\s_]*[(\[]?\s*([^)\]]*?)\s*[)\]]?")
+#: Name and unit of a header.
+_HEADER = re.compile(r"[a-zA-Z]+[\s_]*[(\[]?\s*([^)\]]*?)\s*[)\]]?")
 #: Number of samples and step in the fourth line of an AT2 file, of the newer and older form.
-_AT2 = (
-    re.compile(r"NPTS\s*=\s*(\d+)\s*,\s*DT\s*=\s*([\d.eE+-]+)", re.IGNORECASE),
-    re.compile(r"^\s*(\d+)\s+([\d.eE+-]+)"),
-)
+_AT2 = re.compile(r"(\d+)[^\d.]+(\d*\.?\d+(?:[eE][+-]?\d+)?)")
 
 
 def from_csv(
@@ -47,7 +35,6 @@ def from_csv(
     *,
     unit: str | None = None,
     correct_baseline: bool = False,
-    resample: float | None = None,
 ) -> Signal:
     """Signal from a file of columns, such as a measured motion of a base.
 
@@ -67,8 +54,6 @@ def from_csv(
     correct_baseline : bool, default False
         For an acceleration: subtract a straight line so that the motion ends at rest where it
         began, as in ``from_samples``; right for a record with an offset, wrong for a shock.
-    resample : float, optional
-        New step [s], as in ``from_samples``.
 
     Returns
     -------
@@ -82,29 +67,28 @@ def from_csv(
         that run backwards; or its step is too coarse for the spectrum of the motion.
     """
     name = path_name("path", path)
-    table, comma = _table(name)
-    known = {one: found for one in table.columns if (found := _quantity(one))}
-    times = [one for one, (what, _) in known.items() if what == "time"]
-    motions = {one: known[one] for one in known if one not in times}
+    table = _table(name)
+    units = {one: _unit_of(one) for one in table.columns}
+    times = [one for one, unit in units.items() if unit in _TIMES or _is_time(one)]
+    others = [one for one in units if one not in times]
+    motions = [one for one in others if units[one] in UNITS] or others
     if column is not None:
-        motions = {choice("column", column, motions): motions[column]}
+        motions = [choice("column", column, others)]
     if len(times) != 1 or len(motions) != 1:
         raise InputError(
             f"column must say which one is meant where {name} has not one time and one motion or "
             f"force, such as time_s and acceleration_g, got {shown(column)} and "
             f"{shown(list(table.columns))}"
         )
-    wanted, (what, own) = motions.popitem()
-    factor = _factor(f"column {wanted} of {name}", what, own, unit)
-    time = UNITS["time"][known[times[0]][1] or "s"] * _numbers(name, table, times[0], comma)
-    values = factor * _numbers(name, table, wanted, comma)
-    return _signal(name, wanted, time, values, what, correct_baseline, resample)
+    wanted, (time,) = motions[0], times
+    what, factor = _factor(f"column {wanted} of {name}", units[wanted], unit)
+    seconds = _TIMES.get(units[time], 1.0) * _numbers(name, f"column {time}", table[time])
+    values = factor * _numbers(name, f"column {wanted}", table[wanted])
+    return _signal(name, wanted, seconds, values, what, correct_baseline)
 
 
-def from_at2(
-    path: FileName, *, correct_baseline: bool = False, resample: float | None = None
-) -> Signal:
-    """Displacement [m] from a record of the PEER ground motion database, an acceleration in g.
+def from_at2(path: FileName, *, correct_baseline: bool = False) -> Signal:
+    """Signal from a record of the PEER ground motion database, an acceleration in g.
 
     Parameters
     ----------
@@ -112,16 +96,23 @@ def from_at2(
         AT2 file: four lines of head, of which the last has the number of samples and the step.
     correct_baseline : bool, default False
         As in ``from_csv``.
-    resample : float, optional
-        As in ``from_samples``.
+
+    Returns
+    -------
+    Signal
+        Displacement [m].
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or holds another number of samples than it says.
     """
     name = path_name("path", path)
     try:
         lines = Path(name).read_text(encoding="latin-1").splitlines()
     except OSError as error:
         raise InputError(f"{name} must be a file that can be read: {error.strerror}") from None
-    head = lines[3] if len(lines) > 3 else ""
-    match = next((found for one in _AT2 if (found := one.search(head))), None)
+    match = _AT2.search(lines[3]) if len(lines) > 3 else None
     if match is None or "g" not in lines[2].lower().split("units of")[-1]:
         raise InputError(
             f"{name} must have accelerations in units of g and NPTS and DT in its third and fourth "
@@ -131,23 +122,22 @@ def from_at2(
     cells = " ".join(lines[4:]).split()
     if len(cells) != count:
         raise InputError(f"{name} must hold {count} samples, as it says, got {len(cells)}")
-    values = UNITS["acceleration"]["g"] * _floats(name, "accelerations", cells)
+    values = UNITS["g"][1] * _numbers(name, "accelerations", cells)
     time = step * np.arange(count)
-    return _signal(name, "record", time, values, "acceleration", correct_baseline, resample)
+    return _signal(name, "record", time, values, "acceleration", correct_baseline)
 
 
-def _signal(name, column, time, values, what, correct_baseline, resample):
+def _signal(name, column, time, values, what, correct_baseline):
     """Signal of a quantity; InputError with the name of its file."""
-    options = {"correct_baseline": correct_baseline, "resample": resample}
     try:
-        made = from_samples(time, values, of=_OF.get(what, what), **options)
+        made = from_samples(time, values, of=what, correct_baseline=correct_baseline)
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
     return replace(made, label=f"{column} of {name}")
 
 
-def _table(name: str) -> tuple[Any, bool]:
-    """Columns of a file as a DataFrame by their names, and whether decimals may have a comma."""
+def _table(name: str) -> Any:
+    """Columns of a file as a DataFrame of words by their names, decimal commas as points."""
     import pandas
 
     layout: dict[str, Any] = {"comment": "#", "index_col": False, "dtype": str}
@@ -159,17 +149,20 @@ def _table(name: str) -> tuple[Any, bool]:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{name} must be a CSV file that can be read: {reason}") from None
-    return found.rename(columns=str.strip), between != ","
+    if between != ",":
+        found = found.apply(lambda cells: cells.str.replace(",", "."))
+    return found.rename(columns=str.strip)
 
 
-def _quantity(header: str) -> tuple[str, str] | None:
-    """Quantity and unit that a header names, "" for no unit; None for another header."""
+def _unit_of(header: str) -> str:
+    """Unit that a header names, "" for none."""
     match = _HEADER.fullmatch(header)
-    if match is None:
-        return None
-    word, unit = match[1].lower(), _spelled(match[2])
-    what = next((one for one, names in _NAMES.items() if word in names), None)
-    return None if what is None or (unit and unit not in UNITS[what]) else (what, unit)
+    return _spelled(match[1]) if match else ""
+
+
+def _is_time(header: str) -> bool:
+    """Whether a column without a unit is a time."""
+    return header.lower() in ("t", "time")
 
 
 def _spelled(unit: str) -> str:
@@ -178,38 +171,30 @@ def _spelled(unit: str) -> str:
     return plain if plain == "N" or plain == "kN" else plain.lower().replace("_s_s", "_s2")
 
 
-def _factor(where: str, what: str, own: str, given: str | None) -> float:
-    """SI units in 1 of a column; InputError where neither header nor argument names the unit."""
+def _factor(where: str, own: str, given: str | None) -> tuple[str, float]:
+    """What a column holds, and SI units in 1 of it; InputError where nothing names its unit."""
     if given is not None:
-        given = choice("unit", _spelled(given) if isinstance(given, str) else given, UNITS[what])
+        given = choice("unit", _spelled(given) if isinstance(given, str) else given, UNITS)
+    own = own if own in UNITS else ""
     if own and given and given != own:
         raise InputError(f"unit must be None or {own!r} for {where}, got {given!r}")
     if not (own or given):
         raise InputError(
-            f"unit must be one of {', '.join(UNITS[what])} for {where}, whose name has none, got "
-            "None"
+            f"unit must be one of {', '.join(UNITS)} for {where}, whose name has none, got None"
         )
-    return UNITS[what][own or str(given)]
+    return UNITS[own or str(given)]
 
 
-def _numbers(name, table, column, comma):
-    """Numbers of a column; InputError that names the row of the first cell that holds none."""
-    cells = table[column].to_numpy(object)
-    if comma:
-        cells = [one.replace(",", ".") if isinstance(one, str) else one for one in cells]
-    return _floats(name, f"column {column}", cells)
-
-
-def _floats(name, where, cells):
+def _numbers(name, where, cells):
     """Cells as numbers; InputError that names the first that is none."""
     try:
-        found = np.array(cells, object).astype(np.float64)
+        found = np.asarray(cells, object).astype(np.float64)
     except ValueError as error:
         raise InputError(f"{name} must hold numbers in {where}: {error}") from None
     bad = np.flatnonzero(~np.isfinite(found))
     if len(bad):
         raise InputError(
             f"{name} must hold a finite number in {where} of row {bad[0] + 1}, "
-            f"got {shown(cells[bad[0]])}"
+            f"got {shown(np.asarray(cells, object)[bad[0]])}"
         )
     return found

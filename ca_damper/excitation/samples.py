@@ -18,7 +18,7 @@ import numpy as np
 
 from ca_damper.excitation.signal import MOST_NODES, Signal, end_slope, integral, nodes, spline
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, flag, positive, told_apart
+from taichi_dem.kit.validation import choice, flag, told_apart
 
 #: What samples are of: the signal itself, its first or its second derivative.
 OF = ("value", "velocity", "acceleration")
@@ -38,7 +38,6 @@ def from_samples(
     *,
     of: str = "value",
     correct_baseline: bool = False,
-    resample: float | None = None,
 ) -> Signal:
     """Signal through measured samples; its own time counts from the first of them.
 
@@ -56,10 +55,6 @@ def from_samples(
         Subtract from an acceleration the straight line that makes the motion end at rest where it
         began: for a record with an offset, which integrates to a large drift. Do not use it for a
         shock, which changes the speed for good. A report says what was done.
-    resample : float, optional
-        New step [s]: values at even times are taken from a cubic spline through the samples, whose
-        times need not be even then. A report names the longest gap; a structure refuses one that is
-        longer than two average steps and a quarter of its period.
 
     Returns
     -------
@@ -70,8 +65,8 @@ def from_samples(
     Raises
     ------
     InputError
-        Samples are not finite, times have gaps or run backwards, or the step, also one to resample
-        to, is too coarse: 99 % of the power must lie below a quarter of the sampling rate.
+        Samples are not finite, times are uneven or run backwards, or the step is too coarse: 99 %
+        of the power must lie below a quarter of the sampling rate.
 
     Examples
     --------
@@ -84,22 +79,12 @@ def from_samples(
     times, samples = nodes("time_s", time_s), nodes("values", values)
     if len(times) != len(samples):
         raise InputError(f"values must be {len(times)}, as many as times, got {len(samples)}")
-    step = apart = gap = float(times[-1] - times[0]) / (len(times) - 1)
-    if resample is None:
-        evened = _evened(times, step)
-        _check_spectrum(step, samples, step)
-    else:
-        asked, gap = positive("resample", resample), _longest_gap(times)
-        even = _resampled(times, samples, apart)[1]
-        _check_spectrum(apart, even, max(apart, asked))
-        step, samples = _resampled(times, samples, asked)
-        evened = (
-            f"resampled to {step:.6g} s from {apart:.3g} s on average, across gaps of up to "
-            f"{gap:.3g} s"
-        )
+    step = float(times[-1] - times[0]) / (len(times) - 1)
+    evened = _evened(times, step)
+    _check_spectrum(step, samples)
     made, treated = _integrated(step, samples, of, correct_baseline)
     treated = "; ".join(filter(None, (evened, treated)))
-    return replace(made, treated=treated, apart=apart, gap=gap)
+    return replace(made, treated=treated, apart=step)
 
 
 def _integrated(step, samples, of, correct_baseline):
@@ -121,33 +106,11 @@ def _refined(step, samples):
     if len(samples) > most:
         raise InputError(
             f"values must be at most {most} of a velocity or acceleration, got {len(samples)}: "
-            "read one part at a time, or give a step to resample to"
+            "read one part at a time"
         )
     fine = step / REFINED
     time = fine * np.arange(REFINED * (len(samples) - 1) + 1)
     return fine, spline(step, samples, "samples").at(time)
-
-
-def _longest_gap(times):
-    """Longest time from sample to sample [s]; InputError where times do not ascend."""
-    steps = np.diff(times)
-    if not (steps > 0.0).all():
-        k = int(np.argmin(steps)) + 1
-        raise InputError(f"times must ascend, got {times[k]:.9g} s in sample {k + 1}")
-    return float(steps.max())
-
-
-def _resampled(times, samples, step):
-    """Even step of about the one asked for, and the values of a cubic spline at it."""
-    from scipy.interpolate import CubicSpline
-
-    total = times[-1] - times[0]
-    if total / step > MOST_NODES - 2:
-        got, least = told_apart(step, total / (MOST_NODES - 2))
-        raise InputError(f"resample must be at least {least} s in {total:.3g} s, got {got}")
-    count = 1 + max(3, round(total / step))
-    even = np.linspace(times[0], times[-1], count)
-    return float(total) / (count - 1), CubicSpline(times, samples)(even)
 
 
 def _of_velocity(step, samples):
@@ -166,14 +129,14 @@ def _evened(times, step):
         k = int(np.abs(steps - usual).argmax()) + 1
         raise InputError(
             f"times must ascend evenly, to {_UNEVEN:g} of their step of {usual:g} s, got "
-            f"{times[k]:.9g} s after {times[k - 1]:.9g} s in sample {k + 1}: fill the gap, read "
-            "one part at a time, or give a step to resample to"
+            f"{times[k]:.9g} s after {times[k - 1]:.9g} s in sample {k + 1}: read one part at a "
+            "time, or take values at even times from scipy.interpolate.CubicSpline"
         )
     is_even = late.max() <= _ROUNDED * max(step, abs(times[0]), abs(times[-1]))
     return "" if is_even else f"times evened by up to {late.max():.2g} s"
 
 
-def _check_spectrum(step, samples, longest):
+def _check_spectrum(step, samples):
     """InputError unless nearly all of the power lies where a spline through nodes follows."""
     from scipy import signal
 
@@ -185,8 +148,8 @@ def _check_spectrum(step, samples, longest):
         return
     most = float(frequency[np.searchsorted(np.cumsum(power), POWER_SHARE * power.sum())])
     # To within the width of the window's lobe.
-    if most > 1.0 / (SAMPLES_A_CYCLE * longest) + 2.0 / (count * step):
-        got, allowed = told_apart(longest, 1.0 / (SAMPLES_A_CYCLE * most))
+    if most > 1.0 / (SAMPLES_A_CYCLE * step) + 2.0 / (count * step):
+        got, allowed = told_apart(step, 1.0 / (SAMPLES_A_CYCLE * most))
         raise InputError(
             f"the step of the samples must be at most {allowed} s, as {100 * POWER_SHARE:g} % of "
             f"their power reaches to {most:.4g} Hz, got {got} s"

@@ -53,9 +53,7 @@ class Signal:
     treated : str, default ""
         Treatment of samples before the signal was made, in words.
     apart : float, default 0.0
-        Mean time between the samples that it was made of [s]; 0 for a formula.
-    gap : float, default 0.0
-        Longest time between two of these samples [s].
+        Time between the samples that it was made of [s]; 0 for a formula.
 
     References
     ----------
@@ -68,7 +66,6 @@ class Signal:
     label: str = "signal"
     treated: str = ""
     apart: float = 0.0
-    gap: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "step", positive("step", self.step))

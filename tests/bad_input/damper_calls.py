@@ -142,8 +142,6 @@ def _excitations():
     yield f"{where}.Signal#", excitation.Signal, {"step": 0.1, "label": "x", **nodes}
     yield f"{where}.Signal.at", SIGNAL.at, {"time_s": 0.01}
     yield f"{where}.Signal.scaled", SIGNAL.scaled, {"factor": 2.0}
-    force = {"amplitude": 1.0, "frequency": 5.0}
-    yield f"{where}.SineForce", excitation.SineForce, force
     time = np.arange(100) * 0.01
     samples = {"time_s": time, "values": np.sin(10.0 * time), "of": "acceleration"}
     yield f"{where}.from_samples", excitation.from_samples, samples

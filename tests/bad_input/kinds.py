@@ -76,13 +76,13 @@ KINDS = {
         thickness element size particle_mass diameter reference_speed wall_young v_max mass
         stiffness atol interval duration until budget_s seconds frequency frequencies Every.time_s
         wall_s every_s every_wall_s slip_energy ratio ratios low high step ImpactDamper.clearance
-        masses resample""",
+        masses""",
     "zero or positive": """cohesion normal_damping shear_damping friction contact_damping ramp
         damping_ratio wall_friction gravity static_threshold base_amplitude damping rtol added_mass
         weld_tolerance effects.GasPressure.start nearest dashpot_floor clearance clearances gap
         effects.PrescribedMotion.frequency SceneTable.frequency SceneTable.change.frequency
         SceneTable.drive.frequency Oscillator.right_hand_side.frequency added_masses damping_ratios
-        excitation.SineForce.frequency effects.Pressure.rise needed_effects.tolerance
+        effects.Pressure.rise needed_effects.tolerance
         damper_map.amplitudes collect_and_collide.amplitude""",
     "share": """restitution wall_restitution sleep share theta confidence solve.tolerance
         solve_response.tolerance best_damper.tolerance""",

@@ -18,7 +18,8 @@ from ca_damper import (
     logarithmic_decrement,
     shake,
 )
-from ca_damper.excitation import Excitation, SineForce
+from ca_damper.excitation import Excitation
+from ca_damper.excitation.signal import spline
 from taichi_dem import Checkpoint
 from taichi_dem.kit.checkpoint import Interrupted
 
@@ -26,9 +27,9 @@ PAPER = Oscillator()
 TWO = ((4.3, 0.6e-3, 0.4), (9.1, 0.2e-3, -1.1))
 
 
-def two_sines(duration=1.5, **options):
+def two_sines(duration=1.5):
     frequencies, amplitudes, phases = zip(*TWO)
-    return excitation.sines(frequencies, amplitudes, duration, phases=phases, **options)
+    return excitation.sines(frequencies, amplitudes, duration, phases=phases)
 
 
 def shaken(given, particles=0, **options):
@@ -55,24 +56,22 @@ def test_a_container_under_two_sines_moves_as_the_exact_solution():
 def test_error_falls_with_the_fourth_power_of_the_signal_s_step():
     errors = []
     for nodes in (8, 16, 32):
-        made = shaken(two_sines(step=1 / (9.1 * nodes)))
+        time, step = np.linspace(0.0, 1.5, round(1.5 * 9.1 * nodes) + 1, retstep=True)
+        value = sum(a * np.sin(2.0 * np.pi * f * time + phase) for f, a, phase in TWO)
+        made = shaken(spline(step, value, "two sines"))
         errors.append(worst(made, response(PAPER, made.time_s, TWO)[0]))
     ratios = np.array(errors[:-1]) / errors[1:]
     # Fourth order, or more where the filter of the structure averages the error's sign.
     assert (ratios > 2.0**3.5).all(), errors
 
 
-@pytest.mark.parametrize("form", ["sine", "signal"])
-def test_force_moves_the_container_as_the_exact_solution(form):
+def test_force_moves_the_container_as_the_exact_solution():
     of_force = (5.7, 3e-2, 0.7)
-    force = SineForce(of_force[1], of_force[0], of_force[2])
-    if form == "signal":
-        force = excitation.sines(*of_force[:2], 1.5, phases=of_force[2])
+    force = excitation.sines(*of_force[:2], 1.5, phases=of_force[2])
     made = shaken(Excitation(force=force), duration=1.5)
     static = of_force[1] / PAPER.stiffness
     wanted = response(PAPER, made.time_s, force=(of_force,))[0]
-    # A sine in closed form is integrated to the tolerance of RK45, 1e-9 a step, 60 of them.
-    assert worst(made, wanted) < (1e-6 if form == "sine" else 41 * 3e-6) * static
+    assert worst(made, wanted) < 41 * 3e-6 * static
     assert made.base == pytest.approx(0.0, abs=0.0)
 
 
@@ -187,7 +186,7 @@ def gain_of_a_spline(share):
     return np.sinc(share) ** 4 * 3.0 / (2.0 + math.cos(2.0 * math.pi * share))
 
 
-def record_at_resonance(frequency, rate, of, length=2.0, kept=slice(None), **options):
+def record_at_resonance(frequency, rate, of, length=2.0):
     """A base whose acceleration is sin(w t), sampled, and a structure at whose resonance it is."""
     omega, time = 2.0 * np.pi * frequency, np.arange(round(length * rate) + 1) / rate
     turn = omega * time
@@ -197,7 +196,7 @@ def record_at_resonance(frequency, rate, of, length=2.0, kept=slice(None), **opt
         "value": (turn - np.sin(turn)) / omega**2,
     }
     own = Oscillator(0.1, 0.1 * omega**2, 2.0 * 0.02 * 0.1 * omega)
-    return excitation.from_samples(time[kept], samples[of][kept], of=of, **options), own
+    return excitation.from_samples(time, samples[of], of=of), own
 
 
 def at_resonance(motion, own):
@@ -225,33 +224,6 @@ def test_too_few_samples_a_period_are_told_and_lose_what_a_spline_loses():
     # The ends of the spline, beside the 0.8 %.
     assert share == pytest.approx(gain_of_a_spline(11.0 / 50.0), abs=1e-3)
     assert any("11 Hz" in words for words in made.report.excitation)
-
-
-@pytest.mark.parametrize(("lost", "told"), [(2, ""), (6, "above 3.571"), (31, "refused")])
-def test_gaps_that_resampling_bridges_are_named_and_refused_from_a_quarter_period_on(lost, told):
-    """Of a structure of 6 Hz: 15 ms, 35 ms and 160 ms by 21 and 42 ms, an eighth and a quarter."""
-    kept = np.delete(np.arange(401), np.arange(200, 200 + lost))
-    motion, own = record_at_resonance(6.0, 200.0, "acceleration", kept=kept, resample=5e-3)
-    gap = (lost + 1) * 5e-3
-    assert motion.gap == pytest.approx(gap) and f"gaps of up to {gap:.3g} s" in motion.in_words("m")
-    if told == "refused":
-        with pytest.raises(InputError, match=r"base must have no gap .* of more than 0.0416 s"):
-            at_resonance(motion, own)
-    elif told:
-        with pytest.warns(UserWarning, match=told):
-            at_resonance(motion, own)
-    else:
-        assert at_resonance(motion, own)[0] == pytest.approx(1.0, abs=1e-3)
-
-
-def test_slow_samples_of_a_stiff_structure_are_no_gap():
-    """At uneven times, 3 to a period: told, as if they were even."""
-    time = np.linspace(0.0, 1.0, 101)
-    uneven = time + 3e-3 * np.sin(7.0 * np.pi * time) * np.sin(np.pi * time)
-    slow = excitation.from_samples(uneven, np.sin(2.0 * np.pi * uneven), resample=2e-3)
-    stiff = Oscillator(0.1, 0.1 * (2.0 * np.pi * 33.0) ** 2, 0.1)
-    with pytest.warns(UserWarning, match="fewer than 8 samples"):
-        shaken(slow, oscillator=stiff)
 
 
 G = 9.8

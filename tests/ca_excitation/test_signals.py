@@ -114,7 +114,7 @@ def test_records_of_many_makes_are_one_acceleration(tmp_path, head):
 
 def test_a_unit_that_the_header_lacks_is_asked_for(tmp_path):
     path = written(tmp_path / "bare.csv", GOOD, "time,acc\n")
-    with pytest.raises(InputError, match="unit must be one of m_s2, cm_s2, mm_s2, g, gal for col"):
+    with pytest.raises(InputError, match=r"unit must be one of .* for column acc of"):
         excitation.from_csv(path)
     made = excitation.from_csv(path, unit="m/s^2")
     wanted = excitation.from_samples(*zip(*GOOD), of="acceleration")
@@ -151,21 +151,11 @@ def test_a_velocity_is_integrated_with_the_order_of_its_spline():
     assert errors[0] / errors[1] == pytest.approx(32.0, rel=0.1)
 
 
-def test_resampling_hides_no_samples_that_are_too_few():
-    """Power at 20 Hz: too much for samples 20 ms apart, and for a new step as long."""
-    for rate, step in ((50.0, 2e-3), (500.0, 0.02)):
-        time = np.arange(0.0, 4.0, 1.0 / rate)
-        fast = np.sin(2.0 * np.pi * 20.0 * time)
-        with pytest.raises(InputError, match=r"step of the samples must be at most .* got 0.02"):
-            excitation.from_samples(time, fast, of="acceleration", resample=step)
-
-
-def test_uneven_times_are_resampled_on_request():
-    """Samples of a sine at uneven times: the error of a cubic spline, (w h)^4 / 16 at its knots."""
-    time = np.linspace(0.0, 1.0, 101)
-    uneven = time + 3e-3 * np.sin(7.0 * np.pi * time) * np.sin(np.pi * time)
-    with pytest.raises(InputError, match="or give a step to resample to"):
+def test_samples_that_are_too_few_or_uneven_are_refused():
+    """Power at 20 Hz is too much for samples 20 ms apart."""
+    time = np.arange(0.0, 4.0, 0.02)
+    with pytest.raises(InputError, match=r"step of the samples must be at most .* got 0.02"):
+        excitation.from_samples(time, np.sin(2.0 * np.pi * 20.0 * time), of="acceleration")
+    uneven = time + 3e-3 * np.sin(7.0 * np.pi * time)
+    with pytest.raises(InputError, match="times must ascend evenly"):
         excitation.from_samples(uneven, np.sin(OMEGA * uneven))
-    made = excitation.from_samples(uneven, np.sin(OMEGA * uneven), resample=0.01)
-    off = np.abs(made.value - np.sin(OMEGA * time)).max()
-    assert off < (OMEGA * 0.0133) ** 4 / 16.0 and "resampled to 0.01 s" in made.in_words("m")
