@@ -1,20 +1,21 @@
-"""What does an error of 10 or 1 % in the damper's response cost, by automaton, spheres and RK45?
+"""What does an error of 10 or 1 % in the damper's response cost, by automaton and by spheres?
 
     python experiments/cost_of_accuracy_damper.py          # about four minutes on one core
     python experiments/cost_of_accuracy_damper.py --quick
 
 Automaton and spheres are different models, so each is compared with its own limit: the same method
 at a step far below those of the sweep, with other seeds. A second panel takes the spheres' limit as
-the truth. In a third, RK45 is compared with the transfer function of the empty container.
+the truth.
 
 The error is the RMS over the frequencies of (response - truth), mean over seeds, as a share of the
 peak. Dotted is what seeds alone make of it. Seconds are CPU seconds of one thread, of the fastest
 repeat.
 
-Writes work_precision.png, curves.png, points.csv, answers.csv and summary.json to
+Writes work_precision.png, points.csv, answers.csv and summary.json to
 results/cost_of_accuracy_damper/.
 """
 
+import itertools
 import math
 import sys
 from dataclasses import replace
@@ -22,28 +23,15 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from _work_precision import Point, cheapest
-from ca_damper import (
-    Automaton,
-    Batch,
-    Empty,
-    Oscillator,
-    ProgressBar,
-    SceneTable,
-    SimulationDiverged,
-    Spheres,
-    frequency_response,
-)
-from ca_damper.plot.curves import picture_compared
+from ca_damper import Automaton, ProgressBar, SimulationDiverged, Spheres, frequency_response
 from ca_damper.report.measures import curve_distance, seed_variance
 from taichi_dem import InputError
 from taichi_dem.kit import study
-from taichi_dem.kit.plot_style import picture, power, seconds, styles_of
+from taichi_dem.kit.plot_style import picture, seconds, styles_of
 
 NAME = "cost_of_accuracy_damper"
-OSCILLATOR = Oscillator()
 PARTICLES, SPHERES = 30, "dem_tsuji"
 CA_STEPS = (2e-3, 1.1e-3, 7e-4, 5e-4, 3e-4, 2e-4, 1e-4, 5e-5)
 DEM_STEPS = (1e-4, 6e-5, 4e-5, 3e-5, 2e-5, 1.4e-5)
@@ -70,12 +58,6 @@ SETTINGS = {
 }
 #: Errors that are asked for.
 TARGETS = (0.1, 0.01, 0.001)
-#: RK45 on the empty container: relative tolerances in the kernel and in Python.
-TOLERANCES = {"kernel": (1e-6, 1e-8, 1e-10, 1e-12), "python": (0.1, 0.01, 1e-3, 1e-4, 1e-6, 1e-8)}
-#: A Batch takes at least 40 steps a cycle: the first is the longest [s].
-RK45_STEPS, RK45_CYCLES = (3.9e-3, 1e-3, 2e-4), 30
-#: Samples a cycle from which the RMS of a sine is exact.
-SAMPLES = 8
 #: Times are of one thread.
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
@@ -150,60 +132,15 @@ def points_of(name, sweep, truth):
     return [*bad, *good]
 
 
-def rk45_points(frequency, repeats, quick):
-    """(Points of all ways, seconds of compiling) at frequencies [Hz]; quick: every other point."""
-    every, points, compiling = 2 if quick else 1, [], 0.0
-    jobs = [("rk45_tolerance", rtol, RK45_STEPS[0], rtol) for rtol in TOLERANCES["kernel"][::every]]
-    jobs += [("rk45_step", dt, dt, 1e-2) for dt in RK45_STEPS[::every]]
-    for method, swept, dt, rtol in jobs:
-        table = SceneTable(0, 1, dt, frequency, OSCILLATOR.base_amplitude)
-        batch, spent = Batch(Empty(), table, measured_cycles=1, rtol=rtol, atol=1e-3 * rtol), []
-        # The first run compiles.
-        for _ in range(1 + repeats):
-            started = study.clock()
-            batch.start("empty")
-            rms = batch.run(RK45_CYCLES - 1, 1).rms
-            spent.append(study.clock() - started)
-        error = curve_distance(rms, OSCILLATOR.rms(frequency))
-        label = power(swept) if swept == rtol else f"{1e3 * dt:g} ms"
-        points.append(Point(method, swept, label, min(spent[1:]), error))
-        compiling += batch.compile_seconds
-    for rtol in TOLERANCES["python"][::every]:
-        points.append(Point("rk45_python", rtol, power(rtol), *rk45_in_python(frequency, rtol)))
-    return points, compiling
-
-
-def rk45_in_python(frequency, rtol):
-    """(Seconds, error) of the last cycle, begun in the steady state."""
-    started, found = study.clock(), []
-    cycles = RK45_CYCLES - 1 + np.arange(SAMPLES) / SAMPLES
-    for f in frequency:
-        job = OSCILLATOR.right_hand_side(f), (0.0, RK45_CYCLES / f), OSCILLATOR.steady_state(f)
-        found.append(solve_ivp(*job, rtol=rtol, atol=1e-3 * rtol, t_eval=cycles / f).y[0])
-    spent = study.clock() - started
-    return spent, curve_distance(np.std(found, axis=1), OSCILLATOR.rms(frequency))
-
-
-def by_method(points):
-    """Points by method."""
-    found = {}
-    for point in points:
-        found.setdefault(point.method, []).append(point)
-    return found
-
-
-def draw(path, own, toward, empty, floors):
-    """Errors over seconds: by method, toward the spheres, of the empty container."""
-    panels = {"against its own limit": own, "against the spheres": toward, "RK45": empty}
-    places = [["against its own limit"] * 2, ["against the spheres", "RK45"]]
-    with picture(path, 0, size=(9.2, 9.6)) as (figure, _):
-        drawn = figure.subplot_mosaic(places)
-        for title, axes in drawn.items():
-            draw_points(axes, by_method(panels[title]), {} if title == "RK45" else floors)
+def draw(path, own, toward, floors):
+    """Errors over seconds: by method against its own limit, and toward the spheres."""
+    panels = {"against its own limit": own, "against the spheres": toward}
+    with picture(path, 2, 1, size=(9.2, 9.6)) as (figure, drawn):
+        for axes, (title, points) in zip(drawn, panels.items()):
+            draw_points(axes, points, floors)
             axes.set(xscale="log", yscale="log", title=title, xlabel="CPU time [s]")
             axes.set_ylabel("error of the response curve / its peak [1]")
-        keys = [*drawn["against its own limit"].get_lines(), *drawn["RK45"].get_lines()]
-        keys = [key for key in keys if not key.get_label().startswith("_")]
+        keys = [key for key in drawn[0].get_lines() if not key.get_label().startswith("_")]
         figure.legend(handles=keys, loc="outside upper left", ncols=2)
 
 
@@ -218,22 +155,16 @@ def draw_points(axes, points, floors):
         for one in (*good[:1], *good[-1:]):
             at = {"xytext": (4, 4), "textcoords": "offset points", "color": colour}
             axes.annotate(one.label, (one.seconds, one.error), fontsize=8.5, **at)
-        if name in floors:
-            axes.axhline(floors[name], color=colour, ls=":", lw=1.0)
+        axes.axhline(floors[name], color=colour, ls=":", lw=1.0)
 
 
 def answers_of(points, floors):
     """Rows (method, error asked for, step, seconds, error) of the cheapest steps of each method."""
-    return [
-        (name, f"{target:g}", *(_cells(best) if best else ("none", "", "")))
-        for target in TARGETS
-        for name, some in points.items()
-        for best in [cheapest(some, target, floors[name])]
-    ]
-
-
-def _cells(point):
-    return point.label, f"{point.seconds:.3g}", f"{point.error:.2g}"
+    for target, (name, some) in itertools.product(TARGETS, points.items()):
+        best, cells = cheapest(some, target, floors[name]), ("none", "", "")
+        if best:
+            cells = best.label, f"{best.seconds:.3g}", f"{best.error:.2g}"
+        yield name, f"{target:g}", *cells
 
 
 def figures_of(points, floors, target, words):
@@ -254,29 +185,25 @@ def run(options):
             if one[2] or not options.quick:
                 made[name], spent = sweep_of(name, options, bar)
                 compiling += spent
-    frequency = np.array(options.ratios) * OSCILLATOR.natural_frequency
-    empty, spent = rk45_points(frequency, options.repeats, options.quick)
     truth = made[SPHERES].truth
-    own = [point for name, one in made.items() for point in points_of(name, one, one.truth)]
-    toward = [point for name, one in made.items() for point in points_of(name, one, truth)]
+    own = {name: points_of(name, one, one.truth) for name, one in made.items()}
+    toward = {name: points_of(name, one, truth) for name, one in made.items()}
     floors = {name: floor_of(one.reference, [*one.runs.values()]) for name, one in made.items()}
-    rows, header = answers_of(by_method(own), floors), "method asked step seconds error"
-    study.write_rows(folder / "points.csv", [*own, *empty], Point._fields)
+    rows, header = [*answers_of(own, floors)], "method asked step seconds error"
+    study.write_rows(folder / "points.csv", [*itertools.chain(*own.values())], Point._fields)
     study.write_rows(folder / "answers.csv", rows, header)
     study.print_table(rows, header.split())
-    draw(folder / "work_precision.png", own, toward, empty, floors)
-    curves = {name: (options.ratios, one.reference) for name, one in made.items()}
-    picture_compared(folder / "curves.png", curves, OSCILLATOR)
-    figures = figures_of(by_method(own), floors, 0.01, "at_1_percent")
-    figures |= figures_of(by_method(own), floors, 0.1, "at_10_percent")
-    figures |= figures_of(by_method(toward), floors, 0.02, "to_spheres_within_2_percent")
+    draw(folder / "work_precision.png", own, toward, floors)
+    figures = figures_of(own, floors, 0.01, "at_1_percent")
+    figures |= figures_of(own, floors, 0.1, "at_10_percent")
+    figures |= figures_of(toward, floors, 0.02, "to_spheres_within_2_percent")
     figures["chaos_floor"] = min(floors.values()), "1"
     for name, one in made.items():
-        best = cheapest(by_method(own)[name], 0.01, floors[name])
+        best = cheapest(own[name], 0.01, floors[name])
         figures[f"seconds_at_1_percent_{name}"] = best and best.seconds, "s"
         figures[f"chaos_floor_{name}"] = floors[name], "1"
         figures[f"distance_to_spheres_{name}"] = curve_distance(one.truth, truth), "1"
-    study.finish(options, NAME, figures, compiling + spent)
+    study.finish(options, NAME, figures, compiling)
 
 
 if __name__ == "__main__":

@@ -1,107 +1,157 @@
-"""How much do grains damp, over amplitude and frequency, and what does theory say?
+"""How much do grains damp over amplitude and gap, what does theory say, and how to use it?
 
-The container is driven as A sin(w t), whatever the grains do. The first map has no gravity, and is
-compared with the theory of collect and collide: grains fly as one block between floor and lid and
-lose all relative motion at each wall. Expect the loss to jump at A = gap / pi to 4 in units of N m
-A^2 w^2, and to fall slowly beyond. The second map has gravity: below A w^2 = g grains lie still and
-only add mass; the loss is largest where they are thrown once a cycle, from about 2 g on. A quick
-run leaves out the rules of the paper.
+A driven container gives loss c / (N m w) and apparent mass / (N m) of the grains, which depend on
+its peak acceleration in g and on the gap by its amplitude: below 1 g grains lie still and only add
+mass. Times the mass ratio N m / M, half of the loss is the damping ratio that a structure gains.
+The table for finite-element codes, for every acceleration and gap, has the dashpot and the mass of
+these grains, too. As a check they are put into a plain oscillator: expect its peak within 5 % of
+that of the structure with grains, whatever the base's amplitude.
 
-    python experiments/damper_maps.py            # two minutes
+Without gravity the energy is compared with the theory of collect and collide: grains fly as one
+block between floor and lid and lose all relative motion at each wall. Expect the loss to jump at
+A = gap / pi to 4 in units of N m A^2 w^2, and to fall slowly beyond. A quick run leaves out the
+rules of the paper. Where automaton and spheres differ, over frequency too, shows damper_trust.py.
+
+    python experiments/damper_maps.py            # four minutes on two cores
     python experiments/damper_maps.py --particles 20
 
-Writes collect_and_collide.png, maps.png, a CSV of each map and summary.json to
-results/damper_maps/.
+Writes chart.png, collect_and_collide.png, equivalent.csv, check.csv, a CSV of each map without
+gravity and summary.json to results/damper_maps/.
 """
 
 import sys
 from functools import partial
 
 import numpy as np
+import pandas as pd
 
-from ca_damper import Automaton, Spheres, collect_and_collide, damper_map
+import ca_damper as ca
 from taichi_dem.kit import study
-from taichi_dem.kit.plot_style import BLACK, picture, styles_of
+from taichi_dem.kit.plot_style import BLACK, WINE, picture, styles_of
 from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_maps"
+#: Spheres, and the automaton by the rules of the paper and of place, without gravity.
+PAPER = ca.Automaton(rules="paper", gravity=0.0)
+WEIGHTLESS = ca.Spheres(gravity=0.0), PAPER, ca.Automaton(gravity=0.0)
 SETTINGS = {
-    "particles": (30, 30, study.whole(1, 120), "grains with gravity, default 30"),
-    "block": (40, 40, study.whole(10, 120), "grains without gravity, default 40"),
-    "seeds": (3, 1, study.whole(1, 100), "seeds of each scene, default 3"),
-    # Amplitudes by gap / pi; amplitudes by those of g; frequencies [Hz].
+    "particles": (30, 30, study.whole(1, 100), "grains of the chart, 30"),
+    # Clearances of the chart in diameters; accelerations of the chart and of the check.
+    "gaps": ((1, 2, 3, 4, 6, 8, 12, 16), (2, 6)),
+    "levels": (14, 5),
+    "fine": (40, 16),
+    "bases": ((0.2, 0.3, 0.45, 0.6, 0.9, 1.2, 1.8), (0.3, 0.6, 1.2)),
+    "response": (np.arange(0.93, 1.0201, 0.005), np.arange(0.94, 1.001, 0.01)),
+    "cycles": ((100, 50), (20, 10)),
+    "seeds": (2, 1),
+    # Without gravity: seeds, amplitudes by gap / pi, and cycles.
+    "starts": (3, 1, study.whole(1, 100), "seeds of each scene without gravity, default 3"),
     "ratios": (17, 7),
-    "levels": (12, 5),
-    "frequencies": (10, 4),
-    "cycles": (60, 25),
-    # Spheres, and the automaton by the rules of the paper and of place.
-    "fillings": ((Spheres, partial(Automaton, rules="paper"), Automaton), (Spheres, Automaton)),
+    "half": (30, 12),
+    "fillings": (WEIGHTLESS, WEIGHTLESS[::2]),
 }
-#: Base motion without gravity [Hz], and ranges of the axes.
-WEIGHTLESS_HZ, RATIOS = 6.0, (0.6, 1.4)
-HERTZ, MILLIMETRES = (5.0, 40.0), (0.1, 10.0)
-#: Gravity [m/s2], and points of a curve of theory.
-GRAVITY, FINE = 9.8, 400
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
+FILLING, OWN, GRAVITY = ca.Automaton(), ca.Oscillator(), 9.81
+#: Accelerations of the chart and of the check [g]; mass ratios of the table.
+CHART, CHECK, MASS_RATIOS = (0.7, 10.0), (0.1, 6.0), (0.02, 0.05, 0.1)
+CYCLES = "transient_cycles", "measured_cycles"
+#: Without gravity: grains, motion [Hz], amplitudes by gap / pi, points of a curve of theory.
+BLOCK, WEIGHTLESS_HZ, RATIOS, FINE = 40, 6.0, (0.6, 1.4), 400
+
+
+def driven(options, levels, progress, **box):
+    """A map over accelerations [g] at the natural frequency of the structure."""
+    omega = 2.0 * np.pi * OWN.natural_frequency
+    axes = {"amplitudes": levels * GRAVITY / omega**2, "frequencies": OWN.natural_frequency}
+    axes |= {"particles": options.particles, "seeds": options.seeds, "progress": progress}
+    return ca.damper_map(FILLING, **axes, **dict(zip(CYCLES, options.cycles)), **box)
+
+
+def equivalent(made):
+    """Rows of the table for finite-element codes: means over the seeds."""
+    omega, rows = float(made.omega[0, 0]), []
+    mass = float(made.mass.ravel()[0])
+    for gap, loss, share in zip(made.gaps[:, 0], made.loss[:, 0], made.mass_share[:, 0]):
+        for size, c, m in zip(made.amplitudes, loss[:, 0].mean(-1), share[:, 0].mean(-1)):
+            row = {"acceleration_g": size * omega**2 / GRAVITY, "gap_over_amplitude": gap / size}
+            row.update(amplitude_m=size, gap_m=gap, loss=c, mass_share=m)
+            row.update(dashpot_N_s_m=c * mass * omega, added_mass_kg=m * mass)
+            row.update({f"damping_ratio_at_{100 * r:g}_percent": 0.5 * r * c for r in MASS_RATIOS})
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def peak_of_equivalent(made, base):
+    """Peak RMS [m] of an oscillator with the dashpot and mass of the grains at its amplitude.
+
+    The largest amplitude A that some frequency sustains: |K + i w C| y0 >= A |K - (M + m) w^2 +
+    i w (C + c)|, c and m by the acceleration of A at w.
+    """
+    amplitude = np.linspace(made.amplitudes[0], made.amplitudes[-1], 4000)[:, None]
+    omega = 2.0 * np.pi * OWN.natural_frequency * np.linspace(0.85, 1.05, 400)
+    level, mass = amplitude * omega**2, float(made.mass.ravel()[0])
+    known = np.array(made.amplitudes) * float(made.omega[0, 0]) ** 2
+    loss, share = (one[0, 0, :, 0].mean(-1) for one in (made.loss, made.mass_share))
+    damping = OWN.damping + np.interp(level, known, loss) * mass * omega
+    heavy = OWN.mass + np.interp(level, known, share) * mass
+    held = np.abs(OWN.stiffness - heavy * omega**2 + 1j * omega * damping)
+    pushed = base * np.abs(OWN.stiffness + 1j * omega * OWN.damping)
+    kept = (pushed >= amplitude * held).any(axis=1)
+    return float(amplitude[kept].max()) / np.sqrt(2.0)
+
+
+def check(options, made, progress):
+    """Peaks of the structure with grains and of the equivalent oscillator, a row a base."""
+    job = {"particles": options.particles, "ratios": options.response, "seeds": options.seeds}
+    job["base_amplitude"] = [1e-3 * base for base in options.bases]
+    job |= {**dict(zip(CYCLES, options.cycles)), "progress": progress}
+    peaks = ca.frequency_response(FILLING, **job).peaks()[1][:, 0]
+    plain = [peak_of_equivalent(made, base) for base in job["base_amplitude"]]
+    found = {"grains_mm": 1e3 * peaks.mean(axis=1), "equivalent_mm": 1e3 * np.array(plain)}
+    table = pd.DataFrame({"base_mm": options.bases, **found})
+    return table.assign(error_percent=100.0 * (table.equivalent_mm / table.grains_mm - 1.0))
+
+
+def draw(path, table, checked):
+    """Loss and apparent mass over acceleration and gap, and the check."""
+    shown = {"loss": ("loss c / (N m ω)", "viridis"), "mass_share": ("mass / (N m)", "cividis")}
+    with picture(path, 1, 3, (13.5, 4.8)) as (_, axes):
+        for axis, (name, (words, colours)) in zip(axes, shown.items()):
+            x, y = np.log10(table.acceleration_g), np.log10(table.gap_over_amplitude)
+            drawn = axis.tricontourf(x, y, table[name], levels=10, cmap=colours)
+            lines = axis.tricontour(x, y, table[name], levels=drawn.levels[::2], colors="white")
+            axis.clabel(lines, fontsize=9)
+            for side, ticks in (("x", (1, 2, 3, 5, 10)), ("y", (0.1, 0.3, 1, 3, 10, 30))):
+                getattr(axis, f"set_{side}ticks")(np.log10(ticks), [f"{one:g}" for one in ticks])
+            axis.set(title=words, xlabel="peak acceleration [g]", ylabel="gap / amplitude [1]")
+            axis.set(xlim=(x.min(), x.max()), ylim=(y.min(), y.max()))
+        axes[2].plot(checked.base_mm, checked.grains_mm, "P", ms=11, color=WINE, label="grains")
+        label = "plain oscillator with their dashpot and mass"
+        axes[2].plot(checked.base_mm, checked.equivalent_mm, color=BLACK, lw=2.0, label=label)
+        words = f"check: within {checked.error_percent.abs().max():.1f} %"
+        axes[2].set(title=words, xlabel="amplitude of the base [mm]", ylim=(0.0, None))
+        axes[2].set_ylabel("peak RMS of the structure [mm]")
+        axes[2].legend()
 
 
 def picture_jump(path, maps):
-    """Energy and apparent mass over amplitude without gravity, with the theory as a line."""
+    """Energy over amplitude without gravity, with the theory as a line."""
     first = next(iter(maps.values()))
     size, gap = np.array(first.amplitudes), float(first.gaps[0, 0])
     fine = np.linspace(gap / np.pi * (1.0 + 1e-9), max(size.max(), 0.4 * gap), FINE)
-    theory = collect_and_collide(fine, gap)
-    panels = {
-        "energy": (theory.energy, "energy taken in a cycle\n/ (N m A² ω²) [1]"),
-        "mass_share": (theory.mass, "apparent mass / (N m) [1]"),
-    }
-    with picture(path, 1, 2, (9.2, 4.2)) as (figure, axes):
-        for axis, (name, (curve, words)) in zip(axes, panels.items()):
-            axis.plot(np.pi * fine / gap, curve, color=BLACK, lw=1.0, label="collect and collide")
-            for filling, style in styles_of(maps).items():
-                values = getattr(maps[filling], name)[0, 0, :, 0, :]
-                middle = values.mean(axis=1)
-                bars = [middle - values.min(axis=1), values.max(axis=1) - middle]
-                look = {"color": style.colour, "marker": style.marker, "ms": 4, "lw": 1.0}
-                axis.errorbar(np.pi * size / gap, middle, bars, label=style.label, **look)
-            axis.axvline(1.0, color=BLACK, lw=0.8, ls=":", label="jump of the theory")
-            axis.set(xlabel="π × amplitude / gap [1]", ylabel=words)
-        axes[0].set_ylim(0.0, None)
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=4)
-
-
-def picture_maps(path, maps):
-    """Loss and apparent mass over frequency and amplitude: a column a filling."""
-    first, rows = next(iter(maps.values())), {"loss": "loss\nc / (N m ω) [1]"}
-    rows["mass_share"] = "apparent mass\n/ (N m) [1]"
-    x, y = edges(np.array(first.frequencies)), edges(1e3 * np.array(first.amplitudes))
-    fine = np.geomspace(x[0], x[-1], FINE)
-    with picture(path, 2, len(maps), (9.2, 7.0), sharex=True, sharey=True) as (figure, axes):
-        for panels, (name, words), colours in zip(axes, rows.items(), ("viridis", "cividis")):
-            shown = {k: getattr(one, name)[0, 0].mean(axis=-1) for k, one in maps.items()}
-            every = np.array([*shown.values()])
-            ends = {"vmin": min(0.0, every.min()), "vmax": every.max(), "cmap": colours}
-            for axis, (filling, style) in zip(panels, styles_of(maps).items()):
-                mesh = axis.pcolormesh(x, y, shown[filling], **ends)
-                for times, line in ((1, "-"), (3, "--"), (10, ":")):
-                    size = 1e3 * times * GRAVITY / (2.0 * np.pi * fine) ** 2
-                    axis.plot(fine, size, color="white", ls=line, lw=2.6)
-                    label = f"A ω² = {times} g"
-                    axis.plot(fine, size, color=BLACK, ls=line, lw=1.2, label=label)
-                axis.set(xscale="log", yscale="log", xlim=x[[0, -1]], ylim=y[[0, -1]])
-                axis.set_title(style.label)
-            figure.colorbar(mesh, ax=panels, label=words)
-        for axis in axes[-1]:
-            axis.set_xlabel("frequency [Hz]")
-        for axis in axes[:, 0]:
-            axis.set_ylabel("amplitude [mm]")
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=3)
-
-
-def edges(centres):
-    """Edges of cells around centres whose logarithms are even."""
-    half = np.sqrt(centres[1] / centres[0])
-    return np.append(centres / half, centres[-1] * half)
+    theory = ca.collect_and_collide(fine, gap).energy
+    with picture(path, size=(6.0, 4.2)) as (_, axis):
+        axis.plot(np.pi * fine / gap, theory, color=BLACK, lw=1.0, label="collect and collide")
+        for filling, style in styles_of(maps).items():
+            values = maps[filling].energy[0, 0, :, 0, :]
+            middle = values.mean(axis=1)
+            bars = [middle - values.min(axis=1), values.max(axis=1) - middle]
+            look = {"color": style.colour, "marker": style.marker, "ms": 4, "lw": 1.0}
+            axis.errorbar(np.pi * size / gap, middle, bars, label=style.label, **look)
+        axis.axvline(1.0, color=BLACK, lw=0.8, ls=":", label="jump of the theory")
+        axis.set(xlabel="π × amplitude / gap [1]", ylim=(0.0, None))
+        axis.set_ylabel("energy taken in a cycle / (N m A² ω²) [1]")
+        axis.legend()
 
 
 def jump_of(ratios, energy):
@@ -114,45 +164,48 @@ def jump_of(ratios, energy):
     return float(ratios[k] + share * (ratios[k + 1] - ratios[k]))
 
 
+def weightless(options, folder):
+    """Maps without gravity over amplitude, by filling."""
+    gap = 96e-3 - 6e-3 * BLOCK / 10
+    axes = {"amplitudes": gap / np.pi * np.linspace(*RATIOS, options.ratios)}
+    axes |= {"frequencies": WEIGHTLESS_HZ, "particles": BLOCK, "seeds": options.starts}
+    axes, made = {**axes, **dict.fromkeys(CYCLES, options.half)}, {}
+    for filling in options.fillings:
+        with ProgressBar(f"{filling.label}, no gravity") as bar:
+            made[filling.label] = ca.damper_map(filling, **axes, progress=bar)
+        made[filling.label].write_csv(folder / f"weightless_{filling.label}.csv")
+    return made
+
+
 def run(options):
-    """Map all fillings without and with gravity, compare, picture."""
-    folder, half = study.begin(options), options.cycles // 2
-    cycles = {"transient_cycles": half, "measured_cycles": options.cycles - half}
-    few, jumps, maps, figures = {"seeds": options.seeds, **cycles}, {}, {}, {}
-    gap = 96e-3 - 6e-3 * options.block / 10
-    weightless = {
-        "amplitudes": gap / np.pi * np.linspace(*RATIOS, options.ratios),
-        **{"frequencies": WEIGHTLESS_HZ, "particles": options.block},
-    }
-    heavy = {
-        "amplitudes": 1e-3 * np.geomspace(*MILLIMETRES, options.levels),
-        "frequencies": np.geomspace(*HERTZ, options.frequencies),
-        "particles": options.particles,
-    }
-    jobs = {"weightless": (0.0, weightless, jumps), "gravity": (GRAVITY, heavy, maps)}
-    for make in options.fillings:
-        for name, (gravity, axes, made) in jobs.items():
-            filling = make(gravity=gravity)
-            label = make().label
-            with ProgressBar(f"{label}, gravity {gravity:g} m/s2") as bar:
-                made[label] = damper_map(filling, **axes, **few, progress=bar)
-            made[label].write_csv(folder / f"{name}_{label}.csv")
+    """Map, tabulate, check, compare with theory, picture."""
+    folder, cell = study.begin(options), FILLING.width
+    with ProgressBar("chart") as bar:
+        levels = np.geomspace(*CHART, options.levels)
+        chart = driven(options, levels, bar, clearances=[cell * gap for gap in options.gaps])
+    with ProgressBar("own box") as bar:
+        own = driven(options, np.geomspace(*CHECK, options.fine), bar)
+    with ProgressBar("check") as bar:
+        checked = check(options, own, bar)
+    table, jumps = equivalent(chart), weightless(options, folder)
+    table.to_csv(folder / "equivalent.csv", index=False)
+    checked.to_csv(folder / "check.csv", index=False)
+    print(checked.to_string(index=False, float_format="{:.3g}".format), "\n")
+    draw(folder / "chart.png", table, checked)
     picture_jump(folder / "collect_and_collide.png", jumps)
-    picture_maps(folder / "maps.png", maps)
+    best = table.loc[table.loss.idxmax()]
+    figures = {"largest_loss": (float(best.loss), "1")}
+    figures["largest_loss_at_g"] = float(best.acceleration_g), "g"
+    figures["largest_loss_at_gap"] = float(best.gap_over_amplitude), "1"
+    figures["largest_error_percent"] = float(checked.error_percent.abs().max()), "%"
     for label, made in jumps.items():
         energy = made.energy[0, 0, :, 0].mean(axis=-1)
         ratios = np.pi * np.array(made.amplitudes) / made.gaps[0, 0]
         flat = (energy / made.theory.energy[0, 0])[ratios > 1.05]
         figures[f"jump_ratio_{label}"] = jump_of(ratios, energy), "1"
         figures[f"plateau_share_{label}"] = float(flat.mean()), "1"
-    for label, made in maps.items():
-        loss = made.loss[0, 0].mean(axis=-1)
-        i, j = np.unravel_index(np.argmax(loss), loss.shape)
-        level = made.amplitudes[i] * (2.0 * np.pi * made.frequencies[j]) ** 2 / GRAVITY
-        figures[f"largest_loss_{label}"] = float(loss.max()), "1"
-        figures[f"largest_loss_at_g_{label}"] = float(level), "g"
-    reports = [report for one in (*jumps.values(), *maps.values()) for report in one.reports]
-    study.finish(options, NAME, figures, reports, see="collect_and_collide.png")
+    reports = [report for one in (chart, own, *jumps.values()) for report in one.reports]
+    study.finish(options, NAME, figures, reports, see="chart.png")
 
 
 if __name__ == "__main__":

@@ -1,29 +1,35 @@
-"""Which measurements and solutions of others does the damper meet, and which does it miss?
+"""Where do the damper's fillings agree with others, with exact solutions and with each other?
 
-One grain between walls has a closed form (Masri). A beam with 6 % of its mass in lead grains loses
-half of its energy in a cycle (Friend and Kinra); grains that collect and collide can take 8 times
-the mass ratio, 48 %. In boxes without a lid the apparent mass falls as acceleration to the -2, the
-loss to the -1, whatever the width (Masmoudi et al., Ferreyra et al.). Fillings of one mass have one
-response where the box leaves them room (Sanchez et al.). Rows are measured by the rules of place
-and by spheres; a miss is printed as a miss. The optimum of clearance of the beam and the curves of
-Saeki 2002 are drawn in papers that print no numbers, and are not compared.
+Published cases first. One grain between walls has a closed form (Masri). A beam with 6 % of its
+mass in lead grains loses half of its energy in a cycle (Friend and Kinra); grains that collect and
+collide can take 8 times the mass ratio, 48 %. In boxes without a lid the apparent mass falls as
+acceleration to the -2, the loss to the -1, whatever the width (Masmoudi et al., Ferreyra et al.).
+Fillings of one mass have one response where the box leaves them room (Sanchez et al.). A miss is
+printed as a miss: in one case of Masri's, with 3 % above resonance, both fillings end from rest in
+an irregular motion beside the periodic one; a box without a lid has a mass that turns negative at
+3 g, so that few points are left for its exponent. The optimum of clearance of the beam and the
+curves of Saeki 2002 are drawn in papers that print no numbers, and are not compared.
 
-In one case of Masri's, with 3 % above resonance, both fillings end from rest in an irregular motion
-beside the periodic one. A box without a lid has a mass that turns negative at 3 g, so that few
-points are left for its exponent.
+Then the automaton, by the rules of the paper and by those of place, beside spheres: the motion of
+grains in a container that throws them, loss and apparent mass at small amplitudes, the plug that
+grains form without gravity, the peaks of the damped structure, and whether a motion lasts. Expect
+the rules of place within the wanted range of every such row. The map shows where to trust either,
+by the difference of the impedance from that of spheres.
 
-    python experiments/damper_trust.py            # about five minutes on two cores
-    python experiments/damper_trust.py --quick    # the rules of place alone
+    python experiments/damper_trust.py            # about ten minutes on two cores
+    python experiments/damper_trust.py --quick    # published cases by the rules of place alone
 
-Writes trust.png, trust.csv, damper_trust.md and summary.json to results/damper_trust/.
+Writes trust.png, published.png, trust.csv, map.csv, damper_trust.md and summary.json to
+results/damper_trust/.
 """
 
 import sys
 from functools import partial
 
 import numpy as np
+import pandas as pd
 
-from _damper_trust import BEAM_CELLS, CASES, COLUMNS, EQUAL_MASS, FILLINGS, MASRI
+import _damper_trust as cases
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.plot_style import BLACK, picture, styles_of
@@ -31,101 +37,164 @@ from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_trust"
 SETTINGS = {
-    "seeds": (2, 1, study.whole(1, 100), "of the maps, 2"),
-    "cycles": (50, 10),
+    "seeds": (16, 4, study.whole(1, 1000), "starts averaged beside spheres, default 16"),
+    "transient": (150, 25),
+    "cycles": (20, 6),
+    "long": (2000, 200),
+    # Numbers of grains that swing, cycles of them that are filmed; those whose peaks are sought.
+    "swings": ((40, 20, 5), (40,)),
+    "filmed": (8, 4),
+    "peaks": ((30, 50), ()),
+    "jump": (cases.JUMP, cases.JUMP[::2]),
+    "frequencies": ([4.0, 6.0, 10.0, 16.0, 25.0, 40.0, 64.0], [6.0, 50.0]),
+    "accelerations": ([0.8, 1.2, 1.5, 2.0, 3.0, 5.0, 8.0], [1.5, 3.0]),
+    "grains": ([5, 10, 30, 50], [10, 30]),
+    # Of the published cases: seeds and cycles of the maps, periods of one grain.
+    "few": (2, 1),
+    "driven": (50, 10),
     "levels": (12, 6),
-    "long": (400, 300),
-    "grid": (MASRI, ((0.05,), (0.5,), (2,), MASRI[3])),
-    "gaps": (BEAM_CELLS, (2, 4)),
-    "columns": (COLUMNS, (3,)),
-    "fillings": (((30, 0.75, 0.5), *EQUAL_MASS), EQUAL_MASS[1:3]),
-    "by": (FILLINGS, FILLINGS[:1]),
+    "periods": (400, 300),
+    "grid": (cases.MASRI, ((0.05,), (0.5,), (2,), cases.MASRI[3])),
+    "gaps": (cases.BEAM_CELLS, (2, 4)),
+    "columns": (cases.COLUMNS, (3,)),
+    "fillings": (((30, 0.75, 0.5), *cases.EQUAL_MASS), cases.EQUAL_MASS[1:3]),
+    "by": (("dem", "place"), ("place",)),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
-HEADER = ("case", "source", "published", "by", "ours", "wanted", "verdict")
+#: Shares at which the colours of the map change.
+SHADES = (0.0, 0.05, 0.1, 0.2, 0.4, 1.0)
+UNITS = {"mm": "mm", "deg": "deg", "percent": "%"}
+HEADER = ("case", "source", "published", "spheres", "paper", "place", "wanted", "verdict")
 
 
-def cells_of(label, row):
-    """Cells of the printed table."""
-    verdict = "holds" if row.low <= row.ours <= row.high else "misses"
-    wanted = f"{row.low:g} to {row.high:g}"
-    return row.words, row.source, row.published, label, f"{row.ours:.3g}", wanted, verdict
+def measured(options):
+    """Values and what is drawn by case and filling; impedances by filling."""
+    jobs = [(case, by) for case in cases.PUBLISHED for by in options.by]
+    jobs += [(case, by) for case in cases.COMPARED for by in cases.FILLINGS]
+    jobs += [(cases.lasting, by) for by in ("paper", "place")]
+    found, maps = {}, {}
+    with ProgressBar("cases and map") as bar:
+        for k, (case, by) in enumerate(jobs):
+            bar.count(k, len(jobs) + len(cases.FILLINGS))
+            found[case, by] = case(cases.FILLINGS[by], options)
+        for by, filling in cases.FILLINGS.items():
+            maps[by] = cases.impedance(filling, options)
+    return found, maps
 
 
-def draw(path, found):
-    """Four panels, by the rules of place and by spheres."""
-    with picture(path, 2, 2, (10.5, 8.4)) as (figure, axes):
-        panels = dict(zip(CASES, axes.ravel()))
-        for label, style in styles_of(found).items():
-            look = {"color": style.colour, "marker": style.marker, "ms": 6}
-            for name, axis in panels.items():
-                DRAWINGS[name](axis, found[label][name][0].drawn, {**look, "label": style.label})
-        ends = axes[0, 0].get_xlim()
-        axes[0, 0].plot(ends, ends, color=BLACK, lw=1.0)
-        axes[0, 1].axhspan(40.0, 60.0, color=BLACK, alpha=0.12)
-        axes[0, 0].set(title="one grain (Masri)", xlabel="RMS, closed form [mm]")
-        axes[0, 0].set_ylabel("RMS [mm]")
-        axes[0, 1].set(title="beam with 6 % of grains (grey: measured)", xscale="log", ylim=(0, 70))
-        axes[0, 1].set(xlabel="peak acceleration [g]", ylabel="energy lost in a cycle [%]")
-        axes[1, 0].set(title="no lid: dashed -1, dotted -2", xscale="log", yscale="log")
-        axes[1, 0].set(xlabel="peak acceleration [g]", ylabel="loss (full), mass (open) [1]")
-        axes[1, 0].set_ylim(0.01, 2.0)
-        axes[1, 1].set(title="fillings of one mass", ylabel="peak RMS [mm]")
-        axes[1, 1].set_ylim(0.0, 1.2 * axes[1, 1].get_ylim()[1])
-        axes[1, 1].margins(x=0.15)
-        axes[1, 1].set_xlabel("number, restitution, friction [1]")
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
+def rows_of(found):
+    """Rows of the table: words, source, published, values by filling, ends of what is wanted."""
+    values = {}
+    for (_, by), (ours, _) in found.items():
+        for key, value in ours.items():
+            values.setdefault(key, {})[by] = float(value)
+    rows = {}
+    for key, of in values.items():
+        if key in cases.WANTED:
+            words, source, published, low, high = cases.WANTED[key]
+        else:
+            words, off, share = cases.NEAR[key]
+            source, published, off = "spheres", f"{of['dem']:.3g}", off + share * abs(of["dem"])
+            low, high = of["dem"] - off, of["dem"] + off
+        rows[key] = words, source, published, of, low, high
+    return rows
 
 
-def draw_masri(axis, drawn, look):
-    """Ours over the closed form."""
-    axis.plot(*drawn, ls="", **look)
+def cells_of(words, source, published, of, low, high):
+    """Cells of the printed table; the verdict is that of the rules of place."""
+    numbers = [f"{of[by]:.3g}" if by in of else "" for by in cases.FILLINGS]
+    verdict = "holds" if low <= of["place"] <= high else "misses"
+    return words, source, published, *numbers, f"{low:.3g} to {high:.3g}", verdict
 
 
-def draw_beam(axis, drawn, look):
-    """Capacity over acceleration, the best clearance at each."""
-    levels, capacity, _ = drawn
-    axis.plot(levels, capacity.max(axis=0), **look)
+def draw_map(path, options, apart):
+    """A panel for each number of grains and rules: percent of difference, light is good."""
+    axes_of = {"x": options.frequencies, "y": options.accelerations}
+    shape = {"size": (2.1 * len(options.grains) + 0.8, 6.4), "squeeze": False, "sharex": True}
+    with picture(path, len(apart), len(options.grains), sharey=True, **shape) as (figure, panels):
+        for row, (name, maps) in zip(panels, apart.items()):
+            label = cases.FILLINGS[name].label
+            row[0].set_ylabel(f"{styles_of([label])[label].label}\nacceleration [g]")
+            for axes, count, shares in zip(row, options.grains, maps):
+                shade(axes, shares)
+                axes.set_title(f"{count} grains")
+                for axis, values in axes_of.items():
+                    ticks = {f"{axis}ticks": range(len(values))}
+                    axes.set(**ticks, **{f"{axis}ticklabels": [f"{one:g}" for one in values]})
+        for axes in panels[-1]:
+            axes.set_xlabel("frequency [Hz]")
+        figure.suptitle("Difference of the impedance from that of spheres [%]")
 
 
-def draw_open(axis, drawn, look):
-    """Loss and mass over acceleration for each width."""
-    for level, mass, loss in drawn.values():
-        axis.plot(level, loss, lw=1.0, **look)
-        axis.plot(level, np.where(mass > 0.0, mass, np.nan), lw=1.0, mfc="none", **look)
-    axis.plot(level, 1.6 / level, color=BLACK, ls="--")
-    axis.plot(level, 1.6 / level**2, color=BLACK, ls=":")
+def shade(axes, shares):
+    """Cells of a map with their percent; white below 5 %, darker in steps."""
+    level = np.digitize(shares, SHADES[1:])
+    axes.imshow(level, cmap="YlOrRd", vmin=0, vmax=len(SHADES), origin="lower", aspect="auto")
+    for (i, j), share in np.ndenumerate(shares):
+        colour = "white" if level[i, j] > 0.6 * len(SHADES) else BLACK
+        look = {"ha": "center", "va": "center", "fontsize": 8.5, "color": colour}
+        axes.text(j, i, f"{100.0 * min(share, 9.99):.0f}", **look)
+    axes.grid(False)
 
 
-def draw_equal(axis, drawn, look):
-    """Peak of each filling."""
-    fillings, peaks = drawn
-    axis.plot(range(len(peaks)), peaks, ls="", **look)
-    names = [f"N = {n}\ne = {e:g}\nμ = {friction:g}" for n, e, friction in fillings]
-    axis.set_xticks(range(len(peaks)), names)
+def draw_published(path, found, names):
+    """The beam at its best clearance, and boxes without a lid, over acceleration."""
+    with picture(path, 1, 2, (10.5, 4.6)) as (figure, (left, right)):
+        styles = styles_of([cases.FILLINGS[by].label for by in names]).values()
+        for by, style in zip(names, styles):
+            look = {"color": style.colour, "marker": style.marker, "ms": 6, "label": style.label}
+            levels, capacity = found[cases.beam, by][1]
+            left.plot(levels, capacity.max(axis=0), **look)
+            for level, mass, loss in found[cases.open_boxes, by][1]:
+                right.plot(level, loss, lw=1.0, **look)
+                right.plot(level, np.where(mass > 0.0, mass, np.nan), lw=1.0, mfc="none", **look)
+        right.plot(level, 1.6 / level, color=BLACK, ls="--")
+        right.plot(level, 1.6 / level**2, color=BLACK, ls=":")
+        left.axhspan(40.0, 60.0, color=BLACK, alpha=0.12)
+        left.set(title="beam with 6 % of grains (grey: measured)", xscale="log", ylim=(0, 70))
+        left.set(xlabel="peak acceleration [g]", ylabel="energy lost in a cycle [%]")
+        right.set(title="no lid: dashed -1, dotted -2", xscale="log", yscale="log")
+        right.set(xlabel="peak acceleration [g]", ylabel="loss (full), mass (open) [1]")
+        right.set_ylim(0.01, 2.0)
+        figure.legend(*left.get_legend_handles_labels(), loc="outside upper left", ncols=2)
 
 
-DRAWINGS = {"masri": draw_masri, "beam": draw_beam, "open": draw_open, "equal": draw_equal}
+def write_map(path, options, apart):
+    """The map as a table."""
+    names = pd.MultiIndex.from_product(
+        [apart, options.grains, options.accelerations, options.frequencies],
+        names=["rules", "particles", "acceleration_g", "frequency_Hz"],
+    )
+    table = pd.Series(np.ravel([*apart.values()]), names, name="impedance_difference")
+    table.to_csv(path)
 
 
 def run(options):
-    """Measure all cases, print, write, picture."""
-    folder, found = study.begin(options), {}
-    for filling in options.by:
-        made = found[filling.label] = {}
-        with ProgressBar(filling.label) as bar:
-            for k, (name, case) in enumerate(CASES.items()):
-                bar.count(k, len(CASES))
-                made[name] = list(case(filling, options))
-    rows = [(label, row) for label, made in found.items() for part in made.values() for row in part]
-    cells = [cells_of(*pair) for pair in rows]
+    """Measure all cases and the map; print, write, picture."""
+    folder = study.begin(options)
+    found, maps = measured(options)
+    rows = rows_of(found)
+    cells = [cells_of(*row) for row in rows.values()]
     study.print_table(cells, HEADER)
     study.write_rows(folder / "trust.csv", cells, " ".join(HEADER))
     write_text(folder / f"{NAME}.md", study.markdown_of(HEADER, cells))
-    draw(folder / "trust.png", found)
-    figures = {f"{row.key}_{label}": (float(row.ours), "1") for label, row in rows}
-    figures["holds"] = sum(one[-1] == "holds" for one in cells), "1"
-    figures["rows"] = len(cells), "1"
+    exact = np.array(maps.pop("dem"))
+    apart = {by: np.abs(np.array(one) - exact) / np.abs(exact) for by, one in maps.items()}
+    write_map(folder / "map.csv", options, apart)
+    draw_map(folder / "trust.png", options, apart)
+    draw_published(folder / "published.png", found, options.by)
+    figures = {
+        f"{key}_{by}": (value, next((UNITS[part] for part in key.split("_") if part in UNITS), "1"))
+        for key, row in rows.items()
+        for by, value in row[3].items()
+    }
+    near = [one for key, one in zip(rows, cells) if key in cases.NEAR]
+    figures["near_spheres"], figures["compared"] = (
+        (sum(one[-1] == "holds" for one in near), "1"),
+        (len(near), "1"),
+    )
+    for by, shares in apart.items():
+        figures[f"trusted_share_{by}"] = float((shares < 0.2).mean()), "1"
     study.finish(options, NAME, figures, 0.0)
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
-from ca_damper.oscillator import Oscillator
 from ca_damper.report.measures import first_harmonic
 from taichi_dem.kit.plot_style import BLACK, GREY, STYLES, area_key, line_key, picture, styles_of
 from taichi_dem.kit.validation import FileName, choice
@@ -38,18 +37,6 @@ def picture_damping(path: FileName, curves: Any, shares: Any, fixed: tuple[int, 
         share.set(title="what free grains leave of the peak", xlabel="amplitude of the base [mm]")
         share.set(ylabel="peak / peak with fixed grains [1]", ylim=(0.0, 1.08))
         figure.legend(*curve.get_legend_handles_labels(), loc="outside upper left", ncols=4)
-
-
-def picture_compared(path: FileName, curves: Any, oscillator: Oscillator) -> None:
-    """Curves of several fillings: mean over seeds as lines, their range as bars; empty dotted."""
-    styles = styles_of(curves)
-    with picture(path, 1, 1, (7.0, 4.6)) as (_, axis):
-        for label, (ratios, rms) in curves.items():
-            _bars(axis, ratios, 1e3 * rms, 1e3 * rms.mean(axis=1), styles[label], 4)
-        top = 1.15e3 * max(np.nanmax(rms) for _, rms in curves.values())
-        _draw_empty(axis, oscillator, np.concatenate([ratios for ratios, _ in curves.values()]))
-        axis.set(title="mean over seeds; bars: their range", ylim=(0.0, top))
-        axis.legend()
 
 
 def _draw_curves(axis, response, rows=None):
