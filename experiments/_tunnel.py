@@ -7,49 +7,27 @@ from typing import NamedTuple
 import numpy as np
 
 import taichi_dem as dem
-from taichi_dem.kit.validation import choice
-from taichi_dem.mesh.boreholes import Hole, drilled_rock, read_holes, with_charges
+from taichi_dem.mesh.boreholes import Hole, drilled_rock, with_charges
 from taichi_dem.mesh.mesh import volumes
 from taichi_dem.output.hole_monitor import Attenuation
 
-#: Rock behind the face [m], and the middle of the round on it.
+#: Rock behind the face [m], the middle of the round on it, and moduli and strengths of granite.
 SIZE, MIDDLE = (4.0, 4.0, 3.0), (2.0, 2.0)
-#: Granite as of measurements: moduli, density, strength, fracture energy.
-ROCK = dem.Material.from_elastic(
-    young=50e9,
-    poisson=0.25,
-    density=2700.0,
-    tensile_strength=6e6,
-    fracture_energy=200.0,
-    friction_angle=45.0,
-    cohesion=15e6,
-)
+GRANITE = {"young": 50e9, "poisson": 0.25, "density": 2700.0, "fracture_energy": 200.0}
+GRANITE |= {"tensile_strength": 6e6, "cohesion": 15e6, "friction_angle": 45.0}
+QUIET = ("left", "right", "bottom", "top", "back")
 #: Six holes in two rows, charged on the last two thirds of their length [m].
 HEIGHTS, LENGTH, UNCHARGED = (1.6, 2.0, 2.4), 1.0, 1.0 / 3.0
 #: Distance of a row from the middle, of straight holes and of a V; angle of the V [degrees].
 APART, V_APART, V_ANGLE = 0.35, 0.48, 65.0
-#: Slot: width, height and depth [m], and distances from the nearest row.
-SLOT, BURDENS = (0.1, 1.4, 1.0), (0.2, 0.4, 0.8)
-#: Diameter of the empty hole of a burn cut [m].
-EMPTY = 0.38
+#: Slot 0.4 m from the left row, its corner and size [m]; diameter of the empty hole [m].
+SLOT, EMPTY = ((MIDDLE[0] - APART - 0.5, 1.3, 2.0), (0.1, 1.4, 1.0)), 0.38
 #: Gas: peak [Pa] and rise [s]; the fall takes 2.75 times as long, as in the first paper.
-PEAK, RISE = 575e6, 1.33e-4
-QUIET = ("left", "right", "bottom", "top", "back")
-#: Edges of elements far from holes over those near them, and their growth with each metre.
-FAR, GROWTH, SIDES = 7.0, 0.35, 5
+GAS = {"peak": 575e6, "rise": 1.33e-4}
 #: Distance from the middle of the charges at which peak velocities are given [m], and those from
-#: and up to which a power of the distance is fitted.
-PLACE, FITTED = 1.5, (0.8, 2.0)
-#: Receivers: behind, beside and above the round [m].
-RECEIVERS = {"behind": (2.0, 2.0, 0.6), "beside": (3.7, 2.0, 2.3), "above": (2.0, 3.7, 2.3)}
-#: Speed of a piece towards the tunnel from which on it comes out [m/s].
-OUT = 1.0
-#: Name of the design of a user's table.
-YOURS = "yours"
-#: Designs whose meshes are kept for quick runs without Gmsh, and edges at their holes [m].
-QUICK, QUICK_NEAR = ("parallel", "V cut"), 0.12
-KEPT = Path(__file__).resolve().parent / "tunnel_meshes"
-#: What the work of the gas went into: terms of the account, and those of the last two.
+#: and up to which a power of the distance is fitted; speed from which on a piece comes out [m/s].
+PLACE, FITTED, OUT = 1.5, (0.8, 2.0), 1.0
+#: What the work of the gas went into: terms of the account.
 PARTS = {
     "radiated": ("ground_dashpot",),
     "broken": ("softening", "release"),
@@ -58,6 +36,11 @@ PARTS = {
     "moving": ("kinetic",),
     "strain": ("bond_strain", "sphere_strain"),
 }
+#: Designs whose meshes lie beside the programs, for runs without Gmsh; edge at their holes [m].
+KEPT, KEPT_NEAR = {"parallel": "parallel.msh", "V cut": "V_cut.msh"}, 0.12
+MESHES = Path(__file__).resolve().parent / "tunnel_meshes"
+#: Edges far from holes over those near them.
+FAR = 7.0
 
 
 class Design(NamedTuple):
@@ -68,11 +51,7 @@ class Design(NamedTuple):
 
 
 def two_rows(apart, delay, angle=90.0):
-    """Six charged holes; those of one height fire together, each height a delay [s] later.
-
-    apart: distance of a row from the middle [m]. angle: with the face, towards the middle
-    [degrees].
-    """
+    """Six charged holes; those of one height fire together, each height a delay [s] later."""
     charge = {"length_m": LENGTH, "charge_from_m": UNCHARGED}
     return tuple(
         Hole(MIDDLE[0] + side * apart, y, angle_deg=lean, delay_s=k * delay, **charge)
@@ -81,99 +60,52 @@ def two_rows(apart, delay, angle=90.0):
     )
 
 
-def slot_beside(burden):
-    """A slot at a burden [m] from the left row of holes."""
-    width, height, depth = SLOT
-    corner = MIDDLE[0] - APART - burden - width, MIDDLE[1] - 0.5 * height, SIZE[2] - depth
-    return (corner, SLOT)
-
-
 def designs(delay=0.0):
     """Designs of the same charge, by name."""
     straight = two_rows(APART, delay)
     empty = Hole(*MIDDLE, LENGTH, charge_from_m=LENGTH, diameter_m=EMPTY)
-    slots = {f"slot {one:g} m": Design(straight, (slot_beside(one),)) for one in BURDENS}
     return {
         "parallel": Design(straight),
         "V cut": Design(two_rows(V_APART, delay, V_ANGLE)),
-        **slots,
+        "slot 0.4 m": Design(straight, (SLOT,)),
         "burn cut": Design((*straight, empty)),
     }
 
 
-def design_of(row):
-    """The design that a row of a table of runs names, or that of its table of holes."""
-    if row["design"] == YOURS:
-        return Design(read_holes(row["holes"]))
-    known = designs(row["delay_s"])
-    return known[choice("designs", row["design"], list(known))]
-
-
-def mesh_of(design, near, seed):
-    """Mesh of a design by Gmsh, with edges near its holes [m]; a seed makes another one."""
-    look = {"growth": GROWTH, "sides": SIDES, "slots": design.slots, "seed": seed}
-    return drilled_rock(SIZE, design.holes, near, FAR * near, **look)
-
-
-def path_of_kept(name):
-    """File of the kept mesh of a design."""
-    return KEPT / f"{name.replace(' ', '_')}.msh"
-
-
-def kept_mesh(name):
-    """The small mesh of a design that lies beside the programs; InputError where there is none."""
-    if name not in QUICK:
-        raise dem.InputError(
-            f"a quick run has meshes of {', '.join(QUICK)}: give --near for {name}"
-        )
-    return dem.read_mesh(path_of_kept(name))
+def mesh_of(name, design, near, seed):
+    """Mesh by Gmsh with edges near the holes [m], or without these the one that is kept."""
+    if near:
+        return drilled_rock(SIZE, design.holes, near, FAR * near, slots=design.slots, seed=seed)
+    if name not in KEPT:
+        raise dem.InputError(f"designs must be of {', '.join(KEPT)} without --near, got {name}")
+    return dem.read_mesh(MESHES / KEPT[name])
 
 
 def scene_of(mesh, design, exponent=0.0):
     """The rock with gas in its charges; exponent: of gas that expands, 0 for the pressure given."""
     mesh, stages = with_charges(mesh, SIZE[2], design.holes)
-    kind = dem.effects.GasPressure
-    if exponent:
-        gas = {"radius": radius_of(design), "exponent": exponent}
-        kind = partial(dem.effects.ExpandingGas, **gas)
-    loads = [kind(one, start=delay, peak=PEAK, rise=RISE) for one, delay in stages.items()]
-    quiet = [dem.effects.QuietBoundary(side) for side in QUIET]
-    return dem.Scene(mesh, ROCK, "auto", loads=[*loads, *quiet])
+    loads = [dem.effects.QuietBoundary(side) for side in QUIET]
+    for name, hole in stages.items():
+        gas = dem.effects.GasPressure
+        if exponent:
+            gas = partial(dem.effects.ExpandingGas, radius=0.5 * hole.diameter_m, exponent=exponent)
+        loads.insert(-len(QUIET), gas(name, start=hole.delay_s, **GAS))
+    return dem.Scene(mesh, dem.Material.from_elastic(**GRANITE), "auto", loads=loads)
 
 
-def charged(design):
-    """Holes of a design that have a charge."""
-    return [hole for hole in design.holes if hole.charged_m > 0.0]
-
-
-def radius_of(design):
-    """Radius of all charged holes [m], which gas that expands asks for; InputError for several."""
-    wide = sorted({hole.diameter_m for hole in charged(design)})
-    if len(wide) > 1:
-        words = ", ".join(f"{one:g}" for one in wide)
-        raise dem.InputError(
-            f"diameter_m of the charged holes must be one number with --exponent, got {words}"
-        )
-    return 0.5 * wide[0]
-
-
-def middle_of(design):
-    """Middle of the charges (3,) [m]."""
-    middles = [0.5 * (hole.charge_from_m + hole.length_m) for hole in charged(design)]
-    return np.mean([h.at(SIZE[2], m) for h, m in zip(charged(design), middles)], axis=0)
-
-
-def peaks(result, middle):
-    """Distance from the middle [m], peak speed [m/s] and whether a body is behind, or beside.
+def peaks(design, result):
+    """Distance from the charges [m], peak speed [m/s] and whether a body is behind, or beside.
 
     Bodies of the largest piece alone, the rock that stays: what flies out shakes nothing.
     """
+    charged = [hole for hole in design.holes if hole.charged_m > 0.0]
+    middles = [h.at(SIZE[2], 0.5 * (h.charge_from_m + h.length_m)) for h in charged]
     piece = result.fragment_of_body()
     stays = piece == np.bincount(piece, volumes(result.model.mesh)).argmax()
-    away = (result.model.centre - middle)[stays]
+    away = (result.model.centre - np.mean(middles, axis=0))[stays]
     across, behind = np.hypot(away[:, 0], away[:, 1]), -away[:, 2]
-    distance = np.hypot(across, behind)
-    return distance, result.peak_speed[stays], behind > across, np.abs(behind) < across
+    sides = {"beside": np.abs(behind) < across, "behind": behind > across}
+    return np.hypot(across, behind), result.peak_speed[stays], sides
 
 
 def power_law(distance, speed, chosen):
@@ -204,34 +136,21 @@ def pieces(result):
     return upto[-1], float((own * mean)[out].sum() / upto[-1]), float(deepest)
 
 
-def parts_of_work(result):
-    """What the work of the gas went into, as shares of it, and the work [J]."""
+def measures(design, result):
+    """Numbers of a run by name: peaks, what comes out, what the work of the gas went into."""
+    distance, speed, sides = peaks(design, result)
     last = {name: column[-1] for name, column in result.series.items()}
     work = last["load_work_J"]
-    shares = {
-        name: sum(last[f"{term}_J"] for term in terms) / work for name, terms in PARTS.items()
-    }
-    return work, shares
-
-
-def measured(design, result):
-    """What is measured of a run, numbers by name."""
-    distance, speed, behind, beside = peaks(result, middle_of(design))
-    work, shares = parts_of_work(result)
-    volume, out, depth = pieces(result)
-    side = {f"radiated_{one}_J": result.series[f"quiet_boundary_{one}_J"][-1] for one in QUIET}
+    shares = {part: sum(last[f"{term}_J"] for term in PARTS[part]) / work for part in PARTS}
     return {
         "tetrahedra": result.model.body_count,
-        "beside_m_s": power_law(distance, speed, beside)[1],
-        "behind_m_s": power_law(distance, speed, behind)[1],
-        "exponent": power_law(distance, speed, behind | beside)[0],
+        **{f"{side}_m_s": power_law(distance, speed, on)[1] for side, on in sides.items()},
+        "exponent": power_law(distance, speed, sides["beside"] | sides["behind"])[0],
         "radiated_kJ": 1e-3 * work * shares["radiated"],
-        "out_m3": volume,
-        "out_m_s": out,
-        "depth_m": depth,
+        **dict(zip(("out_m3", "out_m_s", "depth_m"), pieces(result))),
         "work_kJ": 1e-3 * work,
         **{f"{part}_share": share for part, share in shares.items()},
-        "residual_share": result.series["residual_J"][-1] / work,
-        **side,
+        "residual_share": last["residual_J"] / work,
+        **{f"radiated_{side}_J": last[f"quiet_boundary_{side}_J"] for side in QUIET},
         "cpu_s": result.report.run_cpu_seconds,
     }

@@ -15,7 +15,7 @@ Needs gmsh: ``make mesh`` installs it and runs this script.
 import os
 import sys
 
-import _tunnel
+from _tunnel import KEPT, KEPT_NEAR, MESHES, designs, mesh_of, scene_of
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, read_mesh, step_report
 from taichi_dem.kit.files import output_folder, renamed_when_done
 from taichi_dem.kit.study import bare_parser, main_of_tool
@@ -41,15 +41,15 @@ def write(folder):
     block_with_hole(path)
     print(path)
     print(step_report(Scene(read_mesh(path), CONCRETE, "all")))
-    for name in _tunnel.QUICK:
-        write_mesh(_tunnel.path_of_kept(name), best_of_six(_tunnel.designs()[name]))
-        print(_tunnel.path_of_kept(name))
+    for name, file in KEPT.items():
+        write_mesh(MESHES / file, best_of_six(name, designs()[name]))
+        print(MESHES / file)
 
 
-def best_of_six(design):
+def best_of_six(name, design):
     """Of six meshes of a tunnel round the one with the largest stable step."""
-    meshes = [_tunnel.mesh_of(design, _tunnel.QUICK_NEAR, seed) for seed in range(6)]
-    scenes = [_tunnel.scene_of(mesh, design) for mesh in meshes]
+    meshes = [mesh_of(name, design, KEPT_NEAR, seed) for seed in range(6)]
+    scenes = [scene_of(mesh, design) for mesh in meshes]
     steps = [step_report(scene).limits["bond_stiffness"].min() for scene in scenes]
     return meshes[steps.index(max(steps))]
 

@@ -18,74 +18,71 @@ ones.
     python experiments/tunnel_face.py --delay 2.5e-4 --exponent 1.4   # one by one; gas expands
 
 A row of holes.csv is a hole: x_m, y_m, length_m, and by choice angle_deg, charge_from_m, delay_s,
-diameter_m (docs/tunnel.md). Writes cracks.png, peaks.png, energy.png, section.gif, runs.csv,
-designs.csv, receivers.csv and summary.json to results/tunnel_face/.
+diameter_m (docs/tunnel.md). Writes peaks.png, energy.png, runs.csv, designs.csv, summary.json and
+a folder with the whole first run of each design and its cracks to results/tunnel_face/.
 """
 
 import itertools
 import sys
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
-import _tunnel
+import _tunnel as tunnel
 import taichi_dem as dem
-from _tunnel_pictures import draw_cracks, draw_energy, draw_peaks, film_section
-from _tunnel_table import COMPARED, compared, price, with_bars
 from taichi_dem.kit import study
-from taichi_dem.kit.provenance import peak_memory_mb
-from taichi_dem.observers import write_receivers
-from taichi_dem.step_control import StepControl
+from taichi_dem.kit.bars.chance import t_quantile
+from taichi_dem.kit.plot_style import BLUE, GREEN, GREY, ORANGE, WINE, picture
+from taichi_dem.mesh.boreholes import read_holes
 
 NAME = "tunnel_face"
-FOUR = ("parallel", "V cut", "slot 0.4 m", "burn cut")
-DESIGNS = study.several(study.one_of(_tunnel.designs()))
+#: What is compared between designs, with its unit; colours of designs.
+COMPARED = {"beside_m_s": "m/s", "behind_m_s": "m/s", "exponent": "1", "radiated_kJ": "kJ"}
+COMPARED |= {"out_m3": "m3", "out_m_s": "m/s", "depth_m": "m"}
+COLOURS = (GREY, BLUE, ORANGE, GREEN)
+#: Name of the design of a user's table; edges of the coarser meshes over the others.
+YOURS, COARSER = "yours", 1.4
+#: Each body has a step of its own, as those at the holes are a tenth as large as the others.
+CONTROL = dem.StepControl(safety=0.3, dashpot_floor=1e-7)
+METHOD = dem.Multirate(1.6e-6, 1e-4, control=CONTROL, dashpot="limited")
+
+
+DESIGNS = [*tunnel.designs()]
 SETTINGS = {
-    "designs": (FOUR, _tunnel.QUICK, DESIGNS, "of tunnel rounds (docs/tunnel.md)"),
+    "designs": (DESIGNS, [*tunnel.KEPT], study.several(study.one_of(DESIGNS)), "of tunnel rounds"),
     "near": (0.09, None, study.number(0, 0.5), "edge of elements at the holes [m], 0.09"),
     "meshes": (4, 1, study.whole(1, 100), "meshes of each design and size, 4"),
     "until": (2e-3, 8e-4, study.number(0, 1), "simulated time [s], 2e-3"),
     "delay": (0.0, 0.0, study.number(0, 1e-2, open_low=False), "between heights of holes [s], 0"),
     "exponent": (0.0, 0.0, study.number(0, 5, open_low=False), "of gas that expands; 0: none"),
-    "frames": (32, 16, study.whole(1, 1000), "of the film, 32"),
+    "holes": (None, None, str, "CSV file of holes, run beside the parallel ones"),
 }
-#: The coarser size of elements over the finer one.
-COARSER = 1.4
-#: Each body has a step of its own, as those at the holes are a tenth as large as the others.
-METHOD = dem.Multirate(
-    1.6e-6, 1e-4, control=StepControl(safety=0.3, dashpot_floor=1e-7), dashpot="limited"
-)
-
-
-def options_parser():
-    """Options of this experiment."""
-    made = study.parser(NAME, __doc__, settings=SETTINGS)
-    made.add_argument("--holes", help="CSV file of holes, run beside the parallel ones")
-    return made
+options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 
 
 def fired(row):
     """Design and result of a row: name of a design, edge near its holes, number of its mesh."""
-    design, near = _tunnel.design_of(row), row["near_m"]
-    mesh = _tunnel.mesh_of(design, near, row["mesh"]) if near else _tunnel.kept_mesh(row["design"])
-    looks = {"until": row["until_s"], "samples": 200, "frames": row["frames"]}
-    looks["observers"] = [dem.Receivers(_tunnel.RECEIVERS)]
-    scene = _tunnel.scene_of(mesh, design, row["gas_exponent"])
-    return design, dem.simulate(scene, method=METHOD, title=row["design"], **looks)
+    known = tunnel.designs(row["delay_s"])
+    design = known.get(row["design"]) or tunnel.Design(read_holes(row["holes"]))
+    mesh = tunnel.mesh_of(row["design"], design, row["near_m"], row["mesh"])
+    looks = {"until": row["until_s"], "samples": 200, "frames": 16, "title": row["design"]}
+    scene = tunnel.scene_of(mesh, design, row["exponent"])
+    return design, dem.simulate(scene, method=METHOD, **looks)
 
 
-def shot(row):
-    """What is measured of the run of a row."""
-    return _tunnel.measured(*fired(row))
+def measured(row):
+    """What is measured of the run of a row, numbers by name."""
+    return tunnel.measures(*fired(row))
 
 
 def rows_of(options):
     """Rows of all runs; the first mesh of each design, of the finer size, comes first."""
-    names = ("parallel", _tunnel.YOURS) if options.holes else options.designs
-    near = options.near or (_tunnel.QUICK_NEAR if options.holes else 0.0)
-    fixed = {"delay_s": options.delay, "until_s": options.until, "frames": options.frames}
-    own = {"holes": options.holes} if options.holes else {}
-    fixed |= {"gas_exponent": options.exponent, **own}
+    names = ("parallel", YOURS) if options.holes else options.designs
+    near = options.near or (tunnel.KEPT_NEAR if options.holes else 0.0)
+    fixed = {"delay_s": options.delay, "until_s": options.until, "exponent": options.exponent}
+    fixed |= {"holes": options.holes} if options.holes else {}
     sizes = [near, COARSER * near] if options.meshes > 1 else [near]
     numbers = itertools.product(range(options.meshes), sizes, names)
     return [{"design": d, "near_m": n, "mesh": k, **fixed} for k, n, d in numbers]
@@ -97,55 +94,102 @@ def runs_of(options):
     Those are drawn; the others run side by side, and the same command runs what is missing.
     """
     rows = rows_of(options)
-    for row in rows:
-        _tunnel.design_of(row)
     count = len({row["design"] for row in rows})
-    drawn, others = rows[:count], rows[count:]
-    found = []
-    if others:
-        files = filter(None, (_tunnel.__file__, options.holes))
-        version = "".join(Path(file).read_text() for file in files)
+    first = {row["design"]: fired(row) for row in rows[:count]}
+    found = [
+        pd.DataFrame([{**row, **tunnel.measures(*first[row["design"]])} for row in rows[:count]])
+    ]
+    if rows[count:]:
         where = {"out": study.begin(options) / "runs", "workers": options.threads}
-        found.append(dem.sweep(shot, others, version=version, **where))
-        for sentence in found[0]["error"][found[0]["error"] != ""]:
+        version = Path(options.holes).read_text() if options.holes else ""
+        found.append(dem.sweep(measured, rows[count:], version=version, **where))
+        for sentence in found[1]["error"][found[1]["error"] != ""]:
             raise dem.InputError(sentence)
-    first = {row["design"]: fired(row) for row in drawn}
-    rows = [{**row, **_tunnel.measured(*first[row["design"]])} for row in drawn]
-    return pd.concat([pd.DataFrame(rows), *found]), first
+    return pd.concat(found), first
 
 
-def write(options, rows, first, table):
-    """Write tables and pictures; see the head of this file."""
-    folder = study.begin(options)
-    rows.to_csv(folder / "runs.csv", index=False)
-    table.to_csv(folder / "designs.csv")
-    draw_cracks(folder / "cracks.png", first)
-    draw_peaks(folder / "peaks.png", first, table)
-    draw_energy(folder / "energy.png", table)
-    film_section(folder / "section.gif", first.get("V cut", [*first.values()][-1])[1])
-    received = {
-        f"{name} {place}": one
-        for name, (_, result) in first.items()
-        for place, one in result.receivers.items()
-    }
-    write_receivers(folder / "receivers.csv", received)
+def with_bars(rows):
+    """A row a design: means over the meshes of the finer size, and their bars, NAME_bar each.
+
+    A bar is half of the 95 % range of the mean by Student's t, and the difference to the mean of
+    the coarser size; NaN of one mesh.
+    """
+    of_number = rows.select_dtypes("number").columns.drop("near_m")
+    finer, *coarser = (own.groupby("design", sort=False) for _, own in rows.groupby("near_m"))
+    mean, count = finer[of_number].mean(), finer.size()
+    wide = count.map(lambda n: t_quantile(0.95, n - 1) if n > 1 else np.nan)
+    bar = finer[of_number].std().mul(wide / np.sqrt(count), axis=0)
+    for other in coarser:
+        bar = bar + (other[of_number].mean() - mean).abs()
+    return mean.join(bar.add_suffix("_bar"))
+
+
+def compared(table):
+    """Rows in words: value and bar of each design, and whether it differs from the first."""
+    rows = []
+    for name, unit in COMPARED.items():
+        value, bar = table[name], table[f"{name}_bar"]
+        apart = (value - value.iloc[0]).abs() > np.hypot(bar, bar.iloc[0])
+        words = [f"{v:.3g} +- {b:.2g}" if b == b else f"{v:.3g}" for v, b in zip(value, bar)]
+        notes = ["", *("" if known else " (not distinguished)" for known in apart[1:])]
+        rows.append([f"{name} [{unit}]", *(a + b for a, b in zip(words, notes))])
+    return rows
+
+
+def draw_peaks(path, runs, table):
+    """Peak velocities of bodies over distance, their power law, and the bars at one place."""
+    with picture(path, 1, 2, size=(9.6, 4.4), sharey=True) as (figure, panels):
+        for (name, run), colour in zip(runs.items(), COLOURS):
+            distance, speed, sides = tunnel.peaks(*run)
+            for axes, (side, chosen) in zip(panels, sides.items()):
+                chosen &= distance > tunnel.FITTED[0]
+                axes.plot(distance[chosen], speed[chosen], ".", ms=1.5, alpha=0.2, color=colour)
+                power, level = tunnel.power_law(distance, speed, chosen)
+                fit = level * (np.array(tunnel.FITTED) / tunnel.PLACE) ** -power
+                axes.plot(tunnel.FITTED, fit, lw=2.5, color=colour)
+                value, bar = table.loc[name, [f"{side}_m_s", f"{side}_m_s_bar"]]
+                look = {"fmt": "o", "ms": 7, "capsize": 5, "color": colour, "mec": "white"}
+                axes.errorbar(tunnel.PLACE, value, bar if bar == bar else None, label=name, **look)
+                axes.set(xscale="log", yscale="log", title=f"{side} the round", xticks=(1, 2, 3))
+                axes.set_xlabel("distance from the charges [m]")
+        panels[0].set_ylabel("peak velocity [m/s]")
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4)
+
+
+def draw_energy(path, table):
+    """What the work of the gas went into, a bar a design, with the spread over meshes."""
+    parts = [*tunnel.PARTS]
+    shares, bars = (
+        100.0 * table[[f"{part}_share{end}" for part in parts]].set_axis(parts, axis=1)
+        for end in ("", "_bar")
+    )
+    colours = [BLUE, WINE, ORANGE, "#c7b299", GREEN, "#dddddd"]
+    with picture(path, size=(8.4, 1.4 + 0.65 * len(table))) as (figure, axes):
+        look = {"stacked": True, "color": colours, "legend": False, "capsize": 3, "ylabel": ""}
+        shares.plot.barh(xerr=bars, ax=axes, **look)
+        axes.set(xlabel="share of the work of the gas [%]", xlim=(0.0, None))
+        axes.invert_yaxis()
+        figure.legend(loc="outside upper center", ncols=6)
 
 
 def run(options):
     """Fire all designs, draw, print."""
-    rows, first = runs_of(options)
+    (rows, first), folder = runs_of(options), study.begin(options)
     table = with_bars(rows)
     study.print_table(compared(table), ["", *table.index])
-    write(options, rows, first, table)
-    meshes, seconds = price(rows)
+    rows.to_csv(folder / "runs.csv", index=False)
+    table.to_csv(folder / "designs.csv")
+    draw_peaks(folder / "peaks.png", first, table)
+    draw_energy(folder / "energy.png", table)
+    for name, (_, result) in first.items():
+        result.write(folder / name)
+        result.plot.cracks(magnify=3.0, path=folder / name / "cracks.png")
     figures = {
         f"{design.replace(' ', '_')}_{name}": (table.loc[design, name], unit)
         for design in table.index
         for name, unit in COMPARED.items()
     }
-    figures |= {"meshes_for_5_percent": (meshes, "1"), "seconds_for_5_percent": (seconds, "s")}
     figures["tetrahedra"] = int(rows.tetrahedra.max()), "1"
-    figures["memory_MB"] = peak_memory_mb(), "MB"
     study.finish(options, NAME, figures, [result.report for _, result in first.values()])
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.kit.sweeps.table import checked_rows
-from taichi_dem.kit.validation import FileName, between, plain_fields, positive, told_apart, whole
+from taichi_dem.kit.validation import FileName, between, plain_fields, positive, whole
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.gmsh import places_and_rows, prism, session
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
@@ -21,8 +21,8 @@ from taichi_dem.mesh.shapes import in_space_order
 
 #: Least angle of a hole with the face [degrees].
 _FLATTEST = 20.0
-#: Width of a hole [m] from which on its prism has twice as many sides.
-_WIDE = 0.2
+#: Sides of a hole's prism, twice as many from a width [m] on; growth of edges with each metre.
+_PRISM, _WIDE, _GROWTH = 5, 0.2, 0.35
 #: Distance from the axis within which a face belongs to the wall, in radii, and the least share of
 #: a charged wall that the mesh must show.
 _ON_WALL, _SEEN = 1.35, 0.6
@@ -70,19 +70,17 @@ class Hole:
 
 def read_holes(path: FileName) -> tuple[Hole, ...]:
     """Read holes from a CSV file with a row each and the fields of ``Hole`` as columns."""
-    known = [one.name for one in fields(Hole)]
-    holes, rows = [], checked_rows(path)
-    row: Any
+    known, rows = [one.name for one in fields(Hole)], checked_rows(path)
+    if not {*known[:3]} <= {*rows[0]} <= {*known}:
+        raise InputError(
+            f"columns of a table of holes must be {', '.join(known)} (the first three always), "
+            f"got {', '.join(rows[0])}"
+        )
+    holes = []
     for number, row in enumerate(rows, 1):
-        unknown = [name for name in row if name not in known]
-        missing = [name for name in known[:3] if name not in row]
-        if unknown or missing:
-            raise InputError(
-                f"columns of a table of holes must be {', '.join(known)} (the first three always), "
-                f"got {', '.join(row)}"
-            )
+        given: Any = row
         try:
-            holes.append(Hole(**row))
+            holes.append(Hole(**given))
         except InputError as told:
             raise InputError(f"hole {number}: {told}") from None
     return tuple(holes)
@@ -94,9 +92,9 @@ def check_holes(size: Sequence[float], holes: Sequence[Hole]) -> None:
         for place in (hole.at(size[2], 0.0), hole.at(size[2], hole.length_m)):
             room = np.minimum(place, np.array(size) - place)[: 3 if place[2] < size[2] else 2]
             if room.min() <= 0.5 * hole.diameter_m:
+                box, got = (", ".join(f"{x:.4g}" for x in one) for one in (size, place))
                 raise InputError(
-                    f"hole {number} must lie inside the rock of {_words(size)} m, got "
-                    f"({_words(place, ', ')}) m"
+                    f"hole {number} must lie inside the rock of ({box}) m, got ({got})"
                 )
     for (a, one), (b, other) in combinations(enumerate(holes, 1), 2):
         gap = _least_distance(size[2], one, other) - 0.5 * (one.diameter_m + other.diameter_m)
@@ -105,10 +103,6 @@ def check_holes(size: Sequence[float], holes: Sequence[Hole]) -> None:
                 f"holes {a} and {b} must not cross, got walls that are {gap:.3g} m apart, from "
                 f"({one.x_m:g}, {one.y_m:g}) and ({other.x_m:g}, {other.y_m:g}) m on the face"
             )
-
-
-def _words(numbers, between=" x "):
-    return between.join(f"{one:.4g}" for one in numbers)
 
 
 def _least_distance(depth, one, other):
@@ -126,40 +120,42 @@ def drilled_rock(
     near: float,
     far: float,
     *,
-    growth: float = 0.3,
-    sides: int = 6,
     slots: Sequence = (),
     seed: int = 0,
 ) -> Mesh:
-    """Mesh of a box of rock with holes in its face, by Gmsh."""
+    """Mesh of a box of rock with holes and slots in its face, by Gmsh; a seed makes another one."""
     check_holes(size, holes)
     near, far = positive("near", near), positive("far", far)
-    thinnest = min((one.length_m for one in holes), default=2.0 * far)
-    if not near <= min(far, 0.5 * thinnest):
-        got, most = told_apart(near, min(far, 0.5 * thinnest))
-        raise InputError(
-            f"near must be at most far and half of the shortest hole, {most} m, got {got}"
-        )
     draw = np.random.default_rng(whole("seed", seed, 0, 2**31 - 1))
     turn, scale = draw.uniform(size=2) if seed else (0.0, 0.5)
     scale = 0.95 + 0.1 * scale
     with session("drilled_rock") as gmsh:
         occ = gmsh.model.occ
         box = [(3, occ.addBox(0.0, 0.0, 0.0, *size))]
-        cut = [_prism(occ, size[2], hole, turn, whole("sides", sides, 4, 64)) for hole in holes]
+        cut = [_prism(occ, size[2], hole, turn) for hole in holes]
         cut += [(3, occ.addBox(*corner, *edges)) for corner, edges in slots]
-        if cut:
-            occ.cut(box, cut)
+        occ.cut(box, cut)
         occ.synchronize()
-        _set_sizes(gmsh.model, size, scale * near, scale * far, growth)
+        _set_sizes(gmsh.model, size, scale * near, scale * far)
         gmsh.model.mesh.generate(3)
         points, tetrahedra = places_and_rows(gmsh, 4)
-    groups = _sides(points, tetrahedra, size)
+    groups = _sides(points, geometry.outer_faces(tetrahedra), size)
     return in_space_order(checked_mesh(points, tetrahedra, groups))
 
 
-def _prism(occ, depth, hole, turn, sides):
-    count = sides if hole.diameter_m <= _WIDE else 2 * sides
+def _sides(points, outer, size):
+    """Outer faces on the six sides of the box by name."""
+    corners, groups = points[outer], {}
+    for axis, names in enumerate(_BOX):
+        for name, place in zip(names, (0.0, size[axis])):
+            on = np.abs(corners[..., axis] - place).max(axis=1) < 1e-6 * max(size)
+            groups[name] = outer[on]
+    return groups
+
+
+def _prism(occ, depth, hole, turn):
+    """The prism of a hole, which begins outside the rock where it is inclined."""
+    count = _PRISM if hole.diameter_m <= _WIDE else 2 * _PRISM
     angle = 2.0 * np.pi / count
     radius = 0.5 * hole.diameter_m * np.sqrt(angle / np.sin(angle))
     way, up = hole.direction, np.array([0.0, 1.0, 0.0])
@@ -170,7 +166,7 @@ def _prism(occ, depth, hole, turn, sides):
     return prism(occ, ring, (outside + hole.length_m) * way)
 
 
-def _set_sizes(model, size, near, far, growth):
+def _set_sizes(model, size, near, far):
     """Edges grow in proportion to the distance from all curves but the edges of the box."""
     curves, field = [], model.mesh.field
     for dim, tag in model.getEntities(1):
@@ -178,40 +174,28 @@ def _set_sizes(model, size, near, far, growth):
         on = [abs(low - w) + abs(high - w) < 1e-5 for w in (0.0, np.array(size))]
         if np.sum(on) < 2:
             curves.append(tag)
-    edge = f"{float(far)!r}"
-    if curves:
-        away = field.add("Distance")
-        field.setNumbers(away, "CurvesList", curves)
-        field.setNumber(away, "Sampling", 60)
-        edge = f"Min({float(near)!r} + {float(growth)!r} * F{away}, {float(far)!r})"
+    away = field.add("Distance")
+    field.setNumbers(away, "CurvesList", curves)
+    field.setNumber(away, "Sampling", 60)
     edges = field.add("MathEval")
+    edge = f"Min({float(near)!r} + {_GROWTH!r} * F{away}, {float(far)!r})"
     field.setString(edges, "F", edge)
     field.setAsBackgroundMesh(edges)
 
 
-def _sides(points, tetrahedra, size):
-    """Faces of the six sides of the box by name."""
-    outer = geometry.outer_faces(tetrahedra)
-    corners, groups = points[outer], {}
-    for axis, names in enumerate(_BOX):
-        for name, place in zip(names, (0.0, size[axis])):
-            on = np.abs(corners[..., axis] - place).max(axis=1) < 1e-6 * max(size)
-            groups[name] = outer[on]
-    return groups
-
-
-def with_charges(mesh: Mesh, depth: float, holes: Sequence[Hole]) -> tuple[Mesh, dict[str, float]]:
-    """A mesh with a group of the charged walls of each delay, and the delays [s] by group."""
-    delays = sorted({hole.delay_s for hole in holes if hole.charged_m > 0.0})
-    if not delays:
+def with_charges(mesh: Mesh, depth: float, holes: Sequence[Hole]) -> tuple[Mesh, dict[str, Hole]]:
+    """A mesh with a group of the charged walls of each delay and diameter, and a hole of each."""
+    stages: dict[tuple, list] = {}
+    for number, hole in enumerate(holes, 1):
+        if hole.charged_m > 0.0:
+            stages.setdefault((hole.delay_s, hole.diameter_m), []).append((number, hole))
+    if not stages:
         raise InputError("a table of holes must have one that is charged, got none")
-    stages = {f"stage_{k}": delay for k, delay in enumerate(delays, 1)}
-    outer, groups = geometry.outer_faces(mesh.tetrahedra), dict(mesh.groups)
-    for name, delay in stages.items():
-        together = [one for one in enumerate(holes, 1) if one[1].delay_s == delay]
-        walls = [_wall(mesh.points, outer, depth, *one) for one in together if one[1].charged_m]
-        groups[name] = np.vstack(walls)
-    return replace(mesh, groups=groups), stages
+    outer, groups, found = geometry.outer_faces(mesh.tetrahedra), dict(mesh.groups), {}
+    for k, key in enumerate(sorted(stages), 1):
+        walls = [_wall(mesh.points, outer, depth, *one) for one in stages[key]]
+        groups[f"stage_{k}"], found[f"stage_{k}"] = np.vstack(walls), stages[key][0][1]
+    return replace(mesh, groups=groups), found
 
 
 def _wall(points, outer, depth, number, hole):
