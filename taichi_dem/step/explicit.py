@@ -72,7 +72,7 @@ class ExplicitStep(Step):
             # Bonds that are due give their impulse, and break where a unit fails.
             (ALWAYS, lists.bonds, self.bond),
             # At the start bonds that sleep have acted once.
-            (STARTED, waking.leaving()),
+            (STARTED, waking.leaving),
         )
 
     @ti.func

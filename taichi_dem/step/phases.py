@@ -12,9 +12,8 @@ from taichi_dem.contact.search import BroadPhase
 from taichi_dem.kit import backend
 from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.products import squared
-from taichi_dem.step.body import BodyMotion
+from taichi_dem.step.body import BodyLoads, BodyMotion
 from taichi_dem.step.bond import BondForces
-from taichi_dem.step.loads import BodyLoads
 from taichi_dem.step.multirate.schedule import Schedule
 
 
@@ -35,10 +34,6 @@ class Absent:
     """Stands for a part that a scene lacks: phases that name it are left out."""
 
     def __getattr__(self, name: str) -> "Absent":
-        return self
-
-    def __call__(self) -> "Absent":
-        """Itself."""
         return self
 
 

@@ -81,7 +81,7 @@ class SolvedStep(Step):
             # Bonds give the impulse of their springs, and break where a unit fails.
             (ALWAYS, lists.bonds, self.bond),
             # At the start bonds have acted once for a step that there was not.
-            (STARTED, waking.leaving()),
+            (STARTED, waking.leaving),
             (STARTED, bonds, self.undo),
         )
 

@@ -74,6 +74,7 @@ class Waking(Places):
         """At the start bonds that sleep act once."""
         self.sleeping.starting[None] = 1
 
+    @property
     def leaving(self) -> Phases:
         """Phases after which those that sleep are not listed."""
         return self.lists.filling(self.lists.bodies, self.lists.bonds)
