@@ -13,7 +13,7 @@ compares the pairs of which ``until`` lies below the new horizons. Results do no
 times of searches.
 """
 
-from typing import Any
+from typing import Any, Protocol
 
 import taichi as ti
 
@@ -38,6 +38,13 @@ OUTLOOK = 3.5
 _CAPACITIES = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 
 
+class PairListener(Protocol):
+    """What is told of the pairs that a search lists."""
+
+    def notice_listed(self, p: Any, entered: Any, fresh: Any) -> None:
+        """Take note of pair p: nonzero where it is new, and where a break set a body free."""
+
+
 @ti.data_oriented
 class BroadPhase:
     """Finds the pairs that are near and their spheres, for the store of a ``Contacts``.
@@ -48,11 +55,11 @@ class BroadPhase:
 
     scratch_fields = ("free", "free_count", "mark")
 
-    def __init__(self, contacts: Contacts, pair_phases: Phases, limits: Any):
+    def __init__(self, contacts: Contacts, pair_phases: Phases, limits: PairListener | None):
         n = contacts.tables.capacity.bodies
         self.contacts, self.store = contacts, contacts.store
-        self.pair_phases, self.limits = pair_phases, limits
-        self.has_limits = limits is not None
+        self.pair_phases, self.has_limits = pair_phases, limits is not None
+        self.limits: Any = limits
         self.tables, self.state = contacts.tables, contacts.state
         self.free, self.mark = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.free_count = ti.field(ti.i32, shape=())

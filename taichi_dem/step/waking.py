@@ -1,19 +1,19 @@
 """Bodies that were woken enter the lists, and their bonds act from then on."""
 
-from typing import Any
-
 import taichi as ti
 
 from taichi_dem.kit.ordered import Once, Phases, Places
+from taichi_dem.step.multirate.active_lists import ActiveLists
+from taichi_dem.step.multirate.clock import Clock
 
 
 @ti.data_oriented
 class Waking(Places):
     """List of the bodies woken since they were listed; lists them and their bonds."""
 
-    def __init__(self, schedule: Any):
-        self.schedule, self.lists, self.sleeping = schedule, schedule.lists, schedule.sleeping
-        self.tables, self.store = schedule.tables, schedule.store
+    def __init__(self, clock: Clock, lists: ActiveLists):
+        self.clock, self.lists, self.sleeping = clock, lists, clock.sleeping
+        self.tables, self.store = clock.tables, clock.store
         self.most = self.tables.capacity.bodies
 
     @ti.func
@@ -38,7 +38,7 @@ class Waking(Places):
 
     @ti.func
     def _left_out_now(self, b, moved: ti.template()):
-        return self.sleeping.left_out_now(b, self.schedule.seconds(1), moved)
+        return self.sleeping.left_out_now(b, self.clock.seconds(1), moved)
 
     @ti.func
     def admit_in_search(self, a):

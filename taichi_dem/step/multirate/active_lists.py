@@ -7,6 +7,7 @@ import taichi as ti
 from taichi_dem.kit import backend
 from taichi_dem.kit.ordered import Once, Phases, Some, When, side_by_side
 from taichi_dem.state.timeline import MAX_LEVEL
+from taichi_dem.step.multirate.clock import Clock
 from taichi_dem.step.multirate.lists import ActiveList, Everyone
 from taichi_dem.step.sleeping import ASLEEP
 
@@ -20,12 +21,12 @@ class ActiveLists:
     changed: bodies whose level or bonds changed since the lists were ordered.
     """
 
-    def __init__(self, schedule: Any, drifted: bool):
-        self.schedule, self.drifted = schedule, drifted
-        self.tables, self.state, self.contacts = schedule.tables, schedule.state, schedule.contacts
-        self.uniform = schedule.uniform
-        self.sleeps, self.sleeping = schedule.sleeps, schedule.sleeping
-        self.store, self.has_contact = schedule.store, schedule.has_contact
+    def __init__(self, clock: Clock, drifted: bool):
+        self.drifted = drifted
+        self.tables, self.state, self.contacts = clock.tables, clock.state, clock.contacts
+        self.uniform = clock.uniform
+        self.sleeps, self.sleeping = clock.sleeps, clock.sleeping
+        self.store, self.has_contact = clock.store, clock.has_contact
         capacity, bodies = self.tables.capacity, self.tables.body_count
         bonds = Everyone(self.tables.bond_count, capacity.bonds)
         self.bodies = ActiveList(Everyone(bodies, capacity.bodies), self.body_key)

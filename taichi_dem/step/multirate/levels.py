@@ -1,11 +1,11 @@
 """What bodies that touch owe each other: how far levels differ, how far impulses reach."""
 
-from typing import Any
-
 import taichi as ti
 
 from taichi_dem.stability.body_limits import CLOSE
 from taichi_dem.state.timeline import ticks_of
+from taichi_dem.step.multirate.active_lists import ActiveLists
+from taichi_dem.step.multirate.clock import Clock
 
 
 @ti.data_oriented
@@ -16,9 +16,9 @@ class LevelLimit:
     levels at the last ordering of the lists, so that no result depends on the order of bodies.
     """
 
-    def __init__(self, schedule: Any):
-        self.tables, self.state, self.limits = schedule.tables, schedule.state, schedule.limits
-        self.store, self.beside = schedule.store, schedule.lists.beside
+    def __init__(self, clock: Clock, lists: ActiveLists):
+        self.tables, self.state, self.limits = clock.tables, clock.state, clock.limits
+        self.store, self.beside = clock.store, lists.beside
         self.listed_level = ti.field(ti.i32, shape=self.tables.capacity.bodies)
 
     @ti.func
@@ -83,11 +83,11 @@ class AppliedUntil:
     bond, pair: that tick for every bond, and for every slot of the pair store.
     """
 
-    def __init__(self, schedule: Any):
-        self.state = schedule.state
-        self.bond = ti.field(ti.i64, shape=schedule.tables.capacity.bonds)
-        if schedule.has_contact:
-            self.pair = schedule.store.column("applied_until", ti.i64)
+    def __init__(self, clock: Clock):
+        self.state = clock.state
+        self.bond = ti.field(ti.i64, shape=clock.tables.capacity.bonds)
+        if clock.has_contact:
+            self.pair = clock.store.column("applied_until", ti.i64)
 
     @ti.func
     def until(self, i, j):

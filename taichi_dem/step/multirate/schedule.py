@@ -1,112 +1,47 @@
-"""The clock of a run and the levels of its bodies: who is due at a tick, and until when."""
+"""Levels of the bodies: who is due at a tick, which level comes next, and how lists follow."""
 
-from typing import Any
-
-import numpy as np
 import taichi as ti
 
 from taichi_dem.contact.contacts import Contacts
-from taichi_dem.kit.allocation import assign, raise_to, values
+from taichi_dem.kit.allocation import raise_to
 from taichi_dem.kit.ordered import Once, Phases
-from taichi_dem.kit.types import real
 from taichi_dem.methods import Method
-from taichi_dem.stability.body_limits import StabilityLimits
 from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables
-from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL, coarsest_active, ticks_of
+from taichi_dem.state.timeline import MAX_LEVEL, coarsest_active, ticks_of
 from taichi_dem.step.multirate.active_lists import ActiveLists
+from taichi_dem.step.multirate.clock import Clock
 from taichi_dem.step.multirate.levels import AppliedUntil, LevelLimit
-from taichi_dem.step.sleeping import Sleeping
 from taichi_dem.step.waking import Waking
 from taichi_dem.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 
 
 @ti.data_oriented
-class Schedule:
-    """Clock of a run, levels of its bodies, and the lists of what is due.
+class Schedule(Clock):
+    """Levels of the bodies, and the lists of what is due.
 
-    criterion: the method's rule from ``step_control``. uniform: all bodies share the finest level
-    wanted.
-    finest: finest level present. undivided: 1 once it was the last one, below which no step is
-    divided further. low: coarsest level active now.
-    limits: the ``StabilityLimits`` of the bodies, None where the rule needs none. controlled:
-    whether they choose the steps, and bodies may be brought to the present between their own times;
-    applied_until then holds the time up to which bonds and pairs have applied their impulses.
-    every_bond_acts: whether each that holds does in every substep: its impulse then replaces the
-    last one, which its bodies have taken, instead of being added to it.
-    level_limit: largest difference of levels between neighbours. evaluations: substeps, bodies
-    advanced, bonds and pairs evaluated, and the bonds and pairs that one step for all would have
-    evaluated in the same substeps, and the bonds whose laws were called.
+    criterion: the method's rule from ``step_control``. undivided: 1 once the finest level of all
+    was reached, below which no step is divided further. applied_until: the time up to which bonds
+    and pairs have applied their impulses, where bodies may be woken. level_limit: largest
+    difference of levels between neighbours.
     """
 
     def __init__(self, tables: Tables, state: State, contacts: Contacts | None, method: Method):
-        self.tables, self.state, self.contacts = tables, state, contacts
-        self.has_limits = method.control is not None or method.dashpot == "limited"
-        self.limits: Any = None
-        if self.has_limits:
-            self.limits = StabilityLimits(tables, state, contacts, method)
-        self.sleeps = tables.on_demand
-        self.sleeping = Sleeping(tables, state) if self.sleeps else None
-        self.controlled, self.uniform = method.control is not None, method.uniform
-        self.every_bond_acts = self.uniform and not self.controlled and not self.sleeps
-        self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
-        self.store, self.has_contact = getattr(contacts, "store", None), contacts is not None
+        super().__init__(tables, state, contacts, method)
         self.criterion = method.criterion()
-        self.low, self.finest, self.undivided, self.wanted = (
-            ti.field(ti.i32, shape=()) for _ in range(4)
-        )
-        self.evaluations = ti.field(ti.i64, shape=6)
+        self.undivided, self.wanted = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.lists = ActiveLists(self, method.neighbour == "drifted")
-        self.waking = Waking(self) if self.sleeps else None
+        self.waking = Waking(self, self.lists) if self.sleeps else None
         self.applied_until = AppliedUntil(self) if self.controlled else None
         self.spreads = self.controlled and not self.uniform and self.limits.spreads
-        self.level_limit = LevelLimit(self) if self.spreads else None
+        self.level_limit = LevelLimit(self, self.lists) if self.spreads else None
 
     def load(self, model: Model, method: Method, sleep: float) -> None:
         """Load the steps of a method; sleep: see ``Scene``."""
-        assign(self.step_seconds, method.dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
+        super().load(model, method, sleep)
         # A user-defined rule may have no numbers to load.
         getattr(self.criterion, "load", lambda *_: None)(method.distance, method.dt0)
-        if self.has_limits:
-            self.limits.load(model, method)
-        if self.sleeping is not None:
-            self.sleeping.load(model, sleep)
-
-    @property
-    def dt0(self) -> float:
-        """Largest step [s]."""
-        return float(values(self.step_seconds)[0])
-
-    @property
-    def tick_seconds(self) -> float:
-        """Seconds of a tick."""
-        return self.dt0 / MACRO_TICKS
-
-    @property
-    def time_s(self) -> float:
-        """Present time [s]."""
-        return int(values(self.state.tick)) * self.tick_seconds
-
-    @ti.func
-    def pair_step(self, i, j):
-        """Time [s] until a pair of bodies is evaluated again: the smaller of their steps."""
-        return self.step_seconds[ti.max(self.state.level[i], self.state.level[j])]
-
-    @ti.func
-    def own_step(self, i):
-        """Step of body i [s]."""
-        return self.step_seconds[self.state.level[i]]
-
-    @ti.func
-    def elapsed(self, i):
-        """Seconds since body i was last advanced."""
-        return self.seconds(self.state.tick[None] - self.state.last_tick[i])
-
-    @ti.func
-    def seconds(self, tick):
-        """Time of a tick [s]."""
-        return ti.cast(tick, real) * self.step_seconds[MAX_LEVEL]
 
     @ti.func
     def advance_clock(self, one):
