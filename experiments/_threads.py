@@ -1,19 +1,16 @@
-"""Gain of a second thread for whole steps of a large block, and the least work of steps.
-
-See ``taichi_dem.kit.study.floors`` for that work.
-"""
+"""Whole steps of a large block on some threads: their time, and the bytes that they must move."""
 
 import time
 
 import numpy as np
+import taichi as ti
 
 from _blast import METHODS, paper_effects
 from taichi_dem import CONCRETE, InputError, Scene, Simulation, effects, read_mesh, runtime
+from taichi_dem.kit import backend
 from taichi_dem.kit.checkpoint import digest
 from taichi_dem.kit.field_memory import FieldMemory
-from taichi_dem.kit.study import call_in_process
-from taichi_dem.kit.study.floors import CACHE, Copy, Work
-from taichi_dem.kit.timing import busiest_seconds, thread_seconds
+from taichi_dem.kit.study import call_in_process, on_device
 from taichi_dem.mesh.shapes import bar, in_space_order
 
 #: How often runs on one and on two threads take turns.
@@ -27,44 +24,29 @@ READ = (
     *("unit_area", "tables.dashpot.coefficient", "broken_tick"),
     *("mass_inverse", "inertia_inverse", "level", "last_tick"),
 )
-#: The visit of a bond, in f64 and without regard to how things are stored. It reads two numbers of
-#: bodies (8 bytes), the symmetric 6x6 block (21 numbers), the branch (3), the twist of the last
-#: visit (6), and of both bodies twist (6), symmetric inverse inertia (6) and inverse mass (1). It
-#: writes the twist of the visit (6) and those of both bodies (12): 74 numbers. Operations: the
-#: twist of a bond is 6 differences, a cross product (9) and its difference (3), before and after
-#: (36); less the last one (6), times the block (66), its square (5); the moment at the other body
-#: (12), two products of 3x3 matrices with vectors (30), two with masses (6), and 12 sums: 173.
-VISIT = Work(bytes=8 + 8 * 74, flops=173)
+#: The visit of a bond in a sweep. It reads two numbers of bodies, the symmetric 6x6 block (21
+#: numbers), the branch (3), the twist of the last visit (6), and of both bodies twist (6),
+#: symmetric inverse inertia (6) and inverse mass (1). It writes the twist of the visit (6) and
+#: those of both bodies (12): 74 numbers.
+VISIT_BYTES = 8 + 8 * 74
+#: Numbers of an array far beyond every cache, and numbers that one instruction may take at once.
+LARGE, LANES = 1 << 24, 8
 
 
 def bytes_a_step(engine):
-    """Bytes that a step of all bodies and bonds must read, and those that it must write."""
+    """Least bytes that a step of all bodies and bonds moves, each number once."""
     parts = FieldMemory(engine.tables, "constant"), FieldMemory(engine.state, "saved")
     fields = {name: field for part in parts for name, field in part.fields.items()}
     laws = [name for name in fields if name.startswith("tables.bond.")]
-
-    def size(names):
-        return sum(engine.values(fields[name]).nbytes for name in names if name in fields)
-
-    return size([*WRITTEN, *READ, *laws]), size(WRITTEN)
+    moved = [*WRITTEN, *WRITTEN, *READ, *laws]
+    return sum(engine.values(fields[name]).nbytes for name in moved if name in fields)
 
 
 def counts_of(simulation):
     """Numbers of evaluated bonds, and of visits of bonds in sweeps, since the start."""
     counts = simulation.values(simulation.schedule.evaluations).tolist()
     # Those of the third count are both.
-    return counts[5], counts[2] - counts[5]
-
-
-def work_since(simulation, before=(0, 0), store=CACHE):
-    """Least work of a run since it had some ``counts_of``; store: floor that holds for its bytes.
-
-    A bond that is evaluated stands for its share of a step of all bodies, and each visit of a sweep
-    comes to that. Contacts, searches and changes of lists are left out.
-    """
-    evaluated, visits = (now - then for now, then in zip(counts_of(simulation), before))
-    share = sum(bytes_a_step(simulation.engine)) / simulation.model.bond_count
-    return Work(share * evaluated, store=store) + VISIT * visits
+    return np.array([counts[5], counts[2] - counts[5]])
 
 
 def thread_job(mesh, cells, methods, threads, steps, repeats, arch=""):
@@ -75,35 +57,21 @@ def thread_job(mesh, cells, methods, threads, steps, repeats, arch=""):
 
 
 def thread_gains(mesh, cells, methods, steps, rounds, repeats):
-    """Time of one thread over that of two, a dict of figures by method; the bits must be the same.
+    """Time of one thread over that of two by method, with the bodies; the bits must be the same.
 
-    Runs on one and on two threads take turns, as what else keeps the cores busy changes. busy: the
-    same of what the busiest thread took of the cores, None where the system does not tell. seconds:
-    those of a step on two threads; work: the least of such a step.
+    Runs on one and on two threads take turns, as what else keeps the cores busy changes.
     """
     turns = (1, 2) * rounds
     found = [thread_job(mesh, cells, methods, threads, steps, repeats) for threads in turns]
-    return {
-        name: gain_of(*([one[name] for one in found[k::2]] for k in (0, 1))) for name in methods
-    }
+    return {name: gain_of([one[name] for one in found]) for name in methods}
 
 
-def gain_of(single, double):
-    """Figures of ``thread_gains``; single, double: results of runs on one and on two threads."""
-    if len({one["digest"] for one in (*single, *double)}) > 1:
+def gain_of(runs):
+    """Gain and bodies of runs on one and on two threads in turns."""
+    if len({one["digest"] for one in runs}) > 1:
         raise InputError("one thread and two threads must give the same bits, but do not")
-
-    def gain(name):
-        least = [min(value for one in runs for value in one[name]) for runs in (single, double)]
-        return least[0] / least[1]
-
-    told = None not in single[0]["busy"]
-    return {
-        **{key: double[-1][key] for key in ("bodies", "work", "bandwidth")},
-        "gain": gain("seconds"),
-        "busy": gain("busy") if told else None,
-        "seconds": [value for one in double for value in one["seconds"]],
-    }
+    single, double = (min(min(one["seconds"]) for one in runs[k::2]) for k in (0, 1))
+    return {"bodies": runs[0]["bodies"], "gain": single / double}
 
 
 def scene_of(mesh, cells):
@@ -119,17 +87,16 @@ def scene_of(mesh, cells):
 def whole_steps(mesh, cells, methods, steps, repeats):
     """Whole steps by the parallel driver, two of them to warm up; for a JSON file.
 
-    By method, seconds: of a step, one a repeat. busy: the same of what the busiest thread took of
-    the cores. work: least bytes and operations of a step. digest: of where bodies end. bandwidth:
-    of a copy in memory by these threads [B/s]. One method after the other, as 100,000 bodies take
-    2.4 GB.
+    By method, seconds: of a step, one a repeat. bytes: least ones of a step. digest: of where
+    bodies end. bandwidth: of a copy in memory by these threads [B/s]. One method after the other,
+    as 100,000 bodies take 2.4 GB.
     """
     scene, found = scene_of(mesh, cells), {}
     for name in methods:
         make, step = METHODS[name]
         simulation = Simulation(scene, make(step), "parallel")
         # A copy of each: its arrays are cleared with all others.
-        found[name] = {**timed_steps(simulation, steps, repeats), "bandwidth": Copy().bandwidth()}
+        found[name] = {**timed_steps(simulation, steps, repeats), "bandwidth": bandwidth()}
         runtime.clear()
     return found
 
@@ -137,19 +104,37 @@ def whole_steps(mesh, cells, methods, steps, repeats):
 def timed_steps(simulation, steps, repeats):
     """Steps of a simulation from the second on, see ``whole_steps``."""
     simulation.advance_to(2)
-    seconds, busy, counts = [], [], counts_of(simulation)
+    seconds, counts = [], counts_of(simulation)
     for k in range(repeats):
-        started, before = time.perf_counter(), thread_seconds()
+        started = time.perf_counter()
         simulation.advance_to(2 + (k + 1) * steps)
         seconds.append((time.perf_counter() - started) / steps)
-        spent = busiest_seconds(before, thread_seconds())
-        busy.append(None if spent is None else spent / steps)
-    motion, work = simulation.state.motion(), work_since(simulation, counts)
-    each = 1.0 / (steps * repeats)
+    bonds, visits = (counts_of(simulation) - counts) / (steps * repeats)
+    # An evaluated bond stands for its share of a step of all bodies.
+    share, motion = bytes_a_step(simulation.engine), simulation.state.motion()
     return {
         "seconds": seconds,
-        "busy": busy,
         "bodies": simulation.model.body_count,
-        "work": [each * work.bytes, each * work.flops],
+        "bytes": share * bonds / simulation.model.bond_count + VISIT_BYTES * visits,
         "digest": digest(*(np.ascontiguousarray(motion[key]) for key in ("position", "velocity"))),
     }
+
+
+def bandwidth(repeats=5):
+    """Bytes a second that copies of a large array by all threads read and write, the best."""
+    entries, lanes = int(min(LARGE, backend.most_entries())), 1 if on_device() else LANES
+    a, b = (ti.Vector.field(lanes, ti.f64, shape=entries // lanes) for _ in range(2))
+    seconds = []
+    for _ in range(1 + repeats):
+        started = time.perf_counter()
+        copy(a, b)
+        ti.sync()
+        seconds.append(time.perf_counter() - started)
+    return 16.0 * entries / min(seconds[1:])
+
+
+@ti.kernel
+def copy(a: ti.template(), b: ti.template()):
+    """Copy a field into another."""
+    for k in a:
+        b[k] = a[k]

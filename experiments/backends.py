@@ -66,7 +66,7 @@ def measured(place, method, size, options):
     name, arch, threads = place
     cells = 2 * size, size, size
     found = thread_job("", cells, [method], threads, options.steps, options.repeats, arch)[method]
-    floor = found["bandwidth"] / found["work"][0]
+    floor = found["bandwidth"] / found["bytes"]
     rate = 1.0 / min(found["seconds"])
     return SimpleNamespace(
         place=name, method=method, bodies=found["bodies"], rate=rate, floor=floor

@@ -15,8 +15,8 @@ often wait.
     python experiments/blast_scaling.py --l 1e-7    # a longer run
 
 Two threads are measured, not simulated: whole steps of the parallel driver on a large bar and on
-the paper's block, each in its own process, fastest of repeats. If other programs use the cores,
-read the CPU time of the busiest thread instead (..._busy).
+the paper's block, each in its own process, fastest of repeats; other programs that use the cores
+make the gain less.
 
 Writes scaling.png, scaling.csv, shares.csv and summary.json to results/blast_scaling/.
 """
@@ -151,7 +151,6 @@ def run(options):
         figures[name] = one.acceleration(PAPER_SERIAL), "1", PAPER_SPEEDUP.get(way)
     for end, row in zip(("", "_paper_block"), gains.values()):
         figures[f"speedup_2_threads{end}"] = row["gain"], "1"
-        figures[f"speedup_2_threads_busy{end}"] = row["busy"], "1"
     figures["speedup_2_threads_bodies"] = gains["bar"]["bodies"], "1"
     for kind, price in zip(("bond", "pair", "sphere_pair"), workers.prices):
         figures[f"ns_a_{kind}"] = 1e9 * float(price), "ns"
