@@ -1,4 +1,4 @@
-"""How answers are judged: their price over single runs, and their bars by finer runs."""
+"""How the bars of answers are judged: by finer runs."""
 
 import math
 from types import SimpleNamespace
@@ -13,8 +13,7 @@ from taichi_dem.accuracy.runs import Job, Runs
 from taichi_dem.kit import study
 from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.checkpoint import digest, identity_of
-from taichi_dem.saved_run import run_identity
-from taichi_dem.simulate import result_of
+from taichi_dem.simulate import run_identity
 
 #: A reference: first seed, cycles; its step is so much shorter, less so at a peak of spheres.
 FIRST_SEED, TRANSIENT, MEASURED, QUARTER, PEAK_OF_SPHERES = 1001, 120, 80, 4, 2
@@ -23,9 +22,6 @@ FIRST_SEED, TRANSIENT, MEASURED, QUARTER, PEAK_OF_SPHERES = 1001, 120, 80, 4, 2
 STEPS, FEWEST, MOST, ROUNDS, SHARP = 8_000_000, 3, 12, 3, 0.3
 #: The reference has a step so many halvings below that of the answer: 16 times finer.
 FINER = 4
-#: Steps of the scan: the longest stable one, over 2^k; a method whose steps are longer than that by
-#: more than this has no chance.
-SCANNED, HOPELESS = range(6), 100
 
 
 def reference_values(question, answer):
@@ -95,20 +91,11 @@ def job_of(question):
     return Job(question.scene, question.until, question.goal, question.tolerance, 0.95)
 
 
-def answered(question, repeats=2):
-    """Answer to a question to the blast, and its least CPU time [s]: the first may compile."""
-    spent = []
-    for _ in range(repeats):
-        begun = study.clock()
-        given = {"until": question.until, "goal": question.goal, "progress": None}
-        answer = dem.solve(question.scene, tolerance=question.tolerance, **given)
-        spent.append(study.clock() - begun)
-    return answer, min(spent)
-
-
 def asked_blast(question):
     """Answer to a question to the blast, CPU time [s], step of the truth [s], and its measure."""
-    answer, seconds = answered(question, 1)
+    begun, given = study.clock(), {"until": question.until, "goal": question.goal}
+    answer = dem.solve(question.scene, tolerance=question.tolerance, progress=None, **given)
+    seconds = study.clock() - begun
     job, level = job_of(question), answer.plan.begin + 1 + FINER
     step = job.method(level).dt0
 
@@ -215,54 +202,3 @@ def judged(question, reference=measured):
         **{"doubt": doubt, "answer": answer},
         single=not answer.branches and math.isfinite(width + abs(off)),
     )
-
-
-def fixed_runs(question, others):
-    """All runs of the scan that end well: words, value of the goal and CPU seconds of each.
-
-    others: methods beside the answer's.
-    """
-    job = job_of(question)
-    make, longest = type(job.method(0)), job.method(0).dt0
-    methods = [(job.in_words(k), make(longest / 2**k)) for k in SCANNED]
-    if others and job.solves:
-        report = dem.step_report(question.scene)
-        full, limited = (float(report.borne(kind).min()) for kind in ("full", "limited"))
-        methods += [(f"explicit, {dt:.2g} s", dem.Uniform(dt)) for dt in (full, 0.5 * full)]
-        methods.append(
-            (f"limited dashpots, {limited:.2g} s", dem.Uniform(limited, dashpot="limited"))
-        )
-    rows = 100 if question.goal.kind == "extreme" else 1
-    looks = {"until": question.until, "samples": rows, "frames": 1, "progress": None}
-    found = []
-    for words, method in methods:
-        if HOPELESS * method.dt0 <= longest:
-            continue
-        spent = []
-        try:
-            for _ in range(2):
-                begun = study.clock()
-                result = result_of(dem.simulate, question.scene, method=method, **looks)
-                spent.append(study.clock() - begun)
-        except dem.InputError:
-            continue
-        if not result.diverged:
-            found.append((words, question.goal.value(result), min(spent)))
-    return found
-
-
-def twins_of(question, count):
-    """Runs that differ by one rounding: times [ms], mean ways [mm], and how far they are apart.
-
-    (frames,), (count, frames) and (count - 1, frames), the last as a share of a usual way.
-    """
-    runs = Runs(job_of(question), None)
-    level = next(k for k in SCANNED if runs.value(k) is not None)
-    frames = [runs.frames(level, twin) for twin in range(count)]
-    moved = np.array([[frame.displacement for frame in some] for some in frames])
-    far = np.linalg.norm(moved[0, -1], axis=1)
-    moved = moved[:, :, far > np.median(far)]
-    ways = np.linalg.norm(moved, axis=3)
-    apart = np.linalg.norm(moved[1:] - moved[0], axis=3).mean(axis=2)
-    time_ms = 1e3 * np.array([frame.time_s for frame in frames[0]])
-    return time_ms, 1e3 * ways.mean(axis=2), apart / np.maximum(ways[0].mean(axis=1), 1e-300)

@@ -18,7 +18,7 @@ from ca_damper import goals as damper_goals
 from taichi_dem import effects, goals, shapes
 from taichi_dem.kit.display import counted
 from taichi_dem.mesh.mesh import checked_mesh
-from taichi_dem.mesh.shapes import bar, placed_together, single
+from taichi_dem.mesh.shapes import bar
 
 #: Fewest and most boxes along x, y and z, and bodies of a bar.
 BOXES, BODIES = ((2, 12), (1, 5), (1, 5)), (12, 1500)
@@ -114,37 +114,6 @@ def part_question(*seed):
     scene = dem.Scene(mesh, dem.CONCRETE, "auto", loads=loads)
     until = travel * _power(random, LASTS)
     return BlastQuestion(scene, until, _goal(random, scene, "top"), _power(random, TOLERANCE))
-
-
-def paper_question(until, tolerance):
-    """How far the hole of the paper's block opens until a time [s]."""
-    scene = dem.Scene(
-        dem.read_mesh(dem.PAPER_BLOCK), dem.CONCRETE, "auto", loads=[effects.GasPressure()]
-    )
-    return BlastQuestion(scene, until, goals.hole_displacement(), tolerance)
-
-
-def dropped_question(until):
-    """How far three stiff tetrahedra go that fall on a slab: each bounce magnifies what differs.
-
-    Under 3,000 times the weight of the earth, without friction and bonds of their own.
-    """
-    random = np.random.default_rng(1)
-    parts = {"floor": (bar(0.05, 0.6, (1, 4, 4)), (0.0, 0.0, 0.0))}
-    for k in range(3):
-        body = single(0.05)
-        turn, _ = np.linalg.qr(random.standard_normal((3, 3)))
-        turn *= np.sign(np.linalg.det(turn))
-        turned = (body.points - body.points.mean(axis=0)) @ turn
-        place = 0.12 + 0.04 * k, 0.3, 0.3
-        parts[f"body{k}"] = checked_mesh(turned, body.tetrahedra, body.groups), place
-    chosen = [
-        effects.Gravity((-3e4, 0, 0)),
-        effects.BodyContact(),
-        effects.Fixed("floor_left"),
-    ]
-    scene = dem.Scene(placed_together(parts), dem.CONCRETE, chosen)
-    return BlastQuestion(scene, until, goals.displacement("base"), 0.01)
 
 
 def _wave_speed(material, edge):

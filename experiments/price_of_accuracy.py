@@ -1,4 +1,4 @@
-"""What does the hole of the paper's blast cost, known to 1 %?
+"""What does the hole of the paper's blast cost, known to 1 %, and what makes its error?
 
     python experiments/price_of_accuracy.py          # two minutes on one core
     python experiments/price_of_accuracy.py --quick
@@ -11,22 +11,33 @@ step; the error of an answer is its own bar. Expect the cheapest run to cost a t
 paper's rule, and an answer some tens of such runs: these find the step, the error, and the effect
 of chance, which with the paper's contact exceeds 0.1 %.
 
+Then the same hole, at 0.5 ms, and the swing of a damped mass are asked for with all sources of
+error measured: runs at half the step measure step and chance; a run with four times the rays
+measures the contact law; meshes of the same size, with moved inner nodes, measure the mesh; spheres
+measure the automaton. Expect the step, on which the runs are spent, to be the smallest source.
+
 The paper's times are those of another, unnamed machine with one process: 16 min to 0.05 ms and 3897
 min to 0.5 ms (Konno et al., section 4.3). The time to 0.1 ms lies between. For this machine the
 summary has times of the rule to half and to all of the simulated time. A quick run ends at 0.06 ms
 and has ten times the paper's l.
 
 Seconds are CPU seconds of one thread of stepping, without compiling. Writes price_of_accuracy.png,
-price_of_accuracy.csv and summary.json to results/price_of_accuracy/.
+price_of_accuracy.csv, budget.png, budget.csv and summary.json to results/price_of_accuracy/.
 """
 
 import sys
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
+import pandas as pd
+
 import taichi_dem as dem
 from _blast import blast_parser, paper_scene, run_costs
+from _meshes import with_moved_nodes
 from _work_precision import Point, cheapest
+from ca_damper import Automaton, solve_response
+from ca_damper import goals as damper_goals
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLUE, GREY, LIGHT_GREY, picture, seconds, styles_of
 
@@ -41,6 +52,10 @@ SETTINGS = {
     # Steps of the methods of a fixed step [s], from the longest down.
     "limited": ((1.6e-7, 8e-8, 4e-8, 2e-8, 1e-8), (4e-8, 2e-8)),
     "implicit": ((4e-6, 2e-6, 1e-6, 5e-7, 2.5e-7), (2e-6, 1e-6)),
+    # Of the budget: end [s] and meshes of the blast, tolerance of the damper.
+    "later": (5e-4, 5e-5),
+    "meshes": (5, 2, study.whole(2, 50), "other meshes of the block, default 5"),
+    "damper_tolerance": (0.05, 0.5),
 }
 options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS, threads=1)
 METHODS = {"limited": partial(dem.Uniform, dashpot="limited"), "implicit": dem.ImplicitDashpots}
@@ -50,6 +65,10 @@ GOAL, ASKED = dem.goals.hole_displacement(), 0.01
 PAPER_SECONDS, PAPER_UNTIL = (16.0 * 60.0, 3897.0 * 60.0), 5e-5
 #: Times that the axis names [s].
 TICKS = {0.1: "0.1 s", 1.0: "1 s", 60.0: "1 min", 3600.0: "1 h", 86400.0: "1 d"}
+
+
+#: How far inner nodes are moved, as a share of the size of an element; shares that are drawn [%].
+MOVED, SHARES = 0.1, (1e-3, 1e3)
 
 
 class Price(NamedTuple):
@@ -121,6 +140,47 @@ def draw(path, prices, until):
             one.grid(axis="y", visible=False)
 
 
+def blast_budget(options):
+    """Displacement of the hole with the sources that the paper's mesh and contact add."""
+    mesh = dem.read_mesh(options.mesh)
+    element = (np.prod(np.ptp(mesh.points, axis=0)) / mesh.body_count) ** (1.0 / 3.0)
+    most = np.full((len(mesh.points), 1), MOVED * element)
+    for faces in mesh.groups.values():
+        most[np.unique(faces)] = 0.0
+    meshes = [with_moved_nodes(mesh, most, seed) for seed in range(options.meshes)]
+    scene = dem.Scene(mesh, dem.CONCRETE, "auto", loads=[dem.effects.GasPressure()])
+    asked = {"tolerance": 0.05, "sources": ("step", "contact", "mesh"), "meshes": meshes}
+    return dem.solve(scene, until=options.later, goal=GOAL, **asked)
+
+
+def damper_budget(options):
+    """Swing at resonance of a mass with a box of grains, by the automaton and by spheres."""
+    asked = {"goal": damper_goals.rms_at(1.0), "tolerance": options.damper_tolerance}
+    return solve_response(Automaton(), particles=20, sources=["filling"], **asked)
+
+
+def budget_of(question, answer):
+    """Rows of a table: each source as a share of the value, and its seconds."""
+    print(f"{question}: {answer}\n")
+    table = answer.budget.reset_index()
+    table["share_percent"] = 100.0 * table.error / abs(answer.value)
+    return table.assign(question=question, value=answer.value, unit=answer.unit)
+
+
+def draw_budget(path, table):
+    """Shares by source, a panel a question, with what each has cost."""
+    with picture(path, 1, 2, (7.2, 2.8)) as (_, panels):
+        for axes, (question, rows) in zip(panels, table.groupby("question", sort=False)):
+            mine = rows[rows.share_percent > 0.0]
+            axes.barh(mine.source, mine.share_percent, color=BLUE)
+            for name, share, cpu_s in zip(mine.source, mine.share_percent, mine.cpu_s):
+                words = f" {share:.2g} %, {cpu_s:.2g} s" if cpu_s else f" {share:.2g} %"
+                axes.text(max(share, SHARES[0]), name, words, va="center", fontsize=7)
+            axes.set(title=question, xlabel="half-width of the bar [%]", xscale="log")
+            axes.set_xlim(SHARES)
+            axes.invert_yaxis()
+
+
 def run(options):
     """Run, ask, draw, print."""
     folder, scene = study.begin(options), paper_scene(options.mesh)
@@ -139,6 +199,14 @@ def run(options):
     halfway = 0.5 * options.until
     early = PAPER_SECONDS[0] if abs(halfway / PAPER_UNTIL - 1.0) < 1e-9 else None
     figures["paper_rule_half_time_seconds"] = half, "s", early
+    asked = {"hole of a blast": blast_budget, "damped mass": damper_budget}
+    budget = pd.concat([budget_of(name, ask(options)) for name, ask in asked.items()])
+    budget.to_csv(folder / "budget.csv", index=False)
+    draw_budget(folder / "budget.png", budget)
+    figures |= {
+        f"{row.question}_{row.source}_percent".replace(" ", "_"): (row.share_percent, "%")
+        for row in budget.itertuples()
+    }
     study.finish(options, NAME, figures, 0.0)
 
 
