@@ -6,6 +6,7 @@ import json
 import os
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -88,10 +89,11 @@ def run_job(work: Work, row: Row) -> Record:
     try:
         values = _checked_values(work(dict(row)), row)
     except (InputError, SimulationDiverged) as failure:
-        error = _in_one_line(failure)
+        error = " ".join(str(failure).split())
     except (Exception, SystemExit) as failure:
         # SystemExit of a program's parser would end the process, and the row with it.
-        error, final = f"{type(failure).__name__}: {_in_one_line(failure)}", False
+        last, final = traceback.format_exception_only(failure)[-1], False
+        error = " ".join(last.split())
     seconds = time.perf_counter() - started
     return Record(values, error, final, seconds, commit=commit(), machine=machine())
 
@@ -145,20 +147,16 @@ def _value(name, value):
     return float("nan") if value != value else plain_value(name, value)
 
 
-def _in_one_line(failure):
-    try:
-        return " ".join(str(failure).split())
-    except Exception as broken:
-        return f"its text cannot be read: {type(broken).__name__}"
-
-
 class Journal:
-    """Records of finished jobs in a folder, a small file each: whole or not there."""
+    """Records of finished jobs in a folder, a small file each: whole or not there.
 
-    def __init__(self, folder: FileName | None, identity: str):
+    folder: path; None for a journal that forgets. Raises InputError for a folder that cannot be
+    written to.
+    """
+
+    def __init__(self, folder: FileName | None):
         self.folder = "" if folder is None else output_folder(folder)
         if self.folder:
-            self._check_title(os.path.join(self.folder, "sweep.json"), identity)
             output_folder(os.path.join(self.folder, "jobs"))
 
     def read(self, jobs: Iterable[Job]) -> dict[str, Record]:
@@ -167,28 +165,13 @@ class Journal:
         for job in jobs if self.folder else ():
             with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
                 with open(self._path(job), encoding="utf-8") as file:
-                    kept = json.load(file)
-                if kept["check"] == _digest(kept["record"]):
-                    found[job.digest] = Record(**kept["record"])
+                    found[job.digest] = Record(**json.load(file))
         return found
 
     def write(self, job: Job, record: Record) -> None:
         """Keep the record of a job that is final. Raises InputError where there is no space."""
         if self.folder and record.final:
-            kept = {"record": record._asdict(), "check": _digest(record._asdict())}
-            write_text(self._path(job), json.dumps(kept))
+            write_text(self._path(job), json.dumps(record._asdict()))
 
     def _path(self, job):
         return os.path.join(self.folder, "jobs", f"{job.digest}.json")
-
-    def _check_title(self, path, identity):
-        there = identity
-        if os.path.exists(path):
-            with open(path, encoding="utf-8") as file:
-                there = json.load(file)["function"]
-        if there != identity:
-            raise InputError(
-                f"out must be a folder of this sweep ({identity}), got {self.folder}, which "
-                f"holds one of {there}"
-            )
-        write_text(path, json.dumps({"function": identity}))

@@ -21,7 +21,6 @@ from taichi_dem.kit.sweeps.jobs import (
     Journal,
     Record,
     Work,
-    identity_of,
     jobs_of,
     run_in_worker,
     table_of,
@@ -96,7 +95,7 @@ def sweep(
     Raises
     ------
     InputError
-        For a bad argument, a folder of another sweep or without space, a client that is lost, or
+        For a bad argument, a folder without space, a client that is lost, or
         where ``distributed`` is not installed; finished rows are kept in ``out``.
 
     Notes
@@ -111,7 +110,7 @@ def sweep(
     ... # doctest: +SKIP
     """
     count = runtime.usable_cores() if workers is None else whole("workers", workers, 1, 1024)
-    rows, journal = checked_rows(table), Journal(out, identity_of(function))
+    rows, journal = checked_rows(table), Journal(out)
     jobs = jobs_of(function, rows, whole("seed", seed, 0, 2**63), instance("version", version, str))
     records = journal.read(jobs)
     missing = [*{job.digest: job for job in jobs if job.digest not in records}.values()]
