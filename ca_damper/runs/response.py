@@ -19,7 +19,7 @@ from ca_damper.scenes.clock import automatic_dt, steps_per_cycle
 from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.checkpoint import Checkpoint, identity_of
 from taichi_dem.kit.data_table import Tabulated, unit_of
-from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded
+from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, verbatim
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress import Listener
 from taichi_dem.kit.progress_bar import reporting
@@ -127,7 +127,7 @@ class Response(Result):
             f"Response: {self.axes_in_words()}{some}",
             embedded(png, "RMS displacement over frequency"),
             table(self._peak_rows(rows), _PEAK_COLUMNS),
-            unfolded("All figures of the run", self.report.details()) if self.report else "",
+            verbatim(self.report.details()) if self.report else "",
         )
 
     def _peak_rows(self, rows):
