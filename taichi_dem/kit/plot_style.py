@@ -14,7 +14,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import LogFormatterSciNotation
 from PIL import Image
 
 from taichi_dem.kit.files import write_bytes, write_whole
@@ -30,6 +29,8 @@ STYLE = {
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
+    # 0.01, 0.1, 1 instead of powers of ten on logarithmic axes.
+    "axes.formatter.min_exponent": 4,
     "grid.alpha": 0.25,
     "grid.linewidth": 0.6,
     "legend.frameon": False,
@@ -132,7 +133,8 @@ class NotebookFigure(Figure):
     """A figure that shows itself as the last line of a notebook's cell, also without pyplot."""
 
     def _repr_png_(self) -> bytes:
-        return png_of(self)
+        with matplotlib.rc_context(STYLE):
+            return png_of(self)
 
 
 @contextlib.contextmanager
@@ -155,30 +157,9 @@ def picture(
         drawing(path)
     with styled(*shape, **options) as (figure, axes):
         yield figure, axes
-        _write_plain_numbers(figure)
         if path is None:
             return
         write_bytes(path, png_of(figure, dpi))
-
-
-class _PlainLogFormatter(LogFormatterSciNotation):
-    """0.01, 0.1, 1 instead of powers of ten on axes that lie between 0.001 and 10000."""
-
-    def __call__(self, x, pos=None):
-        text = super().__call__(x, pos)
-        low, high = sorted(self.axis.get_view_interval())
-        return f"{x:g}" if text and low > 5e-4 and high < 2e4 else text
-
-
-def _write_plain_numbers(figure):
-    """Label logarithmic axes that have matplotlib's own formatters with plain numbers."""
-    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
-        for level, give in (
-            ("major", axis.set_major_formatter),
-            ("minor", axis.set_minor_formatter),
-        ):
-            if type(getattr(axis, f"get_{level}_formatter")()) is LogFormatterSciNotation:
-                give(_PlainLogFormatter())
 
 
 def png_of(figure: Figure, dpi: float = PNG_DPI) -> bytes:
@@ -208,7 +189,6 @@ def filming(
             if images:
                 background = _draw_changes(canvas, background)
             else:
-                _write_plain_numbers(figure)
                 canvas.draw()
                 figure.set_layout_engine("none")
             images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()))
