@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,51 +14,10 @@ from hypothesis.extra.numpy import arrays
 
 from taichi_dem.kit.viewer import quantise
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.mesh.topology import topology_of
-from taichi_dem.output.record import Frame
-from taichi_dem.result import Result
 from tests.bad_input.refusals import steady
-from tests.turns import matrix, quaternion
+from tests.made_result import made_result
 
 MESH = bar(0.4, 0.1, (4, 1, 1))
-UNTIL_S = 4e-6
-
-
-def block(count=5, mesh=MESH, breaks=True):
-    """Result of a bar with so many frames: it moves, turns, and every third bond breaks."""
-    draw, topology = np.random.default_rng(1), topology_of(mesh)
-    centre = mesh.points[mesh.tetrahedra].mean(axis=1)
-    model = SimpleNamespace(
-        **{"mesh": mesh, "topology": topology, "centre": centre},
-        **{"body_count": mesh.body_count, "bond_count": topology.bond_count},
-    )
-    broken = np.linspace(1e-6, UNTIL_S, topology.bond_count)
-    broken[np.arange(len(broken)) % 3 >= int(breaks)] = np.nan
-    since = {"slip": np.where(draw.random(mesh.body_count) < 0.5, 2e-6, np.nan)}
-    frames = tuple(block_frame(centre, time_s, draw) for time_s in np.linspace(0.0, UNTIL_S, count))
-    report = SimpleNamespace(outcome="implicit, 4e-06 s simulated, <10> of 30 bonds broken")
-    method, peak = SimpleNamespace(dt0=4e-7), np.zeros(mesh.body_count)
-    parts = None, method, model, {}, frames, broken, peak, report
-    return Result(*parts, acting_since=since)
-
-
-def block_frame(centre, time_s, draw):
-    """Bodies moved and turned by amounts that grow with time."""
-    count, share = len(centre), time_s / UNTIL_S
-    displacement = 0.02 * share * draw.normal(size=(count, 3))
-    turns = [quaternion(draw.normal(size=3), 2.0 * share) for _ in range(count)]
-    return Frame(
-        time_s=float(time_s),
-        position=centre + displacement,
-        rotation=np.array([matrix(turn) for turn in turns]),
-        displacement=displacement,
-        velocity=30.0 * share * draw.normal(size=(count, 3)),
-        angular_momentum=np.zeros((count, 3)),
-        stress=share * 1e6 * np.eye(3) * draw.normal(size=(count, 1, 1)),
-        level=draw.integers(0, 4, count),
-        damage=draw.random(count),
-        bound=np.zeros(count, dtype=int),
-    )
 
 
 def data_of(page):
@@ -96,7 +56,9 @@ def test_quantised_values_differ_by_at_most_half_a_step(values):
 @pytest.fixture(scope="module")
 def shown(tmp_path_factory):
     """A result and its page."""
-    result = block()
+    report = SimpleNamespace(outcome="implicit, 4e-05 s simulated, <10> of 30 bonds broken")
+    slipped = {"slip": np.where(np.arange(MESH.body_count) % 2, 2e-5, np.nan)}
+    result = replace(made_result(mesh=MESH, frames=5), report=report, acting_since=slipped)
     return result, result.show(tmp_path_factory.mktemp("view") / "block.html")
 
 
