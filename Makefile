@@ -10,6 +10,7 @@ TEST := -m pytest -q -n 2 --dist loadscope --no-loadscope-reorder --max-worker-r
 PHYSICS := $(addprefix tests/,verification boundaries equivalence material ca_automaton ca_spheres ca_modes \
   ca_excitation ca_maps)
 REST = $(filter-out $(PHYSICS) tests/__pycache__,$(patsubst %/,%,$(wildcard tests/*/)))
+FUZZ := tests/attack/test_random_scenes.py
 TEST_OPTIONS ?=
 BENCH_OPTIONS ?=
 ATTACK_OPTIONS ?=
@@ -60,7 +61,8 @@ test-slow: $(STAMP) ## run those that take longer
 	$(BIN)/python $(TEST) -m slow $(TEST_OPTIONS)
 
 attack: $(STAMP) ## attack it with hostile values, files, sessions and environments (ATTACK_OPTIONS="--attacks 100")
-	$(BIN)/python -m pytest -q -n 2 -m attack tests/attack --attacks 20 $(ATTACK_OPTIONS)
+	$(BIN)/python -m pytest -q -n 2 -m attack tests/bad_input tests/attack --attacks 20 \
+	  --deselect $(FUZZ) $(ATTACK_OPTIONS)
 
 test-gpu: $(STAMP) ## compare each device here with the CPU (as root on Debian or Ubuntu it installs Vulkan's software driver)
 	@$(BIN)/python -c "from taichi_dem.kit import backend; raise SystemExit(not backend.is_present('vulkan'))" || \
@@ -72,11 +74,12 @@ test-gpu: $(STAMP) ## compare each device here with the CPU (as root on Debian o
 	$(BIN)/python -m pytest -q -m gpu tests/devices --durations 5 $(TEST_OPTIONS)
 
 fuzz: $(STAMP) ## run random scenes, also with every access to a field checked (FUZZ_OPTIONS="--attack-seed 7")
-	$(BIN)/python -m pytest -q -n 2 -m attack tests/fuzz --attacks 20 $(FUZZ_OPTIONS)
+	$(BIN)/python -m pytest -q -n 2 -m attack $(FUZZ) --attacks 20 $(FUZZ_OPTIONS)
 
 test-quadrants: $(QUADRANTS_STAMP) ## run the tests on Quadrants, Taichi's successor; list what differs
-	@rm -f results/quadrants.txt
-	$(QUADRANTS)/python $(TEST) -p tests.quadrants.report $(TEST_OPTIONS) || test -s results/quadrants.txt
+	@mkdir -p results
+	$(QUADRANTS)/python $(TEST) --tb line -rfE $(TEST_OPTIONS) >results/quadrants.txt || test -s results/quadrants.txt
+	@tail -n 1 results/quadrants.txt; echo "What differs is listed in results/quadrants.txt"
 
 wheel: $(STAMP) ## build the wheel into dist/ and run it in an empty environment (PYTHONS="python3.12 ...": in several)
 	@rm -rf build dist
