@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ca_damper.accuracy.estimate import STEP_ORDER, Estimate
-from ca_damper.accuracy.job import Job, Stage
+from ca_damper.accuracy.job import Job
 from ca_damper.accuracy.runs import SceneRuns
 from ca_damper.accuracy.search import Search
 from ca_damper.accuracy.sources import MEASURED, filling_source, other_filling
@@ -61,7 +61,6 @@ def solve_response(
     oscillator: Oscillator | None = None,
     ratios: tuple[float, float] | None = None,
     seeds: int | Sequence[int] | None = None,
-    plan: Plan | None = None,
     sources: Iterable[str] = ("step",),
     progress: Listener | str | None = AUTO,
 ) -> Any:
@@ -88,9 +87,6 @@ def solve_response(
         natural frequency, which grows if the peak is outside.
     seeds : int or sequence of int, optional
         Number of seeds or the seeds themselves; as many as it takes if None.
-    plan : Plan, optional
-        Plan of an earlier answer for this filling and number of particles: start at its step, seeds
-        and cycles.
     sources : iterable of str, default ("step",)
         Sources of error to measure and include in the bar: ``"step"``, always; ``"filling"``, by
         the same question to the other model of the grains, ``Spheres`` or ``Automaton``.
@@ -135,18 +131,20 @@ def solve_response(
         budget_s=math.inf if budget_s is None else positive("budget_s", budget_s),
         span=_range(ratios),
         fixed=None if seeds is None else one.seeds,
-        begin=_stage_of(plan, filling, one.particles[0]),
     )
+    answers = _solved(question, progress)
+    others = _others(question, other, answers, progress)
+    answers = tuple(_with_filling(*pair, filling) for pair in zip(answers, others))
+    return answers if isinstance(goal, (list, tuple)) else answers[0]
+
+
+def _solved(question, progress):
+    """Answers of a question to all of its goals."""
     with reporting(progress, "answer") as listener:
         open_ended = OpenEnded(listener)
         search, estimates = _answered(replace(question, listener=open_ended))
         open_ended.end()
-    answers = tuple(
-        doubted(_answer(search, found), *search.doubts(found.goal)) for found in estimates
-    )
-    others = _others(question, other, answers, progress)
-    answers = tuple(_with_filling(*pair, filling) for pair in zip(answers, others))
-    return answers if isinstance(goal, (list, tuple)) else answers[0]
+    return tuple(doubted(_answer(search, found), *search.doubts(found.goal)) for found in estimates)
 
 
 def _other(filling, sources):
@@ -170,18 +168,10 @@ def _others(question, other, answers, progress):
     if left <= 0.0:
         return ["the budget is spent"] * len(answers)
     try:
-        return solve_response(
-            other,
-            particles=question.particles,
-            goal=question.goals,
-            tolerance=question.tolerance,
-            confidence=question.confidence,
-            budget_s=None if math.isinf(left) else left,
-            oscillator=question.oscillator,
-            ratios=question.span,
-            seeds=question.fixed,
-            progress=progress,
-        )
+        # Refuses grains that find no place.
+        Grid(other, question.particles, 1.0, 1, question.oscillator, None)
+        asked = replace(question, filling=other, budget_s=left)
+        return _solved(asked, progress)
     except (InputError, SimulationDiverged) as ended:
         return [f"{type(other).__name__}() has no answer: {ended}"] * len(answers)
 
@@ -191,19 +181,6 @@ def _with_filling(answer, other, filling):
     source = filling_source(answer, filling, other)
     made = answer if source is None else with_source(answer, source)
     return doubted(made, other) if isinstance(other, str) else made
-
-
-def _stage_of(plan, filling, particles):
-    """Stage at which a plan ended, None for none; InputError for a plan of something else."""
-    if plan is None:
-        return None
-    stage = getattr(plan, "begin", None)
-    if not isinstance(stage, Stage) or (stage.filling, stage.particles) != (filling, particles):
-        raise InputError(
-            f"plan must be that of an answer of solve_response for {shown(filling)} and "
-            f"{particles} particles, got {shown(plan)}"
-        )
-    return stage
 
 
 def _range(ratios):
@@ -299,7 +276,7 @@ def _plan(done):
     several = "1 frequency" if count == 1 else f"{count} frequencies"
     method = f"{label}, {done.at.dt:.3g} s, {several}, {seeds}, up to {done.longest()} cycles"
     final_s = done.runs.cpu_s - done.pilot_s
-    return Plan(method, done.runs.runs, done.pilot_s, final_s, begin=done.at)
+    return Plan(method, done.runs.runs, done.pilot_s, final_s)
 
 
 def _cost_curve(done, made):

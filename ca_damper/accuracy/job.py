@@ -1,7 +1,7 @@
 """A checked question to ``solve_response``, and the start of its runs."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from ca_damper.fixed_mass import Empty, RigidMass
@@ -23,14 +23,13 @@ _BELOW, _ABOVE = 0.95, 1.04
 
 @dataclass(frozen=True)
 class Stage:
-    """Which runs make an estimate; another question of the same filling may begin at it.
+    """Which runs make an estimate.
 
-    window: steady cycles of each scene. margin: further frequencies on either side of a peak.
-    level: halvings of the frequencies around it.
+    dt: finest step [s]. window: steady cycles of each scene.
+    has_between: whether there are steps between dt and 4 dt. margin: further frequencies on either
+    side of a peak. level: of halving of the frequencies around it.
     """
 
-    filling: Any
-    particles: int
     dt: float
     seeds: tuple[int, ...]
     window: int = _LEAST_WINDOW
@@ -41,7 +40,10 @@ class Stage:
 
 @dataclass(frozen=True)
 class Job:
-    """A checked question. span: range of ratios or None. fixed: seeds, or None for ours."""
+    """A checked question. span: range of ratios or None. fixed: seeds, or None for ours.
+
+    listener: of progress.
+    """
 
     filling: Any
     particles: int
@@ -52,13 +54,10 @@ class Job:
     budget_s: float = math.inf
     span: tuple[float, float] | None = None
     fixed: tuple[int, ...] | None = None
-    begin: Stage | None = None
     listener: Any = None
 
     def first_step(self) -> float:
         """Coarse step to begin with [s]."""
-        if self.begin is not None:
-            return 2.0 * self.begin.dt
         return min(_OF_DEFAULT * self.filling.default_dt, self.longest_step())
 
     def longest_step(self) -> float:
@@ -68,10 +67,7 @@ class Job:
 
     def first_stage(self, coarse: float) -> Stage:
         """Stage to begin at, half a coarse step [s]."""
-        dt, seeds = coarse / 2.0, self._first_seeds()
-        if self.begin is None:
-            return Stage(self.filling, self.particles, dt, seeds)
-        return replace(self.begin, dt=dt, seeds=seeds, level=0)
+        return Stage(coarse / 2.0, self._first_seeds())
 
     def _first_seeds(self):
         """Seeds to begin with; one of a filling that draws nothing."""
@@ -79,8 +75,6 @@ class Job:
             return self.fixed
         if not self.is_drawn:
             return (1,)
-        if self.begin is not None:
-            return tuple(range(1, 1 + max(LEAST_SEEDS, len(self.begin.seeds))))
         several = math.ceil(_PARTICLES / self.particles)
         return tuple(range(1, 1 + min(_MANY_SEEDS, max(LEAST_SEEDS, several))))
 

@@ -105,8 +105,8 @@ class Plan:
         CPU time of the runs that chose the method and step [s].
     final_s : float
         CPU time of the runs that gave the answer [s].
-    begin : object, default 0
-        Where a similar question may start: a level of the step, or a stage of the damper's runs.
+    begin : int, default 0
+        Where a similar question of ``taichi_dem.solve`` may start: a level of the step.
     parting_s : float, default math.inf
         Simulated time from which runs that differ by one rounding differ by more than was allowed
         [s]; infinite if never.
@@ -116,7 +116,7 @@ class Plan:
     runs: int
     pilot_s: float
     final_s: float
-    begin: Any = 0
+    begin: int = 0
     parting_s: float = math.inf
 
     @property
