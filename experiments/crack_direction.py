@@ -24,7 +24,7 @@ from taichi_dem.kit.plot_style import BLUE, GREEN, GREY, RED, picture
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.mesh.shapes import divided, drawn_out
-from taichi_dem.output.cracks import crack_areas
+from taichi_dem.output.fracture import crack_areas
 from taichi_dem.simulate import run_simulation
 
 NAME = "crack_direction"

@@ -15,7 +15,7 @@ from taichi_dem.kit.bars.goal import BaseGoal
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, finite, flag, instance, shown, whole, word
 from taichi_dem.mesh.topology import faces_of_group
-from taichi_dem.output.fragments import fragment_of_body
+from taichi_dem.output.fracture import fragment_of_body
 from taichi_dem.output.hole_monitor import hole_of
 from taichi_dem.report.energy_balance import TERMS, energy_put_in
 from taichi_dem.result import Result

@@ -19,8 +19,13 @@ from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.observers import Received, write_receivers
-from taichi_dem.output.cracks import apertures_of, cracks_of, rose_of
-from taichi_dem.output.fragments import fragment_of_body, fragments_of
+from taichi_dem.output.fracture import (
+    apertures_of,
+    cracks_of,
+    fragment_of_body,
+    fragments_of,
+    rose_of,
+)
 from taichi_dem.output.hole_monitor import Attenuation, attenuation_of, watched_groups
 from taichi_dem.output.record import Frame, remove_series, series_name, write_bonds, write_paraview
 from taichi_dem.report.effects import Certificate
@@ -147,7 +152,7 @@ class Result:
         -------
         pandas.DataFrame
             Masses, sizes, places, velocities, spins and energies, a row a fragment, the heaviest
-            first (``taichi_dem.output.fragments.fragments_of``).
+            first (``taichi_dem.output.fracture.fragments_of``).
 
         Examples
         --------
@@ -233,7 +238,7 @@ class Result:
         Returns
         -------
         pandas.DataFrame
-            Area and number of faces by sector (``taichi_dem.output.cracks.rose_of``).
+            Area and number of faces by sector (``taichi_dem.output.fracture.rose_of``).
         """
         return rose_of(self.model, np.isfinite(self.broken_time), axis, sectors)
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from taichi_dem.observers import Every, RunView
-from taichi_dem.output.fragments import body_spins
+from taichi_dem.output.fracture import body_spins
 
 
 class MotionRecord:

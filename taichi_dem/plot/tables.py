@@ -12,7 +12,7 @@ from taichi_dem.kit.data_table import arrays_of, unit_of, without_unit
 from taichi_dem.kit.display import scale
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, SPARE_COLOURS, area_key, picture
 from taichi_dem.kit.validation import FileName, choice, positive, unit_vector
-from taichi_dem.output.fragments import COLOURS, body_values, scale_end
+from taichi_dem.output.fracture import COLOURS, body_values, scale_end
 from taichi_dem.plot.view import ALONG_Z, JOINT, View, draw_bodies, frame_block
 
 #: Fragments of a colour of their own; lighter ones are grey.

@@ -19,7 +19,7 @@ from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
 from taichi_dem.mesh.topology import Topology, skin
-from taichi_dem.output.cracks import picture_axes
+from taichi_dem.output.fracture import picture_axes
 from taichi_dem.output.record import Frame, body_corners
 from taichi_dem.state.model import Model
 

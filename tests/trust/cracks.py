@@ -12,7 +12,7 @@ import numpy as np
 from taichi_dem import ImplicitDashpots, Scene, Simulation, effects, simulate
 from taichi_dem.kit.errors import InputError
 from taichi_dem.mesh.mesh import with_cut
-from taichi_dem.output.cracks import crack_areas
+from taichi_dem.output.fracture import crack_areas
 from tests.trust.cases import Number
 from tests.trust.plates import material_of, plate, springs_step
 
