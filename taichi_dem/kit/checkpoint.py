@@ -67,20 +67,7 @@ class Checkpoint:
                 positive(name, getattr(self, name))
 
     def marks(self, last: int, dt: float) -> set[int]:
-        """Steps at which a run is to be saved.
-
-        Parameters
-        ----------
-        last : int
-            Last step of the run.
-        dt : float
-            Step [s].
-
-        Returns
-        -------
-        set of int
-            Steps from 0 to ``last``.
-        """
+        """Steps, from 0 to the last, at which a run with a step dt [s] is to be saved."""
         every = [self.every_steps] if self.every_steps else []
         if self.every_s is not None:
             every.append(max(1, math.ceil(self.every_s / dt - 1e-9)))

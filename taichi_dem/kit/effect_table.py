@@ -149,7 +149,7 @@ class EffectUse:
 
     def negligible(self, tolerance: float) -> bool:
         """Whether it acted, but with less than a share of the energy, or only round-off."""
-        if self.kept or self.rounding:
+        if self.rounding:
             return not self.kept
         if self.share is None or self.steers:
             return False
