@@ -89,69 +89,27 @@ class Effect:
         return made
 
     def check_material(self, material: Material) -> None:
-        """Refuse a material with which the effect cannot act; a scene calls this.
-
-        Parameters
-        ----------
-        material : Material
-            Material of the scene.
-        """
+        """Refuse a material with which the effect cannot act; a scene calls this."""
 
     def numbers(self, material: Material) -> tuple:
-        """Numbers that kernels read; changing them compiles nothing.
+        """Numbers in SI units that kernels read; changing them compiles nothing.
 
         Loads, supports and ground read them as ``self.law[0]`` and on, laws of bonds and contacts
         as ``self.law[m, 0]`` and on, m a pair of materials.
-
-        Parameters
-        ----------
-        material : Material
-            Material of the scene; for a law the one between two bodies (``body_materials.joined``).
-
-        Returns
-        -------
-        tuple of float
-            Numbers, in SI units [SI].
         """
         return ()
 
     def declare(self, capacity: Capacity) -> None:
-        """Declare further fields, with the capacity of an engine; no field may be used here.
-
-        Parameters
-        ----------
-        capacity : Capacity
-            Numbers of bodies, bonds, units and faces that an engine has room for.
-        """
+        """Declare further fields, with the capacity of an engine; no field may be used here."""
 
     def declare_columns(self, store: PairStore) -> None:
-        """Declare data for each pair of bodies, or of spheres; called in scenes with contact.
-
-        Parameters
-        ----------
-        store : PairStore
-            Pair store, whose ``column`` and ``sphere_column`` return fields.
-        """
+        """Declare data for each pair of bodies, or of spheres; called in scenes with contact."""
 
     def load(self, model: Model) -> None:
-        """Fill the declared fields for a scene; they are zero before.
-
-        Parameters
-        ----------
-        model : Model
-            Arrays of the scene.
-        """
+        """Fill the declared fields for a scene; they are zero before."""
 
     def stress(self, material: Material, size: float) -> float:
-        """Stress [Pa] that a load or support may cause in a block, before a run; NaN if unknown.
-
-        Parameters
-        ----------
-        material : Material
-            Material of the scene.
-        size : float
-            Largest extent of the block [m].
-        """
+        """Stress [Pa] that a load or support may cause in a block of a size [m]; NaN if unknown."""
         return np.nan
 
     def change_time(self) -> float:
@@ -162,25 +120,14 @@ class Effect:
         return np.inf
 
     def travel(self) -> Travel:
-        """Bounds of the displacement that a load or support may cause along x, y and z.
+        """Lowest and highest displacement [m] (3,) that a load or support may cause.
 
         Used to decide whether parts of a mesh may meet. Infinite by default.
-
-        Returns
-        -------
-        tuple of (tuple, tuple)
-            Lowest and highest displacement [m], three components each.
         """
         return (-np.inf,) * 3, (np.inf,) * 3
 
     def stand_for(self, given: "Effect") -> None:
-        """Take the attributes of this bound effect from an effect of a scene.
-
-        Parameters
-        ----------
-        given : Effect
-            Effect of the scene.
-        """
+        """Take the attributes of this bound effect from an effect of a scene."""
         self.__dict__["_given"] = vars(given)
 
     @property
@@ -189,13 +136,7 @@ class Effect:
         return bool(self._given.get("is_silent"))
 
     def load_scene(self, model: Model) -> None:
-        """Load the numbers of the effect that this bound one stands for.
-
-        Parameters
-        ----------
-        model : Model
-            Arrays of the scene.
-        """
+        """Load the numbers of the effect that this bound one stands for."""
         if self.stands_silent:
             model = model.harmless()
         if self._count:
@@ -207,11 +148,6 @@ class Effect:
 
         They are valid unless an attribute that kernels read has another value, or the effect has
         another count of numbers.
-
-        Parameters
-        ----------
-        given : Effect
-            Effect of the scene.
         """
         same = (np.array_equal(getattr(given, k, np.nan), v) for k, v in self._frozen.items())
         return _count_of(given) == self._count and all(same)

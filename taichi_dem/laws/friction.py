@@ -36,7 +36,7 @@ class Friction(Effect):
 
 @ti.data_oriented
 class StickingFriction(Friction):
-    """Friction with a tangential spring in each contact, up to Coulomb's limit.
+    """Friction with a spring in each contact, up to a limit (Cundall and Strack 1979).
 
     A body at rest on a slope below the friction angle stays there; with ``Friction`` it creeps. The
     stretch of a spring turns with the first body and is lost when the two part. Between bodies
@@ -48,10 +48,6 @@ class StickingFriction(Friction):
     stiffness_ratio : float, default 0.8
         Ratio of the stiffness of the spring to that along the normal, from 1e-6 to 1; spheres of
         a Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
-
-    References
-    ----------
-    Cundall and Strack, Geotechnique 29 (1979) 47.
     """
 
     name = "sticking_friction"
