@@ -42,11 +42,6 @@ class Goal(BaseGoal):
         Whether the goal is the mean over runs that differ by chance, see ``mean``.
     check : callable or None, optional
         Function of a Scene that raises InputError where the goal needs what the scene lacks.
-
-    Examples
-    --------
-    >>> Goal("fastest body", "m/s", lambda result: result.peak_speed.max(), "extreme").kind
-    'extreme'
     """
 
     kinds: ClassVar[tuple[str, ...]] = ("value", "extreme", "count")

@@ -126,13 +126,6 @@ class _Explicit(Method):
         """Order of the error in the step, see ``order_of``; None where it is not known.
 
         Dashpots lag by half a step; limited ones are those of another material at each step.
-
-        Parameters
-        ----------
-        damped : bool
-            Whether a dashpot acts.
-        varying : bool
-            Whether steps differ between bodies or times.
         """
         if damped and self.dashpot == "limited":
             return None

@@ -1,7 +1,4 @@
-"""Effects that a run needed: which to keep, drop and add.
-
-An effect is called droppable only if a run without it was made and is equal.
-"""
+"""Effects that a run needed: which to keep, drop and add."""
 
 from dataclasses import replace
 

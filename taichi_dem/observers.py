@@ -89,22 +89,7 @@ class Every:
             positive(given[0], value)
 
     def marks(self, last: int, dt: float, samples: int = 1) -> set:
-        """Largest steps at which to call.
-
-        Parameters
-        ----------
-        last : int
-            Last of the largest steps.
-        dt : float
-            Largest step [s].
-        samples : int, default 1
-            Number of rows of the time series after the one at the start.
-
-        Returns
-        -------
-        set of int
-            Steps from 0 to ``last``.
-        """
+        """Largest steps at which to call, from 0 to ``last``; samples: rows after the first."""
         if self.wall_s is not None:
             return {last}
         if self.samples is not None:
@@ -143,22 +128,7 @@ class At:
         object.__setattr__(self, "times_s", checked)
 
     def marks(self, last: int, dt: float, samples: int = 1) -> set:
-        """Largest steps at which to call.
-
-        Parameters
-        ----------
-        last : int
-            Last of the largest steps.
-        dt : float
-            Largest step [s].
-        samples : int, default 1
-            Number of rows of the time series; not used here.
-
-        Returns
-        -------
-        set of int
-            Steps from 0 to ``last``.
-        """
+        """Largest steps at which to call, a set from 0 to ``last``."""
         for time in self.times_s:
             if round(time / dt) > last:
                 got, most = told_apart(time, last * dt)
@@ -186,13 +156,7 @@ class Observer(Protocol):
         """Times of the calls."""
 
     def observe(self, view: "RunView") -> None:
-        """Measure; an exception here ends the run, and no result is written.
-
-        Parameters
-        ----------
-        view : RunView
-            Read-only view of the run.
-        """
+        """Measure; an exception here ends the run, and no result is written."""
 
 
 class Collector:
@@ -228,13 +192,7 @@ class Collector:
         self.view: RunView | None = None
 
     def observe(self, view: "RunView") -> None:
-        """Keep a value of every function.
-
-        Parameters
-        ----------
-        view : RunView
-            Read-only view of the run.
-        """
+        """Keep a value of every function."""
         self.view = view
         for name, read in self.read.items():
             self.rows[name].append(read(view))
@@ -291,14 +249,7 @@ class RunView:
         return self._simulation.evaluations()
 
     def motion(self) -> dict:
-        """Motion of the bodies.
-
-        Returns
-        -------
-        dict of ndarray
-            Arrays by name, as in ``State.motion``: position [m], velocity [m/s], spin [rad/s] and
-            more.
-        """
+        """Motion of the bodies by name, as in ``State.motion``: position [m], velocity, ..."""
         return {name: locked(array) for name, array in self._simulation.motion().items()}
 
     def energy_balance(self) -> dict:
@@ -375,25 +326,13 @@ class Receivers:
         self._rows: list[tuple[float, np.ndarray]] = []
 
     def check_scene(self, scene: Scene) -> None:
-        """Find the bodies that hold the points, and forget an earlier run.
-
-        Parameters
-        ----------
-        scene : Scene
-            Scene of the run.
-        """
+        """Find the bodies that hold the points, and forget an earlier run."""
         places = self.points.items()
         found = [body_at(scene.mesh, f"receiver {name}", np.array(at)) for name, at in places]
         self._bodies, self._rows = np.array(found), []
 
     def observe(self, view: RunView) -> None:
-        """Keep displacements and velocities of the points.
-
-        Parameters
-        ----------
-        view : RunView
-            View of the run.
-        """
+        """Keep displacements and velocities of the points."""
         motion, bodies = view.motion(), self._bodies
         centre = view.model.centre[bodies]
         arm = np.array(list(self.points.values())) - centre

@@ -152,30 +152,18 @@ class Result:
         -------
         pandas.DataFrame
             Masses, sizes, places, velocities, spins and energies, a row a fragment, the heaviest
-            first (``taichi_dem.output.fracture.fragments_of``).
-
-        Examples
-        --------
-        ::
-
-            pieces = result.fragments()
-            print(pieces)
-            print(pieces["sieve_m"][pieces["mass_kg"] > 0.1])
+            first (``taichi_dem.output.fragments.fragments_of``).
         """
         of_body = self.fragment_of_body(frame)
         return data_frame(fragments_of(self.model, self.frame(frame), of_body))
 
     def fragment_of_body(self, frame: int = -1) -> np.ndarray:
-        """Fragment of each body, a row of ``fragments(frame)``.
+        """Fragment of each body (body_count,), a row of ``fragments(frame)``.
 
         Parameters
         ----------
         frame : int
             Number of the frame, the last by default.
-
-        Returns
-        -------
-        ndarray of int, shape (body_count,)
         """
         return fragment_of_body(self.model, self.broken_time <= self.frame(frame).time_s)
 
@@ -319,11 +307,6 @@ class Result:
         open_browser : bool, optional
             By default only from a terminal of a desktop: not in a pipe, a test, a notebook or on a
             build server.
-
-        Returns
-        -------
-        WebPage
-            Path of the page. As the last line of a notebook's cell it shows the page there.
 
         Notes
         -----

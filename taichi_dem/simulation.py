@@ -221,11 +221,6 @@ class Simulation:
         """Choose the first steps, evaluate the bonds and open the account; done once.
 
         Compiles everything, so that the time of the run is that of stepping alone.
-
-        Parameters
-        ----------
-        brief : bool, default False
-            Whether the first sample is brief, see ``sample``.
         """
         opened = self.energy_balance is not None
         flag("brief", brief)
@@ -287,26 +282,14 @@ class Simulation:
         }
 
     def motion(self) -> dict[str, np.ndarray]:
-        """Motion of the bodies, with velocities and spins at the time of the positions.
-
-        Returns
-        -------
-        dict of ndarray
-            Arrays by name, as in ``State.motion``.
-        """
+        """Motion of the bodies by name, as in ``State.motion``, at the time of the positions."""
         motion, table = self.state.stored(), self.readings.motion()
         for place, name in enumerate(("velocity", "spin", "angular_momentum")):
             motion[name] = table[:, 3 * place : 3 * place + 3].copy()
         return motion
 
     def sample(self, brief: bool = False) -> None:
-        """Sample missing effects, slip of bonds, and bonds that the step does not resolve.
-
-        Parameters
-        ----------
-        brief : bool, default False
-            Whether to look only for what ends a run, or makes it depend on chance.
-        """
+        """Sample missing effects and unresolved steps; brief: only what ends a run, or chance."""
         if not flag("brief", brief):
             self.missing_effects.sample(self.time_s)
             self.hops.sample(self.time_s)
@@ -447,11 +430,5 @@ class Simulation:
         )
 
     def acting_since(self) -> dict[str, np.ndarray]:
-        """Time from which each effect acted on each body, with effects="auto".
-
-        Returns
-        -------
-        dict of ndarray
-            Times [s], shape (body_count,), by name; NaN for never.
-        """
+        """Time [s] from which each effect acted on each body, by name; with effects="auto"."""
         return on_demand(self.parts)[0]
