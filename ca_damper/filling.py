@@ -223,15 +223,7 @@ class Filling(Protocol):
         """What is compiled; fillings of a class and an equal structure share it."""
 
     def check(self, particles: int, dt: float) -> None:
-        """Refuse a number of particles or a step that the filling cannot run.
-
-        Parameters
-        ----------
-        particles : int
-            Number of particles.
-        dt : float
-            Step [s].
-        """
+        """Refuse a number of particles or a step that the filling cannot run."""
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
         """Meaning of a code of divergence, and a step that avoids it.
@@ -252,13 +244,7 @@ class Filling(Protocol):
         """
 
     def bind(self, table: SceneFields) -> "DeviceFilling":
-        """Declare the fields of the filling for all scenes of a table; no field may be used yet.
-
-        Parameters
-        ----------
-        table : SceneFields
-            Fields of the scenes.
-        """
+        """Declare the fields of the filling for all scenes of a table; no field may be used yet."""
 
 
 class DeviceFilling(Protocol):

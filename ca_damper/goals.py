@@ -39,11 +39,6 @@ class Goal(BaseGoal):
     ratios : tuple of float, default ()
         Frequency ratios f/f0 [-] that the goal needs; none for an ``"extreme"``, whose Response has
         at least three around the highest RMS.
-
-    Examples
-    --------
-    >>> Goal("swing", "m", lambda found: found.amplitude[0].max(0), "extreme").kind
-    'extreme'
     """
 
     kinds: ClassVar[tuple[str, ...]] = ("value", "extreme", "curve")

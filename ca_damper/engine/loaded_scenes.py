@@ -161,17 +161,12 @@ class LoadedScenes:
         return {"time_s": time_s, **values}
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
-        """Positions and velocities of the particles of a scene.
+        """Positions [m] and velocities [m/s] of the particles of a scene, (particles, 2) each.
 
         Parameters
         ----------
         s : int
             Number of the scene, from 0.
-
-        Returns
-        -------
-        dict
-            As ``DeviceFilling.snapshot``: position [m] and velocity [m/s], each (particles, 2).
         """
         self._check_started()
         return self.device.snapshot(whole("s", s, 0, self.count - 1))

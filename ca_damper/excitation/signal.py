@@ -121,13 +121,7 @@ class Signal:
         return replace(self, value=times * self.value, bend=times * self.bend, label=label)
 
     def in_words(self, unit: str) -> str:
-        """Origin, length, treatment of samples, and both ends of the signal.
-
-        Parameters
-        ----------
-        unit : str
-            Unit of the value.
-        """
+        """Origin, length, treatment of samples, and both ends of the signal."""
         values, slopes, _ = self.at(np.array([0.0, self.duration]))
         size = _ROUNDING * np.abs(self.value).max()
         values, slopes = _unless_tiny(values, size), _unless_tiny(slopes, size / self.step)

@@ -78,13 +78,7 @@ class Certificate(BaseCertificate):
         return [*lines, *super().left_out_lines(), *skipped, *periodic]
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file.
-
-        Returns
-        -------
-        dict
-            Figures by name.
-        """
+        """All figures, for a JSON file."""
         return {
             "effects": self.effects,
             **super().as_dict(),

@@ -138,18 +138,7 @@ class Report:
         return {**figures, **{name: getattr(self, name) for name in derived}}
 
     def write(self, path: FileName) -> None:
-        """Write all figures as JSON.
-
-        Parameters
-        ----------
-        path : path
-            JSON file; it is replaced as a whole.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
-        """
+        """Write all figures as a JSON file, which is replaced as a whole."""
         write_text(path, json.dumps(self.as_dict(), indent=1))
 
     def _certified(self):

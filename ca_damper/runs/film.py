@@ -66,11 +66,6 @@ class Film:
         open_browser : bool, optional
             By default it opens where a person sits at a terminal of a desktop: not in a pipe, a
             test, a notebook or on a build server.
-
-        Returns
-        -------
-        WebPage
-            Path of the page. As the last line of a notebook's cell it shows the page there.
         """
         # Imported here, so that matplotlib loads only where something is shown.
         from ca_damper.plot.containers import MOST_SCENES, show_film
@@ -85,13 +80,7 @@ class Film:
         return show_film(self, chosen, path, open_browser)
 
     def to_xarray(self) -> Any:
-        """The history as an xarray Dataset over sample and scene, units in attributes.
-
-        Returns
-        -------
-        xarray.Dataset
-            Units in the attributes of each variable.
-        """
+        """The history as an xarray Dataset over sample and scene, units in attributes."""
         dims = "sample", "scene"
         units = {"time_s": "s", **SAMPLE_UNITS}
         found = {name: (dims, array, units[name]) for name, array in self.history.items()}

@@ -188,11 +188,6 @@ class Spheres:
     def activated(self, particles: int) -> tuple["Spheres", tuple[Estimate, ...]]:
         """Return these spheres with the effects that a number of them calls for, and estimates.
 
-        Parameters
-        ----------
-        particles : int
-            Largest number of spheres.
-
         Notes
         -----
         Friction is computed unless its coefficients are zero; rotation unless it is negligible.
@@ -202,13 +197,7 @@ class Spheres:
         return chosen, (estimate,)
 
     def left_out(self, particles: int) -> tuple[Estimate, ...]:
-        """Estimates of the effects that are not computed.
-
-        Parameters
-        ----------
-        particles : int
-            Number of spheres.
-        """
+        """Estimates of the effects that are not computed."""
         found = () if self.rotation else (rotation_estimate(self, particles),)
         return (*found, air_estimate(self))
 

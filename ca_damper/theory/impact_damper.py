@@ -197,11 +197,6 @@ class ImpactDamper:
     def multipliers(self, u: float) -> np.ndarray:
         """Factors by which small changes of the motion grow from impact to impact.
 
-        Parameters
-        ----------
-        u : float
-            Speed of the grain [m/s].
-
         Returns
         -------
         ndarray
