@@ -183,7 +183,7 @@ class Transport(Part):
 
     @ti.func
     def reach(self, s, cell, way, number):
-        """Mark a particle, unless it is, and put it on the border; returns the border's size."""
+        """Mark a particle unless it is, and put it on the border; returns the border's new size."""
         # The floor pushes through the heap that it holds; the ceiling pushes against no heap.
         result = number
         kind = self.cells.at(s, cell)

@@ -109,7 +109,7 @@ def picture_peaks(path: FileName | None, responses: Any, particle_mass: Any = No
 
 
 def picture_measures(path: FileName, responses: Mapping[str, Any], particle_mass: float) -> None:
-    """Apparent mass and loss factor over frequency: a column a filling, a line a number."""
+    """Apparent mass and loss factor over frequency: a column a filling, a line a grain count."""
     count = len(responses)
     size = (1.0 + 2.05 * count, 5.4)
     shape = {"squeeze": False, "sharex": True, "sharey": "row"}

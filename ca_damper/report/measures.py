@@ -330,7 +330,7 @@ def vertex(x: ArrayLike, y: ArrayLike) -> tuple[float, float]:
 
 
 def curve_distance(curve: ArrayLike, reference: ArrayLike) -> float:
-    """Root mean square of the difference of two response curves, as a share of its peak."""
+    """RMS difference of two response curves, as a share of the peak of the second."""
     true = np.asarray(reference)
     return float(np.sqrt(((np.asarray(curve) - true) ** 2).mean()) / np.max(true))
 

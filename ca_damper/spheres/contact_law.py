@@ -135,7 +135,7 @@ def contact_members(
 
 @lru_cache(maxsize=64)
 def damping_number(restitution: float, power: float) -> float:
-    """Number alpha of a dashpot d^power: spheres part at ``restitution`` times the speed."""
+    """Number alpha of a dashpot d^power with which spheres part at a restitution."""
     low, high = 0.0, 1.0
     while restitution_of(high, power) > restitution:
         low, high = high, 2.0 * high

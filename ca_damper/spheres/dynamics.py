@@ -110,7 +110,7 @@ class DeviceSpheres:
 
     @ti.func
     def step(self, s, step, dt, since, motion):
-        """Take spheres half a step on, whose positions run ahead; returns their impulse [N s]."""
+        """Advance spheres whose positions run half a step ahead; returns their impulse [N s]."""
         floor = motion.x + 0.5 * dt * (motion.v + 0.25 * dt * motion.a)
         low, high = self.bodies.reach_of_walls(s, floor)
         # Seen from spheres that fall freely, as all that is foreseen of them is their fall.

@@ -126,7 +126,7 @@ class WallForces(Part):
 
     @ti.func
     def add(self, s, contacts, low, high, speed):
-        """Add the forces of the walls; returns their sum along x [N] and who touches."""
+        """Add the forces of the walls; returns their sum along x [N] and how many spheres touch."""
         total, touching = 0.0, 0
         for k in range(self.search.sphere_count[s]):
             i = self.search.sphere[s, k]

@@ -286,7 +286,7 @@ class NearPairs:
 
     @ti.func
     def count_row(self, i):
-        """Count near pairs of which body i is the first, and what they want where it changes."""
+        """Count the near pairs whose first body is i, and the places that they take and free."""
         # Pairs that only hold a pending impulse leave at the next search.
         self.row_is_new[i] = self.neighbours.changed[i]
         self.wanted[i] = ivec3(0)

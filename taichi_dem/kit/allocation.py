@@ -136,7 +136,7 @@ def lies_here() -> bool:
 
 
 def _given_back(address, memory):
-    """Bytes between two numbers that are zero, as their pages went back to the system."""
+    """Range of the bytes that are zero now, as their pages went back to the system."""
     # Most lists are long and hardly used: pages given back take no memory until they are written.
     page = mmap.PAGESIZE
     first, end = -address % page, (address + len(memory)) // page * page - address

@@ -31,7 +31,7 @@ class Transport(Part):
 
     @ti.func
     def follow(self, s, step, motion):
-        """Number the cells anew when the lattice steps; nothing moves in the room or gains."""
+        """Number the cells anew when the lattice steps; no grain moves in the room."""
         # A grain whose new cell is taken keeps its cell and stands farther off its centre.
         width = self.parameters.width[s]
         way = self.cells.step_along(s, step, motion, width)
