@@ -87,7 +87,7 @@ class Job:
 
     def _longest_step(self):
         """Longest step that all springs bear [s]: solved dashpots leave no other limit."""
-        # Solved dashpots limit no step. Contact springs do only where whole faces can touch.
+        # Solved dashpots limit no step. Without bonds, springs of contacts do.
         mesh, material = self.scene.mesh, self.scene.body_materials
         given = mesh, topology_of(mesh), material.density, springs_of(material)
         step = float(spring_step(largest_bond_rate(*given)))

@@ -350,9 +350,8 @@ class StabilityLimits(Places):
     @ti.func
     def bond_share(self, i, step):
         """Share of its bonds' dashpots that is stable at a step [s] of body i."""
-        # A sum of blocks has no larger eigenvalue than the sum of theirs: with rates up to LIMITED
-        # / (2 dt) no step is unstable. Bonds come first: a common share would starve them (+45 % at
-        # 1e-8 s).
+        # A body's rates add up to LIMITED / (2 dt) at most, so no step is unstable. Bonds come
+        # first: one common share would starve them (+45 % at 1e-8 s).
         return self._bonds_get(i, step) / ti.max(2.0 * step * self.bond_damping[i], 1e-200)
 
     @ti.func
