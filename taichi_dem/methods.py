@@ -15,27 +15,6 @@ class Method:
     A user-defined class has at least ``dt0`` and ``name`` (docs/add_a_time_integrator.md). It may
     also have ``step``, a class derived from ``step.explicit.ExplicitStep``; ``structure``, on which
     its kernels depend (``structure_of``); and ``order``, that of its error (``order_of``).
-
-    Attributes
-    ----------
-    dt0 : float
-        Largest step [s].
-    name : str
-        Short word for tables.
-    uniform : bool
-        Whether all bodies share one step.
-    neighbour : str
-        "held" or "drifted", see ``Multirate``.
-    control : StepControl or None
-        Further limits of the step.
-    dashpot : str
-        "full" or "limited", see ``Uniform``.
-    distance : float or None
-        Largest displacement of a body in a step [m]; None for no limit.
-    solves : bool
-        Whether dashpots are solved together.
-    steps_ahead : float
-        Number of steps of a body by which its contacts are counted before they touch.
     """
 
     dt0: Any

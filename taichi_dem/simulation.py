@@ -82,12 +82,6 @@ class Simulation:
     run_seconds, run_cpu_seconds : float
         Wall and CPU time spent in steps so far [s], without compiling and without readings.
 
-    Raises
-    ------
-    InputError
-        Scene or method is of a wrong kind, the driver is unknown or does not fit the device, or the
-        scene exceeds the memory of the machine.
-
     Examples
     --------
     >>> simulation = Simulation(scene, ImplicitDashpots())  # doctest: +SKIP

@@ -51,20 +51,9 @@ _on_clear: list[Callable[[], object]] = []
 
 
 class Session:
-    """One start of Taichi; objects that own fields remember theirs.
+    """One start of Taichi, used by one thread of one process; objects remember theirs.
 
-    Attributes
-    ----------
-    settings : Settings
-        Settings in force.
-    program : object
-        Taichi's own object of the session.
-    thread : int
-        Thread that started it, the only one that may use it.
-    process : int
-        Process that started it.
-    cleared : bool
-        Whether its engines have been given back since.
+    cleared: whether its engines have been given back since.
     """
 
     def __init__(self, settings: Settings):
