@@ -28,9 +28,9 @@ def is_serial(places: int) -> bool:
     return settings.arch == "cpu" and (places <= _SERIAL_UP_TO or settings.threads == 1)
 
 
-def tasks(phases: Phases, bodies: int) -> tuple[tuple[bool, Phases], ...]:
+def tasks(phases: tuple, bodies: int) -> tuple[tuple[bool, tuple], ...]:
     """Phases by the loops of a parallel driver: whether each is on one thread, and which."""
-    found: list[tuple[bool, Phases]] = []
+    found: list[tuple[bool, tuple]] = []
     for phase in phases:
         members = phase[0]
         serial = backend.is_cpu() and members.most == 1
