@@ -69,8 +69,8 @@ class Simulation:
     method : Method
         Method, from ``taichi_dem.methods``.
     driver : str, default "auto"
-        ``"resident"``, ``"parallel"``, or ``"auto"``: parallel on a GPU and for large scenes; for
-        those of middle size on several threads, the faster one by measurement.
+        ``"resident"``, ``"parallel"``, or ``"auto"``: parallel on a GPU, and from
+        10,000 bonds on with several threads.
 
     Attributes
     ----------
