@@ -12,8 +12,8 @@ refuse it in words: returning numbers counts as a failure. The cases are tests, 
 In the overview each case is a square; cases that all methods refuse are grey. In a browser, a
 square of hard_cases.svg opens the picture of its case.
 
-Writes hard_cases.png and .svg, hard_cases.csv, a picture of each case, hard_cases_blast.png,
-hard_cases_damper.png and summary.json to results/hard_cases/.
+Writes hard_cases.png and .svg, hard_cases.csv, a picture of each case and summary.json to
+results/hard_cases/.
 """
 
 import itertools
@@ -21,12 +21,11 @@ import math
 import re
 import sys
 import textwrap
-from collections import Counter, defaultdict
+from collections import Counter
 from functools import partial
 
 from matplotlib.patches import Rectangle
 
-from _asked import found_by
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_whole
 from taichi_dem.kit.plot_style import (
@@ -43,13 +42,16 @@ from taichi_dem.kit.plot_style import (
     power,
     styles_of,
 )
+from taichi_dem.kit.progress_bar import ProgressBar
+from tests.hard_cases.cases import assess
+from tests.hard_cases.test_hard_cases import CASES
 
 NAME = "hard_cases"
 #: Of a quick run, which compile little; the tests ask all, at quick size.
 OF_QUICK = ("single_cell", "step_above_limit", "flat_element", "step_that_is_no_number")
+NAMES = [case.name for case in CASES]
 SETTINGS = {
-    "only": (None, OF_QUICK, study.several(str), "names of cases; default: all"),
-    "columns": (3, 3, study.whole(1, 8), "columns of the sheet, default 3"),
+    "only": (NAMES, OF_QUICK, study.several(study.one_of(NAMES)), "names of cases; default: all"),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 #: Least margins of the squares of the wall, their colours, and how many are side by side.
@@ -67,17 +69,24 @@ def row_of(trial):
     return {**row, "margin": margin, "seconds": f"{trial.seconds:.3g}", "words": trial.words}
 
 
+def trials_of(options):
+    """Every method of every case that is asked for."""
+    asked = [(one, way) for one in CASES if one.name in options.only for way in one.asked]
+    trials = []
+    with ProgressBar("hard cases") as bar:
+        for done, (case, method) in enumerate(asked):
+            bar.count(done, len(asked))
+            trials.append(assess(case, method, options.quick))
+    return trials
+
+
 def run(options):
-    """Ask every method of every case, write table, pictures and the sheet of all."""
-    folder, sheets = study.begin(options), defaultdict(list)
-    trials = found_by(NAME, options)
+    """Ask every method of every case, write table and pictures."""
+    folder, trials = study.begin(options), trials_of(options)
     rows = [row_of(trial) for trial in trials]
     study.write_rows(folder / "hard_cases.csv", rows)
-    for trial in trials:
-        sheets[trial.case.name].append(trial)
-        sheets[f"hard_cases_{trial.case.package}"].append(trial)
-    for name, own in sheets.items():
-        picture_cases(folder / f"{name}.png", own, options.columns)
+    for name, own in by_name(trials).items():
+        picture_case(folder / f"{name}.png", own)
     picture_wall(folder / "hard_cases.png", trials)
     shown = ("case", "method", "status", "margin", "words")
     study.print_table([[cell_of(row[key]) for key in shown] for row in rows], shown)
@@ -97,15 +106,10 @@ def cell_of(value):
     return text if len(text) < 90 else f"{text[:87]}..."
 
 
-def with_powers(words):
-    """Words with powers of ten for numbers as a program prints them: 1e4 -> 10⁴."""
-    return re.sub(r"\d+(?:\.\d+)?e[-+]?\d+", lambda found: power(float(found[0])), words)
-
-
 def title_of(case):
     """Name of a case in words: fragment_at_1_km_s -> fragment at 1 km/s."""
     words = re.sub(r"(\d+_k?m)_s(?![a-z])", r"\1/s", case.name)
-    return with_powers(words.replace("_", " "))
+    return words.replace("_", " ")
 
 
 def by_name(trials):
@@ -125,28 +129,19 @@ def looks_of(trials):
     }
 
 
-def picture_cases(path, trials, columns):
-    """A panel a case with the curves of its methods; one case alone with its question."""
-    cases, looks = by_name(trials), looks_of(trials)
+def picture_case(path, own):
+    """The curves of a case's methods, with its question."""
+    looks = looks_of(own)
     # The first are thick, so that all are seen.
     for k, look in enumerate(looks.values()):
         look["lw"] = max(0.8, 3.0 - 0.45 * k)
-    alone = len(cases) == 1
-    columns = 1 if alone else columns
-    rows = -(-len(cases) // columns)
-    size = (7.0, 4.6) if alone else (3.06 * columns, 0.6 + 2.6 * rows)
-    with picture(path, rows, columns, size, squeeze=False) as (figure, axes):
-        for axis in axes.ravel()[len(cases) :]:
-            axis.set_axis_off()
-        for axis, own in zip(axes.ravel(), cases.values()):
-            draw_case(axis, own, looks)
-        shown = dict.fromkeys(trial.method for trial in trials if trial.curve)
+    with picture(path, size=(7.0, 4.6)) as (figure, axes):
+        draw_case(axes, own, looks)
+        shown = dict.fromkeys(trial.method for trial in own if trial.curve)
         keys = [line_key(**{**looks[method], "marker": None}) for method in shown]
-        place = "lower center" if alone else "upper left"
-        figure.legend(handles=keys, loc=f"outside {place}", ncols=2)
-        if alone:
-            question = textwrap.fill(with_powers(trials[0].case.question), 100)
-            figure.suptitle(question, fontsize=9.0, x=0.02, ha="left")
+        figure.legend(handles=keys, loc="outside lower center", ncols=2)
+        question = textwrap.fill(own[0].case.question, 100)
+        figure.suptitle(question, fontsize=9.0, x=0.02, ha="left")
 
 
 def draw_case(axis, own, looks):

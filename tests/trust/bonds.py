@@ -43,8 +43,7 @@ def disc(effort):
     ]
     words = "direct tension over the strength of a bond"
     numbers.append(Number("disc_tension", words, 1.0, tension / STRENGTH, source="one bond"))
-    shown = {"tension": tension / 1e6, "brazilian": brazilian[0] / 1e6}
-    return numbers, {**shown, "ratio": RATIO, "allowed": ALLOWED}
+    return numbers, {}
 
 
 def strength(test, seed):
@@ -78,9 +77,7 @@ def joint(effort):
         row(f"joint_{angle}", words.format(way), 1.0, shares[:, ANGLES.index(angle)])
         for angle, way in ways.items()
     ]
-    every = np.linspace(0.0, 90.0, 91)
-    law = every, [energy_of(angle) for angle in every]
-    return numbers, {"law": law, "angles": ANGLES, "spent": spent}
+    return numbers, {}
 
 
 def energy_of(angle):

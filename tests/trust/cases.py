@@ -1,11 +1,9 @@
 """Numbers that others have published, and ours beside them.
 
-A ``Case`` is a function of an ``Effort``. It returns its Numbers, and data of its picture.
+A case is a function of an ``Effort`` that returns its Numbers, and the data of its picture by name.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,26 +14,6 @@ class Effort:
 
     seeds: range = range(2)
     sizes: int = 1
-
-    @classmethod
-    def of(cls, options):
-        """What the options of a program ask for."""
-        return cls(range(options.seed, options.seed + options.meshes), options.sizes)
-
-
-class Case(NamedTuple):
-    """Published numbers of one scene; measure(effort) returns Numbers, and what to draw by name."""
-
-    name: str
-    measure: Callable
-
-
-class Findings(NamedTuple):
-    """What a case gave: its Numbers, and the data of its picture by name."""
-
-    case: Case
-    numbers: list
-    drawn: dict
 
 
 @dataclass

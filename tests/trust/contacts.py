@@ -42,8 +42,7 @@ def slope(effort):
         topples("slope_topples", words, 1.0, limit(usual)),
         topples("slope_topples_fine", f"{words}, 36 rays a face", 1.0, limit(fine)),
     )
-    ways = {"slides, mu": 1e3 * way, "topples, b / h": 1e3 * usual}
-    return numbers, {"shares": SHARES, "ways": ways}
+    return numbers, {}
 
 
 def limit(moved):
@@ -127,10 +126,7 @@ def rotation(effort):
         row("rotation_angle", "tangent of the way of parting", tangent, way),
         row("rotation_pair", alike, 0.0, (of_pair - before).ravel(), -1e-12, 1e-12, "rad/s"),
     )
-    unit = FRICTION * SPEED / RADIUS
-    line = np.linspace(0.0, SPINS[-1], 50) / unit
-    closed = line, line - 2.5 * (1.0 + RESTITUTION)
-    return numbers, {"closed": closed, "before": SPINS / unit, "after": spin / unit}
+    return numbers, {}
 
 
 def after(filling, count, spins):

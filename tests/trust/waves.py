@@ -28,8 +28,7 @@ def bar_wave(effort):
         row(f"bar_wave_{2 * n}", words.format(2 * n), float(EXACT), speed[:, k])
         for k, n in enumerate(cells)
     ]
-    error = 100.0 * (speed / EXACT - 1.0)
-    return numbers, {"waves": 2.0 * np.array(cells), "error": error}
+    return numbers, {}
 
 
 def speed_of(cells, seed):
@@ -74,13 +73,12 @@ LEAVES = (2.0 * PEAK - STRENGTH) / (HEAVY * SPEED)
 
 def spall(effort):
     """Depth of the first plane, speed at which its piece leaves, and the number of planes."""
-    numbers, ends = [], []
+    numbers = []
     for across in ACROSS[: effort.sizes]:
         edge = THICK / across
-        depth, speed, planes, ends = zip(*(spalled(edge, seed) for seed in effort.seeds))
-        numbers += of_size(edge, *map(np.array, (depth, speed, planes)))
-    from_end = [1e3 * (ROD - np.array(places)) for places in ends]
-    return numbers, {"from_end": from_end, "depth": 1e3 * DEPTH}
+        found = zip(*(spalled(edge, seed) for seed in effort.seeds))
+        numbers += of_size(edge, *map(np.array, found))
+    return numbers, {}
 
 
 def of_size(edge, depth, speed, planes):
@@ -101,7 +99,7 @@ def of_size(edge, depth, speed, planes):
 
 
 def spalled(edge, seed):
-    """Depth [m] of the first plane, speed [m/s] of the piece, planes, and pieces' ends [m]."""
+    """Depth [m] of the first plane, speed [m/s] of the piece, and planes."""
     mesh = plate(ROD, THICK, edge, seed, layers=round(THICK / edge))
     options = {"density": HEAVY, "tensile_strength": STRENGTH, "fracture_energy": ENERGY}
     more = {"friction_angle": 30.0, "cohesion": 10 * STRENGTH, "damping_ratio": DAMPING}
@@ -118,7 +116,7 @@ def spalled(edge, seed):
     pieces = np.flatnonzero(mass > LEAST * mass.sum())
     first = pieces[far[pieces].argmax()]
     speed = fragments["velocity_x_m_s"].to_numpy()[first]
-    return mass[first] / (HEAVY * THICK**2), speed, len(pieces) - 1, sorted(far[pieces].tolist())
+    return mass[first] / (HEAVY * THICK**2), speed, len(pieces) - 1
 
 
 def pulsed(mesh, material, peak, laws):
