@@ -10,7 +10,7 @@ and in shear a plateau of cohesion + friction x pressure.
     python experiments/demo_fracture_law.py --steps 20000
 
 Dashpots are left out: they would add a traction that depends on the speed. Writes
-law.gif, law.png, tension.csv, shear.csv and summary.json to results/demo_fracture_law/.
+law.png, tension.csv, shear.csv and summary.json to results/demo_fracture_law/.
 """
 
 import sys
@@ -18,8 +18,6 @@ from functools import partial
 
 import numpy as np
 
-from _closed_forms import bond_shear, bond_tension
-from _drawing import moving_picture
 from _meshes import group_area
 from taichi_dem import CONCRETE, Every, Scene, Simulation, Uniform, effects
 from taichi_dem.kit import study
@@ -104,16 +102,10 @@ def compared(curves, broken):
     """Rows of the table. broken: sample at which the pulled one broke."""
     opening, pull = (values[: broken + 1] for values in curves[0])
     work = np.sum(0.5 * (pull[1:] + pull[:-1]) * np.diff(opening))
-    # The unloading branch, by least squares over what lies above zero, and the law's.
-    turn = int(np.argmax(opening >= (1.0 - 1e-9) * PULLED[0]))
-    down = slice(turn, turn + int(np.argmax(opening[turn:] <= 0.0)))
-    slope = np.polyfit(opening[down], pull[down], 1)[0]
-    secant = CONCRETE.softening_slope * (CONCRETE.failure_opening - PULLED[0]) / PULLED[0]
     found = [
         ("peak_MPa", 1e-6 * pull.max(), 1e-6 * CONCRETE.tensile_strength, "MPa"),
         ("failure_opening_um", 1e6 * opening[broken], 1e6 * CONCRETE.failure_opening, "um"),
         ("energy_J_m2", work, CONCRETE.fracture_energy, "J/m2"),
-        ("secant_MPa_mm", 1e-9 * slope, 1e-9 * secant, "MPa/mm"),
     ]
     for pressure, (_, shear) in zip(PRESSURES, curves[1:]):
         plateau = CONCRETE.cohesion + CONCRETE.friction * pressure
@@ -122,56 +114,54 @@ def compared(curves, broken):
     return TABLE.rows(found)
 
 
-def draw(panels, curves, size):
-    """The law as lines in both panels, tension and shear; returns the points measured on them."""
-    laws = [bond_tension(CONCRETE, curves[0][0])]
-    laws += [bond_shear(CONCRETE, way, at) for at, (way, _) in zip(PRESSURES, curves[1:])]
-    marks = []
+def law_in_tension(opening):
+    """Traction [Pa] of a bond that is pulled along a way (Konno et al., Fig. 4).
+
+    opening: its openings [m] in their order. It softens beyond its strength, unloads to the origin,
+    is pressed at its full stiffness, and is gone once it has failed.
+    """
+    opening = np.asarray(opening, dtype=float)
+    limit = np.maximum.accumulate(np.maximum(opening, CONCRETE.onset_opening))
+    left = CONCRETE.failure_opening - limit
+    stiffness = np.where(
+        opening > 0.0, CONCRETE.softening_slope * left / limit, float(CONCRETE.normal_stiffness)
+    )
+    return np.where(left > 0.0, stiffness * opening, 0.0)
+
+
+def law_in_shear(sliding, pressure):
+    """Shear traction [Pa] of a bond that is slid along a way (Konno et al., Fig. 3).
+
+    sliding: in its order [m]. pressure: on the bond all the time [Pa]. It slips at cohesion +
+    friction x pressure, and goes back elastically.
+    """
+    bound = max(0.0, CONCRETE.cohesion + CONCRETE.friction * pressure)
+    slip, stiffness = 0.0, float(CONCRETE.shear_stiffness)
+    found = []
+    for reach in np.asarray(sliding, dtype=float):
+        found.append(float(np.clip(stiffness * (reach - slip), -bound, bound)))
+        slip = reach - found[-1] / stiffness
+    return np.array(found)
+
+
+def draw(panels, curves):
+    """The law as lines in both panels, tension and shear, with the points measured on them."""
+    laws = [law_in_tension(curves[0][0])]
+    laws += [law_in_shear(way, at) for at, (way, _) in zip(PRESSURES, curves[1:])]
     for k, (law, (way, traction)) in enumerate(zip(laws, curves)):
         axes, words = panels[min(k, 1)], f" at {1e-6 * PRESSURES[k - 1]:g} MPa" if k else ""
         axes.plot(1e6 * way, 1e-6 * law, color=GREY, lw=1.0, label="law" if k < 2 else None)
         # Even distances along the curve, so that points do not run together.
-        look = {"ls": "none", "ms": size, "color": COLOURS[k], "marker": MARKERS[k]}
+        look = {"ls": "none", "ms": 3.4, "color": COLOURS[k], "marker": MARKERS[k]}
         look.update(label=f"measured{words}", markevery=0.02)
-        marks += axes.plot(1e6 * way, 1e-6 * traction, **look)
+        axes.plot(1e6 * way, 1e-6 * traction, **look)
     panels[0].set(xlabel="opening [µm]", ylabel="traction [MPa]", ylim=(-3.0, 8.0))
     panels[1].set(xlabel="sliding [µm]", ylabel="shear traction [MPa]", ylim=(0.0, 18.0))
     panels[0].axhline(0.0, color=BLACK, lw=0.5)
     panels[0].legend(loc="lower right")
-    return marks
-
-
-def film(path, curves, count=40):
-    """The bench at work: two specimens above, their tractions below. count: of pictures."""
-    with moving_picture(path, (4.0, 3.6), 120) as (figure, shoot):
-        above, below = figure.subplots(2, 2, height_ratios=(1.0, 1.9))
-        marks = draw(below, curves, size=1.8)
-        below[0].set_title("tension")
-        below[1].set_title("shear under four pressures")
-        # Openings and slidings are drawn so much larger.
-        first = "opening × 600", specimen(above[0], COLOURS[0]), curves[0], (0.6, 0.0)
-        last = "sliding × 60", specimen(above[1], COLOURS[-1]), curves[-1], (0.0, 0.06)
-        begin = first[1].get_xy()
-        for row in np.linspace(0, len(curves[0][0]) - 1, count).round().astype(int):
-            for mark, (way, traction) in zip(marks, curves):
-                mark.set_data(1e6 * way[: row + 1], 1e-6 * traction[: row + 1])
-            for title, body, (way, traction), factors in (first, last):
-                body.set_xy(begin + np.multiply(factors, 1e6 * way[row]))
-                # Rounded first, and zero added: no minus before a zero.
-                shown = round(1e-6 * float(traction[row]), 2) + 0.0
-                body.axes.set_title(f"{title}: {shown:.2f} MPa", loc="center")
-            shoot()
-
-
-def specimen(axes, colour):
-    """Draw two tetrahedra from the side, in millimetres; returns the right one, to be moved."""
-    *face, left, right = 1e3 * pair(EDGE).points[:, :2]
-    edge = sorted(face, key=lambda corner: corner[1])[::2]
-    axes.fill(*np.transpose([*edge, left]), color="#D8D3C6", ec=BLACK, lw=0.7)
-    (body,) = axes.fill(*np.transpose([*edge, right]), color=colour, ec=BLACK, lw=0.7, alpha=0.85)
-    axes.set(xlim=(1.1 * left[0], 1.75 * right[0]), ylim=(-20.0, 50.0), aspect="equal")
-    axes.set_axis_off()
-    return body
+    panels[1].legend(loc="upper left")
+    panels[0].set_title("pulled, unloaded, pressed, pulled until it breaks")
+    panels[1].set_title("slid, back and on, under four pressures")
 
 
 def run(options):
@@ -186,11 +176,7 @@ def run(options):
         columns.update({f"sliding_{end}_m": sliding, f"traction_{end}_Pa": shear})
     write_csv(at("shear.csv"), columns)
     with picture(at("law.png"), 1, 2, size=(9.2, 4.0)) as (_, panels):
-        draw(panels, curves, size=3.4)
-        panels[1].legend(loc="upper left")
-        panels[0].set_title("pulled, unloaded, pressed, pulled until it breaks")
-        panels[1].set_title("slid, back and on, under four pressures")
-    film(at("law.gif"), curves)
+        draw(panels, curves)
     TABLE.show(rows)
     for row in rows:
         name = row["name"]

@@ -10,8 +10,8 @@ strength at depth lambda sigma_t / (2 s0): the stronger the pulse s0, the thinne
 
 The front rises over four cells of the test bar, and dashpots have a twentieth of their strength:
 the mesh does not ring, and the pulse stays sharp. The formula assumes a steep front: at three times
-the strength a bar breaks one cell too near its end. Writes spall.gif, wave.png, spall.png,
-wave.csv, spall.csv and summary.json to results/demo_wave_and_spall/.
+the strength a bar breaks one cell too near its end. Writes spall.png, spall.csv and
+summary.json to results/demo_wave_and_spall/.
 """
 
 import sys
@@ -23,10 +23,8 @@ import numpy as np
 import pandas as pd
 
 import taichi_dem as dem
-from _drawing import FilmedRun, film_runs
 from taichi_dem.kit import study
-from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, RED, picture
+from taichi_dem.kit.plot_style import BLACK, GREY, RED, picture
 from taichi_dem.mesh.shapes import bar, placed_together
 from taichi_dem.simulate import run_simulation
 
@@ -49,8 +47,6 @@ TABLE = study.Table(
     formula_m=("formula_m", "formula [m]", ".3f", "m"),
     error_cells=(lambda one: float(one.depth_m - one.formula_m) / one.cell, "", "", "1"),
 )
-#: Below zero, at zero, above: pressed, at rest, pulled.
-COLOURS, LINES = "RdBu_r", ("-", "--", "-.")
 
 
 def follow(simulation, bars, until, title):
@@ -114,40 +110,18 @@ def spalled(made, k, ratio, speed, cell):
     )
 
 
-def space_time(axes, place, time, values, top):
-    """Draw values over place and time: red above zero, blue below."""
-    look = {"cmap": COLOURS, "vmin": -top, "vmax": top, "shading": "auto", "rasterized": True}
-    axes.set(xlabel="place [m]", ylabel="time [ms]")
-    return axes.pcolormesh(place, 1e3 * time, values, **look)
-
-
-def picture_wave(path, wave, place, cells):
-    """Velocity over place and time, and over time in some cells, by their words."""
-    velocity, label, time = 1e3 * wave.speed[:, 0], "velocity [mm/s]", wave.time
-    with picture(path, 1, 2, size=(9.0, 3.8)) as (figure, (along, over)):
-        drawn = space_time(along, place, time, velocity, np.abs(velocity).max())
-        figure.colorbar(drawn, ax=along, label=label)
-        for (words, cell), colour, line in zip(cells.items(), (BLUE, GREEN, RED), LINES):
-            over.plot(1e3 * time, velocity[:, cell], color=colour, ls=line, label=words)
-            along.axvline(place[cell], lw=1.2, color=colour, ls=line, label=words)
-        along.set_title("the wave runs, returns and runs again")
-        along.legend(loc="lower left", bbox_to_anchor=(0.0, 1.08), ncols=4, columnspacing=1.0)
-        top = velocity[:, [*cells.values()][1]].max()
-        over.axhline(2.0 * top, color=GREY, ls=":", label="twice the wave's peak")
-        over.set(xlabel="time [ms]", ylabel=label, title="the free end doubles the velocity")
-        over.legend(loc="upper left")
-
-
 def picture_spall(path, made, stress, rows, joint, cell):
     """Stress [MPa] over place and time in the first bars, and depths beside the formula's."""
     time, top = made.time, np.abs(stress[:, :2]).max()
     with picture(path, 1, 3, size=(9.15, 3.6)) as (figure, (*panels, last)):
         for k, (row, axes) in enumerate(zip(rows, panels)):
-            drawn = space_time(axes, joint, time, stress[:, k], top)
+            look = {"cmap": "RdBu_r", "vmin": -top, "vmax": top, "rasterized": True}
+            drawn = axes.pcolormesh(joint, 1e3 * time, stress[:, k], shading="auto", **look)
             when, where = np.nonzero(np.diff(made.joints[:, k].astype(int), axis=0, prepend=0))
             axes.plot(joint[where], 1e3 * time[when], "x", color=BLACK, ms=6, label="breaks")
             look = {"color": BLACK, "ls": ":", "lw": 1.0, "label": "first break by the formula"}
             axes.axvline(LENGTH - row["formula_m"], **look)
+            axes.set(xlabel="place [m]", ylabel="time [ms]")
             axes.set_title(f"pulse of {row['ratio']:g} × strength")
         figure.colorbar(drawn, ax=axes, label="stress, tension positive [MPa]")
         figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=2)
@@ -161,26 +135,9 @@ def picture_spall(path, made, stress, rows, joint, cell):
         last.legend(loc="lower right", bbox_to_anchor=(1.0, 1.08))
 
 
-def film(path, result, made, stress, k, count=40):
-    """All bars by their stress [MPa], and the velocity of the free end of one."""
-    cells = np.pad(stress, ((0, 0), (0, 0), (0, 1))).reshape(len(made.time), -1)
-    titles = [f"t = {1e3 * time:.2f} ms" for time in made.time]
-    shown = np.repeat(cells, CELL, axis=1), titles, made.speed[:, k, -1], "free end", GREEN
-    top = np.abs(stress).max()
-    film_runs(
-        *(path, [FilmedRun(result, result.frames, *shown)]),
-        made.time[np.linspace(0, len(made.time) - 1, count).round().astype(int)],
-        words="stress, tension positive [MPa]",
-        curve={"ylabel": "velocity [m/s]"},
-        magnify=150.0,
-        **{"cmap": COLOURS, "clim": (-top, top), "linewidth": 0.0},
-    )
-
-
 def run(options):
     """Push, measure, spall, picture."""
     at, cells, cell = study.output_paths(options.out), options.cells, LENGTH / options.cells
-    place, joint = cell * (np.arange(cells) + 0.5), cell * np.arange(1, cells)
     gates = [round(share * cells) for share in GATES]
     load = dem.effects.GasPressure("left", peak=1e4, rise=2e-4, decay_ratio=1.0)
     elastic = dem.Scene(bar(LENGTH, WIDTH, (cells, 1, 1)), LAW, [load])
@@ -190,14 +147,9 @@ def run(options):
     rows = TABLE.rows([spalled(made, *one, speed, cell) for one in enumerate(options.ratios)])
     TABLE.show(rows)
     study.write_rows(at("spall.csv"), rows)
-    cells = {**{f"at {place[k]:.2f} m": k for k in gates}, "free end": -1}
-    columns = {words.replace(" ", "_"): wave.speed[:, 0, k] for words, k in cells.items()}
-    write_csv(at("wave.csv"), {"time_s": wave.time, **columns})
-    picture_wave(at("wave.png"), wave, place, cells)
     strain = np.where(made.joints, 0.0, np.diff(made.moved, axis=-1) / cell)
     stress = 1e-6 * LAW.density * speed**2 * strain
-    picture_spall(at("spall.png"), made, stress, rows, joint, cell)
-    film(at("spall.gif"), second, made, stress, options.ratios.index(1.5))
+    picture_spall(at("spall.png"), made, stress, rows, cell * np.arange(1, cells), cell)
     end, gate = wave.speed[:, 0, [-1, gates[1]]].max(axis=0)
     figures = {"wave_speed_m_s": (speed, "m/s"), "free_end_over_wave": (float(end / gate), "1")}
     for row in rows:

@@ -9,8 +9,8 @@ same factor every step, until the program ends the run and says where and why.
     python experiments/stable_or_not.py --quick     # dashpots only
 
 Displacements are magnified 15,000 times. The limits are those of the worst body and err on the safe
-side. Writes stable_or_not.gif, its last picture stable_or_not.png, steps.csv, history_*.csv and
-summary.json to results/stable_or_not/.
+side. Writes stable_or_not.png, steps.csv, history_*.csv and summary.json to
+results/stable_or_not/.
 """
 
 import sys
@@ -22,12 +22,12 @@ import numpy as np
 
 import taichi_dem as dem
 from taichi_dem.kit import study
-from taichi_dem.kit.files import write_csv, write_whole
-from taichi_dem.kit.plot_style import BLUE, RED, STYLE, filming, write_gif
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.plot_style import BLUE, RED, picture
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.observers import macro_steps
 from taichi_dem.plot.series import positive
-from taichi_dem.plot.view import View, draw_bodies, frame_block, move_bodies
+from taichi_dem.plot.view import View, draw_bodies, frame_block
 from taichi_dem.simulate import result_of
 
 NAME = "stable_or_not"
@@ -42,8 +42,8 @@ UNTIL = {"bond_dashpot": 4e-5, "bond_stiffness": 2e-4}
 BAR = bar(0.4, 0.1, (8, 2, 2))
 #: Steps before the first look: until then the blow has given too little for the account to close.
 EARLY = 5
-#: View that shows two sides and the struck end, magnification, pictures, the last of which stay.
-SEEN, MOVING, STAYING = {"axis": (-0.35, 0.45, 1.0), "magnify": 1.5e4}, 32, 12
+#: View that shows two sides and the struck end, and magnification of displacements.
+SEEN, MAGNIFY = (-0.35, 0.45, 1.0), 1.5e4
 VIEWS = {"frame": dem.RunView.frame, "energy": dem.RunView.energy_balance}
 VIEWS.update(time=lambda view: view.time_s, spin=lambda view: view.motion()["spin"][:, 0])
 TABLE = study.Table(
@@ -89,45 +89,37 @@ def longest_step(limit):
     return float(dem.step_report(scene).limits[limit].min())
 
 
-def film(folder, runs):
-    """Write both runs side by side over their accounts as a GIF, and its last picture as PNG."""
+def draw(path, runs):
+    """Both bars at their ends, coloured by spin, over their accounts of energy."""
     end = max(float(made.time[-1]) for made in runs if made.sentence)
     most = 0.5 * max(np.abs(made.spin).max() for made in runs)
-    with filming((5.0, 3.6), 300, STYLE) as (figure, shoot, images):
+    with picture(path, 0, size=(5.0, 3.6), dpi=300) as (figure, _):
         *panels, account = figure.subplot_mosaic("01;22", height_ratios=(1, 1.3)).values()
-        drawn = [draw_first(axes, account, made, most) for axes, made in zip(panels, runs)]
+        for axes, made in zip(panels, runs):
+            draw_bar(axes, made, end, most)
+            draw_account(account, made, SHARES[made.share])
         account.set_title("colour: spin", loc="center")
         account.set(xlabel="time [µs]", ylabel="unexplained energy\n/ energy put in [1]")
         account.set(xlim=(0.0, 1.05e6 * end), yscale="log", ylim=(1e-5, 1e5))
-        # Closer together towards the end, where all happens at once.
-        for now in end * (1.0 - np.linspace(1.0, 0.0, MOVING) ** 1.5):
-            for made, marks in zip(runs, drawn):
-                show(made, now, *marks)
-            shoot()
-    write_whole(folder / f"{NAME}.png", lambda name: images[-1].save(name, format="PNG"))
-    small = [image.reduce(2) for image in [*images, *[images[-1]] * STAYING]]
-    write_gif(folder / f"{NAME}.gif", small, 125, 48)
 
 
-def draw_first(axes, account, made, most):
-    """The bar at rest with colours up to a spin [rad/s], its line of the account, and its end."""
-    colour, look = SHARES[made.share], {"cmap": "PuOr", "clim": (-most, most)}
-    bodies = draw_bodies(axes, made.result.model, made.frames[0], made.spin[0], **SEEN, **look)
-    frame_block(axes, View(SEEN["axis"]), made.result.model, 0.02)
+def draw_bar(axes, made, now, most):
+    """The bar at a time [s], or where its run ended, with colours up to a spin [rad/s]."""
+    row, model = int(np.searchsorted(made.time, now * (1.0 + 1e-9))) - 1, made.result.model
+    look = {"axis": SEEN, "magnify": MAGNIFY, "cmap": "PuOr", "clim": (-most, most)}
+    draw_bodies(axes, model, made.frames[row], made.spin[row], **look)
+    frame_block(axes, View(SEEN), model, 0.02)
     axes.set_axis_off()
-    look = {"loc": "center", "color": colour, "fontweight": "bold"}
+    look = {"loc": "center", "color": SHARES[made.share], "fontweight": "bold"}
     axes.set_title(f"{made.share:g} × stable step", **look)
-    (line,) = account.plot([], [], color=colour, lw=3.0)
-    place = 1e6 * made.time[-1], made.residual[-1]
-    return bodies, line, account.text(*place, "", ha="right", va="center")
 
 
-def show(made, now, bodies, line, end):
-    """Move the bodies to a time [s], show the account up to then, and that the program ends it."""
-    row = int(np.searchsorted(made.time, now * (1.0 + 1e-9), side="right")) - 1
-    move_bodies(bodies, made.result.model, made.frames[row], made.spin[row], **SEEN)
-    line.set_data(1e6 * made.time[: row + 1], positive(made.residual)[: row + 1])
-    end.set_text("stopped  " if made.sentence and row == len(made.time) - 1 else "")
+def draw_account(axes, made, colour):
+    """Unexplained energy over time, and that the program ended the run."""
+    axes.plot(1e6 * made.time, positive(made.residual), color=colour, lw=3.0)
+    if made.sentence:
+        place = 1e6 * made.time[-1], made.residual[-1]
+        axes.text(*place, "stopped  ", ha="right", va="center")
 
 
 def run(options):
@@ -141,7 +133,7 @@ def run(options):
         columns = {"time_s": made.time, "unexplained_over_put_in": made.residual}
         write_csv(folder / f"history_{made.limit}_{made.share:g}.csv", columns)
     study.write_rows(folder / "steps.csv", rows)
-    film(folder, runs[: len(SHARES)])
+    draw(folder / f"{NAME}.png", runs[: len(SHARES)])
     figures = {f"limit_{limit}_s": (longest_step(limit), "s") for limit in UNTIL}
     for row in rows:
         figures.update(TABLE.figures(row, "{limited_by}_{share_of_limit:g}_{key}"))
