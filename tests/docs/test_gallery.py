@@ -7,7 +7,7 @@ import pytest
 
 import gallery
 from taichi_dem.kit import runtime, study
-from taichi_dem.kit.study.entries import ENTRIES, Entry
+from taichi_dem.kit.study.results_page import Entry
 
 #: A stand-in for an experiment: writes what one writes, or fails as one fails.
 SCRIPT = """
@@ -75,21 +75,3 @@ def test_a_quick_study_leaves_the_results_of_the_full_one(tmp_path, monkeypatch)
         assert study.main(run, study.parser("tiny", "Tiny."), quick) == 0
     kinds = {path.parent.as_posix(): path.read_text() for path in Path().rglob("kind")}
     assert kinds == {"results/tiny": "False", "results/quick/tiny": "True", "mine": "True"}
-
-
-def test_cpu_times_of_first_runs_become_those_of_the_entries(stand_ins, tmp_path):
-    out, path = stand_ins("good", "fine", "bad"), tmp_path / ENTRIES
-    texts = "\n\n".join(
-        f"## {name}\nquestion: Why?\nlook: Look.\ntime: 3 min\nquick: 15 s\npictures: a.png"
-        for name in ("fine", "good", "bad")
-    )
-    path.write_text(f"# Part\n\n{texts}\n")
-    gallery.main(["--out", str(out), "--only", "good,bad", "--cold"])
-    gallery.main(["--out", str(out / "quick"), "--only", "fine", "--quick"])
-    gallery.keep_times(out, path)
-    cpu_s = float((out / "good" / gallery.CPU_TIME).read_text())
-    made = gallery.read_entries(path)
-    assert [one.time.isdecimal() for one in made] == [False, True, False]
-    # To two digits, in whole seconds.
-    assert float(made[1].time) == pytest.approx(cpu_s, abs=0.5 + 0.05 * cpu_s)
-    assert {one.quick for one in made} == {"15 s"}
