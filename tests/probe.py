@@ -10,8 +10,24 @@ from taichi_dem.kit.allocation import assign, values
 STEP = 2.0**-20
 
 
+class Probe:
+    """A scene of two bodies that are placed by hand."""
+
+    def __init__(self, mesh, effects, material=CONCRETE):
+        self.simulation = Simulation(Scene(mesh, material, effects), Multirate(STEP, 1.0))
+        self.model, self.state = self.simulation.model, self.simulation.state
+        self.advance, self.tables = self.simulation.advance, self.simulation.tables
+        self.centre = self.model.centre
+
+    def place(self, position, orientation=None, velocity=None, spin=None):
+        """Place both bodies, arrays (2, ...)."""
+        still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+        turned = still if orientation is None else orientation
+        self.state.set_motion(position, turned, velocity, spin)
+
+
 @ti.data_oriented
-class BondProbe:
+class BondProbe(Probe):
     """A bonded pair whose motion is prescribed; every call evaluates its bond once.
 
     mesh: two bodies that share a face. Displacements [m], rotations and velocities are those of
@@ -19,18 +35,10 @@ class BondProbe:
     """
 
     def __init__(self, mesh, effects, material=CONCRETE):
-        simulation = Simulation(Scene(mesh, material, effects), Multirate(STEP, 1.0))
-        self.simulation = simulation
-        self.model, self.state, self.step = (
-            simulation.model,
-            simulation.state,
-            simulation.step,
-        )
-        self.tables = simulation.tables
+        super().__init__(mesh, effects, material)
         corners = mesh.points[self.model.topology.vertices[0]]
         self.area = 0.5 * np.linalg.norm(np.cross(*(corners[1:] - corners[0])))
         self.frame = values(self.tables.bond_frame, 0)
-        self.centre = self.model.centre
         self._slots = values(self.tables.bond_slots, 0)
         fields = self.state.fields()
         ends = "_unit", "_slip", "broken_tick", "exposed_tick", "bond_drag", "bond_heat"
@@ -44,10 +52,7 @@ class BondProbe:
 
     def move(self, position, orientation=None, velocity=None, spin=None):
         """Place both bodies, arrays (2, ...), and evaluate the bond; see ``evaluate``."""
-        still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
-        self.state.set_motion(
-            position, still if orientation is None else orientation, velocity, spin
-        )
+        self.place(position, orientation, velocity, spin)
         return self.evaluate()
 
     def open(self, opening, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)):
@@ -107,34 +112,23 @@ class BondProbe:
 
 
 @ti.data_oriented
-class ContactProbe:
+class ContactProbe(Probe):
     """Two loose bodies with spheres on every face; one chosen sphere pair is evaluated.
 
     mesh: two bodies without a common face.
     """
 
     def __init__(self, mesh, effects, material=CONCRETE):
-        self.simulation = simulation = Simulation(
-            Scene(mesh, material, effects), Multirate(STEP, 1.0)
-        )
-        self.model, self.state, self.step = (
-            simulation.model,
-            simulation.state,
-            simulation.step,
-        )
-        self.tables, self.store = simulation.tables, simulation.contacts.store
-        self.centre = self.model.centre
-        self.sphere = simulation.values(self.tables.sphere)
+        super().__init__(mesh, effects, material)
+        self.store = self.simulation.contacts.store
+        self.sphere = self.simulation.values(self.tables.sphere)
 
     def evaluate(self, spheres, position, orientation=None, velocity=None, spin=None):
         """Force [N] and torque [N m] on both bodies (2, 6), and the three heats per STEP [W].
 
         spheres: sphere numbers on body 0 and body 1.
         """
-        still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
-        self.state.set_motion(
-            position, still if orientation is None else orientation, velocity, spin
-        )
+        self.place(position, orientation, velocity, spin)
         wrench, heat = np.zeros((2, 6)), np.zeros(3)
         self._evaluate(spheres[0], spheres[1], wrench, heat)
         return wrench / STEP, heat / STEP
