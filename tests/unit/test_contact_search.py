@@ -10,6 +10,7 @@ import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, Scene, Uniform, effects
+from taichi_dem.contact.contacts import FARTHEST, STEPS
 from taichi_dem.kit.allocation import FieldTree, assign, values
 from taichi_dem.mesh.shapes import bar
 from tests.again import Again
@@ -201,6 +202,25 @@ def test_all_that_touches_is_listed_however_seldom_a_pair_is_looked_at(bars, law
         broad.search(everywhere=False)
         found.append(len(touching))
     assert max(found) > min(found) + 20
+
+
+def test_a_fast_body_has_a_skin_for_some_steps(again):
+    """Each goes STEPS largest steps at its speed, spin included, between half a skin and a cap."""
+    skin, random = 2e-3, np.random.default_rng(3)
+    simulation = scattered(again, skin, 0.03)
+    contacts, count = simulation.contacts, simulation.model.body_count
+    motion, extent = simulation.state.motion(), simulation.values(simulation.tables.extent)
+    fast = 10.0 ** random.uniform(4, 6.5, (2, count, 1)) * random.standard_normal((2, count, 3))
+    simulation.state.set_motion(motion["position"], motion["orientation"], *fast)
+    simulation.broad_phase.search()
+    velocity, spin = np.linalg.norm(fast, axis=2)
+    way = STEPS * simulation.schedule.dt0 * (velocity + spin * extent)
+    wanted = np.maximum(0.5 * skin, np.minimum(way, FARTHEST * extent))
+    exposed = simulation.values(contacts.free) == 1
+    found = simulation.values(contacts.body_skin)
+    assert found[exposed] == pytest.approx(wanted[exposed], rel=1e-12)
+    for low, high in [(0.0, 0.6 * skin), (0.6 * skin, 0.24 * extent), (0.24 * extent, np.inf)]:
+        assert ((found >= low) & (found < high) & exposed).sum() > 10
 
 
 def spheres_of(store):

@@ -25,7 +25,7 @@ from taichi_dem import (
 )
 from taichi_dem.engine import ENGINES
 from taichi_dem.kit.allocation import assign, values
-from taichi_dem.kit.effect_table import NEEDED, SMALL, TRY, EffectTable, EffectUse
+from taichi_dem.kit.certificate import NEEDED
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.report.energy_balance import energy_put_in
 from taichi_dem.state.model import Model
@@ -59,19 +59,6 @@ def test_dropping_effects_that_never_acted_changes_no_bit(gentle):
         np.testing.assert_array_equal(again.series[name], column, err_msg=name)
 
 
-def test_weight_of_all_is_all_the_work(gentle):
-    """Free fall, work = m g (g t) t / 2 = weight times height; the only load, so its share is 1.
-
-    Kicks in the middle of a step of dt give v = g t at its end; with the mean velocity of each
-    kick the work is exactly m (g t)^2 / 2.
-    """
-    use = next(use for use in gentle.report.effect_activity if use.effect == "gravity")
-    mass = gentle.model.body_mass.sum()
-    assert use.events == use.of == 2
-    assert use.share == pytest.approx(1.0, rel=1e-12)
-    assert use.energy_J == pytest.approx(0.5 * mass * (9.81 * UNTIL) ** 2, rel=1e-9)
-
-
 def test_energy_that_bodies_have_at_the_start_is_put_in():
     """Thrown up at v, they have m v^2 / 2, of which their weight takes a part and gives none."""
     speed, mass = 2.0, Model(pair(), CONCRETE, ()).body_mass.sum()
@@ -88,32 +75,6 @@ def test_energy_that_bodies_have_at_the_start_is_put_in():
     words = result.report.rows()["energy put in"]
     told = [float(number) for number in re.findall(r"[-+.\de]+(?= J)", words)]
     assert told == pytest.approx([held, held, -account["load_work"]], rel=1e-5)
-
-
-def made_up(**members):
-    """Advice on six effects, in no order."""
-    shares = {"rub": 6e-3, "touch": 0.3, "drag": 1e-5, "gas": 0.9}
-    uses = [
-        EffectUse(name, "events", 1, share=share, steers=name in ("rub", "touch"))
-        for name, share in shares.items()
-    ]
-    hold = EffectUse(
-        "hold", "bodies held", 1, share=0.0, steers=True, kept="it defines the problem"
-    )
-    return EffectTable(acting=(EffectUse("break", "bonds broken", 0), *uses, hold), **members)
-
-
-def test_effects_stand_in_the_order_of_their_influence():
-    """What holds bodies has none that its energy tells, and stands first."""
-    table = made_up(shown={}).table()
-    assert list(table["effect"]) == ["hold", "gas", "touch", "rub", "drag", "break"]
-    assert list(table["influence"][1:]) == [0.9, 0.3, 6e-3, 1e-5, 0.0]
-    small = list(table["influence"] < SMALL)
-    assert [word == TRY for word in table["advice"]] == small == [False] * 3 + [True] * 3
-    # What a run has shown stands in place of the energy.
-    measured = made_up(shown={"rub": 0.5, "drag": 0.0}).table().set_index("effect")
-    assert list(measured.index)[:4] == ["hold", "gas", "rub", "touch"]
-    assert list(measured["advice"][["rub", "drag", "break"]]) == ["keep", "drop", TRY]
 
 
 def pulled(*listed, speed=2.0):

@@ -19,6 +19,7 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem.mesh.shapes import single
+from tests.structures import filled
 from tests.turns import matrix, quaternion
 
 OBLIQUE = (1.0, 0.0, 0.0), (0.6, 0.8, 0.0), (0.2, -0.3, 0.9)
@@ -83,9 +84,8 @@ def test_supports_that_contradict_a_motion_are_refused(other):
 def body():
     """A free body under the pulse."""
     mesh = checked_mesh(POINTS, [[0, 1, 2, 3]], {"hole": [FACE]})
-    return Simulation(
-        Scene(mesh, CONCRETE, [effects.GasPressure("hole", PEAK, RISE)]), Uniform(STEP)
-    )
+    gas = effects.GasPressure("hole", PEAK, RISE)
+    return Simulation(Scene(mesh, CONCRETE, filled("bonds", gas)), Uniform(STEP))
 
 
 def push_of(body):
