@@ -87,6 +87,7 @@ def test_a_stiffness_of_its_own_is_that_of_the_contact_and_of_its_limits():
         pair = Pair(EDGE, 1e-7, stiffness=factor * CONCRETE.normal_stiffness)
         assert pair.rebound() == pytest.approx(0.1, rel=3.0 * pair.rate * 1e-7)
         reports[factor] = step_report(pair.simulation.scene).limits
+        pair.simulation.close()
     for name in ("contact_stiffness", "contact_dashpot"):
         assert reports[1.0][name] == pytest.approx(2.0 * reports[4.0][name], rel=1e-12)
 

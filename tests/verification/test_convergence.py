@@ -7,16 +7,16 @@ import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Simulation, Uniform, effects
-from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.allocation import assign
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.methods import Method
 from taichi_dem.stability.step_report import bond_steps
-from taichi_dem.state.timeline import MAX_LEVEL
 from tests.scenes import brisk_scene
+from tests.structures import filled
 
 UNTIL = 1e-5
 #: Macro steps in a run; the step halves from one to the next.
-STEPS = (100, 200, 400, 800)
+STEPS = (200, 400, 800)
 
 
 @ti.data_oriented
@@ -34,110 +34,72 @@ class FixedLevels(Method):
 
     name, uniform = "fixed_levels", False
 
-    def __init__(self, neighbour):
-        self.neighbour, self.dt0 = neighbour, UNTIL / STEPS[0]
+    def __init__(self, neighbour, dt0):
+        self.neighbour, self.dt0 = neighbour, dt0
+        self.structure = neighbour
 
     def criterion(self):
         """Step rule for the schedule."""
         return Unchanged()
 
 
-class MovingBar:
-    """18 bodies, unstrained, with random velocities and spins; runs again at any step.
+#: 18 bodies, unstrained, with random velocities and spins, and levels.
+BAR = bar(0.3, 0.1, (3, 1, 1))
+RANDOM = np.random.default_rng(3)
+VELOCITY, SPIN = RANDOM.standard_normal((2, BAR.body_count, 3))
+MIXED = RANDOM.integers(0, 4, BAR.body_count).astype(np.int32)
 
-    The kernels are compiled once: steps and dashpots are numbers in fields.
+
+def position_after(steps, neighbour, levels, damped):
+    """Positions of the bar at UNTIL [m]."""
+    laws = filled("bonds", *([effects.BondDamping()] * damped))
+    scene = Scene(BAR, CONCRETE, laws, velocity=VELOCITY, spin=10.0 * SPIN)
+    simulation = Simulation(scene, FixedLevels(neighbour, UNTIL / steps))
+    assign(simulation.state.level, levels)
+    simulation.advance_to(steps)
+    assert np.array_equal(simulation.values(simulation.state.level), levels)
+    return simulation.motion()["position"]
+
+
+def check_order(neighbour, levels, damped, order):
+    """Observed order: with x = x0 + C dt^p, differences of successive runs fall 2^p-fold.
+
+    It may be off by the next term of the error, in the finest step compared, which is smaller than
+    the first by a step times the fastest rate, of a spring or a dashpot, both from the stability
+    limit 2 / rate.
     """
-
-    def __init__(self, neighbour):
-        scene = Scene(bar(0.3, 0.1, (3, 1, 1)), CONCRETE, [effects.BondDamping()])
-        self.simulation = Simulation(scene, FixedLevels(neighbour))
-        model, state = self.simulation.model, self.simulation.state
-        random = np.random.default_rng(3)
-        turn = np.tile([1.0, 0.0, 0.0, 0.0], (model.body_count, 1))
-        velocity, spin = random.standard_normal((2, model.body_count, 3))
-        state.set_motion(model.centre, turn, velocity, 10.0 * spin)
-        self.mixed = random.integers(0, 4, model.body_count).astype(np.int32)
-        self.fields = state.fields()
-        self.first = {name: values(field) for name, field in self.fields.items()}
-        self.simulation.start()
-
-    def position_after(self, steps, levels, damped):
-        """Positions at UNTIL [m]."""
-        simulation, state = self.simulation, self.simulation.state
-        for name, field in self.fields.items():
-            assign(field, self.first[name])
-        assign(state.level, levels)
-        damping = np.array([CONCRETE.normal_damping, CONCRETE.shear_damping])
-        bonds = simulation.model.bond_count
-        assign(simulation.tables.dashpot.coefficient, np.tile(damping * damped, (bonds, 1)))
-        dt0 = UNTIL / steps
-        for k in range(MAX_LEVEL + 1):
-            simulation.schedule.step_seconds[k] = dt0 / 2.0**k
-        simulation.driver.begin()
-        simulation.advance_to(steps)
-        assert np.array_equal(simulation.values(state.level), levels)
-        return state.motion()["position"]
-
-
-@pytest.fixture(scope="module")
-def bars():
-    """A bar for each treatment of the neighbours."""
-    return {neighbour: MovingBar(neighbour) for neighbour in ("held", "drifted")}
-
-
-def orders(moving, levels, damped):
-    """Observed orders: with x = x0 + C dt^p, differences of successive runs fall 2^p-fold."""
-    runs = [moving.position_after(steps, levels, damped) for steps in STEPS]
-    gaps = [np.linalg.norm(a - b) for a, b in itertools.pairwise(runs)]
-    return np.log2(np.array(gaps[:-1]) / gaps[1:])
-
-
-def slack(moving, damped):
-    """How far an order may be off: the next term of the error, in the finest step compared.
-
-    It is smaller than the first by a step times the fastest rate, of a spring or a dashpot, both
-    from the stability limit 2 / rate.
-    """
-    limits = bond_steps(moving.simulation.model.mesh, CONCRETE)
-    limit = limits["bond_dashpot" if damped else "bond_stiffness"].min()
-    return np.log2(1.0 + 2.0 / limit * UNTIL / STEPS[-2])
-
-
-def check_order(moving, levels, damped, order):
-    """The order at the finest steps, within its slack."""
-    error = slack(moving, damped)
+    limit = bond_steps(BAR, CONCRETE)["bond_dashpot" if damped else "bond_stiffness"].min()
+    error = np.log2(1.0 + 2.0 / limit * UNTIL / STEPS[-2])
     assert error < 0.5
-    assert orders(moving, levels, damped)[-1] == pytest.approx(order, abs=error)
+    runs = [position_after(steps, neighbour, levels, damped) for steps in STEPS]
+    coarse, fine = (np.linalg.norm(a - b) for a, b in itertools.pairwise(runs))
+    assert np.log2(coarse / fine) == pytest.approx(order, abs=error)
 
 
-def test_one_step_for_all_is_leapfrog(bars):
+def test_one_step_for_all_is_leapfrog():
     """v += dt F(x) / m, then x += dt v: positions of second order.
 
     These are the positions of the leapfrog whose velocities live half a step earlier. The one at
     the start is off by dt F / 2 m, which is nothing for an unstrained bar.
     """
-    still = np.zeros_like(bars["held"].mixed)
-    check_order(bars["held"], still, False, 2.0)
+    check_order("held", np.zeros_like(MIXED), False, 2.0)
 
 
-def test_held_neighbours_cost_the_second_order(bars):
-    """A bond sees the coarse body where it was up to a step ago: an opening wrong by v dt."""
-    moving = bars["held"]
-    assert len(np.unique(moving.mixed)) == 4
-    check_order(moving, moving.mixed, False, 1.0)
-
-
-def test_drifted_neighbours_keep_the_second_order(bars):
-    """Each bond kicks both bodies at its own times: an asynchronous variational integrator."""
-    moving = bars["drifted"]
-    check_order(moving, moving.mixed, False, 2.0)
-
-
-@pytest.mark.parametrize("neighbour", ["held", "drifted"])
-def test_explicit_dashpots_are_of_first_order(bars, neighbour):
-    """A dashpot takes the velocity before the kick, half a step old, in every scheme."""
-    moving = bars[neighbour]
-    check_order(moving, moving.mixed, True, 1.0)
+@pytest.mark.parametrize(
+    ("neighbour", "damped", "order"),
+    [
+        # A bond sees the coarse body where it was up to a step ago: an opening wrong by v dt.
+        ("held", False, 1.0),
+        # Each bond kicks both bodies at its own times: an asynchronous variational integrator.
+        ("drifted", False, 2.0),
+        # A dashpot takes the velocity before the kick, half a step old, in every scheme.
+        ("held", True, 1.0),
+        ("drifted", True, 1.0),
+    ],
+)
+def test_neighbours_of_other_steps_have_the_order_of_their_treatment(neighbour, damped, order):
+    assert len(np.unique(MIXED)) == 4
+    check_order(neighbour, MIXED, damped, order)
 
 
 def blown(method, until):

@@ -19,20 +19,18 @@ from taichi_dem import (
     effects,
     read_mesh,
 )
-from taichi_dem.elasticity.mesh_stiffness import motions_under
 from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.shapes import bar, placed_together
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
 from taichi_dem.output.record import Recorder
-from taichi_dem.report.forces import force_names
-from taichi_dem.state.model import Model, column_of, names_of
+from taichi_dem.state.model import column_of, names_of
 from tests.made_result import made_result
 from tests.scenes import paper_effects
+from tests.structures import filled
 from tests.turns import matrix, quaternion
 
 EPS = np.finfo(float).eps
-LENGTH, WIDTH, PRESS = 2.0, 0.5, 1e3
 #: Relative error of what is in equilibrium, which the damped runs below reach.
 STATIC = 1e-9
 
@@ -93,19 +91,6 @@ def test_forces_are_the_impulses_of_the_coming_step():
         acted = np.flatnonzero(force.any(axis=1))
         assert set(acted) <= set(faces_of(simulation.model, group)[0]) and len(acted)
     assert not rolled[:, [0, 2]].any()
-
-
-def test_names_tell_sources_apart():
-    listed = [
-        effects.Roller("left", (1, 0, 0)),
-        effects.Roller("left", (0, 1, 0)),
-        effects.Fixed("left"),
-        effects.Fixed("right"),
-        effects.Gravity(),
-    ]
-    names = "gravity roller_left roller_left_2 fixed_left fixed_right"
-    model = Model(bar(1.0, 1.0, (1, 1, 1)), CONCRETE, listed)
-    assert force_names(model) == [f"{name}_force" for name in names.split()]
 
 
 def test_no_two_names_are_alike_whatever_groups_are_called():
@@ -204,7 +189,8 @@ def test_stress_of_each_body_is_that_of_the_forces_of_its_units():
 
     To the angle between bodies, here some 1e-6. Openings of 1e-7 m round to 1e-9 of themselves.
     """
-    simulation = Simulation(Scene(bar(0.3, 0.1, (1, 1, 1)), CONCRETE, []), Uniform(1e-8))
+    scene = Scene(bar(0.3, 0.1, (1, 1, 1)), CONCRETE, filled("bonds"))
+    simulation = Simulation(scene, Uniform(1e-8))
     model, random = simulation.model, np.random.default_rng(3)
     turns, place = small_turns(random, 6), model.centre + 1e-7 * random.normal(size=(6, 3))
     simulation.state.set_motion(place, turns)
@@ -257,85 +243,6 @@ def test_stress_of_a_breaking_block_is_the_virial_of_gas_and_inertia():
     expected = symmetric(boundary - inertia.T @ frame.position)
     size = np.abs(volumes(model.mesh)[:, None, None] * frame.stress).sum()
     assert np.abs(virial(model, frame.stress) - expected).max() < STATIC * size
-
-
-def bent(cells):
-    """A cantilever under a pressure from above, put where bonds balance it: simulation, recorder.
-
-    Its fixed end carries the tractions of a beam: shear force F along the face, moment F L / 2.
-    """
-    load = effects.Pressure("top", PRESS)
-    scene = Scene(bar(LENGTH, WIDTH, cells), CONCRETE, [effects.Fixed("left"), load])
-    simulation = Simulation(scene, Uniform(1e-8))
-    model = simulation.model
-    wrenches = np.zeros((model.body_count, 6, 1))
-    total = PRESS * LENGTH * WIDTH
-    body, area, middle = faces_of(model, "top")
-    add(wrenches, model, body, -PRESS * area, middle)
-    body, area, _ = faces_of(model, "left")
-    corners = corners_of(model, "left")
-    size = -area[:, 0]
-    # Tension above, linear over the face: a third of an area at each corner and the mean of both.
-    linear = 0.5 * total * LENGTH * (corners[:, :, 1] - 0.5 * WIDTH) / (WIDTH**4 / 12.0)
-    for k in range(3):
-        share = (linear.sum(axis=1) + linear[:, k]) / 12.0
-        along = np.stack([-size * share, size / 3.0 / WIDTH**2 * total, 0.0 * size], axis=1)
-        add(wrenches, model, body, along, corners[:, k])
-    motion = motions_under(model.mesh, model.topology, model.bond_stiffness, wrenches)[:, :, 0]
-    turns = np.column_stack([np.ones(len(motion)), 0.5 * motion[:, 3:]])
-    turns /= np.linalg.norm(turns, axis=1)[:, None]
-    simulation.state.set_motion(model.centre + motion[:, :3], turns)
-    simulation.start()
-    return simulation, Recorder(simulation)
-
-
-def corners_of(model, group):
-    """Corners of a group's faces [m], (n, 3, 3)."""
-    body, face = faces_of_group(model.mesh, model.topology, group)
-    return model.mesh.points[face_vertices(model.mesh, body, face)]
-
-
-def add(wrenches, model, body, force, place):
-    """Add forces at places to the wrenches of bodies."""
-    moment = np.cross(place - model.centre[body], force)
-    np.add.at(wrenches[:, :, 0], body, np.hstack([force, moment]))
-
-
-def test_a_bent_beam_approaches_the_stress_of_beam_theory():
-    """Sigma = M y / I, M = p b (L - x)^2 / 2, in the mean of a box of six bodies.
-
-    Bodies are rigid and bonds have springs at corners: the faces of boxes, n across the height,
-    bear a part of M on their own. Three corners of a triangle of side h have the second moment
-    A h^2 / 6 more than its area, of A (n h)^2 / 12 of the section: 2 / n^2 of M; as much again is
-    allowed for the other faces of the boxes. It falls with n^2, by 4; a half is asked for.
-    """
-    errors = []
-    print("\ncells       load N  reaction N  M y / I Pa  stress Pa  error %")
-    for cells in ((16, 4, 1), (32, 8, 1)):
-        asked, found, load, reaction = stress_at_a_quarter(cells)
-        errors.append(1.0 - found / asked)
-        row = f"{load:8.2f}  {reaction:10.2f}  {asked:10.0f}  {found:9.0f}  {100 * errors[-1]:7.1f}"
-        print(f"{cells!s:10}  {row}")
-        # Turned by 1e-5 or so, the bonds pull along other axes than in the linear solution.
-        assert reaction == pytest.approx(-load, rel=1e-4)
-        assert 0.0 < errors[-1] < 4.0 / cells[1] ** 2
-    assert errors[1] < 0.5 * errors[0]
-
-
-def stress_at_a_quarter(cells):
-    """M y / I and the stress on top of a bent cantilever at x = L / 4 [Pa]; load and reaction [N].
-
-    Stresses at the top box, by the slope over all boxes from L / 4 to L / 2.
-    """
-    simulation, recorder = bent(cells)
-    model, (load, reaction) = simulation.model, simulation.forces.sums()[:, 1]
-    boxes = [model.centre[:, 0], model.centre[:, 1] - 0.5 * WIDTH, recorder.frame().stress[:, 0, 0]]
-    x, y, stress = (one.reshape(*cells, 6).mean(axis=(2, 3)) for one in boxes)
-    expected = 0.5 * PRESS * WIDTH * (LENGTH - x) ** 2 * y / (WIDTH**4 / 12.0)
-    some = slice(cells[0] // 4, cells[0] // 2)
-    slope = (stress * expected)[some].sum() / (expected**2)[some].sum()
-    top = expected[some].max()
-    return top, slope * top, load, reaction
 
 
 def test_a_crack_is_as_open_as_its_faces_have_been_moved_apart():

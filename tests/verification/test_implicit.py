@@ -8,9 +8,9 @@ import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.allocation import assign
-from taichi_dem.mesh.mesh import checked_mesh
-from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.state.timeline import MACRO_TICKS
+from tests.structures import filled
 from tests.verification.test_limits import Rig
 
 EPS = np.finfo(float).eps
@@ -31,7 +31,7 @@ EFFECTS = [
     effects.ShearSlip(),
     effects.SphereContact(outer_faces=True),
     effects.Friction(),
-    effects.GasPressure("hole", peak=1e8, rise=2e-5),
+    effects.GasPressure("pressed_left", peak=1e8, rise=2e-5),
 ]
 METHODS = {
     "explicit": Uniform(TINY, 1.0),
@@ -42,14 +42,13 @@ METHODS = {
 
 @pytest.fixture(scope="module")
 def rigs():
-    """Damped bonded pairs by theta, each compiled once."""
-    made = {}
+    """A damped bonded pair, compiled once, by theta."""
+    made = Rig(pair(), filled("bonds", effects.BondDamping()), ImplicitDashpots(1e-9, **TIGHT))
 
     def rig(theta):
-        if theta not in made:
-            method = ImplicitDashpots(1e-9, theta=theta, **TIGHT)
-            made[theta] = Rig(pair(), [effects.BondDamping()], method)
-        return made[theta]
+        made.simulation.reset(method=ImplicitDashpots(1e-9, theta=theta, **TIGHT))
+        made.simulation.start()
+        return made
 
     return rig
 
@@ -167,31 +166,19 @@ def test_a_body_beside_a_driven_one_follows_it_to_second_order():
     assert np.log2(ratio) == pytest.approx(2.0, abs=0.05)
 
 
-def shapes():
-    """The parts by name: mesh, and names that its groups have in the whole."""
-    return {
-        "stretched": (bar(0.3, 0.1, (3, 1, 1)), {}),
-        "target": (bar(0.2, 0.1, (2, 1, 1)), {}),
-        "fragment": (single(), {}),
-        "first": (single(), {}),
-        "second": (single(), {}),
-        "pulled": (pair(0.4), {}),
-        "pressed": (bar(0.2, 0.1, (2, 1, 1)), {"left": "hole"}),
-    }
-
-
 def assembled():
-    """One mesh of all parts, APART along x; bodies of each part by name."""
-    points, tetrahedra, groups, bodies = [], [], {}, {}
-    for place, (name, (mesh, names)) in enumerate(shapes().items()):
-        first = sum(len(p) for p in points)
-        start = sum(len(t) for t in tetrahedra)
-        points.append(mesh.points + np.array([APART * place, 0.0, 0.0]))
-        tetrahedra.append(np.asarray(mesh.tetrahedra) + first)
-        for group, called in names.items():
-            groups[called] = np.asarray(mesh.group_faces(group)) + first
-        bodies[name] = np.arange(start, start + len(mesh.tetrahedra))
-    return checked_mesh(np.vstack(points), np.vstack(tetrahedra), groups), bodies
+    """One mesh of all parts, APART along x, with a group of bodies for each."""
+    parts = {
+        "stretched": bar(0.3, 0.1, (3, 1, 1)),
+        "target": bar(0.2, 0.1, (2, 1, 1)),
+        "fragment": single(),
+        "first": single(),
+        "second": single(),
+        "pulled": pair(0.4),
+        "pressed": bar(0.2, 0.1, (2, 1, 1)),
+    }
+    apart = [(APART * place, 0.0, 0.0) for place in range(len(parts))]
+    return placed_together(dict(zip(parts, zip(parts.values(), apart))))
 
 
 def closed(model, place, mover, partner, gap):
@@ -227,14 +214,14 @@ def start(model, bodies):
 
 @pytest.fixture(scope="module")
 def parts():
-    """The mesh of all parts, and bodies of each by name."""
-    return assembled()
+    """Bodies of each part by name."""
+    return assembled().body_groups
 
 
 @pytest.fixture(scope="module")
 def runs(parts):
     """What both methods say at UNTIL: explicit, solved."""
-    return [ended(*parts, method) for method in METHODS.values()]
+    return [ended(assembled(), parts, method) for method in METHODS.values()]
 
 
 def ended(mesh, bodies, method):
@@ -264,7 +251,7 @@ def test_displacements_agree_with_tiny_explicit_steps(runs, parts):
     Without contact the error is of second order, (w dt)^2 of the motion, w < 1e5 1/s; contacts are
     met up to a step late, of the hundreds that follow.
     """
-    for name, bodies in parts[1].items():
+    for name, bodies in parts.items():
         if name != "pulled":
             first, second = (run["moved"][bodies] for run in runs)
             assert np.abs(first - second).max() < 1e-3 * np.abs(first).max(), name
@@ -276,7 +263,7 @@ def test_the_scenes_are_what_they_are_called(runs, parts):
         account = run["account"]
         assert min(account[name] for name in ("friction", "sphere_dashpot")) > 1e-3
         assert account["load_work"] > 0.0
-        speed = {name: run["velocity"][of] for name, of in parts[1].items()}
+        speed = {name: run["velocity"][of] for name, of in parts.items()}
         assert speed["fragment"][0, 0] < 0.5 * SHOT[0]
         assert np.abs(speed["target"]).max() > 0.01
         assert abs(speed["second"][0, 0] - speed["first"][0, 0]) < 0.1 * MEETING[0]
@@ -291,7 +278,7 @@ def test_softening_and_release_inside_a_step(runs, parts):
     velocities: a trapezoidal rule along the envelope. Its error is that at the kink, of
     (k + slope) du^2 / 8 an area at most, and half of the last step's overshoot, less than that.
     """
-    model, pulled = runs[1]["model"], parts[1]["pulled"]
+    model, pulled = runs[1]["model"], parts["pulled"]
     bond = model.topology.master.tolist().index(pulled[0])
     broken = [run["broken_s"][bond] for run in runs]
     assert broken[0] > 30 * STEP

@@ -27,6 +27,7 @@ from taichi_dem.mesh.topology import topology_of
 from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED, dashpot_step, spring_step
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL
 from tests.closed_forms import LinearBonds, carried
+from tests.structures import filled
 
 STILL = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
 #: Steps of a run that must grow: at 1.004 of a limit a mode grows by 1.008 a step, 1e10 in all.
@@ -92,7 +93,7 @@ def test_bond_limits_are_where_motion_begins_to_grow(kind):
         soft = {"normal_stiffness": 450e5, "shear_stiffness": 90e5, "fracture_energy": 1e9}
         material = replace(CONCRETE, **soft)
         listed = [effects.BondDamping()]
-    rig = Rig(pair(), listed, material=material)
+    rig = Rig(pair(), filled("bonds", *listed), material=material)
     model = rig.simulation.model
     of, limit = (springs_of, spring_step) if kind == "springs" else (dashpots_of, dashpot_step)
     bonds = LinearBonds(model.mesh, material)
@@ -119,7 +120,7 @@ WAYS = {
 def test_damped_pair_is_calm_below_what_the_report_tells_and_grows_above(way):
     """Seen at many times: what grew large may come to rest again, far from where it was."""
     method, above = WAYS[way]
-    rig = Rig(pair(), [effects.BondDamping()], method)
+    rig = Rig(pair(), filled("bonds", effects.BondDamping()), method)
     told = step_report(rig.simulation.scene).borne(way).min()
     random = np.random.default_rng(3)
     velocity, spin = 1e-7 * random.standard_normal((2, 3)), 1e-6 * random.standard_normal((2, 3))
@@ -151,10 +152,8 @@ GAP = 1e-6
 
 def meeting(divisions, material, **gas):
     """Bodies that face each other, with contact and gas alone, by kernels of all effects."""
-    laws = effects.BondDamping(), effects.Softening(), effects.ShearSlip()
     contact = effects.SphereContact(divisions, outer_faces=True)
-    listed = [*(law.silent() for law in laws), contact, effects.Friction().silent()]
-    listed.append(effects.GasPressure("hole", **gas))
+    listed = filled("paper", contact, effects.GasPressure("hole", **gas))
     return Rig(facing(GAP), listed, Uniform(1e-9, 1.0), material)
 
 
@@ -238,7 +237,8 @@ def test_limited_dashpots_of_a_bond_are_stable_at_any_step():
     """
     soft = {"normal_stiffness": 450e5, "shear_stiffness": 90e5, "fracture_energy": 1e9}
     material = replace(CONCRETE, **soft)
-    rig = Rig(pair(), [effects.BondDamping()], Uniform(1e-9, dashpot="limited"), material)
+    laws = filled("bonds", effects.BondDamping())
+    rig = Rig(pair(), laws, Uniform(1e-9, dashpot="limited"), material)
     table = rig.simulation.schedule.limits.dashpot_table
     bonds = LinearBonds(rig.simulation.model.mesh, material)
     known, rate = values(table), bonds.largest_rate(bonds.damping)
@@ -313,8 +313,6 @@ def test_a_step_above_the_limit_in_contact_is_told_before_and_after(times):
 #: Ways to step, with that of ``StepReport.borne``; None where no step is above a limit.
 STEPPING = {
     "full": (Uniform, "full"),
-    "displacement": (lambda step: Multirate(step, 1e-3), "full"),
-    "limited": (lambda step: Uniform(step, dashpot="limited"), "limited"),
     "solved": (ImplicitDashpots, "solved"),
     "controlled": (lambda step: Multirate(step, 1e-3, control=StepControl()), None),
 }

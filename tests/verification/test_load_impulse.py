@@ -1,4 +1,4 @@
-"""A load gives its whole impulse, and a prescribed motion its whole way, at any step."""
+"""A load gives its whole impulse at any step."""
 
 import numpy as np
 import pytest
@@ -94,14 +94,3 @@ def test_the_gas_gives_the_integral_of_its_pulse_up_to_half_a_step_after_each(ri
     wanted = 0.5 * up - np.sin(np.pi * up) / (2.0 * np.pi)
     wanted += 2.0 * ratio / np.pi * np.sin(0.5 * np.pi * down / ratio)
     assert np.abs(found - peak * rise * wanted).max() < 16 * STEPS * EPS * found.max()
-
-
-def test_a_prescribed_motion_goes_its_whole_way():
-    """Shares that pulse within a step: the way is the velocity times their area."""
-    times, values = pulses()
-    shares = (times, 1e-9 * values)
-    drive = effects.PrescribedMotion("face", (3.0, 0.0, 0.0), history=shares)
-    simulation = body(drive, METHODS["uniform"])
-    simulation.advance_to(STEPS)
-    way = simulation.values(simulation.state.position)[0, 0] - simulation.model.centre[0, 0]
-    assert way == pytest.approx(3.0 * 1e-8 * shares[1][1::3].sum(), abs=STEPS * EPS * 0.1)

@@ -7,6 +7,7 @@ from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import pair
 from tests.probe import ContactProbe
+from tests.structures import filled
 
 EPS = np.finfo(float).eps
 K, C, MU = CONCRETE.contact_stiffness, CONCRETE.contact_damping, CONCRETE.friction
@@ -17,7 +18,8 @@ NOISE = 4 * 0.02 * EPS
 
 def stretched(listed, dt):
     """A mirror-symmetric pair pulled apart along its normal, at rest."""
-    simulation = Simulation(Scene(pair(), CONCRETE, listed), Uniform(dt))
+    scene = Scene(pair(), CONCRETE, filled("bonds", *listed))
+    simulation = Simulation(scene, Uniform(dt))
     place = simulation.model.centre.copy()
     place[1, 0] += STRETCH
     simulation.state.set_motion(place, np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)))

@@ -60,33 +60,6 @@ def test_shear_follows_the_closed_form_to_the_friction_that_remains(bonded):
     assert not bonded.broken
 
 
-def test_energy_spent_is_that_of_mode_two_and_friction_work(bonded):
-    """G_II + mu p s, and (k_s - slope) ds^2 / 2 for each finite step ds, known in closed form.
-
-    In a step the spring is charged beyond the limit and then falls to it: the mean of both is
-    above the integral of the limit by that triangle.
-    """
-    pressure, end = 5e6, 3.0 * CRITICAL
-    way = np.linspace(0.0, end, 1200)
-    slips = []
-    for d in way:
-        bonded.open([-pressure / K_N, d, 0.0])
-        slips.append(traction_at(d, pressure)[1])
-    steps, slip = np.diff(slips), np.array(slips)
-    whole = steps[slip[1:] < CRITICAL]
-    rubbed = steps[slip[:-1] >= CRITICAL]
-    across = steps[(slip[1:] >= CRITICAL) & (slip[:-1] < CRITICAL)]
-    before = CRITICAL - slip[slip < CRITICAL][-1]
-    excess = 0.5 * (K_S - SLOPE) * (whole**2).sum() + 0.5 * K_S * (rubbed**2).sum()
-    # The step across the kink: its triangle is cut off where cohesion ends.
-    excess += 0.5 * K_S * (across**2).sum() - 0.5 * SLOPE * before**2
-    expected = ENERGY + FRICTION * pressure * slip[-1] + excess
-    error = len(way) * SHEAR_ERROR * CRITICAL
-    assert bonded.heat[1] / bonded.area == pytest.approx(expected, abs=error)
-    assert excess < 0.01 * expected
-    assert bonded.heat[0] == bonded.heat[2] == 0.0
-
-
 def test_unloading_is_elastic_and_reloading_meets_the_reduced_limit(bonded):
     """From half the critical slip back with k_s, and again up to the limit left there.
 
