@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.engine.activation import activated, certificate_of, periods_of
+from ca_damper.engine.activation import activated, certificate_of, effect_uses, periods_of
 from ca_damper.engine.damper_engine import borrow
 from ca_damper.engine.launches import Launches
 from ca_damper.engine.loaded_scenes import LoadedScenes
@@ -461,7 +461,7 @@ class Batch(LoadedScenes):
             method=kind.label,
             mount=self.mount,
             effects=kind.effects,
-            effect_activity=self.device.uses(kind.effects),
+            effect_activity=effect_uses(self),
             scenes=self.count,
             particles=(int(particles.min()), int(particles.max())),
             dt_s=(float(dt.min()), float(dt.max())),

@@ -250,10 +250,13 @@ class Filling(Protocol):
 class DeviceFilling(Protocol):
     """A filling on the device, for all scenes of a table; data oriented.
 
-    ``load``, ``uses`` and ``snapshot`` are Python, the others ti.funcs. ``table.dt`` may change
-    between two steps, when a sweep goes on to its next frequency. A filling whose impacts depend on
-    the container's recoil splits ``advance`` into ``find_blows(s, step, motion)``, which returns
-    Blows, and ``carry_out(s, step, motion, recoil)``, which returns the Action.
+    Of its members ``load``, ``uses`` and ``snapshot`` are Python, the others ti.funcs. ``table.dt``
+    may change between two steps, when a sweep goes on to its next frequency. It may have one
+    further member for a certificate, in Python: see ``activation.py``.
+
+    A filling whose impacts depend on the recoil of the container splits ``advance``, so that boxes
+    on one structure resolve their impacts together: ``find_blows(s, step, motion)`` returns Blows,
+    and ``carry_out(s, step, motion, recoil)`` with a Recoil returns the Action.
     """
 
     def load(self, fillings: Fillings) -> None:

@@ -16,7 +16,7 @@ class Probe:
     def __init__(self, mesh, effects, material=CONCRETE):
         self.simulation = Simulation(Scene(mesh, material, effects), Multirate(STEP, 1.0))
         self.model, self.state = self.simulation.model, self.simulation.state
-        self.advance, self.tables = self.simulation.advance, self.simulation.tables
+        self.step, self.tables = self.simulation.step, self.simulation.tables
         self.centre = self.model.centre
 
     def place(self, position, orientation=None, velocity=None, spin=None):

@@ -3,9 +3,10 @@
 A filling takes part by two methods, both optional: ``activated(particles)`` returns the filling
 with the effects that at most so many particles call for, and an Estimate for each effect that it
 decided on; ``left_out(particles)`` returns an Estimate for each effect that it does not compute.
-Its device may have ``first_steps(effects)`` and ``skipped_tests()``, as that of the spheres.
+Its device may have ``first_steps(effects)``, as that of the spheres.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -47,14 +48,13 @@ def certificate_of(batch: Any) -> Certificate:
     """Certificate of a batch since its start."""
     checked, diverged = checked_range(batch), len(batch.divergences())
     outside = checked.outside if checked is not None else ()
-    kinds, device, most = batch.fillings.kinds, batch.device, _most_particles(batch.table)
+    kinds, most = batch.fillings.kinds, _most_particles(batch.table)
     left_out = [one.left_out(most) for one in kinds if hasattr(one, "left_out")]
     return Certificate(
         effects=batch.asked_effects,
-        acting=_acting(batch, device) if hasattr(device, "first_steps") else (),
+        acting=effect_uses(batch),
         left_out=_largest(left_out),
         estimates=batch.estimates,
-        skipped_tests=device.skipped_tests() if hasattr(device, "skipped_tests") else 0,
         periods=batch.periods,
         warnings=(
             *(f"outside of the checked range, {one}" for one in outside),
@@ -80,12 +80,20 @@ def _most_particles(table: Any) -> int:
     return int(table.column("particles").max())
 
 
-def _acting(batch, device):
-    """In how many scenes each effect acted, and from when [s], for fillings that note it."""
-    found = []
-    for name, steps in device.first_steps(batch.fillings.kinds[0].effects).items():
-        times = batch.time_origin + steps * batch.table.column("dt")
-        acted = times[np.isfinite(times)]
-        since = float(acted.min()) if acted.size else None
-        found.append(EffectUse(name, "scenes", acted.size, batch.count, since_s=since))
-    return tuple(found)
+def effect_uses(batch: Any) -> tuple[EffectUse, ...]:
+    """Activity of each effect since the start, and when it began as far as the filling notes it."""
+    device, effects = batch.device, batch.fillings.kinds[0].effects
+    first = device.first_steps(effects) if hasattr(device, "first_steps") else {}
+    return tuple(
+        replace(use, **_begun(batch, first[use.effect])) if use.effect in first else use
+        for use in device.uses(effects)
+    )
+
+
+def _begun(batch, steps):
+    """When [s] and where an effect acted first, by its first step in each scene; empty if never."""
+    times = batch.time_origin + steps * batch.table.column("dt")
+    scene = int(times.argmin())
+    if not np.isfinite(times[scene]):
+        return {}
+    return {"since_s": float(times[scene]), "where": f"scene {scene}"}

@@ -49,8 +49,7 @@ class Certificate(BaseCertificate):
     Parameters
     ----------
     acting : tuple of EffectUse, default ()
-        For each effect that was computed, in how many scenes it acted and from when, as far as the
-        filling counts it.
+        Activity of each effect that was computed, and from when, as far as the filling counts it.
     left_out : tuple of Estimate, default ()
         Estimated size of each effect that was not computed.
     warnings : tuple of str, default ()
@@ -61,19 +60,18 @@ class Certificate(BaseCertificate):
         Estimates of the effects that ``"auto"`` decided on.
     periods : Periods, optional
         Periodicity of the motion; None where fewer than two cycles were measured.
-    skipped_tests : int, default 0
-        Contact tests that were not needed, as no contact could come up before the next.
     """
 
     effects: str
     estimates: tuple[Estimate, ...] = ()
     periods: Periods | None = None
-    skipped_tests: int = 0
 
     def left_out_lines(self) -> list[str]:
         """What was left out, and what is periodic, in lines."""
         lines = [f"estimated: {estimate}" for estimate in self.estimates]
-        skipped = [f"contact tests: {self.skipped_tests:,} skipped"] if self.skipped_tests else []
+        skipped = [
+            f"{one.effect}: {one.skipped:,} tests skipped" for one in self.acting if one.skipped
+        ]
         periodic = [f"periodic: {self.periods}"] if self.periods is not None else []
         return [*lines, *super().left_out_lines(), *skipped, *periodic]
 
@@ -84,7 +82,6 @@ class Certificate(BaseCertificate):
             **super().as_dict(),
             "estimates": [one.as_dict() for one in self.estimates],
             "periods": self.periods and asdict(self.periods),
-            "skipped_tests": self.skipped_tests,
         }
 
 

@@ -141,13 +141,6 @@ class Report:
         """Write all figures as a JSON file, which is replaced as a whole."""
         write_text(path, json.dumps(self.as_dict(), indent=1))
 
-    def _certified(self):
-        """Lines of the certificate."""
-        found = self.certificate
-        if found is None:
-            return []
-        return [*(f"acted: {line}" for line in found.acted()), *found.left_out_lines()]
-
     def _bound(self):
         """Bound of the step, and the step relative to it."""
         if self.step_bound is None:
@@ -159,11 +152,12 @@ class Report:
         """All lines by name."""
         gone = f"{len(self.diverged):,} of them; nan for these and all on one structure with them"
         checked = self.checked
-        acted = (f"{use.effect}: {use}" for use in self.effect_activity)
+        acted = [f"{use.effect}: {use}" for use in self.effect_activity]
+        acted += self.certificate.left_out_lines() if self.certificate else []
         return {
             "method": f"{self.method}, container on the {self.mount}",
             "excitation": "\n".join(self.excitation),
-            "effects": "\n".join([", ".join(self.effects) or "none", *acted, *self._certified()]),
+            "effects": "\n".join([", ".join(self.effects) or "none", *acted]),
             "scenes": self._scenes(),
             "simulated": f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s",
             "diverged": f"{gone}\n{self.diverged[0]}" if self.diverged else "",
@@ -243,4 +237,7 @@ def needed_effects(result: object, tolerance: float = 1e-3) -> EffectTable:
     """
     report: Report = instance("result", getattr(result, "report", result), Report)
     share = fraction("tolerance", tolerance)
-    return EffectTable(acting=report.effect_activity, tolerance=share, shown=None)
+    left_out = report.certificate.left_out if report.certificate else ()
+    return EffectTable(
+        acting=report.effect_activity, left_out=left_out, tolerance=share, shown=None
+    )

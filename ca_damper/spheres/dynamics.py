@@ -274,15 +274,11 @@ class DeviceSpheres:
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """Activity of each of the named effects."""
-        return self.effect_activity.uses(effects)
+        return self.effect_activity.uses(effects, self.search.all_skipped())
 
     def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
         """Step in which each of the named effects first acted, infinite if never, (scenes,)."""
         return self.effect_activity.first_steps(effects)
-
-    def skipped_tests(self) -> int:
-        """Contact tests that were not needed."""
-        return self.search.all_skipped()
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Places and velocities of the spheres of scene s."""

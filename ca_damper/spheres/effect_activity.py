@@ -69,8 +69,8 @@ class EffectActivity(EventCounts):
         self.touches[s] = self.touches[s] + at_wall
         self.motion[s] = self.motion[s] + vec2(going, turning)
 
-    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
-        """An EffectUse for each of the named effects, over all scenes."""
+    def uses(self, effects: tuple[str, ...], skipped: int) -> tuple[EffectUse, ...]:
+        """An EffectUse for each of the named effects, over all scenes; skipped: tests."""
         power, motion = (
             self.table.in_use(field).sum(axis=0) for field in (self.power, self.motion)
         )
@@ -80,7 +80,7 @@ class EffectActivity(EventCounts):
         contact = EffectUse("normal contact", "contacts seen", touches, whole="what contacts took")
         turning = replace(contact, effect="rotation", events=touches if turn else 0)
         found = (
-            replace(contact, share=_share(power, 0), steers=True, kept=unseen),
+            replace(contact, share=_share(power, 0), steers=True, kept=unseen, skipped=skipped),
             replace(contact, effect="friction", share=_share(power, 1), kept=unseen),
             replace(
                 turning,

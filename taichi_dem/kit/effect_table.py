@@ -167,9 +167,10 @@ class EffectUse:
 
     @property
     def acted(self) -> str:
-        """Its events in words, without the name and the energy."""
+        """Its events and their begin in words, without the name and the energy."""
         most = f" of {self.of:,}" if self.of else ""
-        return f"{self.events:,}{most} {self.what}"
+        begun = f" from {1e3 * self.since_s:.3g} ms" if self.since_s is not None else ""
+        return f"{self.events:,}{most} {self.what}{begun}"
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -350,8 +351,7 @@ class BaseCertificate(EffectTable):
     def acted(self) -> Iterator[str]:
         """A line for each effect: what it did, and since when."""
         for use in self.acting:
-            begun = f" from {1e3 * use.since_s:.3g} ms" if use.since_s is not None else ""
-            yield f"{use.effect}: {'never' if use.idle else use.acted + begun}"
+            yield f"{use.effect}: {'never' if use.idle else use.acted}"
 
     def left_out_lines(self) -> list[str]:
         """What was left out, in lines."""
