@@ -7,7 +7,7 @@ import pytest
 
 import gallery
 from taichi_dem.kit import runtime, study
-from taichi_dem.kit.study.results_page import Entry
+from taichi_dem.kit.study.entries import Entry
 
 #: A stand-in for an experiment: writes what one writes, or fails as one fails.
 SCRIPT = """

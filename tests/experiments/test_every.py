@@ -128,11 +128,3 @@ def test_a_diverging_run_names_body_and_step_and_keeps_the_last_good_output(tmp_
     rows = rows_of(tmp_path / "history.csv")
     assert all(math.isfinite(float(value)) for row in rows for value in row.values())
     assert not (tmp_path / "summary.json").exists()
-
-
-@QUICK
-def test_a_block_is_stepped_by_one_method_after_another():
-    """All fields are cleared between two, those of the copy in memory too."""
-    found = thread_job("", (2, 1, 1), ["explicit_limited", "implicit"], 1, steps=2, repeats=1)
-    for one in found.values():
-        assert one["bodies"] == 12 and one["bandwidth"] > 0.0

@@ -25,7 +25,7 @@ from taichi_dem import (
 )
 from taichi_dem.engine import ENGINES
 from taichi_dem.kit.allocation import assign, values
-from taichi_dem.kit.certificate import NEEDED
+from taichi_dem.kit.effect_table import NEEDED
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.report.energy_balance import energy_put_in
 from taichi_dem.state.model import Model
