@@ -13,7 +13,7 @@ from taichi_dem.accuracy.runs import Job, Runs
 from taichi_dem.kit import study
 from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.checkpoint import digest, identity_of
-from taichi_dem.simulate import run_identity
+from taichi_dem.saved_run import run_identity
 
 #: A reference: first seed, cycles; its step is so much shorter, less so at a peak of spheres.
 FIRST_SEED, TRANSIENT, MEASURED, QUARTER, PEAK_OF_SPHERES = 1001, 120, 80, 4, 2

@@ -14,8 +14,7 @@ from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, Uniform, read_mesh, simulat
 from taichi_dem.kit.display import BRIEF
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.tetrahedra import signed_volumes
-from taichi_dem.output.cracks import strike_and_dip
-from taichi_dem.output.fragments import fragment_of_body
+from taichi_dem.output.fracture import fragment_of_body, strike_and_dip
 from tests.made_result import made_result, moved_rigidly
 
 NAN, SEED = float("nan"), 2
