@@ -11,6 +11,7 @@ from taichi_dem.kit.plot_style import colour_table, table_of
 from taichi_dem.kit.validation import FileName
 from taichi_dem.kit.viewer import WebPage, pack, quantise, select_frames, show_page
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
+from taichi_dem.output.fracture import quaternions_of
 from taichi_dem.output.record import Frame
 from taichi_dem.plot.block import TITLES, speed_edges
 from taichi_dem.plot.series import level_names, level_shades
@@ -83,7 +84,7 @@ def _motion(model: Model, frames: Sequence[Frame], bodies: np.ndarray, time: Any
         "times": [time[1] * frame.time_s for frame in frames],
         "centres": pack(model.centre[bodies], "float32"),
         "displacement": quantise([frame.displacement[bodies] for frame in frames]),
-        "turns": quantise([_turns(frame.rotation[bodies]) for frame in frames]),
+        "turns": quantise([rotation_vectors(frame.rotation[bodies]) for frame in frames]),
     }
 
 
@@ -104,12 +105,13 @@ def _shape(model: Model, bodies: np.ndarray) -> Any:
     }
 
 
-def _turns(rotation):
+def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
     """Axis times angle [rad] of rotation matrices (n, 3, 3), (n, 3), angles up to pi."""
-    # Imported here: SciPy takes 0.3 s to import.
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(rotation).as_rotvec()
+    quaternion = quaternions_of(rotation)
+    quaternion *= np.where(quaternion[:, 3:] < 0.0, -1.0, 1.0)
+    sine = np.linalg.norm(quaternion[:, :3], axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, quaternion[:, 3:])
+    return quaternion[:, :3] * (angle / np.where(sine > 0.0, sine, 1.0))
 
 
 def _magnification(model: Model, frame: Frame) -> float:
