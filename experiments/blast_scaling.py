@@ -1,10 +1,11 @@
 """What does it take to keep many workers busy while the work moves over the block?
 
-The paper's blast is run once by the paper's rule; evaluations are counted for each body in
-intervals of 50 largest steps. Then simulated workers share this work in four ways: fixed ranges of
-bodies; ranges that change after each interval by the workers' times (the paper, Figs 8 and 9) or by
-the bodies' costs; and equal parts of what is due at each tick, which the lists of this program
-provide at no cost. At the end of a tick all wait for the slowest; messages cost nothing.
+The paper's blast is run once by the paper's rule; every 50 largest steps the levels of the bodies
+and the near pairs are recorded, from which follow the evaluations of each body. Then simulated
+workers share this work in three ways: fixed ranges of bodies; ranges that change after each
+interval by the workers' times (the paper, Figs 8 and 9); and equal parts of what is due at each
+tick, which the lists of this program provide at no cost. At the end of a tick all wait for the
+slowest; messages cost nothing, and an evaluation of a bond or of a pair counts alike.
 
 Expect fixed shares to differ by factors of 5 to 15, as the work is where the block breaks, and
 rebalanced ones by 1.2. The paper has 5.8 and 1.1, which saves 8 min of 541. Balance over the run is
@@ -14,146 +15,205 @@ often wait.
     python experiments/blast_scaling.py             # most of ten minutes
     python experiments/blast_scaling.py --l 1e-7    # a longer run
 
-Two threads are measured, not simulated: whole steps of the parallel driver on a large bar and on
-the paper's block, each in its own process, fastest of repeats; other programs that use the cores
-make the gain less.
-
 Writes scaling.png, scaling.csv, shares.csv and summary.json to results/blast_scaling/.
 """
 
 import sys
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from _blast import blast_parser, paper_scene
-from _scaling import Workers, record_workload
-from _threads import ROUNDS, thread_gains
-from taichi_dem import Multirate
+from taichi_dem import Collector, Every, Multirate, Simulation
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, PURPLE, RED, picture
+from taichi_dem.kit.plot_style import BLUE, GREEN, GREY, PURPLE, RED, picture
+from taichi_dem.simulate import run_simulation
 
 NAME = "blast_scaling"
 SETTINGS = {
     "until": (5e-4, 5e-5, study.number(0, 1), "simulated time [s], default 5e-4"),
     "l": (1e-8, 1e-7, study.number(0, 1), "limit of a displacement in a step [m], default 1e-8"),
     "every": (50, 50, study.whole(1, 100000), "largest steps in an interval, default 50"),
-    "repeats": (5, 1, study.whole(1, 100), "timings of the threads, default 5"),
-    "counts": ((*range(1, 25), 32, 48, 64, 96, 128, 192, 256), (1, 2, 4, 8, 16, 24, 64, 256)),
-    # Boxes of the bar for the threads, six tetrahedra each, and turns of one and two threads.
-    "cells": ((40, 20, 20), (10, 5, 5)),
-    "rounds": (ROUNDS, 1),
+    "counts": (range(1, 25), (1, 2, 4, 8, 16, 24)),
 }
 DT0 = 1e-8
-#: Method of the threads' times.
-METHOD = "paper_multirate"
 #: Workers of the paper's Fig 15, and the share of one's time that is not contact.
 PAPER_WORKERS, PAPER_SERIAL = 24, 0.05
 #: By way of sharing: longest over shortest time of a worker in Fig 15, and minutes of one process
 #: over those of 24 (4.3, 4.4).
 PAPER_IMBALANCE = {"static": 20381.0 / 3493.0, "rebalanced": 9787.0 / 9023.0}
 PAPER_SPEEDUP = {"static": 2702.0 / 541.0, "rebalanced": 2702.0 / 501.0}
-#: Way of sharing -> words. Those with cuts give every worker a run of bodies.
+#: Words, colour and line by way of sharing. The first two give every worker a run of bodies.
 WAYS = {
-    "static": "fixed shares, by N - i",
-    "polyline": "rebalanced by workers' times (the paper)",
-    "rebalanced": "rebalanced by bodies' costs",
-    "due": "equal parts of active bodies",
+    "static": ("fixed shares, by N - i", RED, "-."),
+    "rebalanced": ("rebalanced by workers' times (the paper)", PURPLE, "--"),
+    "due": ("equal parts of active bodies", GREEN, "-"),
 }
-#: Colour and line by way of sharing.
-LOOK = dict(zip(WAYS, ((RED, "-."), (PURPLE, "--"), (BLUE, "-"), (GREEN, (0, (8, 2))))))
 TABLE = study.Table(
     workers=("workers", "workers"),
     way=("way", "way of sharing"),
-    contact=(lambda one: one.acceleration(), "contact", ".3g"),
-    whole=(lambda one: one.acceleration(PAPER_SERIAL), "whole", ".3g"),
+    acceleration=("acceleration", "acceleration", ".3g"),
     imbalance=("imbalance", "slowest/fastest", ".3g"),
 )
 options_parser = partial(blast_parser, NAME, __doc__, (), settings=SETTINGS)
 
 
-def draw_acceleration(axes, shared, most=np.inf, serial=0.0):
-    """Acceleration over the number of workers by way of sharing, and the bound of all ways.
+def record(scene, options):
+    """Run a scene by the paper's rule; times [s], entries by interval, body and level, simulation.
 
-    shared: by way and number of workers. serial: share of one worker's time that is not shared.
+    A body is charged with the bonds of which it is the master and the near pairs of which it is the
+    first, as the paper charges its master elements; an entry has the finer level of its two bodies.
     """
-    for way, by_count in shared.items():
-        counts = np.array([count for count in by_count if count <= most])
-        gains = [by_count[count].acceleration(serial) for count in counts]
-        colour, line = LOOK[way]
-        axes.plot(counts, gains, ls=line, color=colour, label=WAYS[way])
-    bound = counts / (1.0 + serial * (counts - 1.0))
-    axes.plot(counts, bound, ":", color=GREY, label="bound: no worker waits")
-    axes.set(xlabel="workers [1]", ylabel="acceleration [1]")
+    simulation = Simulation(scene, Multirate(DT0, options.l), "resident")
+    store, top = simulation.engine.contacts.store, simulation.model.topology
+    seen = Collector(
+        Every(steps=options.every),
+        time=lambda view: view.time_s,
+        level=lambda view: view.motion()["level"],
+        pairs=lambda view: store.near_table()[0],
+    )
+    looks = {"samples": 1, "title": "blast", "observers": [seen]}
+    run_simulation(simulation, until=options.until, **looks)
+    levels = np.array(seen.rows["level"][1:])
+    bonds = np.column_stack([top.master, top.slave])
+    entries = np.zeros((*levels.shape, levels.max() + 1))
+    for own, level, pairs in zip(entries, levels, seen.rows["pairs"][1:]):
+        bodies = np.vstack([bonds, pairs])
+        np.add.at(own, (bodies[:, 0], level[bodies].max(axis=1)), 1.0)
+    return np.array(seen["time"][1:]), entries, simulation
 
 
-def draw(path, shared, chosen, time_s, measured):
-    """Acceleration, shares and cuts, as the paper's Figs 14, 15 and 9; time_s: of the cuts."""
-    with picture(path, 2, 2, size=(9.2, 8.4)) as (figure, ((whole, contact), (shares, cuts))):
-        draw_acceleration(whole, shared, PAPER_WORKERS, PAPER_SERIAL)
-        for (way, gain), filled in zip(PAPER_SPEEDUP.items(), (RED, PURPLE)):
-            words = "measured in the paper, " + way.replace("static", "fixed")
-            whole.plot(PAPER_WORKERS, gain, "o", color=filled, label=words)
-        for (name, one), mark in zip(measured.items(), "*P"):
-            words = f"measured here, 2 threads, {name}"
-            whole.plot(2, one["gain"], mark, color=BLACK, ms=9, label=words)
-        words = f"Whole run, simulated workers, {100 * PAPER_SERIAL:g} % not shared (Fig 14)"
-        whole.set(xlim=(0, PAPER_WORKERS + 1), ylim=(0, None), title=words)
-        handles = whole.get_legend_handles_labels()
-        figure.legend(*handles, loc="outside lower center", ncols=3)
-        draw_acceleration(contact, shared)
-        words = "Contact calculation alone, many simulated workers"
-        contact.set(xscale="log", yscale="log", title=words)
-        for way, one in chosen.items():
-            if way != "due":
-                colour, line = LOOK[way]
-                look = {"color": colour, "ls": line, "label": f"{WAYS[way]}: {one.imbalance:.3g}"}
-                seconds = one.seconds / one.seconds.mean()
-                shares.step(np.arange(1, one.workers + 1), seconds, where="mid", **look)
-        shares.set(xlabel="number of the worker [1]", ylabel="time of its work / mean [1]")
-        shares.set(xlim=(0.5, PAPER_WORKERS + 0.5), ylim=(0.0, 1.4 * shares.get_ylim()[1]))
-        shares.set_title("Simulated workers: slowest over fastest in the run (Fig 15)")
-        shares.legend(loc="upper right")
-        places = chosen["rebalanced"].cuts
+def evaluations(entries, every):
+    """Evaluations by interval, body and class of ticks, and ticks of each class in an interval.
+
+    An entry of a level is due at the ticks of its own class and of all coarser ones: a tick of
+    class k is one at which level k and all finer ones are due.
+    """
+    classes = np.arange(entries.shape[-1])
+    ticks = every * np.where(classes > 0, 2.0 ** (classes - 1), 1.0)
+    due = np.flip(np.cumsum(np.flip(entries, -1), axis=-1), -1)
+    return due * ticks, ticks
+
+
+class Shared(NamedTuple):
+    """Work shared in a way: of each worker (workers,), total, all with waiting, cuts if any."""
+
+    way: str
+    workers: int
+    work: np.ndarray
+    elapsed: float
+    cuts: np.ndarray
+
+    @property
+    def imbalance(self):
+        """Work of the slowest worker over that of the fastest (Fig. 15); infinite if one rests."""
+        slowest, fastest = self.work.max(), self.work.min()
+        return float(slowest / fastest) if fastest > 0.0 else np.inf
+
+    @property
+    def acceleration(self):
+        """Time of one worker over that of all, with the part that is not shared."""
+        alone = self.work.sum() * PAPER_SERIAL / (1.0 - PAPER_SERIAL)
+        return float((self.work.sum() + alone) / (self.elapsed + alone))
+
+
+def shared(way, workers, cost, ticks):
+    """Work (intervals, bodies, classes) of a number of workers that share it in one of WAYS."""
+    if way == "due":
+        due = cost.sum(axis=1) / ticks
+        elapsed = float((ticks * np.ceil(due / workers)).sum())
+        even = np.full(workers, cost.sum() / workers)
+        return Shared(way, workers, even, elapsed, np.empty(0))
+    # Body i meets at most N - i others, of higher number: all that is known beforehand.
+    cuts = even_cuts(np.arange(cost.shape[1], 0, -1) - 1.0, workers)
+    work, elapsed, used = np.zeros(workers), 0.0, []
+    for one in cost:
+        shares = share_costs(one, cuts)
+        used.append(cuts)
+        work += shares.sum(axis=1)
+        elapsed += float(shares.max(axis=0).sum())
+        if way == "rebalanced":
+            cuts = recut(cuts, shares.sum(axis=1))
+    return Shared(way, workers, work, elapsed, np.array(used))
+
+
+def even_cuts(cost, workers):
+    """Cuts that divide the cumulative curve of the cost, (items,), evenly.
+
+    The share of each worker takes at most the mean of the shares and the dearest item; together
+    they hold every item once.
+    """
+    curve = np.concatenate([[0.0], np.cumsum(cost)])
+    inner = curve[-1] * np.arange(1, workers) / workers
+    return np.concatenate([[0], np.searchsorted(curve[1:], inner, side="right"), [len(curve) - 1]])
+
+
+def recut(cuts, work):
+    """Cuts after an interval in which every worker's share took some time, (workers,).
+
+    Only a worker's whole time is known, so that within a share all items count alike: the
+    cumulative curve is a polyline with a corner at each cut, as in Figs 8 and 9.
+    """
+    workers, curve = len(work), np.concatenate([[0.0], np.cumsum(work)])
+    # A share without items, or that took no time, leaves two corners at one place of an axis.
+    _, corner = np.unique(curve, return_index=True)
+    inner = np.interp(curve[-1] * np.arange(1, workers) / workers, curve[corner], cuts[corner])
+    return np.concatenate([cuts[:1], np.rint(inner).astype(int), cuts[-1:]])
+
+
+def share_costs(cost, cuts):
+    """Cost of every share, (workers, ...); cost (items, ...)."""
+    start = np.zeros((1, *np.shape(cost)[1:]))
+    return np.diff(np.concatenate([start, np.cumsum(cost, axis=0)])[cuts], axis=0)
+
+
+def draw(path, made, time_s):
+    """Acceleration, work of each worker and cuts, as the paper's Figs 14, 15 and 9."""
+    with picture(path, 1, 3, size=(12.0, 4.8)) as (figure, (whole, each, cuts)):
+        for way, (words, colour, line) in WAYS.items():
+            own = [one for one in made if one.way == way]
+            counts = np.array([one.workers for one in own])
+            gains = [one.acceleration for one in own]
+            whole.plot(counts, gains, ls=line, color=colour, label=words)
+            if way in PAPER_SPEEDUP:
+                gain, words = PAPER_SPEEDUP[way], f"measured in the paper, {way}"
+                whole.plot(PAPER_WORKERS, gain, "o", color=colour, label=words)
+                work = own[-1].work / own[-1].work.mean()
+                look = {"color": colour, "ls": line, "label": f"{way}: {own[-1].imbalance:.3g}"}
+                each.step(np.arange(1, PAPER_WORKERS + 1), work, where="mid", **look)
+        bound = counts / (1.0 + PAPER_SERIAL * (counts - 1.0))
+        whole.plot(counts, bound, ":", color=GREY, label="bound: no worker waits")
+        whole.set(xlabel="workers [1]", ylabel="acceleration [1]", ylim=(0, None))
+        whole.set_title(f"Whole run, {100 * PAPER_SERIAL:g} % not shared (Fig 14)")
+        figure.legend(*whole.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        each.set(xlabel="number of the worker [1]", ylabel="its work / mean [1]")
+        each.set(ylim=(0.0, 1.4 * each.get_ylim()[1]), title="Slowest over fastest (Fig 15)")
+        each.legend(loc="upper right")
+        places = next(one.cuts for one in reversed(made) if one.way == "rebalanced")
         cuts.plot(1e3 * time_s, places[:, 1:-1], color=BLUE, linewidth=0.5)
-        cuts.set(xlabel="time [ms]", ylabel="number of the body [1]")
-        cuts.set(xlim=(0.0, 1e3 * time_s[-1]), ylim=(0, places[0, -1]))
-        cuts.set_title("Lines: where simulated workers' shares begin (Fig 9)")
-        words = "Lines: simulated workers that share the work of one recorded run"
-        figure.suptitle(f"{words};\npoints: measured times of processes or threads")
+        cuts.set(xlabel="time [ms]", ylabel="number of the body [1]", ylim=(0, places[0, -1]))
+        cuts.set_title("Where rebalanced shares begin (Fig 9)")
 
 
 def run(options):
-    """Record, simulate, measure, picture."""
-    scene, at = paper_scene(options.mesh), study.output_paths(options.out)
-    counting = options.until, options.every
-    workload, simulation = record_workload(scene, Multirate(DT0, options.l), *counting)
-    workers = Workers(workload)
-    shared = {way: {n: workers.share(way, n) for n in options.counts} for way in WAYS}
-    chosen = {way: by_count[PAPER_WORKERS] for way, by_count in shared.items()}
-    # Gains of a second thread on a bar, and on the paper's block.
-    jobs = {"bar": ("", options.cells, [METHOD], 10), "block": (options.mesh, None, [METHOD], 400)}
-    often = options.rounds, options.repeats
-    gains = {name: thread_gains(*job, *often)[METHOD] for name, job in jobs.items()}
-    rows = TABLE.rows(one for by_count in shared.values() for one in by_count.values())
+    """Record, simulate, picture."""
+    at = study.output_paths(options.out)
+    time_s, entries, simulation = record(paper_scene(options.mesh), options)
+    work = evaluations(entries, options.every)
+    made = [shared(way, count, *work) for count in options.counts for way in WAYS]
+    rows, last = TABLE.rows(made), made[-len(WAYS) :]
     study.write_rows(at("scaling.csv"), rows)
-    each = {f"{way}_s": one.seconds for way, one in chosen.items()}
+    each = {f"{one.way}_evaluations": one.work for one in last}
     write_csv(at("shares.csv"), {"worker": np.arange(1, PAPER_WORKERS + 1), **each})
-    draw(at("scaling.png"), shared, chosen, workload.time, gains)
-    TABLE.show([row for row in rows if row["workers"] in (2, 4, PAPER_WORKERS, 256)])
+    draw(at("scaling.png"), made, time_s)
+    TABLE.show([row for row in rows if row["workers"] in (2, 4, PAPER_WORKERS)])
     figures = {}
-    for way, one in chosen.items():
-        if way != "due":
-            figures[f"imbalance_24_{way}"] = one.imbalance, "1", PAPER_IMBALANCE.get(way)
-        figures[f"contact_24_{way}"] = one.acceleration(), "1"
-        name = "speedup_24_simulated" if way == "rebalanced" else f"speedup_24_{way}"
-        figures[name] = one.acceleration(PAPER_SERIAL), "1", PAPER_SPEEDUP.get(way)
-    for end, row in zip(("", "_paper_block"), gains.values()):
-        figures[f"speedup_2_threads{end}"] = row["gain"], "1"
-    figures["speedup_2_threads_bodies"] = gains["bar"]["bodies"], "1"
-    for kind, price in zip(("bond", "pair", "sphere_pair"), workers.prices):
-        figures[f"ns_a_{kind}"] = 1e9 * float(price), "ns"
+    for one in last:
+        if one.way in PAPER_IMBALANCE:
+            figures[f"imbalance_24_{one.way}"] = one.imbalance, "1", PAPER_IMBALANCE[one.way]
+        figures[f"speedup_24_{one.way}"] = one.acceleration, "1", PAPER_SPEEDUP.get(one.way)
     study.finish(options, NAME, figures, simulation.compile_seconds)
 
 
