@@ -75,11 +75,6 @@ def run_costs():
     )
 
 
-def print_quality(scene):
-    """Print the worst of a scene's mesh."""
-    print("\n".join(str(dem.step_report(scene)).splitlines()[:10]))
-
-
 def controlled(step):
     """Steps for each by what limits them, down to an eighth, with dashpots limited to that."""
     # With the usual 0.25 the hole is 0.24 % off at 5e-4 s, with 0.2 less than 0.2 %.

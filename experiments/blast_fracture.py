@@ -11,12 +11,10 @@ zone at the hole, cracks that run out from it, and a wedge pushed out of the fre
     python experiments/blast_fracture.py --accuracy 5% --budget contact    # contact's part, too
     python experiments/blast_fracture.py --effects all         # laws evaluated everywhere
     python experiments/blast_fracture.py --with sphere_contact,friction    # contact of the paper
-    python experiments/blast_fracture.py --compare         # both contacts in a table
 
 Bodies touch as wholes and stick until they slip, as in any scene with effects="auto"; the paper has
-spheres behind broken faces, and sliding friction. With --compare the blast is run a second time
-with these; pictures are of the first run. An effect of --with takes the place of the usual one of
-its kind: surface_contact has spheres on all free faces.
+spheres behind broken faces, and sliding friction (demo_contact.py compares both). An effect of
+--with takes the place of the usual one of its kind: surface_contact has spheres on all free faces.
 
 Softening, slip and contact are evaluated only where and when they act; bodies that no wave has
 reached sleep. The certificate in the report says what acted, since when, and what was left out.
@@ -44,14 +42,13 @@ import sys
 from functools import partial
 
 import taichi_dem as dem
-from _blast import EFFECTS, blast_parser, print_quality, run_options
+from _blast import EFFECTS, blast_parser, run_options
 from _blast import METHODS as BLAST_METHODS
 from taichi_dem.demo import SETTINGS as DEMO_SETTINGS
 from taichi_dem.demo import figures_of, picture
 from taichi_dem.kit import study
 from taichi_dem.laws.roles import WORDS
 from taichi_dem.methods import Multirate, Uniform
-from taichi_dem.simulate import result_of
 
 NAME = "blast_fracture"
 #: Methods of the paper, made of the largest step dt0 [s] and the displacement limit l [m].
@@ -68,8 +65,6 @@ METHODS = {
     "fixed": (Uniform, 1e-8),
 }
 PAPER_DT0, PAPER_L = 1e-8, 1e-7
-#: Contact of the paper, as of --with.
-SPHERES = "sphere_contact,friction"
 SETTINGS = {
     "dt0": (None, None, study.number(0, 1), "largest step [s]; default: that of the method"),
     "l": (None, None, study.number(0, 1), "limit of a displacement in a step [m], default 1e-7"),
@@ -85,7 +80,6 @@ def options_parser():
     made.add_argument("--with", dest="added", default="", help="effects to add, with commas")
     words = "auto (default): evaluate laws only where they act; all: everywhere"
     made.add_argument("--effects", choices=WORDS, default=WORDS[0], help=words)
-    made.add_argument("--compare", action="store_true", help="also run it with the paper's contact")
     study.add_accuracy(made, "the displacement of the hole", "contact")
     study.add_pictures(made)
     return made
@@ -100,9 +94,10 @@ def effects_named(text, known):
     return names
 
 
-def chosen_scene(options, added):
-    """The block under gas, with the usual effects but for those of added and of options.without."""
-    mesh, names = dem.read_mesh(options.mesh), ["gas_pressure", *effects_named(added, EFFECTS)]
+def chosen_scene(options):
+    """The block under gas, with the usual effects but for those that options add and leave out."""
+    mesh = dem.read_mesh(options.mesh)
+    names = ["gas_pressure", *effects_named(options.added, EFFECTS)]
     given = [make() for name, make in EFFECTS.items() if name in names]
     scene = dem.Scene(mesh, dem.CONCRETE, options.effects, loads=given)
     without = effects_named(options.without, [effect.name for effect in scene.effects])
@@ -127,14 +122,11 @@ def chosen_method(name, dt0, distance):
 def run(options):
     """Run, picture, print."""
     method = chosen_method(options.method, options.dt0, options.l)
-    if options.compare and (options.added or options.without):
-        words = "must be left out with --with and --without: it runs two lists"
-        raise dem.InputError(f"compare {words}")
-    scene = chosen_scene(options, options.added)
+    scene = chosen_scene(options)
     if options.accuracy is not None:
         return run_to_accuracy(scene, options)
     if options.verbose:
-        print_quality(scene)
+        print(dem.step_report(scene))
         print("", *dem.estimated_effects(scene, options.until), "", sep="\n")
     try:
         result = dem.simulate(scene, method=method, title="blasting", **run_options(options))
@@ -143,42 +135,13 @@ def run(options):
             picture(error.result, options)
         raise
     study.show_report(options, result.report)
-    figures, reports = figures_of(result), [result.report]
-    if options.compare:
-        spheres = run_with_spheres(options, method)
-        show_both(result, spheres)
-        figures.update({f"spheres_{name}": one[:2] for name, one in figures_of(spheres).items()})
-        reports.append(spheres.report)
     draw = partial(picture, result, options)
-    study.finish(options, NAME, figures, reports, see="cracks.png", draw=draw)
-
-
-def run_with_spheres(options, method):
-    """Result of the same blast with the paper's contact, also where that diverges."""
-    given = {name: getattr(options, name) for name in ("until", "driver", "samples")}
-    scene = chosen_scene(options, SPHERES)
-    return result_of(dem.simulate, scene, method=method, title="the paper's contact", **given)
-
-
-def show_both(bodies, spheres):
-    """Print what the contacts of two runs differ in."""
-    # Imported here: the default run needs no table, and pandas takes half a second.
-    import pandas as pd
-
-    runs = {"whole bodies": bodies, "the paper's spheres": spheres}
-    table = {
-        f"{name}, diverged" if run.diverged else name: {
-            **{key: one[0] for key, one in figures_of(run).items()},
-            "cpu_s": run.report.run_cpu_seconds,
-        }
-        for name, run in runs.items()
-    }
-    print(pd.DataFrame(table).to_string(float_format="{:.4g}".format), "\n")
+    study.finish(options, NAME, figures_of(result), [result.report], see="cracks.png", draw=draw)
 
 
 def run_to_accuracy(scene, options):
     """Find the first goal that the scene has to an accuracy; print and write the answer."""
-    study.check_accuracy(options, ("dt0", "l", "compare"))
+    study.check_accuracy(options, ("dt0", "l"))
     at = study.output_paths(options.out)
     in_a_hole = "hole" in scene.mesh.groups
     goal = dem.goals.hole_displacement() if in_a_hole else dem.goals.kinetic_energy()
