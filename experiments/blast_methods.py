@@ -9,11 +9,10 @@ same answer: its displacement limit l is an indirect stability rule, not a measu
     python experiments/blast_methods.py --methods implicit,explicit_limited      # paper's uniform
 
 The reference is the implicit method at a sixteenth of its step. The displacement is the mean of the
-hole's wall. The largest stable step is found by doubling, in runs to --stable-until that must end
-within 10 % of the reference. One bond nearly breaks at 2e-4 s; it breaks in some runs, which end
-one per cent away. Times are CPU seconds of stepping alone. Writes methods.png, levels_NAME.png for
-every method with a step for each body, the table as CSV, the history of every method and
-summary.json to results/blast_methods/.
+hole's wall. One bond nearly breaks at 2e-4 s; it breaks in some runs, which end one per cent away.
+Times are CPU seconds of stepping alone. Writes methods.png, levels_NAME.png for every method with a
+step for each body, the table as CSV, the history of every method and summary.json to
+results/blast_methods/.
 """
 
 import sys
@@ -24,7 +23,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from _blast import METHODS, blast_parser, paper_scene, run_costs, run_options
-from taichi_dem import ImplicitDashpots, ProgressBar, SimulationDiverged, simulate
+from taichi_dem import ImplicitDashpots, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import picture, styles_of
@@ -37,14 +36,10 @@ QUICK_METHODS = ["explicit_limited", "implicit"]
 SETTINGS = {
     "methods": ([*METHODS], QUICK_METHODS, study.several(study.one_of(METHODS)), "default all"),
     "until": (5e-4, 6e-5, study.number(0, 1), "simulated time [s], default 5e-4"),
-    "stable_until": (1e-4, 6e-5, study.number(0, 1), "end of trial runs [s], default 1e-4"),
     "samples": (100, 10),
-    "doublings": (8, 0, study.whole(0, 20), "tried for the largest stable step, default 8"),
 }
 #: CPU seconds of the paper's runs to 0.5 ms, section 4.3.
 PAPER = {"paper_uniform": 3897 * 60.0, "paper_multirate": 2702 * 60.0}
-#: Error of the displacement beyond which a run counts as unstable though no body ran away.
-USABLE = 0.1
 MOVED = "hole_radial_displacement_mm"
 TABLE = study.Table(
     method=("name", "method"),
@@ -56,7 +51,6 @@ TABLE = study.Table(
     displacement_error=("error", "error", ".2g%", "1"),
     broken_faces=("report.broken_faces", "faces", "", "1"),
     ledger_residual_fraction=("report.energy_residual_fraction", "residual", ".2g%", "1"),
-    largest_stable_step_s=("stable", "stable to", ".2g", "s"),
     bound_by=(lambda one: max(one.report.bound_by.items(), key=itemgetter(1))[0], "most bound by"),
 )
 options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS)
@@ -73,29 +67,6 @@ def follow(scene, name, make, step, options):
         plot_levels(path, series["time_s"], shares, step)
     made = {"report": result.report, "series": series, "moved": float(series[MOVED][-1])}
     return SimpleNamespace(name=name, make=make, step=step, **made)
-
-
-def serves(scene, method, exact, options):
-    """Whether a method reaches the time for stability, undiverged and near the reference."""
-    short = {**run_options(options), "until": options.stable_until, "samples": 1}
-    try:
-        found = simulate(scene, method=method, progress=None, **short).series
-    except SimulationDiverged:
-        return False
-    wanted = np.interp(found["time_s"][-1], exact["time_s"], exact[MOVED])
-    return abs(found[MOVED][-1] / wanted - 1.0) < USABLE
-
-
-def largest_stable_step(scene, one, exact, options):
-    """Largest step [s], a power of two from that of a run, with which its method serves."""
-    step = one.step
-    with ProgressBar("largest stable step") as bar:
-        for tried in range(options.doublings):
-            bar.count(tried, options.doublings)
-            if not serves(scene, one.make(2.0 * step), exact, options):
-                break
-            step *= 2.0
-    return step
 
 
 def draw(path, series):
@@ -132,7 +103,6 @@ def run(options):
     runs = [follow(scene, name, *METHODS[name], options) for name in options.methods]
     for one in runs:
         one.error = abs(one.moved / reference.moved - 1.0)
-        one.stable = largest_stable_step(scene, one, reference.series, options)
     rows, best = TABLE.rows(runs), reference.report
     study.write_rows(at("methods.csv"), rows)
     TABLE.show(rows)
