@@ -1,9 +1,12 @@
 """Motion of the container: on its spring, driven by base and filling, or fixed to the base.
 
-All have ``load`` for the numbers of a batch, and the ti.funcs ``start``, ``motion`` and ``base`` at
-the beginning of a step, ``recoil``, the speed that a unit impulse gives it [1/kg], ``renew`` where
-the base changes its frequency, and ``advance``, which returns the attempts of the integration, or
--1.
+A container moves one scene, or a group of ``scenes()`` that begins with scene ``first(s)``. All
+have ``load`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)`` of every scene, then
+``complete_start(first)``; ``motion(s)`` at the beginning of a step, with ``base(s)``, the base's
+displacement [m]; ``recoil(s)``, the speed that a unit impulse gives it [1/kg]; ``renew(s)`` where
+the base has changed its motion, between two frequencies of a sweep; ``set_action(s, action)`` of
+every filling over the step, and then ``advance(first)``, which returns the attempts of the
+integration, or -1.
 """
 
 from typing import Any
@@ -12,7 +15,7 @@ import taichi as ti
 
 from ca_damper.engine import rk45
 from ca_damper.engine.signals import DeviceExcitation
-from ca_damper.filling import Action, Motion
+from ca_damper.filling import Motion
 from ca_damper.oscillator import Forcing, sine_and_cosine, slope, slope_at_phase
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
@@ -26,19 +29,13 @@ _STAGES = (1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0)
 
 @ti.data_oriented
 class Container:
-    """Base of all containers; by itself it takes over nothing."""
+    """Base of all containers: what acts on the container of each scene in the present step.
 
-    def load(self, rtol: float, atol: float) -> None:
-        """Take over the numbers of a batch."""
+    impulse [N s] and carried [kg]. tolerance: local error allowed, rtol and atol, the latter in m
+    and m/s. is_group: whether it may move several scenes.
+    """
 
-    @ti.func
-    def renew(self, s):
-        """Nothing to do."""
-
-
-@ti.data_oriented
-class IntegratedContainer(Container):
-    """Base of containers that RK45 moves on under the action of the filling."""
+    is_group = False
 
     def __init__(self, table: SceneFields):
         self.table = table
@@ -49,14 +46,45 @@ class IntegratedContainer(Container):
         """Take over the numbers of a batch."""
         assign(self.tolerance, [rtol, atol])
 
+    @ti.func
+    def first(self, s):
+        """First scene of the group of scene s."""
+        return s
+
+    @ti.func
+    def scenes(self):
+        """Scenes of a group."""
+        return 1
+
+    @ti.func
+    def complete_start(self, first):
+        """Nothing to do."""
+
+    @ti.func
+    def renew(self, s):
+        """Nothing to do."""
+
+    @ti.func
+    def set_action(self, s, action):
+        """Take over the action of the filling of a scene over the step."""
+        if action.impulse != self.impulse[s] or action.carried != self.carried[s]:
+            self.impulse[s], self.carried[s] = action.impulse, action.carried
+            self._note_action(s)
+
+    @ti.func
+    def _note_action(self, s):
+        """Nothing that depends on it is kept."""
+
 
 @ti.data_oriented
-class SpringContainer(IntegratedContainer):
-    """Base of integrated containers with one spring and dashpot each.
+class SpringContainer(Container):
+    """Base of containers with one spring and dashpot each, that RK45 moves on.
 
-    They have ``_begin(s)``, ``_load(s, action)`` over a step, ``_slope(s, load)`` at its beginning
-    and ``_integrated(s, load)``: state and slope at its end, and attempts. impulse_velocity: share
-    of the acceleration that is due to impacts [m/s^2].
+    They have ``_begin(s)``, ``_load(s)`` over a step, ``_slope(s, load)`` at its beginning and
+    ``_integrated(s, load)``: state and slope at its end, and attempts.
+
+    state, slope: displacement and speed, and their change. impulse_velocity: share of the present
+    acceleration that is due to impacts [m/s^2].
     """
 
     def __init__(self, table: SceneFields):
@@ -68,8 +96,9 @@ class SpringContainer(IntegratedContainer):
     def start(self, s, x, v):
         """Place the container; nothing acts on it but spring, dashpot and excitation."""
         self.state[s], self.impulse_velocity[s] = ti.Vector([x, v]), 0.0
+        self.impulse[s], self.carried[s] = 0.0, 0.0
         self._begin(s)
-        self._set_action(s, Action(0.0, 0.0))
+        self._note_action(s)
 
     @ti.func
     def recoil(self, s):
@@ -84,19 +113,17 @@ class SpringContainer(IntegratedContainer):
         )
 
     @ti.func
-    def _set_action(self, s, action):
-        self.impulse[s], self.carried[s] = action.impulse, action.carried
-        self.slope[s] = self._slope(s, self._load(s, action))
+    def _note_action(self, s):
+        """The slope at the beginning of the step; the last one serves again where none is new."""
+        self.slope[s] = self._slope(s, self._load(s))
 
     @ti.func
-    def advance(self, s, action):
-        """Take the container over the step; the last slope serves again unless the load changed."""
-        if action.impulse != self.impulse[s] or action.carried != self.carried[s]:
-            self._set_action(s, action)
-        y, change, attempts = self._integrated(s, self._load(s, action))
+    def advance(self, s):
+        """Take the container over the step."""
+        y, change, attempts = self._integrated(s, self._load(s))
         self.state[s], self.slope[s] = y, change
-        mass = self.table.mass[s] + action.carried
-        self.impulse_velocity[s] = action.impulse / (self.table.dt[s] * mass)
+        mass = self.table.mass[s] + self.carried[s]
+        self.impulse_velocity[s] = self.impulse[s] / (self.table.dt[s] * mass)
         return attempts
 
 
@@ -120,7 +147,7 @@ class SprungContainer(SpringContainer):
     def renew(self, s):
         """Take over the turn of the base at another frequency."""
         self._begin(s)
-        self._set_action(s, Action(self.impulse[s], self.carried[s]))
+        self._note_action(s)
 
     @ti.func
     def _begin(self, s):
@@ -135,15 +162,15 @@ class SprungContainer(SpringContainer):
         return slope_at_phase(forcing, ti.Vector([0.0, 1.0]), self.state[s])
 
     @ti.func
-    def _load(self, s, action):
+    def _load(self, s):
         """Forcing over the step that begins now; (K + i w C) y0 turned by the present phase."""
-        table, circle = self.table, self.clock.circle[s]
-        per_mass = 1.0 / (table.mass[s] + action.carried)
+        table, circle, carried = self.table, self.clock.circle[s], self.carried[s]
+        per_mass = 1.0 / (table.mass[s] + carried)
         omega = 2.0 * ti.math.pi * table.frequency[s]
         stiffness, damping = table.stiffness[s] * per_mass, table.damping[s] * per_mass
         by_spring = stiffness * table.base_amplitude[s]
         by_dashpot = damping * omega * table.base_amplitude[s]
-        force = action.impulse / table.dt[s] - action.carried * self.table.gravity[s]
+        force = self.impulse[s] / table.dt[s] - carried * table.gravity[s]
         return Forcing(
             stiffness=stiffness,
             damping=damping,
@@ -208,13 +235,14 @@ class ExcitedContainer(SpringContainer):
         return self._change(load, 0.0, self.state[s])
 
     @ti.func
-    def _load(self, s, action):
-        per_mass = 1.0 / (self.table.mass[s] + action.carried)
-        heavy = action.carried
+    def _load(self, s):
+        """Load over the step that begins now."""
+        heavy = self.carried[s]
+        per_mass = 1.0 / (self.table.mass[s] + heavy)
         if ti.static(self.lifts):
             # On a spring the weight of the container itself is in x = 0.
             heavy += self.table.mass[s]
-        force = action.impulse / self.table.dt[s] - heavy * self.table.gravity[s]
+        force = self.impulse[s] / self.table.dt[s] - heavy * self.table.gravity[s]
         return Load(
             scene=s,
             start=self.elapsed[s] * self.table.dt[s],
@@ -250,13 +278,13 @@ class PrescribedContainer(Container):
     """The container fixed to the base, whose motion is prescribed, whatever fills it."""
 
     def __init__(self, table: SceneFields, excitation: DeviceExcitation):
-        self.table, self.moved_by = table, excitation.base
-        self.elapsed = table.field(ti.i32)
+        super().__init__(table)
+        self.moved_by, self.elapsed = excitation.base, table.field(ti.i32)
 
     @ti.func
     def start(self, s, x, v):
         """Time zero; x and v are not used."""
-        self.elapsed[s] = 0
+        self.elapsed[s], self.impulse[s], self.carried[s] = 0, 0.0, 0.0
 
     @ti.func
     def recoil(self, s):
@@ -275,7 +303,7 @@ class PrescribedContainer(Container):
         return Motion(now[0], now[1], now[2])
 
     @ti.func
-    def advance(self, s, action):
+    def advance(self, s):
         """Nothing to integrate: time moves the base."""
         self.elapsed[s] = self.elapsed[s] + 1
         return 1

@@ -1,7 +1,8 @@
 """The step of a coupled scene: filling, container, measures, clock; and the loop over all scenes.
 
-One scene a thread, the whole time loop inside the kernel. State is stored in fields between
-launches, so that neither their number nor other scenes change a bit.
+One scene a thread, or the group of scenes whose boxes are at places of one structure; the whole
+time loop is inside the kernel. All state is stored in fields between
+launches, so that neither their number nor other scenes in the batch change a bit.
 """
 
 import math
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
+from ca_damper.filling import Action, Motion
 from ca_damper.report import measures
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
@@ -71,8 +73,11 @@ class MomentumAccount:
 
 @ti.data_oriented
 class Coupling:
-    """Filling, container and clock of all scenes, tied together.
+    """Fillings, container and clock of all scenes, tied together.
 
+    device: what ``filling.bind`` gave. order: first scene of each group. before: motion at the
+    beginning of a step. wait: whether fillings take a step in two parts, so that the blows of all
+    boxes of a structure are resolved together. account: a MomentumAccount. recorder: a Recorder.
     record: of the measured cycles, shape (scenes, cycles, columns of ``measures.COLUMNS``).
     """
 
@@ -93,15 +98,21 @@ class Coupling:
         self.attempts, self.force = table.field(ti.i64), table.field(ti.f64)
         self.sums, self.extremes = table.vector(SUM_COUNT, ti.f64), table.vector(2, ti.f64)
         self.record = table.field(ti.f64, "cycles", len(measures.COLUMNS))
+        self.before = table.vector(3, ti.f64)
+        self.wait = hasattr(device, "find_blows")
 
     @ti.kernel
     def start(self, initial: _F64):
         """Begin at step 0: particles at their start, the container at initial[s] = (x, v)."""
         for t in range(self.padding * self.table.scenes[None]):
             if t % self.padding == 0:
-                s = t // self.padding
-                self._start_container(s, initial[s, 0], initial[s, 1])
-                self._start_filling(s)
+                first = t // self.padding
+                if first == self.container.first(first):
+                    for s in range(first, first + self.container.scenes()):
+                        self._start_container(s, initial[s, 0], initial[s, 1])
+                    self.container.complete_start(first)
+                    for s in range(first, first + self.container.scenes()):
+                        self._start_filling(s)
 
     @ti.func
     def _start_container(self, s, x, v):
@@ -132,8 +143,8 @@ class Coupling:
 
     @ti.kernel
     def advance(self, share: ti.f64):
-        """Step every scene to a share of the steps from its begin to its goal."""
-        for t in range(self.padding * self.table.scenes[None]):
+        """Step every group to a share of the steps from its begin to its goal."""
+        for t in range(self.padding * (self.table.scenes[None] // self.container.scenes())):
             if t % self.padding == 0:
                 self._advance_scene(self.order[t // self.padding], share)
 
@@ -148,16 +159,67 @@ class Coupling:
                 self.status[s] = CUT_SHORT
 
     @ti.func
-    def _is_sound(self, s):
-        return self.status[s] == 0
+    def _is_sound(self, first):
+        sound = self.status[first] == 0
+        if ti.static(self.container.is_group):
+            for s in range(first, first + self.container.scenes()):
+                if self.status[s] != 0:
+                    sound = False
+        return sound
 
     @ti.func
-    def _advance_step(self, s):
-        before = self.container.motion(s)
-        self._record(s, before)
-        action = self.device.advance(s, self.step[s], before)
-        attempts = self.container.advance(s, action)
-        self._book(s, before, action, attempts)
+    def _advance_step(self, first):
+        """The order of a step: fillings, container, clock, measures, divergence."""
+        if ti.static(self.container.is_group):
+            self._advance_group(first)
+        else:
+            before = self.container.motion(first)
+            self._record(first, before)
+            action = self.device.advance(first, self.step[first], before)
+            self.container.set_action(first, action)
+            attempts = self.container.advance(first)
+            self._book(first, before, action, attempts)
+
+    @ti.func
+    def _advance_group(self, first):
+        """The same of a group, whose motions wait in memory."""
+        end = first + self.container.scenes()
+        for s in range(first, end):
+            motion = self.container.motion(s)
+            self.before[s] = ti.Vector([motion.x, motion.v, motion.a])
+            self._record(s, motion)
+        self._set_actions(first)
+        attempts = self.container.advance(first)
+        for s in range(first, end):
+            ours = 0
+            if s == first:
+                ours = attempts
+            action = Action(self.container.impulse[s], self.container.carried[s])
+            self._book(s, self._motion_before(s), action, ours)
+
+    @ti.func
+    def _motion_before(self, s):
+        """Motion at the beginning of the step."""
+        before = self.before[s]
+        return Motion(before[0], before[1], before[2])
+
+    @ti.func
+    def _set_actions(self, first):
+        """Actions of the fillings on the container; scenes without a box have none."""
+        end = first + self.container.boxed[None]
+        if ti.static(self.wait):
+            for s in range(first, end):
+                blows = self.device.find_blows(s, self.step[s], self._motion_before(s))
+                self.container.set_blows(s, blows)
+            self.container.resolve(first)
+        for s in range(first, end):
+            action = Action(0.0, 0.0)
+            if ti.static(self.wait):
+                recoil = self.container.recoil_of(s)
+                action = self.device.carry_out(s, self.step[s], self._motion_before(s), recoil)
+            else:
+                action = self.device.advance(s, self.step[s], self._motion_before(s))
+            self.container.set_action(s, action)
 
     @ti.func
     def _record(self, s, before):

@@ -6,7 +6,6 @@ from typing import Any
 
 from ca_damper.engine.container import container_of
 from ca_damper.engine.coupling import Coupling, MomentumAccount
-from ca_damper.engine.group_coupling import GroupCoupling
 from ca_damper.engine.modal_container import ModalContainer
 from ca_damper.engine.recorder import ROOM, Recorder
 from ca_damper.engine.signals import DeviceExcitation
@@ -57,16 +56,14 @@ class DamperEngine(Engine):
         mount: Any = self.structure.mount
         kind = self.structure.excitation
         self.excitation = DeviceExcitation(self.table, self.clock, kind)
-        coupling: type[Coupling] | type[GroupCoupling] = Coupling
         if isinstance(mount, int):
             self.container = ModalContainer(self.table, self.excitation, mount)
-            coupling = GroupCoupling
         else:
             is_sine = kind == ExcitationKind()
             self.container = container_of(mount, self.table, self.clock, self.excitation, is_sine)
         self.device = self.structure.filling.bind(self.table)
         parts = self.container, self.device, self.account, self.recorder
-        self.coupling = coupling(self.table, self.clock, *parts)
+        self.coupling = Coupling(self.table, self.clock, *parts)
         self.is_compiled = False
 
     def load(

@@ -1,14 +1,15 @@
 """Boxes at places of a structure given by its modes; interface as that of ``container.py``.
 
-The modes of a group belong to its first scene. A step: ``set_blows`` of every box, ``resolve``,
-``recoil_of`` each, ``set_action`` of every scene, ``advance``.
+The modes of a group belong to its first scene, and RK45 takes them over a step at once. Blows that
+wait for those of other boxes come before: ``set_blows`` of every box, then ``resolve``, then
+``recoil_of`` each.
 """
 
 import numpy as np
 import taichi as ti
 
 from ca_damper.engine import rk45
-from ca_damper.engine.container import MOST_ATTEMPTS, IntegratedContainer
+from ca_damper.engine.container import MOST_ATTEMPTS, Container
 from ca_damper.engine.modal_mount import ModalMount
 from ca_damper.engine.signals import DeviceExcitation
 from ca_damper.filling import Action, Motion, Recoil
@@ -17,21 +18,29 @@ from taichi_dem.kit.allocation import assign
 
 
 @ti.data_oriented
-class ModalContainer(IntegratedContainer):
+class ModalContainer(Container):
     """Boxes of all groups, and their modes in metres as ``ModalMount`` counts them.
 
-    Of a scene, lift: what motion of its place adds to the modes; home: number in the group of the
-    first scene at its place. Of a group, at its first scene, inverse: of the modal masses with all
-    that is carried [1/kg]; constant, lag: forces of the fillings on the modes [N], and by the
-    acceleration of the base [kg]; changed: whether slope and inverse are out of date.
+    Of the batch: group, boxed: scenes of a group, and those of them with a box; mass [kg],
+    stiffness [N/m], damping [N s/m] of each mode, share: of the base's motion, pushed: by the force
+    of the excitation. Of a scene: shape at its place; lift: what motion of the place adds to the
+    modes; residual; home: number in the group of the first scene at its place; seen: motion of the
+    place. Of a group, at its first scene: state, slope: modal
+    coordinates and speeds, and their change; inverse of the modal masses [1/kg] with all that is
+    carried; constant [N]: forces of the fillings on the modes, lag [kg]: by the acceleration of the
+    base; elapsed: steps since the start; changed: whether slope and inverse are out of date;
+    scratch for forces on the modes (pull), their accelerations (gain) and motion (tried). Of a box,
+    of the blows of a step: struck, rubbed [kg] of ``Blows``, speed_gain [m/s] and shared by all.
     """
+
+    is_group = True
 
     def __init__(self, table: SceneFields, excitation: DeviceExcitation, modes: int):
         super().__init__(table)
         self.excitation, self.modes = excitation, modes
         for name in ("mass", "stiffness", "damping", "share", "pushed"):
             setattr(self, name, ti.field(ti.f64, shape=modes))
-        self.group, self.boxes = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
+        self.group, self.boxed = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
         for name in ("shape", "lift", "constant", "lag", "pull", "gain"):
             setattr(self, name, table.field(ti.f64, modes))
         self.inverse, self.tried = table.field(ti.f64, modes, modes), table.field(ti.f64, 2 * modes)
@@ -48,7 +57,7 @@ class ModalContainer(IntegratedContainer):
         for field, row in zip((*modes, self.pushed), (*mount.of_modes(), mount.of_force())):
             assign(field, row)
         rows = mount.of_scenes()
-        assign(self.boxes, len(mount.places))
+        assign(self.boxed, len(mount.places))
         assign(self.group, len(rows))
         of_group = np.arange(self.table.scene_count) % len(rows)
         every = rows[of_group]
@@ -62,6 +71,11 @@ class ModalContainer(IntegratedContainer):
     def first(self, s):
         """First scene of the group of scene s."""
         return s - s % self.group[None]
+
+    @ti.func
+    def scenes(self):
+        """Scenes of a group."""
+        return self.group[None]
 
     @ti.func
     def start(self, s, x, v):
@@ -107,11 +121,9 @@ class ModalContainer(IntegratedContainer):
             self.changed[s] = 1
 
     @ti.func
-    def set_action(self, s, action):
-        """Take over the action of the filling of a scene on its place over the step."""
-        if action.impulse != self.impulse[s] or action.carried != self.carried[s]:
-            self.impulse[s], self.carried[s] = action.impulse, action.carried
-            self.changed[self.first(s)] = 1
+    def _note_action(self, s):
+        """Slope and inverse of the group are out of date."""
+        self.changed[self.first(s)] = 1
 
     @ti.func
     def set_blows(self, s, blows):
@@ -122,9 +134,7 @@ class ModalContainer(IntegratedContainer):
     @ti.func
     def resolve(self, first):
         """Resolve the blows of all boxes of a group together."""
-        # Floors and ceilings first, as if all that is struck were carried; then side walls, where
-        # no grain may drag others on.
-        some, end = 0.0, first + self.boxes[None]
+        some, end = 0.0, first + self.boxed[None]
         for s in range(first, end):
             some += self.struck[s] + self.rubbed[s]
             self.speed_gain[s], self.shared[s] = 0.0, 0.0
@@ -150,7 +160,7 @@ class ModalContainer(IntegratedContainer):
     def _share(self, first, s):
         """Add what is rubbed in a box to the shares of all boxes."""
         self._push(first, s)
-        for other in range(first, first + self.boxes[None]):
+        for other in range(first, first + self.boxed[None]):
             moved = self.rubbed[s] * ti.abs(self._at_place(first, other))
             self.shared[other] = self.shared[other] + moved
 
@@ -230,7 +240,7 @@ class ModalContainer(IntegratedContainer):
             for j in range(self.modes):
                 self.inverse[first, i, j] = 0.0
             self.inverse[first, i, i] = 1.0 / self.mass[i]
-        for s in range(first, first + self.boxes[None]):
+        for s in range(first, first + self.boxed[None]):
             self._carry(first, s, self.carried)
 
     @ti.func
@@ -238,7 +248,7 @@ class ModalContainer(IntegratedContainer):
         self._renew_inverse(first)
         for i in range(self.modes):
             self.constant[first, i], self.lag[first, i] = 0.0, 0.0
-        for s in range(first, first + self.boxes[None]):
+        for s in range(first, first + self.boxed[None]):
             c, dt = self.carried[s], self.table.dt[first]
             force = self.impulse[s] / dt - c * self.table.gravity[s]
             for k in range(self.modes):
@@ -251,7 +261,7 @@ class ModalContainer(IntegratedContainer):
     def _carry(self, first, s, masses: ti.template()):
         """Add the masses of all boxes at a place to the modal masses, at the first of its boxes."""
         c = 0.0
-        for other in range(s, first + self.boxes[None]):
+        for other in range(s, first + self.boxed[None]):
             if self.home[other] == s - first:
                 c += masses[other]
         if c > 0.0:
@@ -269,7 +279,7 @@ class ModalContainer(IntegratedContainer):
         """Accelerations of the modes by the impacts of the step."""
         for k in range(self.modes):
             struck = 0.0
-            for s in range(first, first + self.boxes[None]):
+            for s in range(first, first + self.boxed[None]):
                 struck += self.impulse[s] / self.table.dt[first] * self.shape[s, k]
             self.pull[first, k] = struck
         self._set_gain(first)
