@@ -220,27 +220,6 @@ class Batch(LoadedScenes):
         self._check_divergence()
         self._warn_of_divergence()
 
-    def change(self, **numbers: Any) -> None:
-        """Replace parameters of the scenes; ``start`` must follow.
-
-        The bits are those of a batch made with these parameters, and nothing is compiled.
-
-        Parameters
-        ----------
-        **numbers : float or array_like
-            Parameters by name, as ``SceneTable.change``.
-
-        Raises
-        ------
-        InputError
-            A batch of these parameters would be refused; this one then stays unchanged.
-        """
-        engine = self.engine
-        self.numbers = self._checked(self.numbers.changed(**numbers))
-        self._started = False
-        engine.table.load(self.table)
-        self._load_pace()
-
     def drive(self, frequency: Any) -> None:
         """Continue at another frequency, at the end of a cycle.
 

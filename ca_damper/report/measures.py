@@ -198,42 +198,6 @@ class Cycles:
         """Mean power that the filling takes [W], and i times its reactive power."""
         return -0.5 * self.harmonic("f") * np.conj(self.harmonic("v"))
 
-    def powers(
-        self, base_amplitude: FloatOrArray, stiffness: FloatOrArray, damping: FloatOrArray
-    ) -> dict[str, np.ndarray]:
-        """Mean power of base, dashpot and filling, by first harmonics.
-
-        Parameters
-        ----------
-        base_amplitude : float or ndarray
-            Amplitude of the base [m].
-        stiffness : float or ndarray
-            Stiffness of the primary structure [N/m].
-        damping : float or ndarray
-            Damping of the primary structure [N s/m].
-
-        Returns
-        -------
-        dict of ndarray
-            Power [W] that "base" gives and that "dashpot" and "filling" take.
-
-        Notes
-        -----
-        The base moves as y = -i y0 and pulls the container with K (y - x) + C (y' - x'). In the
-        steady state, dashpot and filling together take what the base gives.
-        """
-        base_amplitude = real_numbers("base_amplitude", base_amplitude)
-        stiffness, damping = real_numbers("stiffness", stiffness), real_numbers("damping", damping)
-        base = -1j * base_amplitude * np.ones(len(self.omega))
-        stretch, speed = base - self.harmonic("x"), 1j * self.omega * base
-        drag = speed - self.harmonic("v")
-        pull = stiffness * stretch + damping * drag
-        return {
-            "base": 0.5 * (pull * np.conj(speed)).real,
-            "dashpot": 0.5 * damping * np.abs(drag) ** 2,
-            "filling": self.complex_power.real,
-        }
-
     def loss_factor(self, mass: FloatOrArray) -> np.ndarray:
         """Energy that the filling takes in a radian over the energy in motion, c / (w (M + m)).
 

@@ -22,12 +22,6 @@ class SceneNumbers:
         self.largest_dt = self.table.column("dt")
         self.drive(self.table.column("frequency"))
 
-    def changed(self, **numbers: Any) -> "SceneNumbers":
-        """The same with other numbers, as ``SceneTable.change``."""
-        table = self.table.copy()
-        table.change(**{"dt": self.largest_dt, **numbers})
-        return SceneNumbers(self.fillings, table, self.has_box)
-
     def drive(self, frequency: np.ndarray) -> None:
         """Take other frequencies [Hz], (scenes,), and fit the steps to the cycles."""
         asked = zip(frequency, self.largest_dt)

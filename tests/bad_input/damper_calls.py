@@ -84,7 +84,6 @@ def _fillings():
 def _batches():
     yield "SceneTable", ca.SceneTable, TABLE
     yield "SceneTable.change", on_new_table("change"), TABLE
-    yield "Batch.change", on_new_batch("change"), TABLE
     yield "SceneTable.drive", on_new_table("drive"), {"frequency": 5.0, "dt": 1e-3}
     yield "SceneTable.column", ca.SceneTable(**TABLE).column, {"name": "dt"}
     yield "SceneTable.row", ca.SceneTable(**TABLE).row, {"s": 0}
@@ -100,8 +99,6 @@ def _batches():
     yield "runs.film.Film.show", made_film().show, page
     for name in ("mean_of", "per_step", "harmonic", "harmonic_by_cycle"):
         yield f"report.measures.Cycles.{name}", getattr(cycles(), name), {"name": "x"}
-    powers = {"base_amplitude": 1e-3, "stiffness": 100.0, "damping": 0.1}
-    yield "report.measures.Cycles.powers", cycles().powers, powers
     yield "report.measures.Cycles.loss_factor", cycles().loss_factor, {"mass": 0.1}
     yield "report.measures.Cycles.damping_ratio", cycles().damping_ratio, HELD
 

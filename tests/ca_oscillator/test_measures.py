@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ca_damper import Automaton, Batch, Oscillator, SceneTable
-from ca_damper.report.measures import COLUMNS, Cycles, peak
+from ca_damper.report.measures import Cycles, peak
 
 STEPS, COUNT, OMEGA = 500, 4, 2.0 * math.pi * 6.0
 
@@ -67,24 +67,6 @@ def test_apparent_mass_and_damping_are_those_of_a_mass_and_a_dashpot():
     assert np.isnan(cycles_of(nothing, nothing, nothing).apparent_mass).all()
 
 
-def cycles_of_harmonics(frequency, **harmonics):
-    """One measured cycle of 1000 steps of exact harmonics x, v and f."""
-    sums = dict.fromkeys(COLUMNS, 0.0)
-    for name, value in harmonics.items():
-        sums[f"{name}_cos"], sums[f"{name}_sin"] = 500.0 * value.real, -500.0 * value.imag
-    return Cycles(np.array([frequency]), np.array([1000]), np.array([[list(sums.values())]]))
-
-
-def test_what_the_base_gives_the_dashpot_and_the_filling_take():
-    """In the steady state of the empty container, by its transfer function."""
-    o, frequency = Oscillator(), 6.3
-    x, w = o.base_amplitude * o.transfer(frequency), 2.0 * np.pi * frequency
-    cycles = cycles_of_harmonics(frequency, x=-1j * x, v=w * x)
-    powers = cycles.powers(o.base_amplitude, o.stiffness, o.damping)
-    assert powers["base"][0] == pytest.approx(powers["dashpot"][0], rel=1e-12)
-    assert powers["base"][0] > 0.0 == powers["filling"][0]
-
-
 def force_mismatch(cycles, o, begin, end):
     """Distance of the harmonic of x from that by the measured force, as a share of the peak.
 
@@ -99,21 +81,6 @@ def force_mismatch(cycles, o, begin, end):
     given -= o.mass * push + (1j * omega * o.mass + o.damping) * shift
     x = cycles.harmonic("x")
     return np.abs(given / (held - o.mass * omega**2) - x).max() / np.abs(x).max()
-
-
-@pytest.mark.parametrize("share", [0.0, 0.25])
-def test_a_force_that_is_not_the_one_that_acted_is_found_out(share):
-    """X = (K + i w C)(-i y0 + F / held) / ...: a share more of the force shifts X by as much."""
-    o = Oscillator()
-    omega = 2.0 * np.pi * o.natural_frequency
-    held = o.stiffness + 1j * omega * o.damping
-    force, dynamic = 0.02 + 0.01j, held - o.mass * omega**2
-    x = (-1j * o.base_amplitude * held + force) / dynamic
-    still = {"x": np.zeros(1), "v": np.zeros(1)}
-    measured = (1.0 + share) * force * np.sinc(1e-3)
-    cycles = cycles_of_harmonics(o.natural_frequency, x=x, f=measured)
-    wanted = share * abs(force / dynamic) / abs(x)
-    assert force_mismatch(cycles, o, still, still) == pytest.approx(wanted, abs=1e-12)
 
 
 def test_the_container_moves_as_the_measured_force_demands():
