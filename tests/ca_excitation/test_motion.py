@@ -1,8 +1,6 @@
 """Structures under signals, shocks, let go and on floors move as the exact solution."""
 
 import math
-import os
-import signal
 
 import numpy as np
 import pytest
@@ -10,7 +8,6 @@ import pytest
 from ca_damper import (
     Automaton,
     Batch,
-    InputError,
     Oscillator,
     RigidMass,
     SceneTable,
@@ -20,8 +17,6 @@ from ca_damper import (
 )
 from ca_damper.excitation import Excitation
 from ca_damper.excitation.signal import spline
-from taichi_dem import Checkpoint
-from taichi_dem.kit.checkpoint import Interrupted
 
 PAPER = Oscillator()
 TWO = ((4.3, 0.6e-3, 0.4), (9.1, 0.2e-3, -1.1))
@@ -104,24 +99,6 @@ def test_forces_between_samples_leave_none_out_and_recording_changes_no_bit():
         assert batch.report().momentum_error < 1e-9
     assert impulses[0] == pytest.approx(impulses[1], rel=1e-12) and impulses[0] < -1e-4
     assert np.array_equal(*records)
-
-
-def test_an_interrupted_run_goes_on_to_the_same_bits(tmp_path):
-    motion, file = two_sines(0.4), tmp_path / "run.checkpoint"
-    few = {"particles": [5, 20], "seeds": 2, "interval": 2e-3}
-    whole = shake(Automaton(), motion, **few)
-
-    def stop(progress):
-        if progress.phase == "stepping":
-            os.kill(os.getpid(), signal.SIGINT)
-
-    with pytest.raises(Interrupted):
-        shake(Automaton(), motion, **few, progress=stop, checkpoint=Checkpoint(file))
-    resumed = shake(Automaton(), motion, **few, resume=file)
-    for name in ("time_s", "base", "x", "v", "force", "rms", "peak"):
-        assert np.array_equal(getattr(whole, name), getattr(resumed, name)), name
-    with pytest.raises(InputError, match="another excitation"):
-        shake(Automaton(), motion.scaled(1.1), **few, resume=file)
 
 
 #: Half a sine of 10 g in 11 ms.

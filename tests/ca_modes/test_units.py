@@ -1,4 +1,4 @@
-"""Units of several sizes on one structure: each box with a filling of its own."""
+"""Units on one structure: each box with a filling of its own, each group as if it were alone."""
 
 import numpy as np
 import pytest
@@ -19,6 +19,16 @@ def shaken(filling, boxes, amplitude=6e-3, **options):
 
 def same(one, other):
     return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ("x", "force"))
+
+
+def test_a_group_is_the_same_alone_and_among_others():
+    boxes = [Box(1, 20), Box(0, 7)]
+    together = shaken(Automaton(), boxes, seeds=[5, 6, 7])
+    for j, seed in enumerate(together.seeds):
+        alone = shaken(Automaton(), boxes, seeds=[seed])
+        for name in ("x", "v", "force", "rms", "peak"):
+            assert np.array_equal(getattr(alone, name)[..., 0], getattr(together, name)[..., j])
+    assert not np.array_equal(together.x[..., 0], together.x[..., 1])
 
 
 @pytest.mark.parametrize("place", [0, 1])

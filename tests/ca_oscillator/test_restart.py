@@ -10,6 +10,7 @@ import pytest
 from ca_damper import (
     Automaton,
     Batch,
+    Box,
     Checkpoint,
     InputError,
     RigidMass,
@@ -17,9 +18,11 @@ from ca_damper import (
     excitation,
     frequency_response,
     shake,
+    shake_structure,
     sweep_up_and_down,
 )
 from taichi_dem.kit.checkpoint import Interrupted
+from tests.ca_modes.frames import two_storeys
 
 IDENTITY = {"job": "a test"}
 TABLE = SceneTable([4, 7, 9], [1, 2, 3], 1e-3, [5.0, 6.0, 6.5], 3e-3)
@@ -67,15 +70,23 @@ def test_an_interrupted_batch_goes_on_to_the_same_bits(tmp_path):
         batch.checkpointed(None, checkpoint.path, {"job": "another"}).__enter__()
 
 
+MOTION = excitation.random_vibration([2.0, 20.0], [0.1, 0.1], duration=0.5)
 #: Of a container with a rigid mass: little to compile.
 JOB = {"particles": 3, "ratios": [0.9, 1.0], "seeds": 2, "dt": 1e-3, "measured_cycles": 2}
+JOB["transient_cycles"] = 20
+SHAKEN = {"excitation": MOTION, "seeds": 2, "dt": 1e-3}
+JOBS = {
+    frequency_response: JOB,
+    sweep_up_and_down: JOB,
+    shake: {**SHAKEN, "particles": 3},
+    shake_structure: {**SHAKEN, "structure": two_storeys(), "boxes": [Box(1, 3), Box(0, 2)]},
+}
 
 
-@pytest.mark.parametrize("work", [frequency_response, sweep_up_and_down])
-def test_responses_and_sweeps_go_on_to_the_same_bits(work, tmp_path):
+@pytest.mark.parametrize("work", JOBS)
+def test_runs_go_on_to_the_same_bits(work, tmp_path):
     """A sweep is stopped in its third of four stages; a finished one is read, not run again."""
-    checkpoint = Checkpoint(tmp_path / "run.checkpoint")
-    job = {**JOB, "transient_cycles": 20}
+    checkpoint, job = Checkpoint(tmp_path / "run.checkpoint"), JOBS[work]
     straight = measures(work(RigidMass(), **job))
     calls = 3 if work is frequency_response else 2
     with pytest.raises(Interrupted):
@@ -85,15 +96,19 @@ def test_responses_and_sweeps_go_on_to_the_same_bits(work, tmp_path):
         assert [a.tobytes() for a in measures(resumed)] == [a.tobytes() for a in straight]
     with pytest.raises(InputError, match="of another filling: RigidMass"):
         work(RigidMass(1e-3), resume=checkpoint.path, **job)
+    if "excitation" in job:
+        with pytest.raises(InputError, match="another excitation"):
+            other = {**job, "excitation": MOTION.scaled(1.1)}
+            work(RigidMass(), resume=checkpoint.path, **other)
+    if "boxes" in job:
+        with pytest.raises(InputError, match="another job"):
+            work(RigidMass(), resume=checkpoint.path, **{**job, "boxes": job["boxes"][::-1]})
 
 
-@pytest.mark.parametrize("work", [frequency_response, sweep_up_and_down, "shake"])
+@pytest.mark.parametrize("work", [frequency_response, sweep_up_and_down, shake])
 def test_a_full_disk_at_the_end_does_not_lose_the_result(work, tmp_path, monkeypatch):
     """The error of the last checkpoint carries what the run came to."""
-    job = {**JOB, "transient_cycles": 20}
-    if work == "shake":
-        work, job = shake, {"particles": 3, "seeds": 2, "dt": 1e-3}
-        job["excitation"] = excitation.random_vibration([2.0, 20.0], [0.1, 0.1], duration=0.5)
+    job = JOBS[work]
     straight, opened = work(RigidMass(), **job), open
 
     def full(name, mode="r", *rest, **options):
