@@ -8,7 +8,6 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from operator import attrgetter
 from typing import Any, NamedTuple
 
 from taichi_dem.kit import runtime
@@ -48,13 +47,10 @@ class Job(NamedTuple):
 
 def identity_of(work: Any) -> str:
     """Name of a function as file:name; InputError unless other processes can import it."""
-    module, name = (getattr(work, key, "") for key in ("__module__", "__qualname__"))
-    try:
-        found = attrgetter(name)(sys.modules[module])
-    except (AttributeError, KeyError, TypeError):
-        found = None
-    file = getattr(sys.modules.get(module), "__file__", None)
-    if found is not work or not file or not os.path.isfile(file):
+    module, name = (str(getattr(work, key, "")) for key in ("__module__", "__qualname__"))
+    found = sys.modules.get(module)
+    file = getattr(found, "__file__", None)
+    if getattr(found, name, None) is not work or not file or not os.path.isfile(file):
         raise InputError(
             "function must be defined at the top of a file, where other processes can import it, "
             f"got {name or shown(work)}"
@@ -100,7 +96,7 @@ def run_job(work: Work, row: Row) -> Record:
 
 def run_in_worker(work: Work | str, row: Row, arch: str) -> Record:
     """Run one job with Taichi started on one CPU thread; work: or its name in the main script."""
-    function: Work = attrgetter(work)(sys.modules["__main__"]) if isinstance(work, str) else work
+    function: Work = getattr(sys.modules["__main__"], work) if isinstance(work, str) else work
     settings = runtime.settings()
     if settings and settings.threads != 1:
         raise InputError(
@@ -123,11 +119,8 @@ def table_of(jobs: Sequence[Job], records: Sequence[Record], given: Sequence[str
         columns[name] = [getattr(record, name) for record in records]
     made = data_frame(columns)
     # A row that failed has no text.
-    return made.fillna({name: "" for name in made if _holds_text(columns[name])})
-
-
-def _holds_text(values):
-    return any(isinstance(value, str) for value in values)
+    texts = [name for name in made if any(isinstance(value, str) for value in columns[name])]
+    return made.fillna(dict.fromkeys(texts, ""))
 
 
 def _checked_values(values, row):
@@ -140,11 +133,11 @@ def _checked_values(values, row):
                 "a result must have a name that is no column of the table and none of "
                 f"{', '.join(ADDED)}, got {shown(name)}"
             )
-    return {name: _value(f"result {name}", value) for name, value in values.items()}
-
-
-def _value(name, value):
-    return float("nan") if value != value else plain_value(name, value)
+    # NaN may be a result.
+    return {
+        name: float("nan") if value != value else plain_value(f"result {name}", value)
+        for name, value in values.items()
+    }
 
 
 class Journal:
