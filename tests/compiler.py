@@ -1,8 +1,4 @@
-"""What the compiler costs a run of the tests, at its end: its share of the time, and the memory.
-
-Its parts: the front end traces a kernel in Python; LLVM makes code of it, or the cache of kernels
-has it; the first launch makes it machine code and runs it once.
-"""
+"""What the compiler costs a run of the tests, at its end: its share of the time, and the memory."""
 
 import collections
 import resource
@@ -13,52 +9,45 @@ import pytest
 from taichi._lib import core
 from taichi.lang.kernel_impl import Kernel
 
-_PARTS = ("front end", "LLVM", "first launch")
 _spent = collections.Counter()
-_fresh, _listening, _of_workers = set(), [], []
+_listening, _of_workers = [], []
 _BYTES_OF_MAXRSS = 1 if sys.platform == "darwin" else 1024
 
 
 def _timed(owner, name, part):
-    """Count the time of calls of a method for which ``part(arguments, before)`` names a part."""
+    """Count the time of a method's calls; returns the method as it was."""
     original = getattr(owner, name)
 
     def method(*arguments, **options):
-        before, begun = part(arguments, None), time.perf_counter()
+        begun = time.perf_counter()
         result = original(*arguments, **options)
-        _spent[part(arguments, before)] += time.perf_counter() - begun
+        _spent[part] += time.perf_counter() - begun
         return result
 
     setattr(owner, name, method)
+    return method
 
 
-def _traced(arguments, before):
-    """Of ``Kernel.materialize``: the number of compiled forms, then what its growth says."""
-    kernel = arguments[0]
+def _forms(kernel):
     # The second name is that of Quadrants.
-    forms = getattr(kernel, "compiled_kernels", None) or getattr(kernel, "materialized_kernels", ())
-    if before is None:
-        return len(forms)
-    if len(forms) == before:
-        return ""
-    _fresh.add(kernel)
-    _spent["kernels"] += 1
-    for names in _listening:
-        names.append(kernel.func.__name__)
-    return "front end"
+    return getattr(kernel, "compiled_kernels", None) or getattr(kernel, "materialized_kernels", ())
 
 
-def _launched(arguments, before):
-    """Of ``Kernel.launch_kernel``: whether it is the first of what has been traced."""
-    if before is None:
-        return arguments[0] in _fresh
-    _fresh.discard(arguments[0])
-    return "first launch" if before else ""
+def _materialize(kernel, *arguments, **options):
+    """Trace a kernel where it has no such form yet, which is heard."""
+    before = len(_forms(kernel))
+    result = _traced(kernel, *arguments, **options)
+    if len(_forms(kernel)) > before:
+        _spent["kernels"] += 1
+        for names in _listening:
+            names.append(kernel.func.__name__)
+    return result
 
 
-_timed(Kernel, "materialize", _traced)
-_timed(Kernel, "launch_kernel", _launched)
-_timed(core.Program, "compile_kernel", lambda arguments, before: "LLVM")
+_traced = _timed(Kernel, "materialize", "front end")
+Kernel.materialize = _materialize
+# LLVM makes code of what is traced, or the cache of kernels has it.
+_timed(core.Program, "compile_kernel", "LLVM")
 
 
 @pytest.fixture
@@ -97,19 +86,12 @@ def pytest_testnodedown(node, error):
 def pytest_terminal_summary(terminalreporter):
     """One line."""
     if _of_workers:
-        terminalreporter.write_line(line(_of_workers))
-
-
-def line(workers):
-    """What workers have counted, in words; a first launch has LLVM in it."""
-    sums = collections.Counter()
-    for counted in workers:
-        sums.update(counted)
-    sums["first launch"] -= sums["LLVM"]
-    parts = ", ".join(f"{part} {sums[part]:.0f} s" for part in _PARTS)
-    share = sum(sums[part] for part in _PARTS) / sums["seconds"]
-    largest = max(counted["bytes"] for counted in workers) / 1e9
-    return (
-        f"compiler: {share:.0%} of {sums['seconds']:.0f} s in {len(workers)} processes ({parts};"
-        f" {sums['kernels']} kernels); the largest process had {largest:.2f} GB"
-    )
+        of = collections.Counter()
+        for counted in _of_workers:
+            of.update(counted)
+        largest = max(counted["bytes"] for counted in _of_workers) / 1e9
+        terminalreporter.write_line(
+            f"compiler: {of['kernels']} kernels, front end {of['front end']:.0f} s, LLVM"
+            f" {of['LLVM']:.0f} s of {of['seconds']:.0f} s in {len(_of_workers)} processes; the"
+            f" largest had {largest:.2f} GB"
+        )
