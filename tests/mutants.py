@@ -2,16 +2,14 @@
 
     python -m tests.mutants                 the test files that a mutant names, until one test fails
     python -m tests.mutants --only contact  mutants whose area or name has this word
-    python -m tests.mutants --all           survivors meet all the tests of ``make test``
     python -m tests.mutants --check         only ask whether each mutant can be made
 
-Each is made in a copy of the checkout; the verdicts go to ``results/mutants.csv``.
+Each is made in a copy of the checkout.
 """
 
 import argparse
 import collections
 import concurrent.futures
-import csv
 import os
 import queue
 import re
@@ -28,7 +26,7 @@ ROOT = HERE.parent
 MOST_SECONDS = 900
 
 Mutant = collections.namedtuple("Mutant", "area name path old new tests")
-Verdict = collections.namedtuple("Verdict", "area name verdict by seconds")
+Verdict = collections.namedtuple("Verdict", "name verdict by seconds")
 
 
 def mutants(text):
@@ -81,17 +79,17 @@ def copied(root, folder):
     return folder
 
 
-def tested(folder, mutant, arguments):
+def tested(folder, mutant):
     """Make the mutant in a copy, run pytest until a test fails, and undo it."""
     path = folder / mutant.path
     source = path.read_text(encoding="utf-8")
     path.write_text(changed(source, mutant), encoding="utf-8")
     begun = time.monotonic()
     try:
-        verdict, by = _run(folder, arguments)
+        verdict, by = _run(folder, mutant.tests)
     finally:
         path.write_text(source, encoding="utf-8")
-    return Verdict(mutant.area, mutant.name, verdict, by, round(time.monotonic() - begun, 1))
+    return Verdict(mutant.name, verdict, by, round(time.monotonic() - begun, 1))
 
 
 def _run(folder, arguments):
@@ -119,7 +117,7 @@ def _run(folder, arguments):
     raise RuntimeError(f"pytest ended with {done.returncode}:\n{done.stdout[-2000:]}{done.stderr}")
 
 
-def verdicts(chosen, whole_suite, jobs):
+def verdicts(chosen, jobs):
     """Test mutants side by side, each in a copy of its own, and yield verdicts as they come."""
     with tempfile.TemporaryDirectory() as temporary:
         copies = queue.Queue()
@@ -129,35 +127,19 @@ def verdicts(chosen, whole_suite, jobs):
         def judged(mutant):
             folder = copies.get()
             try:
-                verdict = tested(folder, mutant, mutant.tests)
-                if verdict.verdict == "survived" and whole_suite:
-                    verdict = tested(folder, mutant, ["tests"])
+                return tested(folder, mutant)
             finally:
                 copies.put(folder)
-            return verdict
 
         with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
             for done in concurrent.futures.as_completed(pool.submit(judged, m) for m in chosen):
                 yield done.result()
 
 
-def summary(found):
-    """Lines: killed of how many, an area and in all."""
-    areas = {}
-    for verdict in found:
-        areas.setdefault(verdict.area, collections.Counter())[verdict.verdict] += 1
-    areas["all"] = sum(areas.values(), collections.Counter())
-    return [
-        f"{area:24} {n['killed']:4} of {n['killed'] + n['survived']} killed"
-        for area, n in areas.items()
-    ]
-
-
 def main():
     """Judge the mutants that are asked for; one survivor is a failure."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--only", default="", help="a word of the area or the name")
-    parser.add_argument("--all", action="store_true", help="survivors meet the whole fast suite")
     parser.add_argument("--check", action="store_true", help="only ask whether mutants can be made")
     parser.add_argument("--jobs", type=int, default=2, help="how many at a time (2)")
     asked = parser.parse_args()
@@ -166,18 +148,12 @@ def main():
     if wrong or asked.check:
         print("\n".join(wrong or [f"{len(chosen)} mutants can be made."]))
         return bool(wrong)
-    found, path = [], ROOT / "results" / "mutants.csv"
-    path.parent.mkdir(exist_ok=True)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file)
-        rows.writerow(Verdict._fields)
-        for verdict in verdicts(chosen, asked.all, asked.jobs):
-            found.append(verdict)
-            rows.writerow(verdict)
-            file.flush()
-            print(f"{verdict.verdict:9} {verdict.seconds:6.1f} s  {verdict.name}  {verdict.by}")
-    print("\n".join(["", *summary(found)]))
-    return any(verdict.verdict == "survived" for verdict in found)
+    ends = collections.Counter()
+    for verdict in verdicts(chosen, asked.jobs):
+        ends[verdict.verdict] += 1
+        print(f"{verdict.verdict:9} {verdict.seconds:6.1f} s  {verdict.name}  {verdict.by}")
+    print(f"{ends['killed']} of {len(chosen)} killed")
+    return ends["survived"] > 0
 
 
 if __name__ == "__main__":
