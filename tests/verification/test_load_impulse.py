@@ -16,6 +16,7 @@ from taichi_dem import (
 from taichi_dem.kit.allocation import assign
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.tetrahedra import area_vectors
+from tests.structures import filled
 
 EPS = np.finfo(float).eps
 STEP, STEPS = 7e-7, 40
@@ -36,16 +37,16 @@ def pulses():
     return times, (signs[:, None] * [0.0, 1e9, 0.0]).ravel()
 
 
-def body(load, method):
+def body(loads, method):
     """A free body that does not turn, so that the force keeps its direction."""
-    made = Simulation(Scene(MESH, CONCRETE, [load]), method)
+    made = Simulation(Scene(MESH, CONCRETE, loads), method)
     assign(made.tables.inertia_inverse, 0.0)
     return made
 
 
-def pushes(load, method):
+def pushes(loads, method):
     """Impulse on the body over the area of its face, after each largest step; and its levels."""
-    simulation = body(load, method)
+    simulation = body(loads, method)
     push = -area_vectors(MESH.points, MESH.groups["face"])[0]
     mass, found, levels = simulation.model.body_mass[0], [], set()
     for step in range(1, STEPS + 1):
@@ -71,7 +72,7 @@ def test_no_pulse_is_lost(name, history):
     Each step rounds a difference of times to their own rounding.
     """
     times, values = history()
-    found, levels = pushes(effects.Pressure("face", values, times), METHODS[name])
+    found, levels = pushes([effects.Pressure("face", values, times)], METHODS[name])
     areas = 0.5 * (values[1:] + values[:-1]) * np.diff(times)
     rounding = 4.0 * len(areas) * times[-1] / np.diff(times).min() * EPS * np.abs(areas).sum()
     assert abs(found[-1] - areas.sum()) < rounding
@@ -88,7 +89,7 @@ def test_the_gas_gives_the_integral_of_its_pulse_up_to_half_a_step_after_each(ri
     """
     peak, ratio, start = 1e9, 2.75, 1.3 * STEP
     gas = effects.GasPressure("face", peak, rise, ratio, start)
-    found, _ = pushes(gas, METHODS["uniform"])
+    found, _ = pushes(filled("bonds", gas), METHODS["uniform"])
     s = ((np.arange(STEPS) + 0.5) * STEP - start) / rise
     up, down = np.clip(s, 0.0, 1.0), np.clip(s - 1.0, 0.0, ratio)
     wanted = 0.5 * up - np.sin(np.pi * up) / (2.0 * np.pi)
