@@ -7,6 +7,7 @@ import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
+from taichi_dem.kit.allocation import FieldTree
 from taichi_dem.loads.history import History
 from taichi_dem.mesh.shapes import pair
 
@@ -18,7 +19,8 @@ class Probe:
     """A history on the device."""
 
     def __init__(self):
-        self.history = History()
+        with FieldTree():
+            self.history = History()
 
     @ti.kernel
     def sample(
@@ -38,13 +40,18 @@ class Probe:
         return found
 
 
+@pytest.fixture(scope="module")
+def probe(taichi_session):
+    """One for all counts."""
+    return Probe()
+
+
 @pytest.mark.parametrize("count", [1, 7])
-def test_values_are_linear_between_the_points_and_constant_beyond(count):
+def test_values_are_linear_between_the_points_and_constant_beyond(probe, count):
     """Values at a time, and means over short and long times by the trapezoidal rule in pieces."""
     draw = np.random.default_rng(count)
     times, values = np.cumsum(draw.uniform(0.1, 2.0, count)), draw.normal(size=count)
     asked = np.concatenate([times, draw.uniform(-1.0, times[-1] + 1.0, 200), [0.0, 1e9]])
-    probe = Probe()
     probe.history.load(tuple(times), tuple(values))
     assert np.abs(probe.means(asked, asked) - np.interp(asked, times, values)).max() < 1e-12
     since = draw.uniform(-1.0, times[-1] + 1.0, 50)

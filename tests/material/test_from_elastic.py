@@ -10,6 +10,7 @@ from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.state.model import Model
 from tests.material.blocks import DENSITY, NU, E, random_block, rock
+from tests.structures import filled
 
 RATIO = 0.05
 
@@ -40,8 +41,8 @@ def test_a_pair_swings_and_dies_away_at_the_damping_ratio():
     step = 2.25 * np.pi / damped / count
     speed = 1e-3
     velocity = np.array([[-0.5 * speed, 0.0, 0.0], [0.5 * speed, 0.0, 0.0]])
-    listed = [effects.BondDamping()]
-    scene = Scene(mesh, rock(damping_ratio=ratio), listed, velocity=velocity)
+    laws = filled("bonds", effects.BondDamping())
+    scene = Scene(mesh, rock(damping_ratio=ratio), laws, velocity=velocity)
     simulation = Simulation(scene, Uniform(step))
     simulation.advance_to(count)
     place = simulation.values(simulation.state.position)[:2, 0] - model.centre[:, 0]
