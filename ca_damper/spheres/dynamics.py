@@ -22,7 +22,7 @@ from ca_damper.spheres.forces import PairForces, WallForces
 from ca_damper.spheres.friction_history import FrictionHistory
 from ca_damper.spheres.rotation import Rotation
 from taichi_dem.kit.allocation import values
-from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.effect_table import EffectUse
 
 # Codes of divergence; a speed is a runaway's when it crosses more than a radius in a step.
 FINE, NOT_FINITE, RUNAWAY, OVERLAP, ENERGY_GAINED = range(5)
@@ -139,6 +139,7 @@ class DeviceSpheres:
         if count > 0:
             self.effect_activity.note(s, PAIRS)
         self.pair_forces.add(s, contact, which, count)
+        self.search.count_skipped(s)
         of_walls = self.wall_contacts.over_step(s, 0, dt, since)
         force, touching = self.wall_forces.add(s, of_walls, low, high, speed)
         if touching > 0:

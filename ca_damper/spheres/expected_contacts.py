@@ -34,6 +34,7 @@ class ExpectedContacts:
     and a sphere and a wall, are listed [m]. nearer: by how much they may have come nearer since
     [m]. least, most: bounds of the way of the spheres in the last step [m]. floor: where the floor
     was then [m].
+    unlisted: tests of pairs and spheres that are not listed; skipped: of all steps since the start.
     """
 
     def __init__(self, table: SceneFields, bodies: Bodies):
@@ -46,6 +47,8 @@ class ExpectedContacts:
         self.floor = table.field(ti.f64)
         for name in ("margin", "nearer", "least", "most"):
             setattr(self, name, table.vector(2, ti.f64))
+        for name in ("unlisted", "skipped"):
+            setattr(self, name, table.field(ti.i64))
 
     def load(self, fillings: Fillings) -> None:
         """Write the numbers of the search to the device."""
@@ -53,7 +56,8 @@ class ExpectedContacts:
 
     @ti.func
     def clear(self, s):
-        """Nothing is listed yet."""
+        """Nothing has been skipped yet."""
+        self.skipped[s] = ti.cast(0, ti.i64)
         self.pair_count[s], self.sphere_count[s] = 0, 0
 
     @ti.func
@@ -79,11 +83,19 @@ class ExpectedContacts:
         if self.cells.refresh(s) or not (nearer[0] < margin[0]):
             margin[0], nearer[0] = self._margin(s, way[0]), 0.0
             self._list_pairs(s, margin[0])
+            self._count_unlisted(s)
         if not (nearer[1] < margin[1]):
             margin[1], nearer[1] = self._margin(s, way[1]), 0.0
             self._list_spheres(s, low + self._reach(s, margin[1]), high - self._reach(s, margin[1]))
+            self._count_unlisted(s)
         self.margin[s] = margin
         self.nearer[s], self.floor[s] = nearer, low[1]
+
+    @ti.func
+    def _count_unlisted(self, s):
+        count = ti.cast(self.table.particles[s], ti.i64)
+        tests = count * (count - 1) // 2 + count
+        self.unlisted[s] = tests - self.pair_count[s] - self.sphere_count[s]
 
     @ti.func
     def _margin(self, s, way):
@@ -144,6 +156,15 @@ class ExpectedContacts:
     def each_listed_pair(self, s, contact, visit: ti.template(), count: ti.template()):
         """Call visit(s, i, j, contact, count) for every pair that was near at the last search."""
         self.cells.each_pair(s, contact, visit, count)
+
+    @ti.func
+    def count_skipped(self, s):
+        """Count the tests that a step skips."""
+        self.skipped[s] = self.skipped[s] + self.unlisted[s]
+
+    def all_skipped(self) -> int:
+        """Tests that all scenes have skipped since their start."""
+        return int(self.table.in_use(self.skipped).sum())
 
 
 #: What is tested for contact, by the name of the search.
