@@ -1,11 +1,11 @@
 """A run of a hard case of the blast: methods by name, bodies, and the limits that many share."""
 
 import numpy as np
-from taichi_dem.output.fragments import body_spins
 
 from taichi_dem import CONCRETE, Scene, Simulation, StepControl, effects
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.observers import Every, RunView
+from taichi_dem.output.fracture import body_spins
 from taichi_dem.simulate import run_simulation
 from tests.closed_forms import damped_opening
 
