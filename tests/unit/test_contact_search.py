@@ -130,6 +130,42 @@ def test_waiting_impulses_survive_a_search(again):
         assert before.get(pair, p) == p
 
 
+def overlap_energy(simulation, born_after):
+    """Elastic energy [J] of the overlaps of listed spheres of which one is younger than a tick."""
+    model, motion = simulation.model, simulation.state.motion()
+    size, sphere = model.spheres.per_face, simulation.values(simulation.tables.sphere)
+    exposed, energy = simulation.values(simulation.state.exposed_tick), 0.0
+    for pair in listed(simulation):
+        body = [one // (4 * size) for one in pair]
+        place = [
+            motion["position"][i] + motion["rotation"][i] @ sphere[one, :3]
+            for i, one in zip(body, pair)
+        ]
+        gap = np.linalg.norm(place[1] - place[0]) - sphere[list(pair), 3].sum()
+        if max(exposed[one // size] for one in pair) > born_after:
+            energy += 0.5 * CONCRETE.contact_stiffness * max(0.0, -gap) ** 2
+    return energy
+
+
+def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
+    """Faces that break now bring k d^2 / 2 an overlap; a second search at the tick nothing."""
+    simulation = scattered(again, 2e-4, 0.02)
+    state, store = simulation.state, simulation.contacts.store
+    assert not values(store.heat, near_slots(store)).any()
+    exposed = simulation.values(state.exposed_tick)
+    free = np.flatnonzero(exposed < 0)
+    exposed[free[: len(free) // 2]] = 7
+    assign(state.exposed_tick, exposed)
+    state.tick[None] = 7
+    simulation.broad_phase.search()
+    wanted = overlap_energy(simulation, 0)
+    assert 0.0 < wanted < 0.9 * overlap_energy(simulation, -1)
+    for _ in range(2):
+        injected = values(store.heat, near_slots(store))[:, 2].sum()
+        assert injected == pytest.approx(wanted, rel=1e-9)
+        simulation.broad_phase.search()
+
+
 @ti.data_oriented
 class AllPairs:
     """Overlaps of all pairs of bodies, by the law of their contact."""
