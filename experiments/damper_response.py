@@ -8,8 +8,8 @@
 
 Figs. 3 and 11 of the paper. Fixed grains, drawn beside free ones, detune the structure as much:
 what free ones take off that peak is damping. Expect 30 of them to leave 0.76, 0.48 and 0.34 of it
-on a base that moves by 0.3, 0.6 and 1.2 mm. Then come the peaks by number of grains, apparent mass
-and loss, and a sweep up and down, the state carried on, which shows where two motions are possible.
+on a base that moves by 0.3, 0.6 and 1.2 mm. Then come the peaks by number of grains and a sweep up
+and down, the state carried on, which shows where two motions are possible.
 The paper's automaton has landing impulses alone, ca_landing; static contact, ca_static, moves its
 peak as that of the spheres. Every number, frequency and seed is a scene; bars and bands are lowest
 and highest of the seeds, lines their median.
@@ -30,12 +30,7 @@ import numpy as np
 import pandas as pd
 
 import ca_damper as ca
-from ca_damper.plot.curves import (
-    picture_damping,
-    picture_hysteresis,
-    picture_measures,
-    picture_peaks,
-)
+from ca_damper.plot.curves import picture_damping, picture_hysteresis, picture_peaks
 from ca_damper.runs.response import OUTSIDE, Grid
 from taichi_dem.kit import study
 from taichi_dem.kit.study import number, several, whole
@@ -99,7 +94,6 @@ def run(options):
     curves = {label: one[options.bases.index(BASE)] for label, one in strengths.items()}
     picture_damping(folder / "response.png", curves, shares, (SHOWN, SHOWN * PARTICLE_MASS))
     picture_peaks(folder / "peaks.png", responses, PARTICLE_MASS)
-    picture_measures(folder / "measures.png", responses, PARTICLE_MASS)
     picture_hysteresis(folder / "hysteresis.png", sweeps)
     peaks = peaks_of(responses)
     print(peaks.to_string(index=False, float_format="{:.4g}".format, na_rep=OUTSIDE), "\n")

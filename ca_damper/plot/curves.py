@@ -71,13 +71,6 @@ def _columns(figure, handles):
     return max(1, min(5, len(handles), int(figure.get_figwidth() / 1.8)))
 
 
-def _legend_of_bands(figure, axis):
-    """Legend above all panels, made from one of them: what bands are is its last entry."""
-    handles, _ = axis.get_legend_handles_labels()
-    handles.append(_band_key())
-    figure.legend(handles=handles, loc="outside upper center", ncols=_columns(figure, handles))
-
-
 def _band_key():
     return area_key("lowest to highest seed", fc=GREY, alpha=0.3)
 
@@ -108,33 +101,8 @@ def picture_peaks(path: FileName | None, responses: Any, particle_mass: Any = No
     return figure
 
 
-def picture_measures(path: FileName, responses: Mapping[str, Any], particle_mass: float) -> None:
-    """Apparent mass and loss factor over frequency: a column a filling, a line a grain count."""
-    count = len(responses)
-    size = (1.0 + 2.05 * count, 5.4)
-    shape = {"squeeze": False, "sharex": True, "sharey": "row"}
-    with picture(path, 2, count, size, **shape) as (figure, axes):
-        for column, (label, response) in zip(axes.T, responses.items()):
-            for k, particles in enumerate(response.particles):
-                if particles > 0:
-                    _draw_measures(column, response, k, particle_mass)
-            column[0].set_title(_narrow(styles_of(responses)[label].label))
-            column[0].axhline(1.0, color=GREY, ls=":", lw=1.0, label="rigid mass")
-            column[1].set_xlabel("frequency f / f$_0$ [1]")
-        axes[0, 0].set_ylabel("apparent mass /\nmass of the particles [1]")
-        axes[1, 0].set_ylabel("loss factor [1]")
-        _legend_of_bands(figure, axes[0, 0])
-
-
 def _narrow(label):
     return textwrap.fill(label, 20)
-
-
-def _draw_measures(column, response, k, particle_mass):
-    particles, colour = response.particles[k], _shade(response, k)
-    share = response.apparent_mass[k] / (particles * particle_mass)
-    _band(column[0], response.ratios, share, colour, f"{particles} particles")
-    _band(column[1], response.ratios, response.loss_factor[k], colour, None)
 
 
 def picture_hysteresis(path: FileName | None, sweeps: Mapping[str, Any]) -> Figure:
