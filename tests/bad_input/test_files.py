@@ -1,17 +1,21 @@
-"""A checkpoint that is damaged anywhere is refused, and a forged one whose seal is right."""
+"""A file that is damaged or forged anywhere is refused, or read as what it was before."""
 
 import hashlib
 import json
 import tracemalloc
+import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from taichi_dem import PAPER_BLOCK, read_mesh
 from taichi_dem.kit.checkpoint import read_checkpoint, write_checkpoint
 from taichi_dem.kit.errors import InputError
-from tests.bad_input.refusals import assert_refused, steady
+from taichi_dem.mesh.files import write_mesh
+from taichi_dem.mesh.shapes import bar
+from tests.bad_input.refusals import assert_refused, ends_within, steady
 
 IDENTITY = {"version": "1", "mesh": "a cube"}
 ARRAYS = {"field/a.b": np.arange(12.0).reshape(4, 3), "part/none": np.zeros((0, 2))}
@@ -33,94 +37,86 @@ def test_a_checkpoint_that_is_changed_anywhere_is_refused(tmp_path_factory, shar
     assert_refused(lambda: read_checkpoint(path, IDENTITY), str(path))
 
 
-def sealed(path, head, body):
-    """A file with the digest of a checkpoint; head: JSON, or bytes."""
-    text = head if isinstance(head, bytes) else json.dumps(head).encode()
-    content = text + b"\n" + body
-    path.write_bytes(content + hashlib.sha256(content).hexdigest().encode())
-
-
-def array(kind="<f8", shape=(2,)):
-    return {"identity": IDENTITY, "arrays": [["a", kind, shape]]}
-
-
-#: Heads and bodies that no run writes.
-FORGED = {
-    "no head": (b"", b""),
-    "no JSON": (b"PK\x03\x04", bytes(100)),
-    "no dict": ([IDENTITY], b""),
-    "nested": (b"[" * 100_000, b""),
-    "no arrays": ({"identity": IDENTITY}, b""),
-    "no identity": ({"arrays": []}, b""),
-    "identity of words": ({"identity": "version", "arrays": []}, b""),
-    "arrays by number": ({"identity": IDENTITY, "arrays": [1, 2]}, b""),
-    "objects": (array("|O"), bytes(16)),
-    "text": (array("<U2"), bytes(16)),
-    "text of no size": (array("<U0", (10**12,)), b""),
-    "a record": (array("f8,i4"), bytes(24)),
-    "no type": (array("pickle"), bytes(16)),
-    "3 TB": (array(shape=(400_000_000_000,)), bytes(16)),
-    "more than there is": (array(shape=(2**80,)), bytes(16)),
-    "less than there is": (array(), bytes(24)),
-    "negative": (array(shape=(-2,)), bytes(16)),
-    "back and forth": (
-        {"identity": IDENTITY, "arrays": [["a", "<f8", [-1]], ["b", "<f8", []]]},
-        b"",
-    ),
-    "twice negative": (array(shape=(-1, -2)), bytes(16)),
-    "halves": (array(shape=(0.5, 4)), bytes(16)),
-    "65 axes": (array(shape=(1,) * 64 + (2,)), bytes(16)),
-    "shape of words": (array(shape=("2",)), bytes(16)),
-}
-
-
-@pytest.mark.parametrize("forged", FORGED)
-def test_a_forged_checkpoint_is_refused_in_a_sentence_and_little_memory(tmp_path, forged):
-    path = tmp_path / "run.checkpoint"
-    sealed(path, *FORGED[forged])
-    tracemalloc.start()
-    assert_refused(lambda: read_checkpoint(path, IDENTITY), str(path))
-    assert tracemalloc.get_traced_memory()[1] < 2e7
-    tracemalloc.stop()
-
-
-def test_a_packed_archive_of_before_is_refused_unread(tmp_path):
-    """Three megabytes of zeros that unpack to 3.2 GB: nothing is unpacked."""
-    path = tmp_path / "run.npz"
-    with open(path, "wb") as file:
-        np.savez_compressed(file, a=np.zeros(4_000_000))
-    content = path.read_bytes()
-    path.write_bytes(content + hashlib.sha256(content).hexdigest().encode())
-    tracemalloc.start()
-    assert_refused(lambda: read_checkpoint(path, IDENTITY), str(path))
-    assert tracemalloc.get_traced_memory()[1] < 4e6
-    tracemalloc.stop()
-
-
-JSON = st.recursive(
+ANYTHING = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=4),
     lambda part: st.lists(part, max_size=4) | st.dictionaries(st.text(max_size=3), part),
     max_leaves=6,
 )
-KIND = st.sampled_from(["<f8", "|b1", "<i4", "<U1", "|V0", "O", "<M8[s]", ">f8", "f8,f8"])
-LENGTH = st.integers(-3, 4) | st.integers()
-
-
-@steady
-@given(
-    named=st.lists(st.tuples(st.text(max_size=3), KIND, st.lists(LENGTH, max_size=3)), max_size=3),
-    other=st.none() | JSON,
-    body=st.binary(max_size=40),
+KINDS = ["<f8", "|b1", "<i4", "<U1", "<U2", "<U0", "|V0", "|O", "<M8[s]", ">f8", "f8,i4", "pickle"]
+LENGTH = st.integers(-3, 4) | st.sampled_from([0.5, "2", 10**12, 2**80])
+ARRAY = st.tuples(st.text(max_size=3), st.sampled_from(KINDS), st.lists(LENGTH, max_size=3))
+HEAD = st.fixed_dictionaries(
+    {"identity": st.just(IDENTITY) | ANYTHING, "arrays": st.lists(ARRAY, max_size=3) | ANYTHING}
 )
-def test_any_head_is_refused_or_gives_arrays_of_the_bytes_that_follow(
-    tmp_path_factory, named, other, body
-):
+
+
+def of_one(*shape, kind="<f8"):
+    """Head of a checkpoint with one array."""
+    return {"identity": IDENTITY, "arrays": [["a", kind, shape]]}
+
+
+@settings(steady, max_examples=100)
+@given(head=HEAD | ANYTHING, body=st.binary(max_size=40))
+@example(head=b"", body=b"")
+@example(head=b"PK\x03\x04", body=bytes(100))
+@example(head=b"[" * 100_000, body=b"")
+@example(head={"identity": IDENTITY}, body=b"")
+@example(head=of_one(400_000_000_000), body=bytes(16))
+@example(head=of_one(2**80), body=bytes(16))
+@example(head=of_one(*[1] * 64, 2), body=bytes(16))
+@example(head=of_one(10**12, kind="<U0"), body=b"")
+@example(head=of_one(-1, -2), body=bytes(16))
+@example(head={"identity": IDENTITY, "arrays": [["a", "<f8", [-1]], ["b", "<f8", []]]}, body=b"")
+def test_any_head_is_refused_or_gives_arrays_of_the_bytes_that_follow(tmp_path_factory, head, body):
+    """In a sentence and little memory, though the seal is right; head: JSON, or bytes."""
     path = tmp_path_factory.mktemp("forged") / "run.checkpoint"
-    sealed(path, {"identity": IDENTITY, "arrays": named if other is None else other}, body)
+    text = head if isinstance(head, bytes) else json.dumps(head).encode()
+    content = text + b"\n" + body
+    path.write_bytes(content + hashlib.sha256(content).hexdigest().encode())
+    tracemalloc.start()
     try:
         arrays = read_checkpoint(path, IDENTITY)
     except InputError as error:
-        assert str(path) in str(error)
-        assert "\n" not in str(error)
+        assert str(path) in str(error) and "\n" not in str(error)
     else:
         assert sum(one.nbytes for one in arrays.values()) <= len(body)
+    assert tracemalloc.get_traced_memory()[1] < 2e7
+    tracemalloc.stop()
+
+
+NUMBERS = ("-1", "0", "2147483648", "99999999999999999999", "nan", "inf", "x", "1.5", "")
+
+
+def read(path, lines):
+    """The mesh of a file with these lines, or the sentence that refuses it."""
+    path.write_text("\n".join(lines))
+    try:
+        with ends_within(100.0), warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            return read_mesh(path)
+    except InputError as error:
+        assert str(path) in str(error) and "\n" not in str(error)
+        return str(error)
+
+
+@pytest.mark.attack
+@pytest.mark.parametrize("version", ["2.2", "4.1"])
+def test_a_changed_gmsh_file_is_refused_or_read_as_the_same_bodies(tmp_path, version, seed):
+    """Any word of the structure: heads, numbers and corners; places may be anywhere."""
+    draw, path = np.random.default_rng(seed), tmp_path / "mesh.msh"
+    write_mesh(path, bar(0.2, 0.1, (2, 1, 1)))
+    with open(path if version == "2.2" else PAPER_BLOCK, encoding="utf-8") as file:
+        lines = [*file.read().splitlines(), ""]
+    whole = read(path, lines)
+    first, last = lines.index("$Elements") + 1, lines.index("$EndElements")
+    for _ in range(12):
+        row = int(draw.integers(first, last))
+        words = lines[row].split()
+        words[draw.integers(len(words))] = NUMBERS[draw.integers(len(NUMBERS))]
+        found = read(path, [*lines[:row], " ".join(words), *lines[row + 1 :]])
+        if not isinstance(found, str):
+            assert np.array_equal(found.points, whole.points), (row, words)
+            assert np.array_equal(found.tetrahedra, whole.tetrahedra), (row, words)
+    text = "\n".join(lines)
+    cut = int(draw.integers(1, text.index("$EndElements") + len("$EndElements") - 1))
+    assert isinstance(read(path, [text[:cut]]), str)
