@@ -73,21 +73,13 @@ def test_something_happens_in_what_is_compared(computed):
 
 
 @pytest.mark.parametrize("arch", PRESENT)
-def test_fields_of_a_drawn_tree_keep_apart(arch):
-    """Each field of a tree of drawn kinds and lengths keeps what was written to it."""
-    assert json.loads(said("-m", "tests.devices.trees", arch).splitlines()[-1]) == {
-        "trees": 12,
-        "damaged": 0,
-    }
-
-
-@pytest.mark.parametrize("arch", PRESENT)
-def test_a_launch_that_falls_short_is_an_error(arch):
-    """Of a driver that ends loops after some rounds, in both packages."""
-    found = json.loads(said("-m", "tests.devices.refusals", arch).splitlines()[-1])
-    rounds = found.pop("rounds")
-    for package, sentence in found.items():
-        assert (f"{rounds} rounds" in sentence) == (rounds > 0), package
+def test_fields_keep_apart_and_a_launch_that_falls_short_is_an_error(arch):
+    """Fields of drawn trees, and a driver that ends loops after some rounds, in both packages."""
+    found = json.loads(said("-m", "tests.devices.checks", arch).splitlines()[-1])
+    assert found["trees"] == 12 and found["damaged"] == 0
+    for package in ("blast", "damper"):
+        refused = f"{found['rounds']} rounds" in found[package]
+        assert refused == (found["rounds"] > 0), package
 
 
 #: Most launches of a substep beside its sweeps, of a sweep, and reads of the host.
