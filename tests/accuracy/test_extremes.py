@@ -9,7 +9,6 @@ import pytest
 from taichi_dem import CONCRETE, Scene, effects, goals, solve
 from taichi_dem.accuracy.extremes import BEFORE, change, extreme_doubts
 from taichi_dem.goals import Goal
-from tests.accuracy.small_bar import struck_bar
 from tests.made_result import made_result
 from tests.scenes import apart
 
@@ -109,12 +108,3 @@ def test_a_largest_speed_of_a_falling_body_is_no_answer(up, word, speed):
     answer = solve(scene, until=1.0, goal=goals.peak_speed(1), progress=None)
     assert not answer.reached and word in answer.shortfall
     assert answer.value == pytest.approx(speed, rel=1e-9)
-
-
-def test_a_largest_speed_behind_a_wave_is_an_answer():
-    """The blow lasts 35 us, and its wave is reflected until 0.1 ms."""
-    scene, goal = struck_bar(), goals.peak_speed(0)
-    answer = solve(scene, until=1e-4, goal=goal, tolerance=0.1, progress=None)
-    assert answer.reached and answer.error <= 0.1 * answer.value
-    early = solve(scene, until=5e-6, goal=goal, tolerance=0.1, progress=None)
-    assert not early.reached and early.value < answer.value

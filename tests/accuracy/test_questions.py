@@ -27,16 +27,6 @@ def test_a_number_draws_the_same_question_and_another_one_another(kind):
     assert len({str(make(battery, 3)) for battery in range(4)}) == 4
 
 
-def test_meshes_are_numbered_and_moved_at_random():
-    """Half of the paper's blocks are in another order, half have other nodes."""
-    mesh = questions.dem.read_mesh(questions.dem.PAPER_BLOCK)
-    made = [questions.block_question(0, number).scene.mesh for number in range(16)]
-    ordered = sum(np.array_equal(one.tetrahedra, mesh.tetrahedra) for one in made)
-    unmoved = sum(np.array_equal(one.points, mesh.points) for one in made)
-    # Binomial of 16: fewer than 2 or more than 14 in 1 of 2,000 cases.
-    assert 2 <= ordered <= 14 and 2 <= unmoved <= 14
-
-
 ANSWER = SimpleNamespace(value=1.0, error=0.1, parts="step 0.1", reached=True, branches=())
 WHAT, OTHER = (questions.damper_question(0, number) for number in (3, 5))
 
@@ -73,18 +63,6 @@ def test_a_scene_that_differs_in_its_mesh_alone_is_another_question():
     other = replace(one, scene=moved)
     assert str(one) == str(other) and content_of(one) != content_of(other)
     assert content_of(one) == content_of(questions.bar_question(0, 0))
-
-
-@pytest.mark.parametrize("true", [np.inf, np.nan])
-def test_a_truth_that_diverged_is_no_number(asked, tmp_path, true):
-    assert not asked(References(tmp_path / "none.csv").of(0, 0, WHAT), true).single
-
-
-def test_a_truth_that_is_refused_leaves_the_question_out(asked, tmp_path):
-    def crushed(step, bar, measure):
-        raise questions.dem.InputError("pairs_per_body must be more")
-
-    assert asked(crushed, 1.0) is None
 
 
 @pytest.mark.parametrize(("true", "holds"), [(1.1, True), (0.89, False), (1.2, False)])

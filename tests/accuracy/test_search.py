@@ -140,15 +140,6 @@ def test_two_runs_support_no_bar_below_a_third_of_the_tolerance(searched, tolera
     assert answer.sources[0].error == pytest.approx(answer.error)
 
 
-@pytest.mark.parametrize("tolerance", [0.01, 0.1])
-def test_a_bar_narrower_than_a_third_has_three_runs_or_more(searched, tolerance):
-    """Over power laws whose first difference is a tenth of what is asked to ten times as much."""
-    for factor in np.geomspace(0.1, 10.0, 9) * 3.0 * tolerance:
-        for order, events in ((1.0, True), (2.0, False)):
-            answer = searched(job(tolerance), power(order, factor), events=events, moved=1e-9)
-            assert answer.plan.runs > 2 or answer.share >= 0.999 * tolerance / 3.0
-
-
 @pytest.mark.parametrize(("budget", "runs"), [(math.inf, 3), (3.5, 2)])
 def test_the_same_number_twice_is_confirmed_by_a_third_step(searched, budget, runs):
     """Or has the bar of two, where no budget is left for it."""
@@ -207,21 +198,6 @@ def test_a_count_of_what_breaks_is_known_to_one_at_best(searched, value):
     assert ("broken faces is known to one" in answer.shortfall) != answer.reached
     none = searched(many, lambda level, twin: 0.0, moved=0.0)
     assert none.error == 0.0 and none.reached
-
-
-def test_costs_that_chance_keeps_from_single_runs_are_predicted_or_left_out(searched):
-    """Asked to 10 %, what falls with the step may do for 1 %; what never falls will not."""
-
-    def falls(level, twin):
-        return 3.0 + 0.1 * 2.0**-level + 0.006 * 2.0**-level * (twin % 2)
-
-    falling = searched(job(0.1), falls, events=True, moved=1e-3)
-    known = {one.tolerance: one.measured for one in falling.cost_curve}
-    assert known[0.1] and 0.01 in known and not known[0.003]
-    hopeless = searched(job(0.01), scattered(0.3), events=True, moved=0.1)
-    assert all(
-        one.tolerance * hopeless.value >= hopeless.parts.chance for one in hopeless.cost_curve
-    )
 
 
 @pytest.mark.parametrize(("events", "long", "again"), [(1, 1, 2.0), (0, 1, 2.0), (0, 20, 1.1)])

@@ -1,7 +1,6 @@
 """Sources of error beside the step: each is measured by its formula, or named as not measured."""
 
 import math
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -147,31 +146,6 @@ def test_what_is_reached_is_as_narrow_as_asked_with_all_sources(value):
         assert made.error == pytest.approx(np.linalg.norm([step, *others]))
         assert made.reached == (made.error <= 0.05 * value)
         assert made.budget.error.tolist() == [step, *others]
-
-
-def test_a_bar_names_what_it_does_not_have():
-    listed = Source("step", 0.3, "two runs"), Source("mesh", math.nan, "not measured: ask")
-    plan = Plan("a method", 2, 1.0, 0.0)
-    words = str(Answer("way", "mm", 3.0, ErrorParts(step=0.3), 0.1, 0.95, plan, sources=listed))
-    assert "(step 0.3; not in the bar: mesh)" in words and "not measured: ask" in words
-
-
-@pytest.mark.parametrize(
-    ("half", "common", "larger"), [(0.3, 0.4, 1), (0.3, 0.2, 0), (0.3, 0.0, 0)]
-)
-def test_the_first_line_names_a_larger_error_that_is_not_in_the_bar(half, common, larger):
-    listed = (
-        Source("step", half, "two runs"),
-        Source("contact", math.nan, "not measured: ask"),
-        Source("mesh", math.nan, "not measured: ask", 1.0, common),
-    )
-    plan = Plan("a method", 2, 1.0, 0.0)
-    made = Answer("way", "mm", 10.0, ErrorParts(step=half), 0.1, 0.95, plan, sources=listed)
-    assert [one.name for one in made.larger] == ["mesh"] * larger
-    first = str(made).splitlines()[0]
-    assert ("4 %" in first) == bool(larger) and "not in the bar: contact, mesh" in first
-    measured = replace(made, sources=(Source("mesh", common, "spread over 3 meshes", 1.0, common),))
-    assert measured.larger == ()
 
 
 @pytest.mark.parametrize("events", [False, True])
