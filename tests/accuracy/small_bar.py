@@ -2,6 +2,7 @@
 
 from taichi_dem import CONCRETE, Scene, effects
 from taichi_dem.mesh.shapes import bar
+from tests.structures import filled
 
 UNTIL, BROKEN_UNTIL = 2e-5, 3e-4
 
@@ -9,7 +10,8 @@ UNTIL, BROKEN_UNTIL = 2e-5, 3e-4
 def struck_bar(damping=True):
     """Bar of 72 bodies under a blow on its left end, damped unless told otherwise."""
     blow = effects.GasPressure("left", peak=5e6, rise=1e-5)
-    return Scene(bar(0.1, 0.05, (3, 2, 2)), CONCRETE, [blow, *([effects.BondDamping()] * damping)])
+    acting = filled("bonds", blow, *([effects.BondDamping()] * damping))
+    return Scene(bar(0.1, 0.05, (3, 2, 2)), CONCRETE, acting)
 
 
 def broken_bar():

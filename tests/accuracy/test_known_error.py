@@ -9,6 +9,7 @@ from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Uniform, ef
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.methods import order_of
 from tests.accuracy.small_bar import UNTIL, struck_bar
+from tests.structures import filled
 
 #: Half of an order would be another scheme; what the next order adds is a few hundredths here.
 SEEN = 0.1
@@ -66,7 +67,8 @@ def test_the_account_of_crushed_bonds_closes_with_the_order_of_the_steps(tension
     smaller steps the residual falls 16 times, and 4 times where a term is of first order.
     """
     blow = effects.GasPressure("left", peak=5e7, rise=1e-5)
-    scene = Scene(bar(0.1, 0.05, (3, 2, 2)), CONCRETE, [blow, effects.ShearSlip(), *tension])
+    acting = filled("bonds", blow, effects.ShearSlip(), *tension)
+    scene = Scene(bar(0.1, 0.05, (3, 2, 2)), CONCRETE, acting)
     looks = {"until": 6e-5, "samples": 1, "progress": None}
     accounts = [
         (report := simulate(scene, method=Uniform(4e-7 / 2**k), **looks).report).energy_balance
