@@ -7,6 +7,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import taichi as ti
 
 from taichi_dem import (
     CONCRETE,
@@ -23,7 +24,7 @@ from taichi_dem import (
 from taichi_dem.elasticity.rates import bond_rates, dashpots_of, largest_bond_rate, springs_of
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.mesh.topology import faces_of_group, topology_of
-from taichi_dem.stability.body_limits import dashpot_step, spring_step
+from taichi_dem.stability.body_limits import dashpot_limit, dashpot_step, spring_limit, spring_step
 from taichi_dem.stability.step_report import stable_together
 from taichi_dem.step_control import CRITERIA
 from tests.closed_forms import LinearBonds
@@ -125,6 +126,22 @@ def test_limited_dashpots_take_the_share_that_the_step_bears_and_name_it(dt, is_
     said = f"bond 0 to {100 * share:.2g} %"
     findings = simulation.step_resolution.findings()
     assert [said in finding for finding in findings] == [True] * is_less
+
+
+def test_kernels_and_arrays_share_the_formulas_of_the_stable_step():
+    """Bit for bit, and both without a limit where nothing limits."""
+    rates = np.concatenate([np.random.default_rng(4).uniform(0.0, 1e9, 200), [1e-30, 1e30]])
+    found = np.zeros((len(rates), 2))
+
+    @ti.kernel
+    def limits(rates: ti.types.ndarray(ti.f64, 1), found: ti.types.ndarray(ti.f64, 2)):
+        for k in range(rates.shape[0]):
+            found[k, 0], found[k, 1] = dashpot_limit(rates[k]), spring_limit(rates[k])
+
+    limits(rates, found)
+    assert np.array_equal(found, np.column_stack([dashpot_step(rates), spring_step(rates)]))
+    limits(np.zeros(len(rates)), found)
+    assert found.min() > 1e90 and np.isinf([dashpot_step(0.0), spring_step(0.0)]).all()
 
 
 @pytest.mark.parametrize(("law", "name"), [(dashpots_of, "damping"), (springs_of, "stiffness")])
