@@ -172,7 +172,9 @@ def flipped(data):
 
 
 @pytest.mark.parametrize(
-    "harm", [lambda data: data[:-40], flipped, lambda data: b"PK stranger"], ids=str
+    "harm",
+    [lambda data: data[:-40], flipped, lambda data: b"PK stranger"],
+    ids=["cut short", "a bit flipped", "foreign"],
 )
 def test_damaged_and_foreign_checkpoints_are_refused(tmp_path, harm):
     path = tmp_path / "run.checkpoint"
