@@ -13,8 +13,6 @@ from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.study import call_in_process, on_device
 from taichi_dem.mesh.shapes import bar, in_space_order
 
-#: How often runs on one and on two threads take turns.
-ROUNDS = 2
 #: Edge of the boxes of the bar that stands for a block [m]: more bodies make it larger.
 BOX = 0.05
 #: What every step writes of bodies and bonds, and what it reads besides; also the laws of bonds.

@@ -4,7 +4,6 @@ A lane computes the same, operation by operation, as one member alone: no bit de
 members share a vector. A vector in space of all lanes is a matrix (components, lanes).
 """
 
-import numpy as np
 import taichi as ti
 
 from taichi_dem.kit import backend
@@ -14,7 +13,6 @@ from taichi_dem.kit.types import real, vec6
 LANES = 4
 
 lane_numbers = ti.types.vector(LANES, real)
-lane_indices = ti.types.vector(LANES, ti.i32)
 lane_vectors = ti.types.matrix(3, LANES, real)
 
 
@@ -161,8 +159,3 @@ def access() -> tuple:
 def row_of(one, other, n: ti.template()):
     """The vectors of lane n, one after the other: six numbers."""
     return vec6(one[0, n], one[1, n], one[2, n], other[0, n], other[1, n], other[2, n])
-
-
-def by_lane(array: np.ndarray) -> np.ndarray:
-    """Values of a field of groups, a row a lane: from (groups, ..., LANES) to (n, ...)."""
-    return np.moveaxis(array, -1, 1).reshape(-1, *array.shape[1:-1])

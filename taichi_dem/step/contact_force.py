@@ -104,11 +104,6 @@ class ContactForces:
         self.limited = self.has_limits and schedule.limits.limited
 
     @ti.func
-    def forces_now(self, p):
-        """Forces of a pair's contacts at the present time, a ``PairForces``; nothing changes."""
-        return self.forces_of(p, 0.0, 0.0, False)
-
-    @ti.func
     def push(self, p, dt, found):
         """Add the impulses of a pair's forces in a time [s] to both bodies, and their heat."""
         self.contacts.add_impulse(p, 0, -found.force * dt, found.moment_i * dt)

@@ -6,7 +6,6 @@ from ca_damper import Batch, SceneTable, Spheres
 from tests.ca_spheres.rig import Rig
 
 DT = 2e-5
-SHAKEN = {"dt": DT, "frequency": 6.0, "amplitude": 0.02}
 SCENES = 8
 
 
