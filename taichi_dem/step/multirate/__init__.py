@@ -4,8 +4,8 @@ A body steps by dt0 / 2^k, with the least level k at which it moves by no more t
 
     dt <= l / |v|        (Konno et al., 3.1; ``taichi_dem.step_control.Displacement``)
 
-``schedule``: levels, clock, who is active. ``members``: by which keys bodies, bonds and pairs are
-listed. ``lists``: lists by falling key. ``neighbours``: how far levels of bodies that touch may
-differ, and up to when they have pushed each other. ``half_step``: what is recorded at one time.
-One step for all is one level for all.
+``clock``: ticks, seconds, the step of each level. ``schedule``: levels, who is due.
+``active_lists``: by which keys bodies, bonds and pairs are listed. ``lists``: lists by falling key.
+``levels``: how far levels of bodies that touch may differ, and up to when they have pushed each
+other. ``half_step``: what is recorded at one time. One step for all is one level for all.
 """
