@@ -152,7 +152,7 @@ class Result:
         -------
         pandas.DataFrame
             Masses, sizes, places, velocities, spins and energies, a row a fragment, the heaviest
-            first (``taichi_dem.output.fragments.fragments_of``).
+            first (``taichi_dem.output.fracture.fragments_of``).
         """
         of_body = self.fragment_of_body(frame)
         return data_frame(fragments_of(self.model, self.frame(frame), of_body))
