@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.accuracy.extremes import extreme_doubts
-from taichi_dem.accuracy.runs import Job, Runs
-from taichi_dem.accuracy.sources import Beside, awake_price
-from taichi_dem.accuracy.twins import MANY, Twins
+from taichi_dem.accuracy.runs import Job, Runs, extreme_doubts
+from taichi_dem.accuracy.sources import MANY, Beside, Twins, awake_price
 from taichi_dem.kit.bars.answer import (
     Answer,
     ErrorParts,

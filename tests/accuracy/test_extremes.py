@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, effects, goals, solve
-from taichi_dem.accuracy.extremes import BEFORE, change, extreme_doubts
+from taichi_dem.accuracy.runs import BEFORE, change, extreme_doubts
 from taichi_dem.goals import Goal
 from tests.made_result import made_result
 from tests.scenes import apart
