@@ -17,8 +17,7 @@ from typing import Any, Protocol
 
 import taichi as ti
 
-from taichi_dem.contact.breaks import Breaks
-from taichi_dem.contact.contacts import Contacts
+from taichi_dem.contact.contacts import Breaks, Contacts
 from taichi_dem.contact.verlet_list import NearPairs, VerletList
 from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import assign, values
