@@ -2,13 +2,10 @@
 
 from taichi_dem.laws.body_contact import BodyContact
 from taichi_dem.laws.bond import BondDamping, ShearSlip, SlipWeakening, Softening
-from taichi_dem.laws.friction import Friction, StickingFriction
 from taichi_dem.laws.mixed_mode import MixedMode
-from taichi_dem.laws.sphere_contact import SphereContact
-from taichi_dem.loads.expanding_gas import ExpandingGas
-from taichi_dem.loads.pressure import GasPressure, Gravity, Pressure
-from taichi_dem.loads.quiet_boundary import QuietBoundary
-from taichi_dem.loads.supports import Fixed, PrescribedMotion, Roller
+from taichi_dem.laws.sphere_contact import Friction, SphereContact, StickingFriction
+from taichi_dem.loads.pressure import ExpandingGas, GasPressure, Gravity, Pressure
+from taichi_dem.loads.supports import Fixed, PrescribedMotion, QuietBoundary, Roller
 
 __all__ = [
     "BodyContact",

@@ -13,8 +13,7 @@ from taichi_dem.kit.validation import shown
 from taichi_dem.laws.base import PARTS_OF_BOND, Effect
 from taichi_dem.laws.body_contact import BodyContact
 from taichi_dem.laws.bond import BondDamping, ShearSlip, Softening
-from taichi_dem.laws.friction import StickingFriction
-from taichi_dem.laws.sphere_contact import ONCE_BROKEN
+from taichi_dem.laws.sphere_contact import ONCE_BROKEN, StickingFriction
 from taichi_dem.materials.body_materials import BodyMaterials
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import parts_of

@@ -1,18 +1,19 @@
-"""Contact of fragments through spheres on their broken faces (Konno et al., 2.2, Fig. 5)."""
+"""Contact of spheres on broken faces (Konno et al., 2.2, Fig. 5), and friction of contacts."""
 
 from typing import Any
 
 import taichi as ti
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.products import matvec, squared
+from taichi_dem.kit.products import dot, matvec, norm, squared
+from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import between, flag, shown, whole
 from taichi_dem.laws.base import Effect
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.physics.sphere_pair import Nearest, is_within, meeting, normal_force
+from taichi_dem.physics.sphere_pair import Nearest, friction_force, is_within, meeting, normal_force
 from taichi_dem.state.model import Model
 from taichi_dem.state.pair_store import PairStore
 
@@ -203,3 +204,111 @@ class SphereContact(Effect):
     def stored(self, m, overlap):
         """Elastic energy of a contact [J]."""
         return 0.5 * self.law[m, 0] * overlap * overlap
+
+
+@ti.data_oriented
+class Friction(Effect):
+    """Sliding friction of contacts, without a tangential spring (Konno et al., section 2.2)."""
+
+    role = "friction"
+    activation = "bodies that touch slide"
+    may_be_silent = True
+
+    def numbers(self, material: Material) -> tuple[float, ...]:
+        """Friction coefficient."""
+        return (material.friction,)
+
+    @ti.func
+    def limit(self, m, force_normal):
+        """Largest friction [N] at a normal force [N]; of impulses likewise."""
+        return self.law[m, 0] * force_normal
+
+    @ti.func
+    def force(self, m, damping, force_normal, slide):
+        """Force [N] on the second sphere against its sliding velocity [m/s]."""
+        return friction_force(self.law[m, 0], damping, force_normal, slide)
+
+
+@ti.data_oriented
+class StickingFriction(Friction):
+    """Friction with a spring in each contact, up to a limit (Cundall and Strack 1979).
+
+    A body at rest on a slope below the friction angle stays there; with ``Friction`` it creeps. The
+    stretch of a spring turns with the first body and is lost when the two part. Between bodies
+    (``BodyContact``) the spring always has the area of the smaller body's largest face: with the
+    area of contact it would creep.
+
+    Parameters
+    ----------
+    stiffness_ratio : float, default 0.8
+        Ratio of the stiffness of the spring to that along the normal, from 1e-6 to 1; spheres of
+        a Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
+    """
+
+    name = "sticking_friction"
+    activation = "bodies that touch slide"
+    remembers = True
+    #: Its springs let bodies that touch remember: without a limit they would still slip.
+    may_be_silent = False
+
+    def __init__(self, stiffness_ratio: float = 0.8):
+        self.stiffness_ratio = between("stiffness_ratio", stiffness_ratio, 1e-6, 1.0)
+
+    def numbers(self, material: Material) -> tuple[float, ...]:
+        """Friction coefficient, stiffness of the spring of spheres [N/m], and its ratio."""
+        spring = self.stiffness_ratio * float(material.contact_stiffness)
+        return material.friction, spring, self.stiffness_ratio
+
+    def declare_columns(self, store: PairStore) -> None:
+        """Keep the stretch [m] of the spring of each sphere pair, in the first body's frame."""
+        self.stretch = store.sphere_column("tangential_stretch", real, 3)
+        if self.tables.contact.meets_bodies:
+            self.bodies = store.sphere
+
+    @ti.func
+    def stiffness(self, m, k):
+        """Stiffness of the spring of pair k [N/m]; of bodies for as much area as may touch."""
+        found = self.law[m, 1]
+        if ti.static(self.tables.contact.meets_bodies):
+            area = self.tables.contact.largest_area(self.bodies[k][0], self.bodies[k][1])
+            found = self.law[m, 2] * self.tables.contact.elastic(m, 1.0) * area
+        return found
+
+    @ti.func
+    def follow(self, k, normal, way):
+        """Turn the spring of sphere pair k into the contact's plane, stretch it by ``way`` [m]."""
+        stretch = self.stretch[k]
+        flat = stretch - dot(stretch, normal) * normal
+        # Turned, not projected: to turn with the contact takes no energy.
+        self.stretch[k] = flat * (norm(stretch) / ti.max(norm(flat), 1e-300)) + way
+
+    @ti.func
+    def slip(self, m, k, limit, way):
+        """Shorten the spring of sphere pair k to a limit [N]; return the energy dissipated [J]."""
+        # Work of the stretch at the mean force = energy stored + energy dissipated by slipping.
+        trial = self.stretch[k]
+        stiffness = self.stiffness(m, k)
+        longest = limit / stiffness
+        size = norm(trial)
+        present = trial
+        if size > longest:
+            present = trial * (longest / size)
+        self.stretch[k] = present
+        return 0.5 * stiffness * dot(trial - way + present, trial - present)
+
+    @ti.func
+    def spring(self, m, k):
+        """Force of the spring of sphere pair k on the second sphere [N]."""
+        return -self.stiffness(m, k) * self.stretch[k]
+
+    @ti.func
+    def stored(self, m, k):
+        """Elastic energy in the spring of sphere pair k [J]."""
+        return 0.5 * self.stiffness(m, k) * squared(self.stretch[k])
+
+    @ti.func
+    def part(self, m, k):
+        """Reset the spring of sphere pair k, whose spheres have parted; return its energy [J]."""
+        energy = self.stored(m, k)
+        self.stretch[k] = vec3(0.0)
+        return energy
