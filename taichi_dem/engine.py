@@ -15,10 +15,9 @@ from taichi_dem.laws.bond import Separable
 from taichi_dem.methods import Method, structure_of
 from taichi_dem.report.forces import Forces
 from taichi_dem.report.readings import Readings
-from taichi_dem.state.capacity import LEAST, Capacity
 from taichi_dem.state.model import ROLES, Model
 from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
+from taichi_dem.state.tables import LEAST, Capacity, Tables
 from taichi_dem.step.drivers import DRIVERS
 from taichi_dem.step.explicit import ExplicitStep
 from taichi_dem.step.multirate.schedule import Schedule

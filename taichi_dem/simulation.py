@@ -30,10 +30,9 @@ from taichi_dem.report.report import Report, known_error
 from taichi_dem.report.resolution import StepResolution
 from taichi_dem.report.shared_volume import SharedVolume
 from taichi_dem.scene import Scene
-from taichi_dem.state.capacity import capacity_of
 from taichi_dem.state.model import Model, names_of
 from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
+from taichi_dem.state.tables import Tables, capacity_of
 from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.drivers import DRIVERS, driver_name
 from taichi_dem.step.multirate.schedule import Schedule

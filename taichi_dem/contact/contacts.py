@@ -11,11 +11,10 @@ from taichi_dem.laws.sphere_contact import ONCE_BROKEN
 from taichi_dem.methods import Method
 from taichi_dem.physics.rotation import place_in
 from taichi_dem.physics.sphere_pair import DEEPEST_SHARE, SUNK, Nearest
-from taichi_dem.state.capacity import SPARE_PAIRS, SPARE_SPHERES
 from taichi_dem.state.model import Model
 from taichi_dem.state.pair_store import PairStore
 from taichi_dem.state.state import State
-from taichi_dem.state.tables import Tables
+from taichi_dem.state.tables import SPARE_PAIRS, SPARE_SPHERES, Tables
 
 #: Largest steps that a fast body makes before it is searched again.
 STEPS = 16.0

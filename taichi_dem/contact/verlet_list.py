@@ -11,8 +11,8 @@ from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.ordered import Grouping, RunningSums, Some
 from taichi_dem.kit.types import ivec3, real
 from taichi_dem.methods import Method
-from taichi_dem.state.capacity import SPARE_NEIGHBOURS
 from taichi_dem.state.model import Model
+from taichi_dem.state.tables import SPARE_NEIGHBOURS
 
 #: State of the list when it must be rebuilt, and while it is being rebuilt.
 STALE, MAKING = 1, 2

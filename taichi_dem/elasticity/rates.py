@@ -20,10 +20,9 @@ from taichi_dem.kit.fixed_order import (
 from taichi_dem.materials.body_materials import AnyMaterial
 from taichi_dem.materials.bond_rules import Constant, Density, per_bond
 from taichi_dem.mesh import tetrahedra as geometry
-from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import area_vectors, signed_volumes, unit_normals
-from taichi_dem.mesh.topology import Topology, body_properties, face_vertices
+from taichi_dem.mesh.topology import Topology, body_properties, face_vertices, spheres_of_faces
 
 #: Rings of bodies around a face over which its moduli are means.
 _RINGS = 2

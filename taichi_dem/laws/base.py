@@ -20,10 +20,9 @@ from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import shown, told_apart
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.materials.body_materials import MOST, BodyMaterials
-from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import MANY, Model
 from taichi_dem.state.pair_store import PairStore
-from taichi_dem.state.tables import Tables
+from taichi_dem.state.tables import Capacity, Tables
 
 #: Lowest and highest displacement along x, y and z [m].
 Travel = tuple[tuple[float, ...], tuple[float, ...]]

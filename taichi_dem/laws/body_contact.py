@@ -23,14 +23,14 @@ from taichi_dem.laws.sphere_contact import SphereContact
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials
 from taichi_dem.materials.bond_rules import typical_of
-from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES, all_faces, area_vectors
+from taichi_dem.mesh.topology import ContactSpheres
 from taichi_dem.physics.body_overlap import raised, ray_ends, sum_of_rays, turning
 from taichi_dem.physics.sphere_pair import Meeting, Nearest
-from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import Model
 from taichi_dem.state.pair_store import PairStore
+from taichi_dem.state.tables import Capacity
 
 #: Largest number of parts of an edge, overlap [m2] that counts as none, and distance from which on
 #: the rays to a face are left out at once, as a share of the size of their body.

@@ -18,8 +18,8 @@ from taichi_dem.physics.fracture import (
     softening_energy,
     weakening_slip,
 )
-from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import Model
+from taichi_dem.state.tables import Capacity
 
 #: Bits of the parts of a ``Separable`` law.
 NORMAL, TANGENTIAL = 1, 2

@@ -8,7 +8,7 @@ from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.kit.validation import positive, shown
 from taichi_dem.laws.base import NEAR, Effect, check_sliding_energy
 from taichi_dem.materials import Material
-from taichi_dem.state.capacity import Capacity
+from taichi_dem.state.tables import Capacity
 
 #: Largest exponent, and its steps: powers of quarters need roots and products alone, which every
 #: processor rounds in one way.

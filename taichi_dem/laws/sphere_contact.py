@@ -11,8 +11,8 @@ from taichi_dem.kit.validation import between, flag, shown, whole
 from taichi_dem.laws.base import Effect
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials
-from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.topology import ContactSpheres, spheres_of_faces
 from taichi_dem.physics.sphere_pair import Nearest, friction_force, is_within, meeting, normal_force
 from taichi_dem.state.model import Model
 from taichi_dem.state.pair_store import PairStore

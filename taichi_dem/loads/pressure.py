@@ -20,8 +20,8 @@ from taichi_dem.loads.history import History, history_points, shortest_piece
 from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
-from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import Model
+from taichi_dem.state.tables import Capacity
 
 #: Largest exponent, and how far a wall may close, in radii, before it closes no further.
 _MOST_EXPONENT, _CLOSED = 5.0, -0.5

@@ -22,8 +22,8 @@ from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
 from taichi_dem.physics.wrench import Block
-from taichi_dem.state.capacity import Capacity
 from taichi_dem.state.model import Model
+from taichi_dem.state.tables import Capacity
 
 #: Sine of the angle below which two normals count as parallel.
 _PARALLEL = 1e-6

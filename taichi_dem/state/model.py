@@ -14,10 +14,9 @@ from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import AnyMaterial, BodyMaterials, body_materials
 from taichi_dem.materials.bond_rules import per_bond
 from taichi_dem.materials.material import harmless
-from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import area_vectors, components
-from taichi_dem.mesh.topology import body_properties, edge_colours, topology_of
+from taichi_dem.mesh.topology import ContactSpheres, body_properties, edge_colours, topology_of
 
 #: Roles that take one effect, in the order in which effects are listed, bound and reported.
 SINGLE = ("bond", "tension", "shear", "dashpot", "friction", "contact")

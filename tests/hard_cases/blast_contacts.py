@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
-from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
-from taichi_dem.mesh.topology import body_properties
+from taichi_dem.mesh.topology import body_properties, spheres_of_faces
 from tests.closed_forms import damped_opening, velocity_after_impact
 from tests.hard_cases.blast_run import EDGE, FREE, TOUCHING, Run, X
 from tests.hard_cases.cases import Cases

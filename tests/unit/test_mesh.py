@@ -10,13 +10,13 @@ import pytest
 from _meshes import group_area
 from taichi_dem import PAPER_BLOCK, InputError, join, read_mesh
 from taichi_dem.mesh import tetrahedra as geometry
-from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import checked_mesh, volumes
 from taichi_dem.mesh.shapes import bar, placed_together
 from taichi_dem.mesh.topology import (
     body_properties,
     edge_colours,
     face_vertices,
+    spheres_of_faces,
     topology_of,
 )
 from tests.turns import matrix, quaternion
