@@ -35,8 +35,7 @@ from _blast import (
     paper_effects,
     run_options,
 )
-from _drawing import crossings
-from _meshes import mirrored_copies
+from _meshes import crossings, mirrored_copies
 from make_meshes import block_with_hole
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.kit import study

@@ -28,7 +28,7 @@ from matplotlib.patches import Rectangle
 
 import taichi_dem as dem
 from _blast import BLOCK_STEP, blast_parser
-from _drawing import crossings
+from _meshes import crossings
 from taichi_dem import effects
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
