@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from ca_damper.runs.response import Response
-from taichi_dem.kit.bars.goal import BaseGoal
+from taichi_dem.kit.bars.answer import BaseGoal
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import instance, positive, several, shown

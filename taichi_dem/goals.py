@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from taichi_dem.kit.bars.goal import BaseGoal
+from taichi_dem.kit.bars.answer import BaseGoal
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, finite, flag, instance, shown, whole, word
 from taichi_dem.mesh.topology import faces_of_group

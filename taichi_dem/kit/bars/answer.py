@@ -1,16 +1,18 @@
-"""Answer to a question with a tolerance: value, error bar and cost."""
+"""Question with a tolerance, and its answer: value, error bar and cost."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import reduce
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from taichi_dem.kit.bars.budget import Source, table
 from taichi_dem.kit.bars.chance import mean_and_deviation, share_error, t_quantile
 from taichi_dem.kit.display import by_fields, counted
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import choice, shown, word
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,6 +21,29 @@ if TYPE_CHECKING:
 TOLERANCES = (0.1, 0.03, 0.01, 0.003)
 #: A number, or one for each place of a curve.
 Values = float | np.ndarray
+
+
+@dataclass(frozen=True)
+class BaseGoal:
+    """Name, unit, function and kind of an output."""
+
+    kinds: ClassVar[tuple[str, ...]]
+    given: ClassVar[str]
+
+    name: str
+    unit: str
+    function: Callable[[Any], Any] = field(repr=False)
+    kind: str = "value"
+
+    def __post_init__(self) -> None:
+        word("name of a goal", self.name)
+        word("unit of a goal", self.unit)
+        choice("kind of a goal", self.kind, self.kinds)
+        if not callable(self.function):
+            raise InputError(
+                f"function of a goal must be a function of a {self.given}, "
+                f"got {shown(self.function)}"
+            )
 
 
 @dataclass(frozen=True)
@@ -64,8 +89,8 @@ class ErrorParts:
 
     def __str__(self):
         found = {part.name: largest(getattr(self, part.name)) for part in fields(self)}
-        shown = (f"{name} {value:.2g}" for name, value in found.items() if value > 0.0)
-        return ", ".join(shown) or "no error found"
+        told = (f"{name} {value:.2g}" for name, value in found.items() if value > 0.0)
+        return ", ".join(told) or "no error found"
 
 
 @dataclass(frozen=True)
