@@ -11,8 +11,7 @@ The error is the RMS over the frequencies of (response - truth), mean over seeds
 peak. Dotted is what seeds alone make of it. Seconds are CPU seconds of one thread, of the fastest
 repeat.
 
-Writes work_precision.png, points.csv, answers.csv and summary.json to
-results/cost_of_accuracy_damper/.
+Writes work_precision.png, points.csv and summary.json to results/cost_of_accuracy_damper/.
 """
 
 import itertools
@@ -24,7 +23,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from _work_precision import Point, cheapest
 from ca_damper import Automaton, ProgressBar, SimulationDiverged, Spheres, frequency_response
 from ca_damper.report.measures import curve_distance, seed_variance
 from taichi_dem import InputError
@@ -56,10 +54,35 @@ SETTINGS = {
     # The first may compile.
     "repeats": (3, 2),
 }
-#: Errors that are asked for.
-TARGETS = (0.1, 0.01, 0.001)
 #: Times are of one thread.
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
+
+
+class Point(NamedTuple):
+    """A run of a method.
+
+    step: the swept number, larger is coarser; label: the same in words. error: a share, NaN where a
+    run failed. failure: why it did, in a word.
+    """
+
+    method: str
+    step: float
+    label: str
+    seconds: float
+    error: float = math.nan
+    failure: str = ""
+
+
+def cheapest(points, target, floor=0.0):
+    """The cheapest point of a method with an error up to a target, or None.
+
+    All finer steps must be as good, and the floor must lie below: the distance of runs that should
+    not differ. A single lucky run answers nothing.
+    """
+    finest_first = sorted(points, key=lambda one: one.step)
+    # NaN, of a failure, is no error at all.
+    reached = itertools.takewhile(lambda one: one.error <= target, finest_first)
+    return min(reached, key=lambda one: one.seconds, default=None) if floor <= target else None
 
 
 class Sweep(NamedTuple):
@@ -158,15 +181,6 @@ def draw_points(axes, points, floors):
         axes.axhline(floors[name], color=colour, ls=":", lw=1.0)
 
 
-def answers_of(points, floors):
-    """Rows (method, error asked for, step, seconds, error) of the cheapest steps of each method."""
-    for target, (name, some) in itertools.product(TARGETS, points.items()):
-        best, cells = cheapest(some, target, floors[name]), ("none", "", "")
-        if best:
-            cells = best.label, f"{best.seconds:.3g}", f"{best.error:.2g}"
-        yield name, f"{target:g}", *cells
-
-
 def figures_of(points, floors, target, words):
     """Figures of the cheapest method for an error: its seconds and name."""
     found = [cheapest(some, target, floors[name]) for name, some in points.items()]
@@ -189,10 +203,7 @@ def run(options):
     own = {name: points_of(name, one, one.truth) for name, one in made.items()}
     toward = {name: points_of(name, one, truth) for name, one in made.items()}
     floors = {name: floor_of(one.reference, [*one.runs.values()]) for name, one in made.items()}
-    rows, header = [*answers_of(own, floors)], "method asked step seconds error"
     study.write_rows(folder / "points.csv", [*itertools.chain(*own.values())], Point._fields)
-    study.write_rows(folder / "answers.csv", rows, header)
-    study.print_table(rows, header.split())
     draw(folder / "work_precision.png", own, toward, floors)
     figures = figures_of(own, floors, 0.01, "at_1_percent")
     figures |= figures_of(own, floors, 0.1, "at_10_percent")

@@ -35,9 +35,9 @@ import pandas as pd
 import taichi_dem as dem
 from _blast import blast_parser, paper_scene, run_costs
 from _meshes import with_moved_nodes
-from _work_precision import Point, cheapest
 from ca_damper import Automaton, solve_response
 from ca_damper import goals as damper_goals
+from cost_of_accuracy_damper import Point, cheapest
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLUE, GREY, LIGHT_GREY, picture, seconds, styles_of
 

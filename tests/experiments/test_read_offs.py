@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from _meshes import group_area, mirrored_copies
-from _work_precision import Point, cheapest
 from blast_scaling import even_cuts, share_costs
 from ca_damper.theory.bouncing import Fall, RecordedFall
-from cost_of_accuracy_damper import floor_of
+from cost_of_accuracy_damper import Point, cheapest, floor_of
 from taichi_dem import CONCRETE, PAPER_BLOCK, read_mesh
 from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.topology import topology_of
