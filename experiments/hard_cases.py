@@ -9,27 +9,20 @@ in the table. A method that claims the case passes if all figures are within the
 margin is the bound over the figure, of the worst figure. A method that cannot handle the case must
 refuse it in words: returning numbers counts as a failure. The cases are tests, in tests/hard_cases.
 
-In the overview each case is a square; cases that all methods refuse are grey. In a browser, a
-square of hard_cases.svg opens the picture of its case.
-
-Writes hard_cases.png and .svg, hard_cases.csv, a picture of each case and summary.json to
-results/hard_cases/.
+In the picture each case is a square; cases that all methods refuse are grey. Writes hard_cases.png,
+hard_cases.csv and summary.json to results/hard_cases/.
 """
 
 import itertools
 import math
-import re
 import sys
-import textwrap
 from collections import Counter
 from functools import partial
 
 from matplotlib.patches import Rectangle
 
 from taichi_dem.kit import study
-from taichi_dem.kit.files import write_whole
 from taichi_dem.kit.plot_style import (
-    BLACK,
     BLUE,
     GREY,
     NAVY,
@@ -37,10 +30,7 @@ from taichi_dem.kit.plot_style import (
     RED,
     SKY,
     area_key,
-    line_key,
     picture,
-    power,
-    styles_of,
 )
 from taichi_dem.kit.progress_bar import ProgressBar
 from tests.hard_cases.cases import assess
@@ -85,8 +75,6 @@ def run(options):
     folder, trials = study.begin(options), trials_of(options)
     rows = [row_of(trial) for trial in trials]
     study.write_rows(folder / "hard_cases.csv", rows)
-    for name, own in by_name(trials).items():
-        picture_case(folder / f"{name}.png", own)
     picture_wall(folder / "hard_cases.png", trials)
     shown = ("case", "method", "status", "margin", "words")
     study.print_table([[cell_of(row[key]) for key in shown] for row in rows], shown)
@@ -106,97 +94,26 @@ def cell_of(value):
     return text if len(text) < 90 else f"{text[:87]}..."
 
 
-def title_of(case):
-    """Name of a case in words: fragment_at_1_km_s -> fragment at 1 km/s."""
-    words = re.sub(r"(\d+_k?m)_s(?![a-z])", r"\1/s", case.name)
-    return words.replace("_", " ")
-
-
 def by_name(trials):
     """Trials of each case, by its name; those of a case follow each other."""
     groups = itertools.groupby(trials, lambda trial: trial.case.name)
     return {name: list(own) for name, own in groups}
 
 
-def looks_of(trials):
-    """Label, colour, mark and dashes of every method."""
-    methods = dict.fromkeys(trial.method for trial in trials)
-    # A uniform step of a hard case is fixed: the paper's rule does not shorten it.
-    styles = styles_of("fixed" if method == "uniform" else method for method in methods)
-    return {
-        m: {"label": s.label, "color": s.colour, "marker": s.marker, "ls": s.line}
-        for m, s in zip(methods, styles.values())
-    }
-
-
-def picture_case(path, own):
-    """The curves of a case's methods, with its question."""
-    looks = looks_of(own)
-    # The first are thick, so that all are seen.
-    for k, look in enumerate(looks.values()):
-        look["lw"] = max(0.8, 3.0 - 0.45 * k)
-    with picture(path, size=(7.0, 4.6)) as (figure, axes):
-        draw_case(axes, own, looks)
-        shown = dict.fromkeys(trial.method for trial in own if trial.curve)
-        keys = [line_key(**{**looks[method], "marker": None}) for method in shown]
-        figure.legend(handles=keys, loc="outside lower center", ncols=2)
-        question = textwrap.fill(own[0].case.question, 100)
-        figure.suptitle(question, fontsize=9.0, x=0.02, ha="left")
-
-
-def draw_case(axis, own, looks):
-    """Curves of the methods of a case, and how they fared in the title."""
-    shown = [trial for trial in own if trial.curve]
-    for trial in shown:
-        xlabel, x, ylabel, lines, dots = trial.curve
-        look = looks[trial.method]
-        hollow = {"ls": "none", "ms": 1.6 * look["lw"] + 1.0, "mfc": "none", "lw": 1.0}
-        look = {**look, **(hollow if dots else {"marker": None})}
-        for y in lines:
-            axis.plot(x, y, **look)
-        axis.set(xlabel=xlabel, ylabel=ylabel)
-    if shown:
-        axis.locator_params(axis="x", nbins=5)
-    else:
-        said = textwrap.fill(f"“{own[0].words}”", 32)
-        axis.set(xticks=[], yticks=[])
-        axis.text(0.03, 0.92, said, fontsize=8.5, va="top", transform=axis.transAxes)
-    lowest, highest = axis.get_ylim()
-    if 0.0 < lowest < 0.95 * highest:
-        axis.set_ylim(0.0, 1.05 * highest)
-    failed = any(trial.status == "failed" for trial in own)
-    title = textwrap.fill(f"{title_of(own[0].case)}: {verdict(own)}", 32)
-    axis.set_title(title, fontsize=9.0, color=RED if failed else BLACK)
-
-
-def verdict(own):
-    """How the methods of a case fared, in words."""
-    ends = [trial.status for trial in own]
-    words = {"passed": "passed", "refused": "refused", "failed": "FAILED"}
-    said = [f"{ends.count(end)} {word}" for end, word in words.items() if end in ends]
-    least = min((trial.worst.margin for trial in own if trial.worst), default=math.inf)
-    if math.isfinite(least):
-        # A line of the title shall not end within it.
-        number = power(least) if least >= 100.0 else f"{least:.2g}"
-        said.append(f"margin {number}".replace(" ", "\N{NO-BREAK SPACE}"))
-    return ", ".join(said)
-
-
 def picture_wall(path, trials):
-    """A square a case, coloured by ``level_of``; as SVG, too, where a square opens its picture."""
+    """A square a case, coloured by ``level_of``."""
     levels = {name: level_of(own) for name, own in by_name(trials).items()}
     names = sorted(levels, key=lambda name: [*WALL].index(levels[name]))
     counts, columns = Counter(levels.values()), min(ACROSS, len(names))
     with picture(path, size=(5.0, 3.6), dpi=300) as (figure, axes):
         for k, name in enumerate(names):
             place, look = (k % columns, k // columns), {"fc": WALL[levels[name]], "lw": 0.0}
-            axes.add_patch(Rectangle(place, 0.88, 0.88, url=f"{name}.png", **look))
+            axes.add_patch(Rectangle(place, 0.88, 0.88, **look))
         axes.set(xlim=(-0.1, columns), ylim=(-(-len(names) // columns), -0.1), aspect="equal")
         axes.set_axis_off()
         keys = [area_key(f"{name}: {counts[name]}", fc=colour) for name, colour in WALL.items()]
         look = {"loc": "outside lower center", "ncols": 3, "fontsize": 9.5, "title_fontsize": 9.5}
         figure.legend(handles=keys, title=f"{len(names)} hard cases, by margin", **look)
-        write_whole(path.with_suffix(".svg"), partial(figure.savefig, format="svg"))
 
 
 def level_of(own):

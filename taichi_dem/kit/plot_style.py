@@ -80,9 +80,6 @@ STYLES = {
     "dem_printed": MethodStyle("spheres, damping as printed", PURPLE, "v", _LONG_DASHES),
     "dem_soft": MethodStyle("spheres, modulus / 100", SKY, "P"),
     "empty": MethodStyle("empty container", LIGHT_GREY, "X", ":"),
-    "rk45_tolerance": MethodStyle("RK45 in the kernel, tolerance swept", BROWN, "o"),
-    "rk45_step": MethodStyle("RK45 in the kernel, longest step swept", VIOLET, "s"),
-    "rk45_python": MethodStyle("RK45 in Python, tolerance swept", BLACK, "D"),
 }
 #: Other names of the same.
 _SAME = {
@@ -233,14 +230,6 @@ def seconds(value: float) -> str:
         if value >= size:
             return f"{value / size:.3g} {unit}"
     return f"{value / 1e-9:.3g} ns"
-
-
-def power(value: float) -> str:
-    """A number with two figures and a power of ten: 3.1e-07 -> 3.1 × 10⁻⁷, 1e-06 -> 10⁻⁶."""
-    factor, exponent = f"{value:.1e}".split("e")
-    raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    factor = factor.replace(".0", "")
-    return f"10{raised}" if factor == "1" else f"{factor} × 10{raised}"
 
 
 def write_gif(
