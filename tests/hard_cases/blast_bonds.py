@@ -57,7 +57,6 @@ def spin(trial, axis, _):
     trial.limit("energy error", abs(energy - 1.0), bound, "(w dt)^2 (I3 - I1) / 12 I1")
     trial.limit("angular momentum error", kept, run.steps * EPS, "n eps: rounding")
     trial.limit("drift of the centre [m]", abs(run.moved), 0.0, "nothing acts")
-    run.draw("energy of spin / at the start - 1 [1]", energy - 1.0)
 
 
 @case(FREE)
@@ -67,7 +66,6 @@ def fragment_at_1_km_s(trial):
     run.flies_straight()
     change = abs(run["velocity"] - run["velocity"][0])
     trial.limit("change of velocity", change, 0.0, "same bits")
-    run.draw("x [m]", run.moved[:, 0, 0])
 
 
 @case(FREE)
@@ -184,7 +182,6 @@ def stiffness_ratio_1e4(trial):
     states = np.array([expm(time * matrix) @ start for time in run.time_s])
     run.momentum_kept()
     run.converged("error of the slide / first", left, states[:, 6:9] - states[:, :3], 5e-6)
-    run.draw("slide [µm]", 1e6 * left[:, 1])
 
 
 @case(STANDING)
@@ -204,7 +201,6 @@ def many_steps_at_rest(trial):
     settling = CONCRETE.shear_damping / CONCRETE.shear_stiffness
     run.converged("error of the sag / sag", sag[-1], static, scale)
     trial.limit("way still to go / sag", settling * speed / scale, 0.01, "v c / k")
-    run.draw("sag [nm]", 1e9 * sag.min(axis=1))
 
 
 @case((), (TOO_LONG, "diverged at"))

@@ -77,7 +77,6 @@ def deep_overlap_at_start(trial):
     parted = run.moved[:, 1, 0] - run.moved[:, 0, 0]
     run.momentum_kept()
     run.converged("error of the way apart / way", parted[early], way[early], way[early][-1])
-    run.draw("distance [µm]", 1e6 * parted)
 
 
 @case(["implicit"], LIMITED)
@@ -97,7 +96,6 @@ def mass_ratio_1e4(trial):
     speed = run["velocity"][:, 0]
     run.momentum_kept()
     run.converged("velocity error / speed", speed[-1], true, 1.0)
-    run.draw("speed [m/s]", speed[:, 0])
 
 
 def sphere_on_base(mesh):
@@ -118,7 +116,6 @@ def strongest_dashpot(trial):
     speed = run["velocity"][:, :, 0]
     run.momentum_kept()
     run.converged("speed error / first", speed[-1], 0.5, 1.0, formula="1 % of one speed")
-    run.draw("speed [m/s]", speed[:, 0])
 
 
 @case(("multirate_held", "controlled", "implicit"))
@@ -134,7 +131,6 @@ def sudden_pressure_on_sleepers(trial):
     trial.limit("momentum error", report.linear_momentum_error, 1e-12, "rounding")
     residual = report.energy_residual_fraction
     trial.limit("energy from nowhere", residual, 0.05, "the specification")
-    run.draw("impulse [N s]", impulse)
 
 
 @case(("implicit",))

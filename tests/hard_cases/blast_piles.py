@@ -42,10 +42,8 @@ class Pile(Run):
         trial.limit("momentum error", report.linear_momentum_error, 1e-9, "rounding")
 
     def way(self):
-        """Largest way of a body at every sample [m], drawn."""
-        way = np.linalg.norm(self.moved, axis=2).max(axis=1)
-        self.draw("way [mm]", 1e3 * way)
-        return way
+        """Largest way of a body at every sample [m]."""
+        return np.linalg.norm(self.moved, axis=2).max(axis=1)
 
     def stands(self):
         """Nothing moves once the weight has come to rest."""
@@ -72,7 +70,6 @@ class Pile(Run):
         energy = (self.kinetic_energy + weight - weight[0]) / self.kinetic_energy.max()
         rise, formula = energy.max() - energy[0], "kinetic + weight <= at the start"
         self.trial.limit("energy made / most of motion", rise, 1e-3, formula)
-        self.draw("energy / most of motion [1]", energy)
 
 
 def plate(half):

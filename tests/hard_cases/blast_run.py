@@ -143,15 +143,9 @@ class Run(MotionRecord):
         trial.warnings += simulation.step_resolution.findings()
         self.trial, self.dt, self.steps = trial, method.dt0, self.time_s[-1] / method.dt0
 
-    def draw(self, ylabel, y):
-        """Draw a quantity over time."""
-        self.trial.draw("time [µs]", 1e6 * self.time_s, ylabel, y)
-
     def energy(self):
-        """Kinetic energy over that at the start, which is drawn."""
-        share = self.kinetic_energy / self.kinetic_energy[0]
-        self.draw("kinetic energy / given [1]", share)
-        return share
+        """Kinetic energy over that at the start."""
+        return self.kinetic_energy / self.kinetic_energy[0]
 
     def nothing_made(self):
         """Momentum is kept, and kinetic energy never exceeds what there was at the start."""
@@ -177,7 +171,6 @@ class Run(MotionRecord):
         """Nothing moves, to the bit."""
         moved = abs(self.moved).max(axis=(1, 2))
         self.trial.limit("displacement [m]", moved, 0.0, "nothing acts")
-        self.draw("displacement [m]", moved)
 
     def converged(
         self, name, found, true, scale, bound=ACCURACY, formula="1 % of the exact solution"
@@ -186,10 +179,8 @@ class Run(MotionRecord):
         self.trial.limit(name, abs(np.asarray(found) - true) / scale, bound, formula)
 
     def gap(self, opening=0.0):
-        """Distance of body 1 from body 0 along x beyond that of the mesh [m], drawn."""
-        gap = opening + self.moved[:, 1, 0] - self.moved[:, 0, 0]
-        self.draw("opening [µm]", 1e6 * gap)
-        return gap
+        """Distance of body 1 from body 0 along x beyond that of the mesh [m]."""
+        return opening + self.moved[:, 1, 0] - self.moved[:, 0, 0]
 
     def exact_gap(self, opening, speed=0.0, area=AREA):
         """Opening [m] of a bonded pair over time; opening [m], speed [m/s]: at the start."""

@@ -1,7 +1,7 @@
 """Cases at the edge of what methods bear: each method stays within bounds or refuses in words.
 
 A ``Case`` is a function of a ``Trial``. It runs the trial's method on a small job and gives the
-trial figures with their bounds, and a curve to draw. ``assess`` tells how the method fared.
+trial figures with their bounds. ``assess`` tells how the method fared.
 """
 
 import math
@@ -82,17 +82,16 @@ class Cases(list):
 class Trial:
     """A method in a case: what the run gave, and how the method fared.
 
-    quick: whether to take a smaller job. limits: figures with bounds. curve: what to draw of the
-    run, (xlabel, x, ylabel, lines, whether as dots). warnings: sentences in which the run itself
-    said that its numbers are not to be trusted. words: the worst figure, or the sentence with which
-    the method refused. worst: the worst figure, if any. seconds: in all; compile_s: part of them.
+    quick: whether to take a smaller job. limits: figures with bounds. warnings: sentences in which
+    the run itself said that its numbers are not to be trusted. words: the worst figure, or the
+    sentence with which the method refused. worst: the worst figure, if any. seconds: in all;
+    compile_s: part of them.
     """
 
     case: Case
     method: str
     quick: bool
     limits: list = field(default_factory=list)
-    curve: tuple | None = None
     warnings: list = field(default_factory=list)
     compile_s: float = 0.0
     status: str = "failed"
@@ -103,10 +102,6 @@ class Trial:
     def limit(self, name, value, bound, formula):
         """Add a figure, or the largest of an array, and its bound."""
         self.limits.append(Limit(name, float(np.max(value)), float(bound), formula))
-
-    def draw(self, xlabel, x, ylabel, *lines, dots=False):
-        """Keep lines over x to draw."""
-        self.curve = xlabel, x, ylabel, lines, dots
 
 
 def assess(case, method, quick):

@@ -22,7 +22,6 @@ def full_box(trial):
     what = filling(trial)
     run = drive(trial, what, what.capacity, 4 if trial.quick else 40)
     run.speed_bounded()
-    run.draw_places()
 
 
 @case(("empty", *ALL))
@@ -30,7 +29,6 @@ def empty_box(trial):
     """No particle, at resonance: the transfer function, to RK45's tolerance and its round-off."""
     run = spring(trial, filling(trial), 0, 20 if trial.quick else 1000)
     run.rigid_response(1e-8, "10 x rtol of RK45")
-    run.draw_swings()
 
 
 @case(ALL)
@@ -156,7 +154,6 @@ def resonance_for_long(trial):
     wall = run.omega * run.column("x_max").max()
     run.weight_carried(4.0 * wall / (run.what.gravity * run.time), "4 V / (g T)")
     trial.limit("power given", -run.cycles.complex_power[0].real, 0.0, "grains only take")
-    run.draw_swings()
 
 
 def below_lift_off(trial, particles, cycles, *limit, what=None, **options):
@@ -164,7 +161,6 @@ def below_lift_off(trial, particles, cycles, *limit, what=None, **options):
     run = spring(trial, what or filling(trial), particles, cycles, **options)
     run.sound()
     run.rigid_response(*limit or (2e-3, "the specification"))
-    run.draw_swings()
 
 
 @case(EXACT)
@@ -212,7 +208,6 @@ def still_heap(trial):
     run.weight_carried(1e-3, "the specification")
     energy = run.column("energy")
     trial.limit("energy rise", np.diff(energy) / energy[0], 1e-6, "nothing moves")
-    run.draw_places()
 
 
 @case(ALL)

@@ -104,7 +104,6 @@ def weighed(trial, gravity, share, _):
     weight = 30 * what.particle_mass * np.linalg.norm(gravity)
     force = batch.run(20, 5).mean_force[0] / weight
     trial.limit("mean force error / weight", abs(force - share), 1e-3, "N m g, the specification")
-    trial.draw("cycle [1]", np.arange(5.0), "force / weight [1]", np.full(5, force))
 
 
 @case(SPHERES)

@@ -62,20 +62,6 @@ class Run:
         self.kept_inside()
         if self.trial.method in EXACT:
             self.momentum_kept()
-        energy = 1e3 * self.column("energy")
-        cycle = np.arange(1, len(energy) + 1)
-        self.trial.draw("cycle [1]", cycle, "energy of the particles [mJ]", energy)
-
-    def draw_swings(self):
-        """Draw the highest and the lowest displacement of every cycle."""
-        ends = [1e3 * self.column(name) for name in ("x_max", "x_min")]
-        cycle = np.arange(1, len(ends[0]) + 1)
-        self.trial.draw("cycle [1]", cycle, "highest and lowest x [mm]", *ends)
-
-    def draw_places(self):
-        """Draw where the particles are."""
-        x, y = 1e3 * self.batch.snapshot(0)["position"].T
-        self.trial.draw("across [mm]", x, "up [mm]", y, dots=True)
 
     def kept_inside(self):
         """No particle is missing or out of the box.
@@ -162,10 +148,8 @@ def still(trial, what, particles, dt=None, **options):
 
 
 def fall(trial, what, seconds, particles=1, samples=400):
-    """Energy of particles in a container at rest over that at the start; it is drawn."""
+    """Energy of particles in a container at rest [J]."""
     batch = still(trial, what, particles, what.default_dt)
     every = max(1, round(seconds / samples / batch.table.row(0)["dt"]))
     history = film(batch, every * samples, sample_every=every).history
-    share = history["energy"][:, 0] / history["energy"][0, 0]
-    trial.draw("time [s]", history["time_s"][:, 0], "energy / energy at the start [1]", share)
     return history["energy"][:, 0]
