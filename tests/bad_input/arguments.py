@@ -110,10 +110,10 @@ METHODS = {
         "Automaton": ("clearance with_clearance", ca.Automaton),
         "Spheres": ("clearance with_clearance", ca.Spheres),
         "SceneTable": ("change drive column row", lambda: ca.SceneTable(**TABLE)),
-        "Batch": ("start change drive run measure_each advance snapshot", started),
+        "Batch": ("start drive run measure_each advance snapshot", started),
         "runs.film.Film": ("show", film),
         "report.measures.Cycles": (
-            "mean_of per_step harmonic harmonic_by_cycle powers loss_factor damping_ratio",
+            "mean_of per_step harmonic harmonic_by_cycle loss_factor damping_ratio",
             cycles,
         ),
         "Oscillator": ("transfer rms steady_state right_hand_side peak scaled", ca.Oscillator),

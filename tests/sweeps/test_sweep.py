@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import InputError, sweep
-from taichi_dem.kit.sweeps.jobs import Journal, jobs_of, run_job
+from taichi_dem.kit.sweeps.jobs import jobs_of
 from taichi_dem.kit.sweeps.table import checked_rows
 from tests.processes import users_environment
 from tests.scenes import ROOT
@@ -142,18 +142,6 @@ def test_a_digest_changes_with_the_row_its_seed_the_source_and_the_version_alone
     others = {"text": SOURCE + "X = 1\n", "x": 2.0, "seed": 1, "version": "of 28 November"}
     each = [digest(), *(digest(**{name: value}) for name, value in others.items())]
     assert len(set(each)) == 5 and digest() == each[0]
-
-
-def test_a_record_with_a_changed_digit_is_not_believed(tmp_path):
-    journal = Journal(tmp_path, "tests.sweeps.jobs:squared")
-    (job,) = jobs_of(jobs.squared, [{"x": 3}], 0)
-    journal.write(job, run_job(jobs.squared, job.row))
-    (path,) = (tmp_path / "jobs").iterdir()
-    text = path.read_text()
-    path.write_text(text.replace('"square": 9', '"square": 8'))
-    assert path.read_text() != text and journal.read([job]) == {}
-    path.write_text(text)
-    assert journal.read([job])[job.digest].values["square"] == 9
 
 
 def test_a_table_has_numbers_where_cells_are_numbers_and_text_elsewhere(tmp_path):

@@ -155,7 +155,7 @@ def test_the_force_is_the_gradient_of_the_energy_and_conserves_momentum():
         assert np.abs(turning).max() < 1e-12 * size
         # Forces on the second times arms from the first, of which stresses are made: but for a
         # twist about the normal, their skew part is the moment.
-        skew = table[22:].reshape(3, 3) - table[22:].reshape(3, 3).T
+        skew = table["leverage"] - table["leverage"].T
         apart = pushed[0, 1] + [skew[2, 1], skew[0, 2], skew[1, 0]]
         assert np.abs(np.cross(apart, slope)).max() < 1e-6 * size * np.abs(pushed[0, 1]).max()
 
