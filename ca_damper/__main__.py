@@ -4,12 +4,12 @@ import sys
 from collections.abc import Sequence
 
 import ca_damper
-from taichi_dem.kit.terminal import list_contents
+from taichi_dem.kit import listing
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
-    return list_contents(ca_damper, {}, arguments)
+    return listing.run(ca_damper, {}, arguments)
 
 
 if __name__ == "__main__":

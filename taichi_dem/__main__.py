@@ -5,13 +5,13 @@ from collections.abc import Sequence
 
 import taichi_dem
 from taichi_dem import effects, methods, shapes
-from taichi_dem.kit.terminal import list_contents
+from taichi_dem.kit import listing
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program; returns its exit code."""
     parts = {"Effects": effects, "Methods": methods, "Shapes": shapes}
-    return list_contents(taichi_dem, parts, arguments)
+    return listing.run(taichi_dem, parts, arguments)
 
 
 if __name__ == "__main__":
