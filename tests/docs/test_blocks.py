@@ -10,7 +10,6 @@ import pytest
 from ca_damper.automaton.accounting import ACCOUNTINGS
 from taichi_dem import runtime
 from tests.docs.pages import FOLDER, PAGES, blocks, lines
-from tests.hard_cases.cases import assess
 from tests.processes import users_environment
 from tests.terminal import phases_of
 
@@ -119,8 +118,3 @@ def test_the_integrator_gains_energy_by_its_factor(left_by):
     # Of energies of one time the leapfrog's differ by (w dt)^2 / 4, cos^2(p / 2) at phase p.
     swing = 0.25 * rate2 * step**2 * 1.01
     assert left["leapfrog"] / left["leapfrog"][0] == pytest.approx(1.0, rel=swing)
-
-
-def test_the_hard_case_of_the_page_passes(left_by):
-    (case,) = left_by("docs/hard_cases.md")["CASES"]
-    assert assess(case, "implicit", quick=True).status == "passed"
