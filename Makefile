@@ -6,10 +6,6 @@ PYTHON ?=
 DEMO_OPTIONS ?=
 # One worker a core; tests of a group share what they compile (tests/conftest.py). A worker that dies is a failure.
 TEST := -m pytest -q -n 2 --dist loadscope --no-loadscope-reorder --max-worker-restart 0
-# Folders of tests of physics: verification, invariance, digests, both packages. The rest is all else.
-PHYSICS := $(addprefix tests/,verification boundaries equivalence material ca_automaton ca_spheres ca_modes \
-  ca_excitation ca_maps)
-REST = $(filter-out $(PHYSICS) tests/__pycache__,$(patsubst %/,%,$(wildcard tests/*/)))
 FUZZ := tests/attack/test_random_scenes.py
 TEST_OPTIONS ?=
 BENCH_OPTIONS ?=
@@ -34,7 +30,7 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-physics test-rest test-experiments test-slow test-quadrants test-gpu attack fuzz lint bench coverage \
+.PHONY: help venv demo test test-all test-experiments test-slow test-quadrants test-gpu attack fuzz lint bench coverage \
   gallery docs mesh wheel release-check clean
 
 help: ## print this list
@@ -48,11 +44,8 @@ demo: $(STAMP) ## blast a block and show the fracture
 test: $(STAMP) ## run the tests that a change must pass
 	$(BIN)/python $(TEST) --durations 10 $(TEST_OPTIONS)
 
-test-physics: $(STAMP) ## of these: physics, invariance and bits, both packages
-	$(BIN)/python $(TEST) --durations 10 $(PHYSICS) $(TEST_OPTIONS)
-
-test-rest: $(STAMP) ## of these: all others
-	$(BIN)/python $(TEST) --durations 10 $(REST) $(TEST_OPTIONS)
+test-all: $(STAMP) ## these and all that repeat one of them at greater length
+	$(BIN)/python $(TEST) -m "not slow and not experiment and not attack and not gpu" --durations 10 $(TEST_OPTIONS)
 
 test-experiments: $(STAMP) ## run every experiment, hard case and program of the pages, each once and quick
 	$(BIN)/python $(TEST) -m "experiment and not slow" --durations 10 $(TEST_OPTIONS)

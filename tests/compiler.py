@@ -1,4 +1,7 @@
-"""What the compiler costs a run of the tests, at its end: its share of the time, and the memory."""
+"""What the compiler costs a run of the tests: kernels by structure, its share of the time, memory.
+
+The run fails where it compiles more than ``MOST_KERNELS``.
+"""
 
 import collections
 import resource
@@ -9,7 +12,14 @@ import pytest
 from taichi._lib import core
 from taichi.lang.kernel_impl import Kernel
 
+from taichi_dem.kit.engine_pool import Engine
+from tests.structures import name_of
+
+#: Kernels beyond which a run of ``make test`` fails: each costs every later run its time.
+MOST_KERNELS = 550
 _spent = collections.Counter()
+#: Kernels and engines by structure; the structure whose engine was made last.
+_of_structure, _engines, _now = collections.Counter(), collections.Counter(), ["none"]
 _listening, _of_workers = [], []
 _BYTES_OF_MAXRSS = 1 if sys.platform == "darwin" else 1024
 
@@ -39,6 +49,7 @@ def _materialize(kernel, *arguments, **options):
     result = _traced(kernel, *arguments, **options)
     if len(_forms(kernel)) > before:
         _spent["kernels"] += 1
+        _of_structure[_now[0]] += 1
         for names in _listening:
             names.append(kernel.func.__name__)
     return result
@@ -46,8 +57,21 @@ def _materialize(kernel, *arguments, **options):
 
 _traced = _timed(Kernel, "materialize", "front end")
 Kernel.materialize = _materialize
-# LLVM makes code of what is traced, or the cache of kernels has it.
+# LLVM makes code of what is traced, or the session's folder of kernels has it.
 _timed(core.Program, "compile_kernel", "LLVM")
+
+
+_made = Engine.__init__
+
+
+def _make(engine, structure, capacity):
+    """Make an engine; kernels compiled from here on are its structure's."""
+    _now[0] = name_of(structure)
+    _engines[_now[0], tuple(capacity)] += 1
+    _made(engine, structure, capacity)
+
+
+Engine.__init__ = _make
 
 
 @pytest.fixture
@@ -65,14 +89,23 @@ def pytest_sessionstart(session):
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session):
-    """A worker tells the process that started it what it counted."""
+    """A worker tells the process that started it what it counted; too many kernels are a failure."""
     seconds = time.perf_counter() - _spent.pop("begun")
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _BYTES_OF_MAXRSS
-    counted = {**_spent, "seconds": seconds, "bytes": memory}
+    counted = {**_spent, "seconds": seconds, "bytes": memory, "structures": dict(_of_structure)}
+    counted["engines"] = sum(_engines.values())
+    counted["again"] = counted["engines"] - len(_engines)
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["compiler"] = counted
     elif not _of_workers:
         _of_workers.append(counted)
+    if _too_many(_sum("kernels"), session.config) and not session.exitstatus:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def _too_many(kernels, config):
+    """Whether a run of the tests that a change must pass compiled more than it may."""
+    return kernels > MOST_KERNELS and "not long" in config.option.markexpr
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -83,15 +116,24 @@ def pytest_testnodedown(node, error):
         _of_workers.append(counted)
 
 
-def pytest_terminal_summary(terminalreporter):
-    """One line."""
-    if _of_workers:
-        of = collections.Counter()
-        for counted in _of_workers:
-            of.update(counted)
-        largest = max(counted["bytes"] for counted in _of_workers) / 1e9
-        terminalreporter.write_line(
-            f"compiler: {of['kernels']} kernels, front end {of['front end']:.0f} s, LLVM"
-            f" {of['LLVM']:.0f} s of {of['seconds']:.0f} s in {len(_of_workers)} processes; the"
-            f" largest had {largest:.2f} GB"
-        )
+def _sum(name):
+    return sum(counted.get(name, 0) for counted in _of_workers)
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """The structures that took most kernels, then a line about all."""
+    if not _of_workers:
+        return
+    say, structures = terminalreporter.write_line, collections.Counter()
+    for counted in _of_workers:
+        structures.update(counted["structures"])
+    for name, kernels in structures.most_common(40):
+        say(f"{kernels:5d} kernels: {name}")
+    say(
+        f"compiler: {_sum('kernels')} kernels in {len(structures)} structures, {_sum('engines')} engines"
+        f" of which {_sum('again')} were made again; front end {_sum('front end'):.0f} s, LLVM"
+        f" {_sum('LLVM'):.0f} s of {_sum('seconds'):.0f} s in {len(_of_workers)} processes; the largest"
+        f" had {max(counted['bytes'] for counted in _of_workers) / 1e9:.2f} GB"
+    )
+    if _too_many(_sum("kernels"), config):
+        say(f"too many kernels: at most {MOST_KERNELS} (see tests/structures.py)")

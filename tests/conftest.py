@@ -113,8 +113,8 @@ def pytest_runtest_protocol(item):
 
 #: Bytes of the process beyond which the next file begins with another session, if that of before
 #: has taken a good part of them.
-_MOST_BYTES, _LEAST_GROWTH = 1.05e9, 0.25e9
-_MOST_TREES = 200
+_MOST_BYTES, _LEAST_GROWTH = 1.4e9, 0.25e9
+_MOST_TREES = 300
 _at_start = {}
 
 
@@ -122,7 +122,7 @@ _at_start = {}
 def taichi_session():
     """Two threads, whatever the machine has: results must not depend on their number.
 
-    Files of a group share a session, and so the engines that have been compiled, if there is room.
+    All files of a worker share a session, and so what has been compiled, if there is room.
     """
     _give_back()
     if runtime.settings() is not None and _is_full():
@@ -154,7 +154,7 @@ def _resident_bytes():
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_teardown(item, nextitem):
-    """Give the memory of a group back after its last test: engines, and runs that it has kept."""
+    """Let go of the runs that a group has kept after its last test: their engines serve others."""
     yield
     group = group_of(item.path)
     if nextitem is None or group_of(nextitem.path) != group:
@@ -162,7 +162,8 @@ def pytest_runtest_teardown(item, nextitem):
             path = Path(getattr(module, "__file__", None) or "")
             if path.parent.parent == item.path.parent.parent and group_of(path) == group:
                 _forget_runs(module)
-        _stop()
+        if nextitem is None:
+            _stop()
 
 
 def _forget_runs(module):

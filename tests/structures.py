@@ -6,6 +6,7 @@ bit. A test that needs another set adds a row and says what it is for.
 """
 
 from taichi_dem import effects
+from taichi_dem.engine import Structure
 
 #: Effects by name of the set, in their order.
 STRUCTURES = {
@@ -33,3 +34,19 @@ def filled(name, *own, group="left"):
 def _idle(kind, group):
     """An effect that never acts."""
     return kind(group, start=1.0) if kind is effects.GasPressure else kind().silent()
+
+
+def name_of(structure):
+    """Name of a structure, with its method: the set of effects, or its parts where it is in none."""
+    if not isinstance(structure, Structure):
+        return _words(getattr(structure, "key", structure))
+    kinds, method, _ = structure.key
+    name = next((name for name, row in STRUCTURES.items() if row == kinds), None)
+    return f"{name or _words(kinds)}: {_words(method)}"
+
+
+def _words(parts):
+    """A structure's key in words."""
+    if isinstance(parts, tuple):
+        return " ".join(filter(None, map(_words, parts)))
+    return "" if parts is None or parts is False else getattr(parts, "__name__", str(parts))

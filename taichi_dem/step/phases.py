@@ -120,7 +120,8 @@ class Step:
 
     def start(self, last: int) -> None:
         """Run the phases of the start before those that always run, or the last, after them."""
-        self._launch_starts[last]()
+        if self.of_start[last]:
+            self._launch_starts[last]()
 
     @ti.kernel
     def _start(self, last: ti.template()):
