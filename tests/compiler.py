@@ -89,7 +89,7 @@ def pytest_sessionstart(session):
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session):
-    """A worker tells the process that started it what it counted; too many kernels are a failure."""
+    """A worker tells the process that started it what it counted; too many kernels fail."""
     seconds = time.perf_counter() - _spent.pop("begun")
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _BYTES_OF_MAXRSS
     counted = {**_spent, "seconds": seconds, "bytes": memory, "structures": dict(_of_structure)}
@@ -130,10 +130,10 @@ def pytest_terminal_summary(terminalreporter, config):
     for name, kernels in structures.most_common(40):
         say(f"{kernels:5d} kernels: {name}")
     say(
-        f"compiler: {_sum('kernels')} kernels in {len(structures)} structures, {_sum('engines')} engines"
-        f" of which {_sum('again')} were made again; front end {_sum('front end'):.0f} s, LLVM"
-        f" {_sum('LLVM'):.0f} s of {_sum('seconds'):.0f} s in {len(_of_workers)} processes; the largest"
-        f" had {max(counted['bytes'] for counted in _of_workers) / 1e9:.2f} GB"
+        f"compiler: {_sum('kernels')} kernels in {len(structures)} structures, {_sum('engines')}"
+        f" engines ({_sum('again')} made again); front end {_sum('front end'):.0f} s, LLVM"
+        f" {_sum('LLVM'):.0f} s of {_sum('seconds'):.0f} s in {len(_of_workers)} processes; the"
+        f" largest had {max(counted['bytes'] for counted in _of_workers) / 1e9:.2f} GB"
     )
     if _too_many(_sum("kernels"), config):
         say(f"too many kernels: at most {MOST_KERNELS} (see tests/structures.py)")

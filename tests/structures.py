@@ -37,7 +37,7 @@ def _idle(kind, group):
 
 
 def name_of(structure):
-    """Name of a structure, with its method: the set of effects, or its parts where it is in none."""
+    """Name of a structure: of its set of effects, or of its parts where it is in none; method."""
     if not isinstance(structure, Structure):
         return _words(getattr(structure, "key", structure))
     kinds, method, _ = structure.key
