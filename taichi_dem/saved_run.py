@@ -47,7 +47,7 @@ def writer_of(
 
 def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
     """All that a checkpoint holds of a started simulation, a ``restart.RunSnapshot``."""
-    parts = {"simulation": simulation, **simulation.followed, "recorder": recorder}
+    parts = {"simulation": simulation, **simulation.followed.kept, "recorder": recorder}
     identity = run_identity(simulation.scene, simulation.method)
     return RunSnapshot(identity, FieldMemory(simulation.engine), parts)
 

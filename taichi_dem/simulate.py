@@ -118,8 +118,7 @@ def simulate(
         warnings.warn(sentence, stacklevel=2)
     with reporting(progress, title) as tell:
         simulation, recorder = _started(Simulation(scene, method, driver))
-        found = simulation.shared_volume.at_start(), simulation.step_resolution.at_start()
-        for sentence in (*found[0], *found[1]):
+        for sentence in simulation.followed.at_start():
             warnings.warn(sentence, stacklevel=2)
         writer = writer_of(simulation, recorder, checkpoint, resume, arrays)
         result, error = _result(simulation, recorder, writer, plan, tell)

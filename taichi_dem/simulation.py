@@ -1,10 +1,8 @@
 """A scene on the device, ready to step: builds all parts once and connects them."""
 
 import contextlib
-import copy
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,32 +15,23 @@ from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress import compiling
 from taichi_dem.kit.validation import choice, flag, instance, shown, whole
-from taichi_dem.loads.history import unresolved_histories
 from taichi_dem.methods import Method
-from taichi_dem.report.divergence import DivergenceCheck
-from taichi_dem.report.effects import certificate_of, effect_uses, on_demand
-from taichi_dem.report.energy_balance import EnergyBalance, open_account
+from taichi_dem.report.effects import on_demand
+from taichi_dem.report.followed import Followed
 from taichi_dem.report.forces import Forces
-from taichi_dem.report.hops import Hops
-from taichi_dem.report.missing_effects import MissingEffects
-from taichi_dem.report.readings import Kept, Readings, Run
-from taichi_dem.report.report import Report, known_error
-from taichi_dem.report.resolution import StepResolution
-from taichi_dem.report.shared_volume import SharedVolume
+from taichi_dem.report.readings import Readings, Run
+from taichi_dem.report.report import Report
 from taichi_dem.scene import Scene
-from taichi_dem.state.model import Model, names_of
+from taichi_dem.state.model import Model
 from taichi_dem.state.state import State
 from taichi_dem.state.tables import Tables, capacity_of
 from taichi_dem.state.timeline import MACRO_TICKS
 from taichi_dem.step.drivers import DRIVERS, driver_name
 from taichi_dem.step.multirate.schedule import Schedule
 from taichi_dem.step.phases import Step
-from taichi_dem.step_control import CRITERIA
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
-#: Figures of a report that the schedule counts, in its order.
-_COUNTS = "substeps body_updates bond_evaluations pair_evaluations uniform_evaluations".split()
 #: Parts in which the kernels of a run are compiled, the last of them the recording's.
 PARTS = 5
 
@@ -131,10 +120,15 @@ class Simulation:
         self.engine.owner = None
 
     @property
+    def followed(self) -> Any:
+        """What reports follow, a ``Followed``; None before the start."""
+        self._engine.check(self)
+        return self._followed
+
+    @property
     def energy_balance(self) -> Any:
         """Account of the energy, None before the start."""
-        self._engine.check(self)
-        return self._balance
+        return self.followed and self.followed.energy_balance
 
     def values(self, field: ti.Field) -> np.ndarray:
         """Copy of a field of one of the parts.
@@ -158,7 +152,7 @@ class Simulation:
             self.engine.load(self.model, self.method, *numbers)
             if self.scene.initial_motion:
                 self.state.set_motion(self.model.centre, **self.scene.initial_motion)
-            self._balance: Any = None
+            self._followed: Any = None
             self.run_seconds = self.run_cpu_seconds = 0.0
             self.first_motion: dict[str, np.ndarray] = {}
 
@@ -245,34 +239,15 @@ class Simulation:
         compiling("energy balance", 4, PARTS)
         self.readings.step_back()
         with self.readings.held():
-            self._open_balance()
+            self._followed = Followed(self.parts)
             self.sample(brief)
-            self.divergence_check.check()
-
-    def _open_balance(self):
-        """Begin the energy balance and all else that is followed."""
-        self._balance = EnergyBalance(self.parts)
-        self.divergence_check = DivergenceCheck(self.parts, self.energy_balance)
-        self.shared_volume = SharedVolume(self.parts)
-        self.missing_effects = MissingEffects(self.parts, self.shared_volume)
-        self.step_resolution, self.hops = StepResolution(self.parts), Hops(self.parts)
+            self.followed.divergence_check.check()
 
     @property
     def parts(self) -> Run:
         """Parts that reports read."""
         parts = self.model, self.state, self.schedule, self.step, self.readings, self.contacts
         return Run(*parts)
-
-    @property
-    def followed(self) -> dict[str, Kept]:
-        """What is kept over a run beside the fields, by name."""
-        return {
-            "energy balance": self.energy_balance,
-            "missing effects": self.missing_effects,
-            "shared volume": self.shared_volume,
-            "step resolution": self.step_resolution,
-            "hops": self.hops,
-        }
 
     def motion(self) -> dict[str, np.ndarray]:
         """Motion of the bodies by name, as in ``State.motion``, at the time of the positions."""
@@ -283,13 +258,7 @@ class Simulation:
 
     def sample(self, brief: bool = False) -> None:
         """Sample missing effects and unresolved steps; brief: only what ends a run, or chance."""
-        if not flag("brief", brief):
-            self.missing_effects.sample(self.time_s)
-            self.hops.sample(self.time_s)
-        elif self.divergence_check.keeps_bodies_apart:
-            self.shared_volume.sample(self.time_s)
-        self.divergence_check.check_shared(self.shared_volume)
-        self.step_resolution.sample(self.time_s)
+        self.followed.sample(self.time_s, flag("brief", brief))
 
     def advance_to(self, macro_step: int, on_call: Callable[[], object] | None = None) -> None:
         """Step until a number of largest steps.
@@ -317,7 +286,7 @@ class Simulation:
                 self.driver.run(end)
             with self.readings.held():
                 # A runaway fills the lists: it is named first.
-                self.divergence_check.check(hurried=bool(values(self.state.tick) < end))
+                self.followed.divergence_check.check(hurried=bool(values(self.state.tick) < end))
                 self._check_capacity()
                 if on_call is not None:
                     on_call()
@@ -369,58 +338,19 @@ class Simulation:
         flag("brief", brief)
         if self.energy_balance is None:
             raise InputError("report must follow start(), but the simulation was not started")
+        figures = {
+            "driver": self.driver.name,
+            "sweeps": self.sweeps(),
+            "searches": self.searches,
+            "compile_seconds": self.compile_seconds,
+            "run_seconds": self.run_seconds,
+            "run_cpu_seconds": self.run_cpu_seconds,
+        }
         with self.readings.held():
-            return self._reported(brief)
-
-    def _reported(self, brief):
-        here = slice(self.model.body_count)
-        # A look of its own: to report changes nothing of what later samples find.
-        shared_volume = copy.copy(self.shared_volume)
-        if not brief:
-            shared_volume.sample(self.time_s, finished=True)
-        linear, angular = self.energy_balance.momentum_errors()
-        account = self.energy_balance.account()
-        bound = np.bincount(values(self.state.bound, here), minlength=len(CRITERIA))
-        unconverged, worst = self.step_resolution.unconverged
-        report = Report(
-            method=self.method.name,
-            driver=self.driver.name,
-            effects=tuple(filter(None, names_of(self.model.effects))),
-            until_s=self.time_s,
-            body_count=self.model.body_count,
-            bond_count=self.model.bond_count,
-            broken_faces=int(self.state.broken().sum()),
-            smallest_step_s=self.method.dt0 / 2.0 ** int(values(self.state.level, here).max()),
-            **dict(zip(_COUNTS, values(self.schedule.evaluations).tolist())),
-            sweeps=self.sweeps(),
-            unconverged_steps=unconverged,
-            worst_residual=worst,
-            searches=self.searches,
-            energy_balance=account,
-            linear_momentum_error=float(linear),
-            angular_momentum_error=float(angular),
-            compile_seconds=self.compile_seconds,
-            run_seconds=self.run_seconds,
-            run_cpu_seconds=self.run_cpu_seconds,
-            effect_activity=effect_uses(self.parts, self.energy_balance, account),
-            missing_effects=() if brief else self.missing_effects.findings(shared_volume),
-            unresolved=(
-                *self.step_resolution.findings(),
-                *unresolved_histories(self.scene.effects, self.method.dt0),
-                *self.hops.findings(),
-                *shared_volume.findings(),
-                *open_account(account, self.divergence_check.round_off()),
-            ),
-            interpenetration=shared_volume.worst if shared_volume.has_looked else None,
-            bound_by={name: n for name, n in zip(CRITERIA, bound.tolist()) if n},
-            bond_slip=self.step_resolution.bond_slip(),
-            round_off_J=self.divergence_check.round_off(),
-        )
-        return replace(
-            report,
-            known_error=known_error(report, self.scene, self.method),
-            certificate=certificate_of(self, report) if self.scene.on_demand else None,
-        )
+            way = self.motion()["position"] - self.first_motion["position"]
+            return self.followed.report(
+                self.scene, self.method, figures, np.linalg.norm(way, axis=1), brief
+            )
 
     def acting_since(self) -> dict[str, np.ndarray]:
         """Time [s] from which each effect acted on each body, by name; with effects="auto"."""

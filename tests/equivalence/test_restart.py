@@ -48,7 +48,7 @@ class Run:
         self.simulation.advance_to(self.last)
         self.simulation.sample()
         self.recorder.sample()
-        missing = self.simulation.missing_effects
+        missing = self.simulation.followed.missing_effects
         columns, frame = self.recorder.history(), self.recorder.frames[-1]
         told = {
             "account": self.simulation.energy_balance.account(),

@@ -140,7 +140,7 @@ class Run(MotionRecord):
         soon = 2e-5 if trial.quick else 1e-4
         self.result = run_simulation(simulation, until=until or soon, **looks)
         trial.compile_s += simulation.compile_seconds
-        trial.warnings += simulation.step_resolution.findings()
+        trial.warnings += simulation.followed.step_resolution.findings()
         self.trial, self.dt, self.steps = trial, method.dt0, self.time_s[-1] / method.dt0
 
     def energy(self):

@@ -177,7 +177,7 @@ def test_a_limit_passed_between_two_samples_is_seen():
     assert found.count == 1 and 0.0 < found.first_s < 5e-6
     middle = pair(EDGE).points[simulation.model.topology.vertices[0]].mean(axis=0)
     assert found.place_m == pytest.approx(tuple(middle), rel=1e-15)
-    assert simulation.missing_effects.strain[0] < 1e-2
+    assert simulation.followed.missing_effects.strain[0] < 1e-2
 
 
 def groups(mesh=HALVES, **motion):

@@ -124,7 +124,7 @@ def test_limited_dashpots_take_the_share_that_the_step_bears_and_name_it(dt, is_
     assert factor == pytest.approx(1.0 - share * rate * dt, rel=1e-9)
     assert -1.0 < factor
     said = f"bond 0 to {100 * share:.2g} %"
-    findings = simulation.step_resolution.findings()
+    findings = simulation.followed.step_resolution.findings()
     assert [said in finding for finding in findings] == [True] * is_less
 
 
