@@ -48,53 +48,26 @@ def pytest_configure(config):
     arch.choose(config.getoption("--arch"))
 
 
-class ByGroup(LoadScopeScheduling):
-    """Tests of a group run in one worker: they share engines, which are compiled once.
+#: Folders of the first worker, whose structures are those of the paper, of bonds and of bodies.
+OF_THE_FIRST = ("verification", "equivalence", "material", "boundaries", "unit")
+
+
+class InHalves(LoadScopeScheduling):
+    """Each worker runs its half of the tests in their order, so that a second run finds in the
+    cache what the first has compiled: fields of a session are numbered as they are made.
 
     Experiments, which run in processes of their own, share nothing.
     """
 
     def _split_scope(self, nodeid):
-        group = group_of(Path(nodeid.partition("::")[0]))
-        return nodeid if group == "experiments" else group
-
-
-#: Groups that take longest: begun first, so that workers end together.
-FIRST = ("verification", "unit", "ca", "activation")
-#: Files of the first group that run the paper's effects: side by side, as they share engines.
-OF_THE_BLOCK = """equivalence/test_bits.py verification/test_conservation.py
-    equivalence/test_digests.py equivalence/test_restart.py verification/test_wake_up.py
-    verification/test_convergence.py verification/test_implicit.py
-    material/test_two_materials.py equivalence/test_shared_engines.py""".split()
-
-
-def group_of(path):
-    """Group of a test file: its folder, all of the damper as one, and all that share the block."""
-    if path.parent.name == "equivalence" or _name(path) in OF_THE_BLOCK:
-        return FIRST[0]
-    return path.parent.name.partition("_")[0]
-
-
-def _name(path):
-    return f"{path.parent.name}/{path.name}"
-
-
-def pytest_collection_modifyitems(items):
-    """Long groups first; in the first, what shares engines side by side."""
-    rank = {name: place for place, name in enumerate(FIRST)}
-    of_the_block = {name: place for place, name in enumerate(OF_THE_BLOCK)}
-
-    def place(item):
-        later = len(of_the_block)
-        return rank.get(group_of(item.path), len(rank)), of_the_block.get(_name(item.path), later)
-
-    items.sort(key=place)
+        folder = Path(nodeid.partition("::")[0]).parent.name
+        return nodeid if folder == "experiments" else str(folder in OF_THE_FIRST)
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     """Take the place of ``--dist loadscope``; None for all others."""
-    return ByGroup(config, log) if config.getoption("dist") == "loadscope" else None
+    return InHalves(config, log) if config.getoption("dist") == "loadscope" else None
 
 
 #: Longest time of one test [s]; the longest takes two minutes on a busy machine.
@@ -113,7 +86,7 @@ def pytest_runtest_protocol(item):
 
 #: Bytes of the process beyond which the next file begins with another session, if that of before
 #: has taken a good part of them.
-_MOST_BYTES, _LEAST_GROWTH = 1.4e9, 0.25e9
+_MOST_BYTES, _LEAST_GROWTH = 1.2e9, 0.25e9
 _MOST_TREES = 300
 _at_start = {}
 
@@ -154,13 +127,11 @@ def _resident_bytes():
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_teardown(item, nextitem):
-    """Let go of the runs that a group has kept after its last test: their engines serve others."""
+    """Let go of the runs that a folder has kept after its last test: their engines serve others."""
     yield
-    group = group_of(item.path)
-    if nextitem is None or group_of(nextitem.path) != group:
-        for module in list(sys.modules.values()):
-            path = Path(getattr(module, "__file__", None) or "")
-            if path.parent.parent == item.path.parent.parent and group_of(path) == group:
+    if nextitem is None or nextitem.path.parent != item.path.parent:
+        for name, module in list(sys.modules.items()):
+            if name.startswith("tests."):
                 _forget_runs(module)
         if nextitem is None:
             _stop()
