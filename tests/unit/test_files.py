@@ -8,8 +8,6 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import ca_damper
 import taichi_dem
@@ -24,25 +22,20 @@ from taichi_dem import (
     Uniform,
     simulate,
 )
-from taichi_dem.kit import files
-from taichi_dem.kit.checkpoint import Interrupted, read_checkpoint, write_checkpoint
+from taichi_dem.kit.checkpoint import Interrupted, write_checkpoint
 from taichi_dem.kit.field_memory import without_end
 from taichi_dem.kit.files import output_folder, renamed_when_done, write_csv
 from taichi_dem.mesh.shapes import pair
 from tests.scenes import ROOT
 
 DAY_S = 86_400.0
-#: Writes half of a file, says so, and waits to be killed or told to go on.
-_HALF = """
-import sys
+#: Writes half of a file and is killed.
+_KILLED = """
+import os, sys
 from taichi_dem.kit.files import renamed_when_done
 with renamed_when_done(sys.argv[1]) as name:
-    with open(name, "w") as file:
-        file.write("half")
-        file.flush()
-        print("half", flush=True)
-        sys.stdin.readline()
-        file.write("whole")
+    open(name, "w").write("half")
+    os._exit(0)
 """
 #: A short run of two bodies, and how often it is sampled.
 JOB = {"method": Uniform(1e-8), "until": 1e-6, "samples": 4, "progress": None}
@@ -59,23 +52,6 @@ def assert_same(first, second):
         assert column.tobytes() == second.series[name].tobytes(), name
 
 
-@pytest.fixture
-def half_done(tmp_path):
-    """Start processes that have written half of a file of a name."""
-    started = []
-
-    def start(name):
-        line, ends = [sys.executable, "-c", _HALF, str(tmp_path / name)], subprocess.PIPE
-        one = subprocess.Popen(line, stdin=ends, stdout=ends, text=True, cwd=ROOT)
-        started.append(one)
-        return one
-
-    yield start
-    for one in started:
-        one.kill()
-        one.communicate()
-
-
 def parts(folder):
     """Names of the files that are not done."""
     return sorted(name for name in os.listdir(folder) if ".part" in name)
@@ -87,34 +63,28 @@ def parts(folder):
     [lambda folder: write_checkpoint(folder / "x.checkpoint", {}, {}), output_folder],
     ids=["checkpoint", "output"],
 )
-def test_a_save_removes_what_killed_ones_left_and_nothing_else(tmp_path, half_done, save):
+def test_a_save_removes_what_killed_ones_left_and_nothing_else(tmp_path, save):
     mine = tmp_path / ".film.2019.part.txt"
     mine.touch()
     os.utime(mine, (0, 0))
-    dead, alive = half_done("dead.txt"), half_done("alive.txt")
-    for one in (dead, alive):
-        assert one.stdout.readline() == "half\n"
-    dead.kill()
-    dead.wait()
-    assert len(parts(tmp_path)) == 3
-    save(tmp_path)
-    assert [name.split(".")[1] for name in parts(tmp_path)] == ["alive", "film"]
-    alive.communicate("\n")
-    assert (tmp_path / "alive.txt").read_text() == "halfwhole"
+    killed = subprocess.run([sys.executable, "-c", _KILLED, tmp_path / "dead.txt"], cwd=ROOT)
+    assert killed.returncode == 0 and len(parts(tmp_path)) == 2
+    with renamed_when_done(tmp_path / "alive.txt") as name:
+        open(name, "w").close()
+        save(tmp_path)
+        assert parts(tmp_path) == [os.path.basename(name), mine.name]
     assert parts(tmp_path) == [mine.name]
 
 
 @pytest.mark.parametrize(("age_s", "stays"), [(0.5 * DAY_S, True), (2.0 * DAY_S, False)])
-def test_a_part_of_another_machine_is_left_for_a_day(tmp_path, monkeypatch, age_s, stays):
+def test_a_part_of_another_machine_is_left_for_a_day(tmp_path, age_s, stays):
     """Its number may name a process here, or none, and tells nothing."""
-    with monkeypatch.context() as there:
-        there.setattr(files, "_here", lambda: "0a1b2c3d")
-        name = renamed_when_done(tmp_path / "theirs.csv").__enter__()
-    with open(name, "w"):
-        then = os.stat(name).st_mtime - age_s
+    name = tmp_path / f".theirs.{os.getpid()}-0a1b2c3d.part.csv"
+    name.touch()
+    then = name.stat().st_mtime - age_s
     os.utime(name, (then, then))
     output_folder(tmp_path)
-    assert os.path.exists(name) == stays
+    assert name.exists() == stays
 
 
 def test_text_of_a_table_is_no_formula_and_numbers_stay(tmp_path):
@@ -130,58 +100,29 @@ def test_text_of_a_table_is_no_formula_and_numbers_stay(tmp_path):
     assert [row[-1] for row in rows] == ["'=1", "-7"]
 
 
-@given(
-    shape=st.tuples(st.integers(0, 3000), st.integers(1, 5), st.integers(1, 3)),
-    share=st.floats(0.0, 1.0),
-    kind=st.sampled_from([np.int32, np.float64]),
-    gap=st.booleans(),
-)
-@settings(derandomize=True, database=None, deadline=None)
-def test_a_checkpoint_leaves_out_zeros_at_the_end_to_the_bit(shape, share, kind, gap):
+@pytest.mark.parametrize("last", [np.float64(-0.0), np.float64(5e-324), np.int32(1)])
+def test_a_checkpoint_leaves_out_zeros_at_the_end_to_the_bit(last):
     """Not before the smallest number, a negative zero, and also where entries lie apart."""
-    array = np.zeros((shape[0], shape[1] + gap, shape[2]), dtype=kind)[:, : shape[1]]
-    used = int(share * len(array))
-    if used:
-        array[used - 1, -1, -1] = -0.0 if kind is np.float64 else 1
-    assert len(without_end(array)) == used
-    assert np.array_equal(array[:used], without_end(array))
-
-
-#: Whose representation tells a checkpoint which run it is of.
-IDENTIFYING = (
-    taichi_dem.CONCRETE,
-    taichi_dem.Uniform(distance=1e-8),
-    taichi_dem.Multirate(control=taichi_dem.StepControl()),
-    taichi_dem.ImplicitDashpots(),
-    ca_damper.Automaton(),
-    ca_damper.Spheres(),
-    ca_damper.Oscillator(),
-)
-
-
-@pytest.mark.parametrize("thing", IDENTIFYING, ids=lambda thing: type(thing).__name__)
-def test_what_identifies_a_run_is_shown_in_full(thing):
-    """Evaluated, it is the object again: two of them that differ have different words."""
-    assert eval(repr(thing), {**vars(taichi_dem), **vars(ca_damper)}) == thing
-
-
-def flipped(data):
-    """One bit within the numbers of the first array."""
-    middle = len(data) // 2
-    return data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :]
+    for used in (0, 1, 1000, 3000):
+        array = np.zeros((3000, 4, 2), dtype=last.dtype)[:, :3]
+        array[used - 1 : used, -1, -1] = last
+        assert len(without_end(array)) == used
 
 
 @pytest.mark.parametrize(
-    "harm",
-    [lambda data: data[:-40], flipped, lambda data: b"PK stranger"],
-    ids=["cut short", "a bit flipped", "foreign"],
+    "thing",
+    [
+        CONCRETE,
+        Uniform(distance=1e-8),
+        taichi_dem.Multirate(control=taichi_dem.StepControl()),
+        ca_damper.Spheres(),
+        ca_damper.Oscillator(),
+    ],
+    ids=lambda thing: type(thing).__name__,
 )
-def test_damaged_and_foreign_checkpoints_are_refused(tmp_path, harm):
-    path = tmp_path / "run.checkpoint"
-    write_checkpoint(path, {}, {"field/a.b": np.arange(12.0).reshape(4, 3)})
-    path.write_bytes(harm(path.read_bytes()))
-    with pytest.raises(InputError, match="must be a complete checkpoint"):
-        read_checkpoint(path, {})
+def test_what_identifies_a_run_is_shown_in_full(thing):
+    """Evaluated, it is the object again: two of them that differ have different words."""
+    assert eval(repr(thing), {**vars(taichi_dem), **vars(ca_damper)}) == thing
 
 
 class FullDisk:
@@ -199,21 +140,24 @@ class FullDisk:
         return self.opened(name, mode, *rest, **options)
 
 
+@pytest.fixture(scope="module")
+def whole(taichi_session):
+    """A run that writes nothing."""
+    return simulate(flying(), frames=2, **JOB)
+
+
 @pytest.mark.parametrize("ending", [".csv", ".msh", ".json", ".vtu", ".pvd", ".checkpoint"])
-def test_a_full_disk_at_the_end_does_not_lose_the_result(tmp_path, monkeypatch, ending):
+def test_a_full_disk_at_the_end_does_not_lose_the_result(whole, tmp_path, monkeypatch, ending):
     """Whatever file finds no room; the result is that of a run that wrote nothing."""
     kept = {"output": tmp_path / "out", "checkpoint": Checkpoint(tmp_path / "run.checkpoint")}
-    whole = simulate(flying(), frames=2, **JOB)
     FullDisk(monkeypatch, ending)
     with pytest.raises(InputError, match="No space left") as refused:
         simulate(flying(), frames=2, **kept, **JOB)
-    found = refused.value.result
-    assert_same(whole, found)
-    assert len(found.frames) == len(whole.frames)
-    assert not found.diverged
+    assert_same(whole, refused.value.result)
+    assert len(refused.value.result.frames) == len(whole.frames)
 
 
-def test_a_checkpoint_that_finds_no_room_leaves_the_one_before_and_the_result(tmp_path):
+def test_a_checkpoint_that_finds_no_room_leaves_the_one_before_and_the_result(whole, tmp_path):
     """What the run has so far is also written, where there is room for that."""
     path = tmp_path / "run.checkpoint"
     saved = {"checkpoint": Checkpoint(path, every_steps=25), "output": tmp_path / "out"}
@@ -226,7 +170,7 @@ def test_a_checkpoint_that_finds_no_room_leaves_the_one_before_and_the_result(tm
     with open(tmp_path / "out" / "history.csv", encoding="utf-8") as file:
         assert len([*csv.reader(file)]) == 1 + len(times)
     assert sorted(os.listdir(tmp_path)) == ["out", "run.checkpoint"]
-    assert_same(simulate(flying(), **JOB), simulate(flying(), resume=path, **JOB))
+    assert_same(whole, simulate(flying(), resume=path, **JOB))
 
 
 def test_what_an_observer_raises_carries_the_result_up_to_there():
@@ -240,11 +184,11 @@ def test_what_an_observer_raises_carries_the_result_up_to_there():
     assert not failed.value.result.diverged
 
 
-def test_a_signal_saves_the_run_which_goes_on_with_the_bits_of_one_never_stopped(tmp_path):
+def test_a_signal_saves_the_run_which_goes_on_with_its_bits(whole, tmp_path):
     def end(view):
         os.kill(os.getpid(), signal.SIGTERM)
 
     path, observers = tmp_path / "run.checkpoint", [Collector(At((5e-7,)), end=end)]
     with pytest.raises(Interrupted, match="interrupted at t = "):
         simulate(flying(), checkpoint=Checkpoint(path), observers=observers, **JOB)
-    assert_same(simulate(flying(), **JOB), simulate(flying(), resume=path, **JOB))
+    assert_same(whole, simulate(flying(), resume=path, **JOB))
