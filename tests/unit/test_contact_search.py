@@ -4,13 +4,13 @@ Pairs that stay near keep their memory through every search.
 """
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, Scene, Uniform, effects
-from taichi_dem.contact.contacts import FARTHEST, STEPS
 from taichi_dem.kit.allocation import FieldTree, assign, values
 from taichi_dem.mesh.shapes import bar
 from tests.again import Again
@@ -29,26 +29,16 @@ class Marked(effects.SphereContact):
         self.of_spheres = store.sphere_column("sphere_mark", ti.i32)
 
 
-@pytest.fixture(scope="module")
-def bars():
-    """A bar to be thrown about, of bodies that touch with spheres or whole, each made once."""
-
-    @cache
-    def loose(law):
-        return Again(Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [law()]), Uniform(DT))
-
-    return loose
+@cache
+def loose(law):
+    """A bar to be thrown about, of bodies that touch with spheres or whole."""
+    return Again(Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [law()]), Uniform(DT))
 
 
-@pytest.fixture
-def again(bars):
-    """One of bodies that touch with spheres."""
-    return bars(Marked)
-
-
-def scattered(again, skin, spread, seed=2):
-    """Its simulation, bodies thrown about by `spread` [m], half of its faces broken."""
-    simulation, random = again.simulation, np.random.default_rng(seed)
+def scattered(skin, spread, law=Marked):
+    """The bar, bodies thrown about by `spread` [m], half of its faces broken."""
+    again, random = loose(law), np.random.default_rng(2)
+    simulation = again.simulation
     model, state = simulation.model, simulation.state
     again.restart(DT)
     turn = random.standard_normal((model.body_count, 4))
@@ -81,23 +71,29 @@ def listed(simulation):
     return [tuple(pair) for pair in np.concatenate(parts).tolist()]
 
 
-def expected(simulation, skin):
-    """Every pair of exposed spheres of two unbonded bodies with a gap below the skin [m]."""
-    model, motion = simulation.model, simulation.state.motion()
-    size, top = model.spheres.per_face, simulation.model.topology
-    sphere = simulation.values(simulation.tables.sphere)
+def spheres_now(simulation):
+    """Of every sphere: its body, place and radius [m], and since which tick its face is free."""
+    motion, sphere = simulation.state.motion(), simulation.values(simulation.tables.sphere)
+    size = simulation.model.spheres.per_face
     body = np.arange(len(sphere)) // (4 * size)
     turned = np.einsum("nij,nj->ni", motion["rotation"][body], sphere[:, :3])
     place = turned + motion["position"][body]
-    shown = np.flatnonzero(simulation.values(simulation.state.exposed_tick).repeat(size) >= 0)
-    intact = simulation.values(simulation.state.broken_tick) < 0
-    bonded = np.zeros((model.body_count,) * 2, dtype=bool)
+    since = simulation.values(simulation.state.exposed_tick).repeat(size)
+    return body, place, sphere[:, 3], since
+
+
+def expected(simulation, skin):
+    """Every pair of exposed spheres of two unbonded bodies with a gap below the skin [m]."""
+    body, place, radius, since = spheres_now(simulation)
+    top, shown = simulation.model.topology, np.flatnonzero(since >= 0)
+    intact = ~simulation.state.broken()
+    bonded = np.zeros((simulation.model.body_count,) * 2, dtype=bool)
     bonded[tuple(np.sort([top.master[intact], top.slave[intact]], axis=0))] = True
     pairs = set()
     for a in shown:
         later = shown[body[shown] > body[a]]
         later = later[~bonded[body[a], body[later]]]
-        gap = np.linalg.norm(place[later] - place[a], axis=1) - sphere[later, 3] - sphere[a, 3]
+        gap = np.linalg.norm(place[later] - place[a], axis=1) - radius[later] - radius[a]
         pairs |= {(int(a), int(b)) for b in later[gap < skin]}
     return pairs
 
@@ -109,47 +105,24 @@ def slot_of_pair(store):
     return {tuple(pair): int(p) for pair, p in zip(bodies, slots)}
 
 
-def test_waiting_impulses_survive_a_search(again):
-    """They keep their bits, also when the pair has moved out of reach; a new pair has none."""
-    simulation = scattered(again, 2e-4, 0.01)
-    store = simulation.contacts.store
-    before, impulses = slot_of_pair(store), np.zeros((store.slots, 2, 6))
-    for p in before.values():
-        impulses[p] = np.random.default_rng(p).standard_normal((2, 6))
-    assign(store.impulse, impulses.reshape(-1, 6))
-    assign(store.waiting, impulses.any(axis=2))
-    motion = simulation.state.motion()
-    motion["position"][::3] = np.roll(motion["position"][::3], 1, axis=0)
-    simulation.state.set_motion(motion["position"], motion["orientation"])
-    simulation.broad_phase.search()
-    after, found = slot_of_pair(store), values(store.impulse).reshape(-1, 2, 6)
-    assert set(before) < set(after)
-    for pair, p in after.items():
-        wanted = impulses[p] if pair in before else np.zeros((2, 6))
-        assert np.array_equal(found[p], wanted)
-        assert before.get(pair, p) == p
+@pytest.mark.parametrize("spread", [0.01, 0.03, 0.1, 0.3])
+def test_a_search_of_all_lists_the_spheres_nearer_than_the_skin_and_no_others(spread):
+    simulation = scattered(2e-3, spread)
+    assert sorted(listed(simulation)) == sorted(expected(simulation, 2e-3))
 
 
 def overlap_energy(simulation, born_after):
     """Elastic energy [J] of the overlaps of listed spheres of which one is younger than a tick."""
-    model, motion = simulation.model, simulation.state.motion()
-    size, sphere = model.spheres.per_face, simulation.values(simulation.tables.sphere)
-    exposed, energy = simulation.values(simulation.state.exposed_tick), 0.0
-    for pair in listed(simulation):
-        body = [one // (4 * size) for one in pair]
-        place = [
-            motion["position"][i] + motion["rotation"][i] @ sphere[one, :3]
-            for i, one in zip(body, pair)
-        ]
-        gap = np.linalg.norm(place[1] - place[0]) - sphere[list(pair), 3].sum()
-        if max(exposed[one // size] for one in pair) > born_after:
-            energy += 0.5 * CONCRETE.contact_stiffness * max(0.0, -gap) ** 2
-    return energy
+    _, place, radius, since = spheres_now(simulation)
+    a, b = np.array(listed(simulation)).T
+    overlap = radius[a] + radius[b] - np.linalg.norm(place[b] - place[a], axis=1)
+    overlap[np.maximum(since[a], since[b]) <= born_after] = 0.0
+    return 0.5 * CONCRETE.contact_stiffness * (np.maximum(overlap, 0.0) ** 2).sum()
 
 
-def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
+def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once():
     """Faces that break now bring k d^2 / 2 an overlap; a second search at the tick nothing."""
-    simulation = scattered(again, 2e-4, 0.02)
+    simulation = scattered(2e-4, 0.02)
     state, store = simulation.state, simulation.contacts.store
     assert not values(store.heat, near_slots(store)).any()
     exposed = simulation.values(state.exposed_tick)
@@ -198,30 +171,23 @@ def overlapping(simulation, pairs):
     return set(zip(*np.nonzero(meets)))
 
 
-@pytest.mark.parametrize(
-    ("law", "seed"), [(Marked, 0), (Marked, 1), (effects.BodyContact, 0), (effects.BodyContact, 1)]
-)
-def test_all_that_touches_is_listed_however_seldom_a_pair_is_looked_at(bars, law, seed):
+@pytest.mark.parametrize("law", [Marked, effects.BodyContact])
+def test_all_that_touches_is_listed_however_seldom_a_pair_is_looked_at(law):
     """Bodies drift and turn, each its own way, by up to a share of the skin between two searches.
 
     A search leaves out the pairs that cannot meet yet, by how far their bodies have gone; half the
-    skin is what a body may go before the next one. A search of all lists all spheres nearer than
-    the skin, and no others.
+    skin is what a body may go before the next one.
     """
-    skin, far, turn, random = 2e-3, 0.2, 5e-4, np.random.default_rng(seed)
-    simulation = scattered(bars(law), skin, 0.03, seed)
+    skin, far, turn, random = 2e-3, 0.2, 5e-4, np.random.default_rng(0)
+    simulation = scattered(skin, 0.03, law)
     broad, contacts = simulation.broad_phase, simulation.contacts
-    pairs = None
-    if contacts.law.meets_bodies:
-        pairs = AllPairs(contacts, simulation.model.body_count)
-    else:
-        assert sorted(listed(simulation)) == sorted(expected(simulation, skin))
+    pairs = AllPairs(contacts, simulation.model.body_count) if law is not Marked else None
     motion = simulation.state.motion()
     way = random.standard_normal(motion["position"].shape)
     way *= far * skin * random.random((len(way), 1)) / np.linalg.norm(way, axis=1, keepdims=True)
     spin = turn * random.standard_normal(motion["orientation"].shape)
     extent = simulation.values(simulation.tables.extent)
-    found, before = [], motion["orientation"]
+    met, before = [], motion["orientation"]
     for step in range(1, 61):
         turned = motion["orientation"] + step * spin
         turned /= np.linalg.norm(turned, axis=1, keepdims=True)
@@ -236,27 +202,8 @@ def test_all_that_touches_is_listed_however_seldom_a_pair_is_looked_at(bars, law
             touching, near = expected(simulation, 0.0), listed(simulation)
         assert touching <= set(near)
         broad.search(everywhere=False)
-        found.append(len(touching))
-    assert max(found) > min(found) + 20
-
-
-def test_a_fast_body_has_a_skin_for_some_steps(again):
-    """Each goes STEPS largest steps at its speed, spin included, between half a skin and a cap."""
-    skin, random = 2e-3, np.random.default_rng(3)
-    simulation = scattered(again, skin, 0.03)
-    contacts, count = simulation.contacts, simulation.model.body_count
-    motion, extent = simulation.state.motion(), simulation.values(simulation.tables.extent)
-    fast = 10.0 ** random.uniform(4, 6.5, (2, count, 1)) * random.standard_normal((2, count, 3))
-    simulation.state.set_motion(motion["position"], motion["orientation"], *fast)
-    simulation.broad_phase.search()
-    velocity, spin = np.linalg.norm(fast, axis=2)
-    way = STEPS * simulation.schedule.dt0 * (velocity + spin * extent)
-    wanted = np.maximum(0.5 * skin, np.minimum(way, FARTHEST * extent))
-    exposed = simulation.values(contacts.free) == 1
-    found = simulation.values(contacts.body_skin)
-    assert found[exposed] == pytest.approx(wanted[exposed], rel=1e-12)
-    for low, high in [(0.0, 0.6 * skin), (0.6 * skin, 0.24 * extent), (0.24 * extent, np.inf)]:
-        assert ((found >= low) & (found < high) & exposed).sum() > 10
+        met.append(touching)
+    assert len(set().union(*met) - met[0]) > 20
 
 
 def spheres_of(store):
@@ -267,17 +214,29 @@ def spheres_of(store):
 
 
 def marked(simulation):
-    """Give all columns of what is near numbers that tell the pair; they by pair, by spheres."""
+    """Give all that is near numbers that tell the pair, and every other pair waiting impulses.
+
+    Pairs by bodies, sphere pairs by spheres.
+    """
     store, law = simulation.contacts.store, simulation.tables.contact
     pairs, spheres = slot_of_pair(store), spheres_of(store)
     vector, of_spheres = values(law.vector), values(law.of_spheres)
+    impulses = np.zeros((store.slots, 2, 6))
     for (i, j), p in pairs.items():
         vector[p] = [i, j, 1.0]
+        impulses[p] = (p % 2) * pair_impulse(i, j)
     for (a, b), k in spheres.items():
         of_spheres[k] = 10000 * a + b
     assign(law.vector, vector)
     assign(law.of_spheres, of_spheres)
+    assign(store.impulse, impulses.reshape(-1, 6))
+    assign(store.waiting, impulses.any(axis=2))
     return pairs, spheres
+
+
+def pair_impulse(i, j):
+    """Impulses that wait in the slot of a pair, (2, 6)."""
+    return np.random.default_rng((i, j)).standard_normal((2, 6))
 
 
 @ti.kernel
@@ -286,33 +245,40 @@ def _pack(store: ti.template()):
         store.pack_spheres()
 
 
-@pytest.mark.parametrize(("share", "way"), [(0.05, 1.0), (1.0, 1.0), (0.1, 0.1)])
-@pytest.mark.parametrize("packed", [False, True])
-def test_what_stays_near_keeps_its_slot_and_its_columns(again, share, way, packed):
+def thrown(simulation, random, share, way):
+    """Throw a share of the bodies by a way [m], and search."""
+    place = simulation.state.motion()["position"]
+    far = way * random.standard_normal(place.shape)
+    place = place + np.where(random.random((len(place), 1)) < share, far, 0.0)
+    simulation.state.set_motion(place, simulation.state.motion()["orientation"])
+    simulation.broad_phase.search()
+
+
+def test_what_stays_near_or_waits_keeps_its_slot_and_all_that_it_remembers():
     """Whether few bodies are listed anew or all, by large ways or small, and lists are packed.
 
     New pairs begin with zeros, also those that left. No two near pairs share a slot. Sphere pairs
     are matched by their spheres, wherever these lie after a search.
     """
-    simulation, stayed, moved = scattered(again, 1e-3, 0.02), 0, 0
+    simulation, stayed, moved = scattered(1e-3, 0.02), 0, 0
     store, law, left = simulation.contacts.store, simulation.tables.contact, set()
-    for seed in range(6):
+    random = np.random.default_rng(0)
+    for share, way, packed in product((0.05, 1.0, 0.1), (0.01, 0.001), (False, True)):
         before = marked(simulation)
         if packed:
             _pack(store)
             assert store.sphere_end[None] == len(before[1])
-        random, motion = np.random.default_rng(seed), simulation.state.motion()
-        thrown = random.random(len(motion["position"])) < share
-        place = motion["position"] + 0.01 * way * random.standard_normal((len(thrown), 3))
-        place = np.where(thrown[:, None], place, motion["position"])
-        simulation.state.set_motion(place, motion["orientation"])
-        simulation.broad_phase.search()
+        thrown(simulation, random, share, way)
         pairs, spheres = slot_of_pair(store), spheres_of(store)
         assert len({*pairs.values()}) == len(pairs)
+        assert {pair for pair, p in before[0].items() if p % 2} <= {*pairs}
         vector, of_spheres = values(law.vector), values(law.of_spheres)
+        impulses = values(store.impulse).reshape(-1, 2, 6)
         for pair, p in pairs.items():
+            known = pair in before[0]
             assert before[0].get(pair, p) == p
-            assert vector[p].tolist() == ([*pair, 1.0] if pair in before[0] else [0.0] * 3)
+            assert vector[p].tolist() == ([*pair, 1.0] if known else [0.0] * 3)
+            assert np.array_equal(impulses[p], known * (p % 2) * pair_impulse(*pair))
         for (a, b), k in spheres.items():
             assert of_spheres[k] == (10000 * a + b if (a, b) in before[1] else 0)
         left |= {*before[0]} - {*pairs}
