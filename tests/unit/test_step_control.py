@@ -1,13 +1,12 @@
 """No body takes a longer step than its springs, dashpots, motion and loads bear.
 
-The limits of steps that a mesh is told to have are those of its motion as a whole.
+A run that leaves its bounds says where and what to try, keeps what it had, and is right.
 """
 
 import dataclasses
 
 import numpy as np
 import pytest
-import taichi as ti
 
 from taichi_dem import (
     CONCRETE,
@@ -15,19 +14,21 @@ from taichi_dem import (
     Multirate,
     Scene,
     Simulation,
+    SimulationDiverged,
     StepControl,
     Uniform,
     effects,
     read_mesh,
+    simulate,
     step_report,
 )
-from taichi_dem.elasticity.rates import bond_rates, dashpots_of, largest_bond_rate, springs_of
-from taichi_dem.mesh.shapes import bar, pair
+from taichi_dem.elasticity.rates import bond_rates, largest_bond_rate, springs_of
+from taichi_dem.mesh.shapes import bar, pair, placed_together
 from taichi_dem.mesh.topology import faces_of_group, topology_of
-from taichi_dem.stability.body_limits import dashpot_limit, dashpot_step, spring_limit, spring_step
+from taichi_dem.stability.body_limits import dashpot_step, spring_step
 from taichi_dem.stability.step_report import stable_together
 from taichi_dem.step_control import CRITERIA
-from tests.closed_forms import LinearBonds
+from tests.structures import filled
 
 
 def multiplier(dt, stiffness, damping):
@@ -128,31 +129,88 @@ def test_limited_dashpots_take_the_share_that_the_step_bears_and_name_it(dt, is_
     assert [said in finding for finding in findings] == [True] * is_less
 
 
-def test_kernels_and_arrays_share_the_formulas_of_the_stable_step():
-    """Bit for bit, and both without a limit where nothing limits."""
-    rates = np.concatenate([np.random.default_rng(4).uniform(0.0, 1e9, 200), [1e-30, 1e30]])
-    found = np.zeros((len(rates), 2))
-
-    @ti.kernel
-    def limits(rates: ti.types.ndarray(ti.f64, 1), found: ti.types.ndarray(ti.f64, 2)):
-        for k in range(rates.shape[0]):
-            found[k, 0], found[k, 1] = dashpot_limit(rates[k]), spring_limit(rates[k])
-
-    limits(rates, found)
-    assert np.array_equal(found, np.column_stack([dashpot_step(rates), spring_step(rates)]))
-    limits(np.zeros(len(rates)), found)
-    assert found.min() > 1e90 and np.isinf([dashpot_step(0.0), spring_step(0.0)]).all()
+def test_the_largest_rate_of_a_mesh_is_that_of_its_fastest_body():
+    """By LAPACK and without: both are backward stable, and differ by units in the last place."""
+    mesh = bar(0.2, 0.05, (2, 1, 1))
+    given = mesh, topology_of(mesh), CONCRETE.density, springs_of(CONCRETE)
+    rounding = 36 * np.finfo(float).eps
+    assert largest_bond_rate(*given) == pytest.approx(bond_rates(*given).max(), rel=rounding)
 
 
-@pytest.mark.parametrize(("law", "name"), [(dashpots_of, "damping"), (springs_of, "stiffness")])
-@pytest.mark.parametrize("mesh", [pair(0.05, 0.02), bar(0.2, 0.05, (2, 1, 1))])
-def test_largest_rate_of_the_whole_mesh_is_bounded_by_the_report(mesh, law, name):
-    # |a - b|^2 <= 2 |a|^2 + 2 |b|^2 in every unit: the whole cannot be faster than twice its
-    # fastest body; and it cannot be slower than that body between neighbours at rest.
-    bonds, top = LinearBonds(mesh, CONCRETE), topology_of(mesh)
-    fastest = bond_rates(mesh, top, CONCRETE.density, law(CONCRETE)).max()
-    whole = bonds.largest_rate(getattr(bonds, name))
-    assert fastest * (1.0 - 1e-9) <= whole <= 2.0 * fastest * (1.0 + 1e-9)
-    # By LAPACK: both are backward stable, and differ by some units in the last place.
-    given = mesh, top, CONCRETE.density, law(CONCRETE)
-    assert abs(largest_bond_rate(*given) - fastest) <= 36 * np.finfo(float).eps * fastest
+STEP, UNTIL = 1e-6, 2e-4
+
+
+def run(step, output=None):
+    """A small damped bar, pressed at its left end."""
+    listed = filled("bonds", effects.BondDamping(), effects.GasPressure("left", 1e5, 1e-5))
+    scene = Scene(bar(0.1, 0.05, (2, 1, 1)), CONCRETE, listed)
+    return simulate(scene, method=Uniform(step), until=UNTIL, samples=20, output=output)
+
+
+@pytest.fixture(scope="module")
+def diverged(tmp_path_factory):
+    """The refusal of a step twenty times too large, and the folder of its output."""
+    folder = tmp_path_factory.mktemp("diverged")
+    with pytest.warns(UserWarning, match="bonds"), pytest.raises(SimulationDiverged) as refusal:
+        run(STEP, str(folder))
+    return refusal.value, folder
+
+
+def test_the_step_it_advises_is_stable(diverged):
+    """And the same run diverges no more: the residual stays small and the speed sane."""
+    advised = diverged[0].advice["step"]
+    assert advised < STEP
+    report = run(advised).report
+    # First order in step times fastest rate, which the advice keeps at 1.
+    assert report.energy_residual_fraction < 1.0
+    assert report.energy_balance["kinetic"] <= report.energy_balance["load_work"]
+
+
+def test_what_is_above_its_limit_is_named_before_what_flies():
+    """A bar whose springs the step is too long for, beside a block that flies and is calm."""
+    block, slender = bar(0.4, 0.1, (4, 1, 1)), bar(0.3, 0.05, (6, 1, 1))
+    mesh = placed_together({"block": (block, (0, 0, 0)), "bar": (slender, (0, 0.5, 0))})
+    velocity = np.zeros((mesh.body_count, 3))
+    velocity[: block.body_count, 2] = 50.0
+    velocity[block.body_count, 0] = 0.1
+    listed = filled("bonds", effects.BondDamping(), group="block_left")
+    scene = Scene(mesh, CONCRETE, listed, velocity=velocity)
+    limits = step_report(scene).limits["bond_dashpot"]
+    limit = limits[block.body_count :].min()
+    assert 1.4 * limit < limits[: block.body_count].min()
+    with pytest.warns(UserWarning), pytest.raises(SimulationDiverged) as refusal:
+        simulate(scene, method=Uniform(1.4 * limit), until=1e-4, progress=None)
+    words, above = str(refusal.value), np.flatnonzero(limits < 1.4 * limit)
+    first = int(words.split("body ")[1].split()[0])
+    assert first in above and first >= block.body_count
+    assert words.index(f"{limit:.3g} s") < words.rindex("body ")
+    assert refusal.value.advice["step"] <= limit
+
+
+def test_an_idle_scene_does_not_diverge_however_long_it_rests():
+    """The energy that rounding gives it grows with the steps, and stays round-off."""
+    scene = Scene(bar(0.4, 0.1, (4, 1, 1)), CONCRETE, filled("bonds", effects.BondDamping()))
+    report = simulate(scene, method=Uniform(1e-8), until=1e-4, samples=4, progress=None).report
+    assert 0.0 < report.energy_balance["kinetic"] < report.round_off_J
+    assert "round-off" in report.unexplained
+
+
+def test_a_diverged_run_leaves_its_last_good_output(diverged):
+    error, folder = diverged
+    assert error.result.diverged == str(error)
+    times = error.result.series["time_s"]
+    assert len(times) >= 1 and np.isfinite(error.result.series["kinetic_J"]).all()
+    rows = (folder / "history.csv").read_text().splitlines()
+    assert len(rows) == len(times) + 1
+    assert "diverged at t" in (folder / "report.json").read_text()
+
+
+def test_a_motion_that_is_no_number_is_named_and_not_searched_with():
+    """Bodies in contact, one of them moving beyond all numbers: none is without a cell."""
+    touch = effects.BodyContact(outer_faces=True)
+    scene = Scene(bar(0.1, 0.05, (2, 1, 1)), CONCRETE, [touch])
+    simulation = Simulation(scene, Uniform(1e-8))
+    simulation.start()
+    simulation.state.velocity[3] = [np.nan, 0.0, 0.0]
+    with pytest.raises(SimulationDiverged, match="body"):
+        simulation.advance_to(20)
