@@ -1,6 +1,6 @@
 """A scene whose parts may meet, or whose number has another unit, is told so before a run.
 
-A scene that begins in motion runs as one whose bodies were set in motion by hand.
+It begins in the motion that it is given; its supports act together, and bear no contradiction.
 """
 
 import pickle
@@ -12,25 +12,28 @@ import pytest
 from ca_damper import Spheres
 from taichi_dem import (
     CONCRETE,
+    InputError,
     Multirate,
     Scene,
     Simulation,
     Uniform,
+    checked_mesh,
     effects,
     shapes,
     simulate,
 )
 from taichi_dem.kit.likely_units import UnitWarning
-from taichi_dem.mesh.shapes import bar, placed_together
+from taichi_dem.mesh.shapes import bar, placed_together, single
 from taichi_dem.scene import outer_faces_warnings
-from taichi_dem.simulate import run_simulation
 from tests.scenes import apart, beside
+from tests.structures import filled
+from tests.turns import matrix, quaternion
 
 BAR = bar(0.2, 0.05, (4, 1, 1))
-FALL, HELD = effects.Gravity(), effects.Fixed("first_left")
+SIDE, FALL, HELD = "base", effects.Gravity(), effects.Fixed("first_left")
 START = bar(0.2, 0.1, (2, 1, 1))
 CENTRE = START.points[START.tetrahedra].mean(axis=1)
-COUNT, METHOD, UNTIL = START.body_count, Uniform(1e-7), 2e-6
+COUNT, METHOD = START.body_count, Uniform(1e-7)
 ROWS = np.random.default_rng(3).uniform(-1.0, 1.0, (2, COUNT, 3))
 
 
@@ -70,31 +73,12 @@ def test_parts_without_contact_are_told_where_they_may_come_to_meet(shift, liste
     assert told(shift, *listed, effects.SphereContact(outer_faces=False))
 
 
-def scene(**options):
-    return Scene(START, CONCRETE, [], **options)
-
-
-@pytest.fixture(scope="module")
-def by_hand(taichi_session):
-    """Result of a run whose motion was set before it."""
-    simulation = Simulation(scene(), METHOD)
-    simulation.state.set_motion(simulation.model.centre, velocity=ROWS[0], spin=ROWS[1])
-    return run_simulation(simulation, until=UNTIL, samples=2, frames=1, progress=None)
-
-
-def assert_same(result, other):
-    for name in ("position", "velocity", "rotation"):
-        first, second = (getattr(one.frames[-1], name) for one in (result, other))
-        assert first.tobytes() == second.tobytes(), name
-    for name, column in result.series.items():
-        assert column.tobytes() == other.series[name].tobytes(), name
-
-
-def test_a_moving_scene_has_the_bits_of_a_motion_set_by_hand(by_hand):
-    moving = scene(velocity=lambda x: ROWS[0], spin=ROWS[1])
-    options = {"method": METHOD, "until": UNTIL, "samples": 2, "frames": 1, "progress": None}
-    assert_same(simulate(moving, **options), by_hand)
-    assert_same(simulate(pickle.loads(pickle.dumps(moving)), **options), by_hand)
+def test_a_moving_scene_begins_in_its_motion_also_after_pickling():
+    moving = Scene(START, CONCRETE, [], velocity=lambda x: ROWS[0], spin=ROWS[1])
+    for scene in (moving, pickle.loads(pickle.dumps(moving))):
+        motion = Simulation(scene, METHOD).state.motion()
+        assert np.array_equal(motion["velocity"], ROWS[0])
+        assert motion["spin"] == pytest.approx(ROWS[1], rel=1e-13)
 
 
 def test_body_groups_move_and_turn_each_for_itself_as_one_rigid_body():
@@ -107,20 +91,18 @@ def test_body_groups_move_and_turn_each_for_itself_as_one_rigid_body():
     np.testing.assert_allclose(motion["velocity"][COUNT:], expected, atol=1e-14)
 
 
-@pytest.mark.parametrize("kind", [Uniform, Multirate])
-def test_no_body_moves_further_than_the_distance_in_a_step(kind):
+def test_no_body_moves_further_than_the_distance_in_a_step():
     """dt_i <= l / |v_i| (Konno et al., 3.1), and none could be twice as long; dt0 is a step of all.
 
-    A uniform run takes the step of the fastest for all. Every body is visited when its own step
-    ends, and not more often.
+    Every body is visited when its own step ends, and not more often.
     """
     count, dt0, distance = 40, 1e-6, 1e-8
     speed = 10.0 ** np.random.default_rng(5).uniform(-4.0, 0.5, count)
     velocity = speed[:, None] * [1.0, 0.0, 0.0]
-    simulation = Simulation(Scene(apart(count), CONCRETE, velocity=velocity), kind(dt0, distance))
+    scene = Scene(apart(count), CONCRETE, velocity=velocity)
+    simulation = Simulation(scene, Multirate(dt0, distance))
     simulation.advance_to(3)
-    allowed = speed if kind is Multirate else np.full(count, speed.max())
-    wanted = np.maximum(0, np.ceil(np.log2(allowed * dt0 / distance))).astype(int)
+    wanted = np.maximum(0, np.ceil(np.log2(speed * dt0 / distance))).astype(int)
     assert simulation.values(simulation.state.level).tolist() == wanted.tolist()
     assert simulation.report().body_updates == 3 * (2**wanted).sum()
 
@@ -145,3 +127,63 @@ def test_a_number_in_the_likely_unit_is_warned_about_and_in_its_own_is_not(name)
             pass  # a wrong unit may lie out of the range of another option too
     assert any(one.category is UnitWarning and name in str(one.message) for one in told)
     build(value * factor)
+
+
+def on_planes(*normals, spin=(0.0, 0.0, 0.0)):
+    """Velocity and rotation of a body of no symmetry that is pushed, its face held on planes."""
+    regular = single(0.1)
+    mesh = checked_mesh(regular.points * [1.0, 1.5, 0.8], regular.tetrahedra, regular.groups)
+    held = [effects.Roller(SIDE, normal) for normal in normals]
+    scene = Scene(mesh, CONCRETE, [*held, effects.Gravity((3e4, 2e4, -4e4))], spin=spin)
+    (frame,) = simulate(scene, method=METHOD, until=2e-5, frames=1, progress=None).frames[-1:]
+    return frame.velocity[0], frame.rotation[0]
+
+
+def test_a_body_on_two_planes_slides_along_both_and_does_not_turn():
+    """The third plane is the first, seen from its other side."""
+    planes = np.array([(1.0, 0.0, 0.0), (0.6, 0.8, 0.0), (-1.0, 0.0, 0.0)])
+    velocity, rotation = on_planes(*planes)
+    assert np.abs(planes @ velocity).max() < 1e-12 * np.abs(velocity).max()
+    assert np.abs(velocity).max() > 0.1
+    assert np.array_equal(rotation, np.eye(3))
+
+
+def test_a_body_on_one_plane_turns_about_its_normal_alone():
+    """As fast as it did, for it has no torque about it: by 1e4 rad/s in 2e-5 s."""
+    normal = np.array([0.6, 0.8, 0.0])
+    velocity, rotation = on_planes(normal, normal, -normal, spin=1e4 * normal)
+    assert abs(velocity @ normal) < 1e-12 * np.abs(velocity).max()
+    assert np.abs(rotation @ normal - normal).max() < 1e-12
+    assert np.trace(rotation) == pytest.approx(1.0 + 2.0 * np.cos(0.2), abs=1e-9)
+
+
+@pytest.mark.parametrize("other", [effects.Fixed(SIDE), moved(SIDE, 1.0, 0.0, 0.0, frequency=10.0)])
+def test_supports_that_contradict_a_motion_are_refused(other):
+    scene = Scene(single(0.1), CONCRETE, [moved(SIDE, 1.0, 0.0, 0.0), other])
+    with pytest.raises(InputError, match=r"must not share bodies .* got body 0 in both"):
+        Simulation(scene, METHOD)
+
+
+def test_pressure_turns_with_the_body():
+    """From rest in a turned position, one face of four: v = R f J / m, L = R t J, of one J.
+
+    f, t: force per pressure and its torque about the centre, from the corners alone [m^2, m^3].
+    """
+    points = np.array([[0, 0, 0], [0.06, 0.01, 0], [0.01, 0.05, 0], [0.02, 0.01, 0.055]])
+    mesh = checked_mesh(points, [[0, 1, 2, 3]], {"left": [[1, 2, 3]]})
+    gas = effects.GasPressure("left", peak=575e6, rise=2.0**-13)
+    body = Simulation(Scene(mesh, CONCRETE, filled("bonds", gas)), Uniform(2.0**-19))
+    turn = quaternion([1.0, 2.0, -0.5], 2.0)
+    body.state.set_motion(body.model.centre, [turn])
+    body.advance_to(1)
+    a, b, c = points[1:]
+    force = -0.5 * np.cross(b - a, c - a)
+    torque = np.cross((a + b + c) / 3.0 - points.mean(axis=0), force)
+    force, torque = matrix(turn) @ force, matrix(turn) @ torque
+    motion, booked = body.state.motion(), body.values(body.state.load_impulse)[0]
+    given = body.model.body_mass[0] * motion["velocity"][0]
+    impulse = given @ force / (force @ force)
+    assert impulse > 0.0
+    assert given == pytest.approx(impulse * force, rel=1e-13)
+    assert motion["angular_momentum"][0] == pytest.approx(impulse * torque, rel=1e-12)
+    assert booked[:3] == pytest.approx(impulse * force, rel=1e-13)
