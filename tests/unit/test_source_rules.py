@@ -80,29 +80,6 @@ def test_every_module_has_a_layer_and_imports_nothing_from_a_later_one():
     assert [found for path in PATHS for found in later(path)] == []
 
 
-def arrows():
-    """Modules of both packages that each module imports, by path."""
-    paths = {name_of(path): path for path in PATHS}
-    found = {}
-    for path in paths.values():
-        names = set(imported(parsed(path)))
-        modules = {name if name in paths else name.rpartition(".")[0] for name in names}
-        found[path] = {paths[name] for name in modules & set(paths)} - {path}
-    return found
-
-
-def name_of(path):
-    return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-
-
-def test_no_module_imports_itself_by_way_of_others():
-    """Taking out what imports nothing that is left must leave nothing."""
-    left = arrows()
-    while leaves := {path for path, ahead in left.items() if not ahead & set(left)}:
-        left = {path: ahead for path, ahead in left.items() if path not in leaves}
-    assert left == {}
-
-
 def atomic_sums(tree):
     """Lines where threads may add to one entry of a field in any order, or hide it from a read."""
     for function in ast.walk(tree):
