@@ -16,8 +16,6 @@ from taichi_dem.mesh.shapes import pair
 
 LAWS = {
     "paper": [Softening(), ShearSlip()],
-    "tension alone": [Softening()],
-    "slip alone": [ShearSlip()],
     "weakening": [Softening(), SlipWeakening(500.0)],
     "mixed": [MixedMode(500.0, 1.75)],
 }

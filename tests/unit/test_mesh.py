@@ -106,22 +106,6 @@ def test_bar_fills_its_box_with_equal_bodies():
             assert np.all(mesh.points[mesh.group_faces(name)][..., axis] == value), name
 
 
-def test_the_papers_block_has_its_size_and_its_hole():
-    """Konno et al., 4.1: 962 tetrahedra, 277 nodes, the hole 40 cm from the right face.
-
-    The hole is a regular octagon of circumradius 2.5 cm: area 4 sin 45 R^2, side 2 R sin 22.5.
-    """
-    mesh = read_mesh(PAPER_BLOCK)
-    assert abs(mesh.body_count - 962) <= 10 and abs(mesh.point_count - 277) <= 30
-    octagon = 4.0 * np.sin(np.pi / 4.0) * 0.025**2
-    assert volumes(mesh).sum() == pytest.approx((2.0 * 2.0 - octagon) * 0.2, rel=1e-12)
-    perimeter = 8.0 * 2.0 * 0.025 * np.sin(np.pi / 8.0)
-    assert group_area(mesh, "hole") == pytest.approx(perimeter * 0.2, rel=1e-9)
-    wall = mesh.points[np.unique(mesh.group_faces("hole"))]
-    assert np.hypot(wall[:, 0] - 1.6, wall[:, 1] - 1.0) == pytest.approx(0.025, rel=1e-9)
-    assert np.all(mesh.points[mesh.group_faces("right")][..., 0] == 2.0)
-
-
 def test_a_moved_mesh_turns_about_its_middle_and_keeps_its_groups():
     named = BAR.body_group("half", lambda x: x[:, 0] < 0.1)
     turned = named.moved(turned=(30.0, -40.0, 70.0), by=(1.0, 2.0, 3.0))

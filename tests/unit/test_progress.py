@@ -52,13 +52,6 @@ def test_a_run_writes_a_line_a_phase_and_none_where_a_listener_hears_or_none_is_
     assert shares == sorted(shares) and (shares[-1], told[-1].seconds_left) == (1.0, 0.0)
 
 
-def test_the_phases_of_a_bar_below_another_are_said_of_the_outer_one(capsys):
-    with ProgressBar("outer"):
-        run(title="inner")
-    said = lines(capsys)
-    assert said[0] == "outer: compiling" and not [line for line in said if "inner" in line]
-
-
 def test_a_long_phase_is_spoken_of_now_and_then(capsys, clock):
     """Ten hours: never silent for longer than 30 s and a tenth of the time, and in few lines."""
     said, step = [0.0], 1.0
@@ -73,14 +66,13 @@ def test_a_long_phase_is_spoken_of_now_and_then(capsys, clock):
     assert 20 < len(said) < 80
 
 
-@pytest.mark.parametrize("seconds", [1e-3, 30.0])
-def test_many_runs_write_few_lines(capsys, clock, seconds):
-    """10,000 runs, each with a title and two phases of its own."""
+def test_many_runs_write_few_lines(capsys, clock):
+    """10,000 runs of a millisecond, each with a title and two phases of its own."""
     for k in range(10_000):
         with ProgressBar(f"run {k}") as shown:
             for phase in ("compiling", "stepping"):
                 shown(Progress(0.0, 0.0, phase))
-                clock.now += 0.5 * seconds
+                clock.now += 5e-4
     assert 2 <= len(lines(capsys)) < 300
 
 
