@@ -9,6 +9,7 @@ import subprocess
 import sys
 import zipfile
 from functools import partial
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 from tests.docs.pages import FOLDER
@@ -78,6 +79,16 @@ def later(path):
 
 def test_every_module_has_a_layer_and_imports_nothing_from_a_later_one():
     assert [found for path in PATHS for found in later(path)] == []
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    named = [path.removesuffix(".py").removesuffix("/__init__").replace("/", ".") for path in PATHS]
+    paths, before = dict(zip(named, PATHS)), {}
+    for module, path in paths.items():
+        names = set(imported(parsed(path)))
+        modules = {name if name in paths else name.rpartition(".")[0] for name in names}
+        before[module] = modules & {*paths} - {module}
+    TopologicalSorter(before).prepare()  # raises CycleError
 
 
 def atomic_sums(tree):
