@@ -86,6 +86,9 @@ def pytest_runtest_protocol(item):
         faulthandler.cancel_dump_traceback_later()
 
 
+#: Room of the damper's engines for nearly all tests, so that each structure is compiled once.
+damper_engine._POOL.least = (64, 128, 4096, 512, 4096, *(256,) * 32)
+
 #: Bytes of the process beyond which the next file begins with another session, if that of before
 #: has taken a good part of them.
 _MOST_BYTES, _LEAST_GROWTH = 1.2e9, 0.25e9
