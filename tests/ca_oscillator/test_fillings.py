@@ -8,7 +8,7 @@ import pytest
 
 from ca_damper import Automaton, Batch, RigidMass, SceneTable, Spheres, film
 from ca_damper.errors import InputError
-from tests.paper import paper
+from tests.paper import expected, paper
 
 DT = {"Spheres": 2e-5}
 SMALL = {"columns": 6, "rows": 9, "width": 4e-3, "particle_mass": 0.08e-3, "restitution": 0.5}
@@ -17,17 +17,15 @@ FLAT = {"width": 0.05, "height": 0.03, "diameter": 4e-3, "particle_mass": 0.1e-3
 HIGH = {"width": 0.07, "height": 0.2, "gravity": 7.0, "restitution": 0.9, "wall_friction": 0.1}
 #: Three fillings, and the particles of each.
 THREE = {
-    "place": ([Automaton(**SMALL, friction=0.1), Automaton(), Automaton(**LARGE)], [11, 50, 90]),
-    "paper": ([paper(**SMALL), paper(), paper(**LARGE)], [11, 50, 90]),
-    "named cells": (
+    "place": (
         [
-            Automaton(**SMALL, start=((0, 0), (3, 8))),
+            Automaton(**SMALL, friction=0.1, start=((0, 0), (3, 8))),
             Automaton(start=((5, 2),)),
             Automaton(**LARGE, start=((12, 29), (0, 3), (7, 7))),
         ],
         [2, 1, 3],
     ),
-    "spheres": ([Spheres(**FLAT), Spheres(), Spheres(**HIGH)], [9, 30, 50]),
+    "paper": ([paper(**SMALL), paper(), paper(**LARGE)], [11, 50, 90]),
     "sizes": (
         [
             Spheres(**FLAT, sizes=((5, 4e-3), (4, 3e-3)), rotation=True),
@@ -48,28 +46,69 @@ THREE = {
 }
 
 
-def run(fillings, particles, rows):
-    """What scenes of these rows, shaken by three cycles, measure and end with, a list a scene."""
+def started(name, rows):
+    """A batch of scenes of these rows of THREE."""
+    fillings, particles = THREE[name]
     number, amplitude = [particles[k] for k in rows], [(3e-3, 8e-3, 12e-3)[k] for k in rows]
     filling = fillings[rows[0]] if len(rows) == 1 else [fillings[k] for k in rows]
     dt = DT.get(type(fillings[0]).__name__, 1e-4)
     batch = Batch(filling, SceneTable(number, rows, dt, 6.0, amplitude), measured_cycles=1)
-    batch.start("rigid")
-    cycles, now, error = batch.run(2, 1), batch.sample(), batch.report().momentum_error
-    of_all = [cycles.record, batch.attempts(), *(now[name] for name in sorted(now))]
-    shots = [batch.snapshot(s) for s in range(len(rows))]
-    found = [[*(one[s] for one in of_all), *shots[s].values()] for s in range(len(rows))]
-    return found, error
+    with expected(batch):
+        batch.start("rigid")
+    return batch
+
+
+def now_of(batch):
+    """All that scenes show, a list a scene."""
+    now = batch.sample()
+    of_all = [batch.attempts(), *(now[name] for name in sorted(now))]
+    shots = [batch.snapshot(s) for s in range(batch.count)]
+    return [[*(one[s] for one in of_all), *shot.values()] for s, shot in enumerate(shots)]
+
+
+def run(name, rows):
+    """What scenes of these rows, shaken by three cycles, measure and end with, a list a scene."""
+    batch = started(name, rows)
+    record = batch.run(2, 1).record
+    assert batch.report().momentum_error < 1e-9
+    return [[mine, *shown] for mine, shown in zip(record, now_of(batch))]
+
+
+def same_bits(one, other):
+    return all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
 
 
 @pytest.mark.parametrize("name", THREE)
 def test_each_scene_is_as_in_a_batch_of_its_filling_and_momentum_closes(name):
-    fillings, particles = THREE[name]
-    together, error = run(fillings, particles, [2, 0, 1])
-    alone = [run(fillings, particles, [k])[0][0] for k in (2, 0, 1)]
-    for mine, same in zip(together, alone):
-        assert all(np.array_equal(a, b) for a, b in zip(mine, same, strict=True))
-    assert error < 1e-9
+    together = run(name, [2, 0, 1])
+    for mine, k in zip(together, (2, 0, 1)):
+        assert same_bits(mine, *run(name, [k]))
+
+
+def test_a_second_batch_compiles_nothing_and_has_its_bits_as_alone(compilations, compiled_anew):
+    run("placed spheres", [2])
+    compilations.clear()
+    (later,) = run("placed spheres", [0])
+    assert compilations == []
+    compiled_anew()
+    assert same_bits(later, *run("placed spheres", [0]))
+    assert "advance" in compilations
+
+
+def test_batches_that_live_at_once_have_an_engine_each_and_their_bits_as_alone():
+    """Two batches in turns of 37 steps."""
+    alone = []
+    for k in (0, 1):
+        batch = started("placed spheres", [k])
+        batch.advance(10 * 37)
+        alone += now_of(batch)
+    del batch
+    both = [started("placed spheres", [k]) for k in (0, 1)]
+    for _ in range(10):
+        for batch in both:
+            batch.advance(37)
+    assert both[0].engine is not both[1].engine
+    assert all(same_bits(*now_of(batch), wanted) for batch, wanted in zip(both, alone))
 
 
 def test_a_report_names_the_scene_nearest_to_its_bound_and_all_that_is_outside():
@@ -134,19 +173,11 @@ def test_a_film_of_several_fillings_is_refused_before_it_runs():
 
 def test_a_state_of_several_fillings_goes_on_to_the_same_bits():
     """Put aside while a batch of the same fillings in another order uses the engine."""
-    fillings, particles = THREE["place"]
-
-    def batch(order):
-        number, of = [particles[k] for k in order], [fillings[k] for k in order]
-        made = Batch(of, SceneTable(number, 1, 1e-4, 6.0, 8e-3), measured_cycles=1)
-        made.start()
-        made.run(0, 1)
-        return made
-
-    first = batch([0, 1, 2])
+    first = started("place", [0, 1, 2])
+    first.run(0, 1)
     aside, straight = first.aside(), first.run(0, 1).record
     del first
-    batch([2, 1, 0])
-    again = batch([0, 1, 2])
+    started("place", [2, 1, 0]).run(0, 1)
+    again = started("place", [0, 1, 2])
     again.take_up(aside)
     assert np.array_equal(again.run(0, 1).record, straight)

@@ -73,20 +73,6 @@ def turn(rate: ti.f64, t_end: ti.f64, rtol: ti.f64) -> ti.types.vector(3, ti.f64
     return ti.Vector([y[0], y[1], ti.cast(attempts, ti.f64)])
 
 
-@ti.kernel
-def one_turning_step(rate: ti.f64, h: ti.f64) -> ti.types.vector(4, ti.f64):
-    y = ti.Vector([0.25, 1.5])
-    new, _, gap = rk45.step(turning, rate, 0.0, y, turning(rate, 0.0, y), h)
-    return ti.Vector([new[0], new[1], gap[0], gap[1]])
-
-
-def test_a_step_has_the_same_bits_in_a_kernel_and_in_python():
-    y = np.array([0.25, 1.5])
-    slope = turning_in_python(3.0, 0.0, y)
-    new, _, gap = rk45.step(turning_in_python, 3.0, 0.0, y, slope, 0.0625)
-    assert np.array_equal(one_turning_step(3.0, 0.0625).to_numpy(), np.concatenate([new, gap]))
-
-
 def test_integration_in_a_kernel_keeps_the_tolerance_and_agrees_with_python():
     kernel, y = turn(2.0, 10.0, 1e-9).to_numpy(), np.array([0.0, 1.0])
     assert np.abs(kernel[:2] - [math.sin(20.0), math.cos(20.0)]).max() < kernel[2] * 1e-9
