@@ -16,7 +16,6 @@ from ca_damper import (
     shake,
 )
 from ca_damper.excitation import Excitation
-from ca_damper.excitation.signal import spline
 
 PAPER = Oscillator()
 TWO = ((4.3, 0.6e-3, 0.4), (9.1, 0.2e-3, -1.1))
@@ -32,42 +31,18 @@ def shaken(given, particles=0, **options):
     return shake(RigidMass(gravity=0.0), given, particles=particles, seeds=1, **options)
 
 
-def worst(history, wanted):
-    return np.abs(history.x[:, 0, 0] - wanted).max()
-
-
-def test_a_container_under_two_sines_moves_as_the_exact_solution():
-    made = shaken(two_sines())
-    x, v = response(PAPER, made.time_s, TWO)
-    # The spline is off by 3e-6 of the amplitude at most, the structure amplifies by 41 at most.
-    allowed = 41 * 3e-6 * 0.8e-3
-    assert worst(made, x) < allowed
-    assert np.abs(made.v[:, 0, 0] - v).max() < 2 * np.pi * 9.1 * allowed
-    fine = response(PAPER, np.arange(15001) * 1e-4, TWO)[0]
-    assert made.peak[0, 0] == pytest.approx(np.abs(fine).max(), rel=1e-4)
-    assert made.rms[0, 0] == pytest.approx(fine.std(), rel=1e-3)
-
-
-def test_error_falls_with_the_fourth_power_of_the_signal_s_step():
-    errors = []
-    for nodes in (8, 16, 32):
-        time, step = np.linspace(0.0, 1.5, round(1.5 * 9.1 * nodes) + 1, retstep=True)
-        value = sum(a * np.sin(2.0 * np.pi * f * time + phase) for f, a, phase in TWO)
-        made = shaken(spline(step, value, "two sines"))
-        errors.append(worst(made, response(PAPER, made.time_s, TWO)[0]))
-    ratios = np.array(errors[:-1]) / errors[1:]
-    # Fourth order, or more where the filter of the structure averages the error's sign.
-    assert (ratios > 2.0**3.5).all(), errors
-
-
-def test_force_moves_the_container_as_the_exact_solution():
+def test_a_container_under_sines_of_base_and_force_moves_as_the_exact_solution():
     of_force = (5.7, 3e-2, 0.7)
     force = excitation.sines(*of_force[:2], 1.5, phases=of_force[2])
-    made = shaken(Excitation(force=force), duration=1.5)
-    static = of_force[1] / PAPER.stiffness
-    wanted = response(PAPER, made.time_s, force=(of_force,))[0]
-    assert worst(made, wanted) < 41 * 3e-6 * static
-    assert made.base == pytest.approx(0.0, abs=0.0)
+    made = shaken(Excitation(two_sines(), force))
+    x, v = response(PAPER, made.time_s, TWO, (of_force,))
+    # The spline is off by 3e-6 of the amplitude at most, the structure amplifies by 41 at most.
+    allowed = 41 * 3e-6 * (0.8e-3 + of_force[1] / PAPER.stiffness)
+    assert np.abs(made.x[:, 0, 0] - x).max() < allowed
+    assert np.abs(made.v[:, 0, 0] - v).max() < 2 * np.pi * 9.1 * allowed
+    fine = response(PAPER, np.arange(15001) * 1e-4, TWO, (of_force,))[0]
+    assert made.peak[0, 0] == pytest.approx(np.abs(fine).max(), rel=1e-4)
+    assert made.rms[0, 0] == pytest.approx(fine.std(), rel=1e-3)
 
 
 def test_a_container_let_go_decays_as_the_closed_form():
@@ -92,7 +67,7 @@ def test_forces_between_samples_leave_none_out_and_recording_changes_no_bit():
     """Seven steps to a sample and some at the end: their impulse is that of every step."""
     impulses, records = [], []
     for every in (7, 1):
-        batch = grains(20, two_sines(0.4), measured_cycles=1, recorded_samples=5000)
+        batch = grains(20, two_sines(0.4), measured_cycles=1, recorded_samples=4001)
         records.append(batch.run(0, 1, record_every=every).record)
         series = batch.time_series()
         impulses.append((series["force"][1:, 0] * np.diff(series["time_s"][:, 0])).sum())
@@ -141,7 +116,7 @@ def largest_stretch():
     return float(np.abs(np.exp(-decay * later) * free / turn).max())
 
 
-@pytest.mark.parametrize("length", [0.15, 1.0])
+@pytest.mark.parametrize("length", [0.15, 0.5])
 def test_a_half_sine_stretches_the_spring_as_duhamel_says(length):
     """17.7 mm whatever the length of the record; samples of 1 ms miss a peak by (w dt)^2 / 8."""
     time = np.arange(round(length / 1e-4) + 1) * 1e-4
@@ -221,7 +196,7 @@ def box(particles=0, ratio=0.5, amplitude=0.0):
     """A batch of one box on the floor, of which every step is recorded."""
     damping = 2.0 * ratio * OMEGA * MASS
     table = SceneTable(particles, 1, 2e-5, 10.0, amplitude, MASS, STIFFNESS, damping)
-    return Batch(RigidMass(gravity=G), table, mount="floor", recorded_samples=50_000)
+    return Batch(RigidMass(gravity=G), table, mount="floor", recorded_samples=10_001)
 
 
 def motion(batch, cycles):
