@@ -79,12 +79,16 @@ def figures_of(rows):
 
 
 def page_of(rows):
-    """The table in Markdown, and the reasons of the misses, to which their verdicts refer."""
+    """Table in Markdown, each source once, and the reasons of misses, to which verdicts refer."""
     lines = ["| " + " | ".join(HEADER) + " |", "|" + "---|" * len(HEADER)]
     reasons = list(dict.fromkeys(row.miss for row in rows if row.miss and not row.holds))
+    above = None
     for row in rows:
         note = f" ({reasons.index(row.miss) + 1})" if row.miss and not row.holds else ""
-        lines.append("| " + " | ".join(cells(row)) + note + " |")
+        words, source, *rest = cells(row)
+        shown = (words, "" if source == above else source, *rest)
+        lines.append("| " + " | ".join(shown) + note + " |")
+        above = source
     notes = [f"{k}. {reason}." for k, reason in enumerate(reasons, 1)]
     return "\n".join([*lines, "", *notes]) + "\n"
 
