@@ -70,8 +70,6 @@ def pytest_xdist_make_scheduler(config, log):
     return InHalves(config, log) if config.getoption("dist") == "loadscope" else None
 
 
-#: Room of damper engines for scenes, cycles, samples and places: tests then compile few sizes.
-damper_engine._POOL.least = (64, 128, 4096, *(512,) * 32)
 #: Longest time of one test [s]; the longest takes two minutes on a busy machine.
 MOST_SECONDS = 900
 
