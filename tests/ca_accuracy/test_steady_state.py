@@ -91,41 +91,6 @@ def test_a_slow_approach_in_noise_ends_within_its_bar(time, noise):
     assert held >= 16
 
 
-def own_places(rng):
-    """A seed about a place of its own, for ever."""
-    return 1.0 + 0.1 * rng.normal() + 0.02 * rng.normal(size=256)
-
-
-def one_motion(rng):
-    return 1.0 + 0.02 * rng.normal(size=256)
-
-
-def left_motion(rng):
-    """A seed that leaves its motion for good at any time, once in 150 cycles in the mean."""
-    stays = np.arange(256) < rng.exponential(150.0)
-    return np.where(stays, 1.0, 0.7) + 0.02 * rng.normal(size=256)
-
-
-def two_motions(rng):
-    """A seed that goes to and fro between two motions, once in 400 of 640 cycles in the mean."""
-    changes = np.cumsum(rng.exponential(400.0, size=20))
-    place = np.searchsorted(changes, np.arange(640)) + rng.integers(2)
-    return np.where(place % 2, 1.0, 0.7) + 0.02 * rng.normal(size=640)
-
-
-@pytest.mark.parametrize(
-    ("seed_of", "share"),
-    [(own_places, 0.0), (left_motion, 0.0), (two_motions, 0.0), (one_motion, 1.0)],
-)
-def test_seeds_that_differ_or_wander_are_not_steady_before_they_have_run_long(seed_of, share):
-    """20 groups of eight: of steady ones a twentieth and twice a hundredth are sent on."""
-    rng = np.random.default_rng(11)
-    groups = (np.array([seed_of(rng) for _ in range(8)]) for _ in range(20))
-    steady = sum(steady_part(rows, 1e-3).is_steady for rows in groups)
-    alarms = 20 * (FALSE_ALARMS + 0.02)
-    assert abs(steady - 20 * share) <= (alarms + 3.0 * math.sqrt(alarms) if share else 0.0)
-
-
 @pytest.mark.parametrize("cycles", [1, 2, 6])
 def test_a_periodic_series_is_seen_with_its_period(cycles):
     values = np.exp(1j * np.arange(cycles)) + 2.0
