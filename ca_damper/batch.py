@@ -1,7 +1,4 @@
-"""Many scenes, run together in launches of bounded length.
-
-Nothing is compiled where a batch of the same structure has run before, whatever its size.
-"""
+"""Many scenes, run together in launches of bounded length."""
 
 import contextlib
 import time

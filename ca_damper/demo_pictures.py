@@ -30,10 +30,7 @@ _EXPECTED = {
 
 @dataclass(frozen=True, eq=False)
 class Decay:
-    """Decays of a filling from several starts of each number of particles.
-
-    amplitude: of every cycle [m], x: samples over time [m], (counts x starts, ...) each.
-    """
+    """Decays of a filling from several starts of each number of particles."""
 
     counts: Sequence[int]
     amplitude: np.ndarray

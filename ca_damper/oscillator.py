@@ -197,10 +197,7 @@ class Oscillator:
 
 @ti.dataclass
 class Forcing:
-    """Acceleration terms of the container in a step, per mass; time counts from its beginning.
-
-    The base contributes drive cos(omega t) + quadrature sin(omega t) [m/s^2]; constant is the rest.
-    """
+    """Acceleration terms of the container in a step, per mass; time counts from its beginning."""
 
     stiffness: ti.f64
     damping: ti.f64

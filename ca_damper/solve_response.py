@@ -1,8 +1,4 @@
-"""Outputs of the damper to a tolerance, with an error bar.
-
-A pilot at a coarse step finds the frequencies that the goal needs. Scenes at two steps then
-continue until their transients have ended and the bar is narrow enough.
-"""
+"""Outputs of the damper to a tolerance, with an error bar."""
 
 import math
 from collections.abc import Iterable, Sequence

@@ -36,11 +36,7 @@ _ZERO = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class SeedValues:
-    """A goal's values at one step, (seeds, places).
-
-    variance: of a seed's value by the sampling of its cycles, (places,). drift: half-width by
-    transients that are not over.
-    """
+    """A goal's values at one step, (seeds, places)."""
 
     values: np.ndarray
     variance: np.ndarray

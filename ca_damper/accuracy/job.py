@@ -23,12 +23,7 @@ _BELOW, _ABOVE = 0.95, 1.04
 
 @dataclass(frozen=True)
 class Stage:
-    """Which runs make an estimate.
-
-    dt: finest step [s]. window: steady cycles of each scene.
-    has_between: whether there are steps between dt and 4 dt. margin: further frequencies on either
-    side of a peak. level: of halving of the frequencies around it.
-    """
+    """Which runs make an estimate."""
 
     dt: float
     seeds: tuple[int, ...]
@@ -40,10 +35,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Job:
-    """A checked question. span: range of ratios or None. fixed: seeds, or None for ours.
-
-    listener: of progress.
-    """
+    """A checked question. span: range of ratios or None. fixed: seeds, or None for ours."""
 
     filling: Any
     particles: int

@@ -1,8 +1,4 @@
-"""Scenes of one filling that continue from their state until they are steady.
-
-All seeds continue for the same number of cycles: if each stopped once it looks steady, the quieter
-of several motions would be counted too often.
-"""
+"""Scenes of one filling that continue from their state until they are steady."""
 
 import math
 import time

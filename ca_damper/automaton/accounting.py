@@ -1,8 +1,4 @@
-"""Forces on the container (Komatsuzaki et al., 6.2, eq. 11: the sum of m (v - v') / dt).
-
-An accounting says which gains of velocity of the particles act on the container: a class each, and
-one line in the table below. Gains are counted in whole quanta, so that sums do not depend on order.
-"""
+"""Forces on the container (Komatsuzaki et al., 6.2, eq. 11: the sum of m (v - v') / dt)."""
 
 from typing import Any, ClassVar
 
@@ -66,10 +62,7 @@ class Uncounted:
 
 @ti.data_oriented
 class AllImpulses(Uncounted):
-    """Every impact and push counts, and so do losses to the six directions of the lattice.
-
-    Momentum is then conserved, and the mean force is the weight.
-    """
+    """Every impact and push counts, and so do losses to the six directions of the lattice."""
 
     labels: ClassVar[tuple[str, str]] = ("ca_all", "ca_static")
     effects: ClassVar[tuple[str, ...]] = ("ejection",)
@@ -89,10 +82,7 @@ class AllImpulses(Uncounted):
 
 @ti.data_oriented
 class Landings(Uncounted):
-    """Impacts of particles that came from another cell, as in the paper (6.2).
-
-    Only the first impact on a wall after a change of cell counts; impacts within a heap do not.
-    """
+    """Impacts of particles that came from another cell, as in the paper (6.2)."""
 
     labels: ClassVar[tuple[str, str]] = ("ca_landing", "ca_landing_static")
 

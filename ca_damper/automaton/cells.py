@@ -12,11 +12,7 @@ from ca_damper.scenes.scene_fields import SceneFields
 
 @ti.data_oriented
 class Traversal:
-    """Cells visited in a step: those on a list of particles, or all from the first to the last.
-
-    The order changes no result: rules read only data that no other cell writes, random numbers
-    resolve conflicts, and impulses are summed as integers.
-    """
+    """Cells visited in a step: those on a list of particles, or all from the first to the last."""
 
     def __init__(self, table: SceneFields, lattice: Lattice, listed: bool):
         self.table, self.lattice, self.listed = table, lattice, listed
@@ -135,12 +131,7 @@ def _named_cells(options):
 
 @ti.data_oriented
 class Placement:
-    """First cells of the particles: named by the user, or drawn from the scene's seed.
-
-    Drawn singly, as a full row would fall as one lump. Taking a cell with the chance needed / left
-    makes every choice equally likely (selection sampling, Knuth, The Art of Computer Programming 2,
-    3.4.2).
-    """
+    """First cells of the particles: named by the user, or drawn from the scene's seed."""
 
     def __init__(self, table: SceneFields, cells: Cells, way: int, is_named: bool):
         self.table, self.cells, self.lattice = table, cells, cells.lattice

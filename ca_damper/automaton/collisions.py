@@ -1,8 +1,4 @@
-"""Collisions of particles with each other and with walls (Komatsuzaki et al., 5.3 and 5.4).
-
-The event of every touching particle is found from the state after the flight. Events claim the
-particles they need, and only the winners are carried out.
-"""
+"""Collisions of particles with each other and with walls (Komatsuzaki et al., 5.3 and 5.4)."""
 
 from typing import Any
 
@@ -46,10 +42,7 @@ def deflected(direction, draw):
 
 @ti.data_oriented
 class Collisions(Part):
-    """Judge and carry out the events of a step.
-
-    other: speed of what is met, along the direction of the particle that meets it [m/s].
-    """
+    """Judge and carry out the events of a step."""
 
     def __init__(self, automaton: Any, both: bool):
         super().__init__(automaton)

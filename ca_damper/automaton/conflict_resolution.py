@@ -1,7 +1,4 @@
-"""Resolve conflicting claims to a cell by random rank: the largest does not depend on their order.
-
-Ranks grow with the step, so that old claims never need to be cleared.
-"""
+"""Resolve conflicting claims to a cell by random rank, in whatever order they come."""
 
 from typing import Any
 

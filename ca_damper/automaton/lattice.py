@@ -1,8 +1,4 @@
-"""The triangular lattice of the container (Komatsuzaki et al., 5.1, Fig. 4).
-
-One axis stands along gravity; odd columns are half a cell higher. Walls are cells too: 16 rows and
-10 columns inside make 18 x 12 cells, counted upwards, column by column.
-"""
+"""The triangular lattice of the container (Komatsuzaki et al., 5.1, Fig. 4)."""
 
 from typing import Any
 

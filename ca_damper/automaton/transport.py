@@ -73,11 +73,7 @@ class Accumulator:
 
 @ti.data_oriented
 class Transport(Part):
-    """Flight of the particles, and how they follow the lattice.
-
-    touching, crossing: cells of particles that meet an obstacle, or may change their cell; pushed:
-    1 in the cluster that a wall pushes along; border: its cells still to look around.
-    """
+    """Flight of the particles, and how they follow the lattice."""
 
     def __init__(self, automaton: Any):
         super().__init__(automaton)

@@ -129,10 +129,7 @@ class SpringContainer(Container):
 
 @ti.data_oriented
 class SprungContainer(SpringContainer):
-    """The container on its spring, its base moving by a single sine.
-
-    phase: sine and cosine of the base's turn up to each stage of a step, the same in all steps.
-    """
+    """The container on its spring, its base moving by a single sine."""
 
     def __init__(self, table: SceneFields, clock: Clock):
         super().__init__(table)
@@ -212,10 +209,7 @@ class Load:
 
 @ti.data_oriented
 class ExcitedContainer(SpringContainer):
-    """The container on its spring, its base and a force moving as an Excitation says.
-
-    lifts: whether it lies on the base by its weight, and spring and dashpot push but never pull.
-    """
+    """The container on its spring, its base and a force moving as an Excitation says."""
 
     def __init__(self, table: SceneFields, excitation: DeviceExcitation, lifts: bool):
         super().__init__(table)

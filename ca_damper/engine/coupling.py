@@ -1,9 +1,4 @@
-"""The step of a coupled scene: filling, container, measures, clock; and the loop over all scenes.
-
-One scene a thread, or the group of scenes whose boxes are at places of one structure; the whole
-time loop is inside the kernel. All state is stored in fields between
-launches, so that neither their number nor other scenes in the batch change a bit.
-"""
+"""The step of a coupled scene, and the loop over all scenes: one thread a scene or group."""
 
 import math
 from typing import Any
@@ -36,11 +31,7 @@ _F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 @ti.data_oriented
 class MomentumAccount:
-    """Expected momentum of the fillings: the initial one, less that given to container and gravity.
-
-    Counted from the end of the first step, when all carried particles move along. late: part that
-    the carried mass takes over at its next step; exchanged: sum of impulses' magnitudes [kg m/s].
-    """
+    """Expected momentum of the fillings: the initial one, less that given away."""
 
     def __init__(self, table: SceneFields):
         self.table = table
@@ -73,13 +64,7 @@ class MomentumAccount:
 
 @ti.data_oriented
 class Coupling:
-    """Fillings, container and clock of all scenes, tied together.
-
-    device: what ``filling.bind`` gave. order: first scene of each group. before: motion at the
-    beginning of a step. wait: whether fillings take a step in two parts, so that the blows of all
-    boxes of a structure are resolved together. account: a MomentumAccount. recorder: a Recorder.
-    record: of the measured cycles, shape (scenes, cycles, columns of ``measures.COLUMNS``).
-    """
+    """Fillings, container and clock of all scenes, tied together."""
 
     def __init__(
         self,

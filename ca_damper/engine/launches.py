@@ -12,11 +12,7 @@ LAUNCH_SECONDS = 0.15
 
 
 class Launches:
-    """Progress of the present run in launches that advance every scene by the same share.
-
-    A launch lasts about a sixth of a second, so that Ctrl-C, progress and checks are prompt. pace,
-    most_steps: scene-steps that a launch may have, and steps of one scene.
-    """
+    """Progress of the present run in launches that advance every scene by the same share."""
 
     def __init__(self, scenes: int):
         self.done = self.seconds = self.run_seconds = 0.0

@@ -1,9 +1,4 @@
-"""Boxes at places of a structure given by its modes; interface as that of ``container.py``.
-
-The modes of a group belong to its first scene, and RK45 takes them over a step at once. Blows that
-wait for those of other boxes come before: ``set_blows`` of every box, then ``resolve``, then
-``recoil_of`` each.
-"""
+"""Boxes at places of a structure given by its modes; interface as that of ``container.py``."""
 
 import numpy as np
 import taichi as ti
@@ -19,19 +14,7 @@ from taichi_dem.kit.allocation import assign
 
 @ti.data_oriented
 class ModalContainer(Container):
-    """Boxes of all groups, and their modes in metres as ``ModalMount`` counts them.
-
-    Of the batch: group, boxed: scenes of a group, and those of them with a box; mass [kg],
-    stiffness [N/m], damping [N s/m] of each mode, share: of the base's motion, pushed: by the force
-    of the excitation. Of a scene: shape at its place; lift: what motion of the place adds to the
-    modes; residual; home: number in the group of the first scene at its place; seen: motion of the
-    place. Of a group, at its first scene: state, slope: modal
-    coordinates and speeds, and their change; inverse of the modal masses [1/kg] with all that is
-    carried; constant [N]: forces of the fillings on the modes, lag [kg]: by the acceleration of the
-    base; elapsed: steps since the start; changed: whether slope and inverse are out of date;
-    scratch for forces on the modes (pull), their accelerations (gain) and motion (tried). Of a box,
-    of the blows of a step: struck, rubbed [kg] of ``Blows``, speed_gain [m/s] and shared by all.
-    """
+    """Boxes of all groups, and their modes in metres as ``ModalMount`` counts them."""
 
     is_group = True
 

@@ -1,7 +1,4 @@
-"""Boxes on structures given by modes, as scenes in groups: one structure a group, one box a scene.
-
-Each place without a box follows the boxes as a scene without particles, to be measured too.
-"""
+"""Boxes on structures given by modes, as scenes in groups: one structure a group."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -21,11 +18,7 @@ _SHARED = ("frequency", "base_amplitude", "dt")
 
 
 class ModalMount:
-    """What the scenes of each group hang on: a ModalStructure, with boxes at places.
-
-    Mode k is counted in metres of the place where it moves most (``sizes``), so that the tolerances
-    of RK45 keep their unit, and one place is integrated as an Oscillator.
-    """
+    """What the scenes of each group hang on: a ModalStructure, with boxes at places."""
 
     def __init__(
         self, structure: ModalStructure, places: Sequence[int], force_place: int | None = None

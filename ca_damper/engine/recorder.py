@@ -16,11 +16,7 @@ LATEST, ROOM = ("a", "force", "energy", "momentum"), 32
 
 @ti.data_oriented
 class Recorder:
-    """Samples of every scene, every so many steps of a run.
-
-    late: steps before the run since the last sample was due. series: (scenes, places) of SERIES.
-    pushed: sum of the forces since the last sample, but for that of the last step [N].
-    """
+    """Samples of every scene, every so many steps of a run."""
 
     def __init__(self, table: SceneFields):
         self.table = table

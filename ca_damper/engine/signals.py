@@ -1,8 +1,4 @@
-"""Excitation on the device: what moves the base and what pushes the container, at any time.
-
-Each has ``load(excitation)`` and the ti.func ``at(s, start, t)``: value and two derivatives of a
-displacement [m] or force [N] at t after the beginning of a step at ``start`` [s].
-"""
+"""Excitation on the device: what moves the base and what pushes the container, at any time."""
 
 from typing import Any
 

@@ -40,10 +40,7 @@ _SMALL |= dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "legend.fontsize"
 
 @dataclass(frozen=True)
 class Box:
-    """Inside of the container: width and height [m], and the diameter of a particle [m].
-
-    The automaton's box is ``staggered``: every other column, the first too, is half a cell higher.
-    """
+    """Inside of the container: width and height [m], and the diameter of a particle [m]."""
 
     width: float
     height: float

@@ -194,11 +194,7 @@ class SweepPlots:
 
 @dataclass(frozen=True, eq=False)
 class FilmMeasures:
-    """Measures of the particles in every frame of filmed cycles; arrays (cycles, frames).
-
-    height_mm: mean height in the room, less that at rest on the floor of a container in its middle.
-    floor, ceiling: share of the particles less than half a diameter away.
-    """
+    """Measures of the particles in every frame of filmed cycles; arrays (cycles, frames)."""
 
     phase: np.ndarray
     height_mm: np.ndarray

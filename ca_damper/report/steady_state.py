@@ -40,11 +40,7 @@ _MOST_CORRELATED = 0.98
 
 @dataclass(frozen=True)
 class SteadyPart:
-    """The steady part of a series, from cycle ``begin`` on.
-
-    error: standard error of the mean. drift: distance of the mean from the limit of a slow
-    approach, infinite where no limit can be seen. more: cycles to go on by before asking again.
-    """
+    """The steady part of a series, from cycle ``begin`` on."""
 
     is_steady: bool
     begin: int

@@ -1,7 +1,4 @@
-"""Sweeps up and down through the frequencies with continued state, to show hysteresis.
-
-The frequency changes as the base passes its middle: it keeps its place and takes its new speed.
-"""
+"""Sweeps up and down through the frequencies with continued state, to show hysteresis."""
 
 import math
 from collections.abc import Sequence

@@ -1,8 +1,4 @@
-"""Peak of a structure under sines of its base, however little the structure itself damps.
-
-Scenes begin near the steady state of the grains as a fixed mass. Harmonics of successive cycles
-then obey X[n + 1] = q X[n] + c, which tells the limit c / (1 - q) long before it is reached.
-"""
+"""Peak of a structure under sines of its base, however little the structure itself damps."""
 
 from typing import Any
 

@@ -38,10 +38,7 @@ def automatic_dt(default_dt: float, highest: float) -> float:
 
 @ti.data_oriented
 class Clock:
-    """Phase of the base of every scene, as a count of steps in the cycle, with sine and cosine.
-
-    Each cycle begins anew with 0 and 1, so that rounding stays below steps a cycle x 1e-16.
-    """
+    """Phase of the base of every scene, as a count of steps in the cycle, with sine and cosine."""
 
     def __init__(self, table: SceneFields):
         self.table = table

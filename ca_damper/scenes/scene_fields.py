@@ -34,12 +34,7 @@ class Part:
 
 @ti.data_oriented
 class SceneFields:
-    """Parameters of each scene of a batch; fields of shape (capacity,).
-
-    seed is cast to u32 for hashing. gravity: along the motion [m/s^2]; weight: of a particle along
-    it [N]; recoil: speed that a unit impulse gives the container [1/kg], 0 for a prescribed motion.
-    A scene depends on its own row only, so that no bit depends on what else is in a batch.
-    """
+    """Parameters of each scene of a batch; fields of shape (capacity,)."""
 
     def __init__(self, capacity: int, sizes: dict[str, int]):
         self.capacity, self.sizes = capacity, dict(sizes)

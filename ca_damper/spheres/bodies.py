@@ -22,11 +22,7 @@ vec2 = ti.types.vector(2, ti.f64)
 
 @ti.dataclass
 class Body:
-    """Numbers of all spheres of a scene: radius of the largest [m], mean mass [kg], box [m].
-
-    pull: acceleration by gravity [m/s^2], as a vector that the compiler does not take apart: both
-    components are then divided and subtracted by one instruction.
-    """
+    """Numbers of all spheres of a scene: radius of the largest [m], mean mass [kg], box [m]."""
 
     radius: ti.f64
     mass: ti.f64

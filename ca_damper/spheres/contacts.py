@@ -1,8 +1,4 @@
-"""Numbers of the contacts of two spheres, and of spheres and walls, by the sizes of the spheres.
-
-The container moves along x only: a blow on floor or ceiling meets m M / (m + M), with M its mass, a
-blow on a side wall m.
-"""
+"""Numbers of the contacts of two spheres, and of spheres and walls, by the sizes of the spheres."""
 
 from typing import Any
 
@@ -101,11 +97,7 @@ class PairContacts(Part):
 
 @ti.data_oriented
 class WallContacts(Part):
-    """Contacts of a sphere with the walls, by scene and size of spheres.
-
-    contact: with a wall that does not recoil; recoiling: damping and yielding of floor and ceiling,
-    and grip of the side walls.
-    """
+    """Contacts of a sphere with the walls, by scene and size of spheres."""
 
     constant_fields = ("contact",)
 

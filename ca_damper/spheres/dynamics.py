@@ -1,9 +1,4 @@
-"""One step of the spheres: contacts, walls, motion; and readings between steps.
-
-Leapfrog with positions half a step ahead of velocities: second order, symplectic without
-dissipation, and forces do not lag. Spheres move in the frame at rest, so that their gain of
-momentum is the exact counterpart of the impacts on the container.
-"""
+"""One step of the spheres: contacts, walls, motion; and readings between steps."""
 
 import math
 from typing import Any
@@ -46,11 +41,7 @@ FORGOTTEN = 1.0 / 256.0
 
 @ti.data_oriented
 class DeviceSpheres:
-    """The spheres of all scenes of a table, on the device; see ``ca_damper.filling``.
-
-    given: work of the walls [J]. lost: most energy that contacts had taken up at a recent look [J].
-    allowed: gain that errors of recent impacts explain [J].
-    """
+    """The spheres of all scenes of a table, on the device; see ``ca_damper.filling``."""
 
     def __init__(self, options: Any, table: SceneFields):
         self.table, self.rubs = table, options.rubs

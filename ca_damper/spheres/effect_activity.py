@@ -1,8 +1,4 @@
-"""Effects of the spheres: their activity in a run, and estimates before it.
-
-Activity is sampled when a scene is checked for divergence: in every step it would cost a fifth
-more. The first action of each effect is noted in the step itself.
-"""
+"""Effects of the spheres: their activity in a run, and estimates before it."""
 
 import math
 from dataclasses import replace
@@ -38,11 +34,7 @@ _LIMITS = (1e-3, 1e-2)
 
 @ti.data_oriented
 class EffectActivity(EventCounts):
-    """Sums over the checks since the reset, by scene.
-
-    power: into dashpots and into friction of sphere on sphere [W]. motion: translation and rotation
-    [J].
-    """
+    """Sums over the checks since the reset, by scene."""
 
     def __init__(self, table: SceneFields):
         super().__init__(table, len(_BY), _BY)

@@ -1,9 +1,4 @@
-"""Expected contacts: pairs and spheres at walls that may touch before a lower bound of the time.
-
-All others need no test until the spheres have come nearer to each other, or to a wall, by a
-margin. How much nearer is summed from what moved in each step: the spread of the velocities of the
-spheres, and the floor. So it holds whatever moves them: gravity, contacts, a given motion.
-"""
+"""Expected contacts: pairs and spheres at walls that may touch before a lower bound of the time."""
 
 import taichi as ti
 
@@ -26,16 +21,7 @@ _NEARLY_ALL = 3
 
 @ti.data_oriented
 class ExpectedContacts:
-    """Lists of the pairs and of the spheres at walls that are tested in every step.
-
-    pair, pair_count; sphere, sphere_count: the lists; pair[s, EXPECTED] is that of a scene, and
-    pair[s, TOUCHING] has places for those of them that touch in a step. most_touch: whether nearly
-    all of them do, so that they are evaluated without a test. margin: how far apart two spheres,
-    and a sphere and a wall, are listed [m]. nearer: by how much they may have come nearer since
-    [m]. least, most: bounds of the way of the spheres in the last step [m]. floor: where the floor
-    was then [m].
-    unlisted: tests of pairs and spheres that are not listed; skipped: of all steps since the start.
-    """
+    """Lists of the pairs and of the spheres at walls that are tested in every step."""
 
     def __init__(self, table: SceneFields, bodies: Bodies):
         self.table, self.bodies, self.cells = table, bodies, CellList(table, bodies)

@@ -1,8 +1,4 @@
-"""Forces of two spheres on each other, and of the container's walls on those that touch them.
-
-Pairs are evaluated eight at a time, which rounds as single numbers do and halves the time of roots
-and divisions, and added one by one in their order.
-"""
+"""Forces of two spheres on each other, and of the container's walls on those that touch them."""
 
 from typing import Any
 

@@ -9,10 +9,7 @@ from taichi_dem.kit.allocation import values
 
 @ti.data_oriented
 class Rotation:
-    """Turning of solid spheres in the plane, of moment of inertia 2/5 m r^2; or no trace of it.
-
-    tangential_share: of the effective mass that resists a tangential impulse.
-    """
+    """Turning of solid spheres in the plane, of moment of inertia 2/5 m r^2; or no trace of it."""
 
     def __init__(self, bodies: Bodies, turns: bool):
         self.bodies, self.turns = bodies, turns

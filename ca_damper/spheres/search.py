@@ -1,7 +1,4 @@
-"""Pairs of spheres: all of them, or those near each other by a cell grid.
-
-Both name the pairs (i, j), i < j, in the same order: forces are summed to the same bits.
-"""
+"""Pairs of spheres: all of them, or those near each other by a cell grid."""
 
 from typing import Any
 
@@ -98,12 +95,7 @@ class AllPairs:
 
 @ti.data_oriented
 class CellList:
-    """List of pairs within a skin of touching, found by cells; renewed when the skin is used up.
-
-    cell_first, next: chains of the spheres in a cell. The list of a scene fills its places of pair
-    from the end back to pair_first. full: more spheres near each other than can lie side by side.
-    travel: by how much two spheres may have come nearer since the search [m].
-    """
+    """List of pairs within a skin of touching, found by cells; renewed when the skin is used up."""
 
     constant_fields = ("grid",)
 

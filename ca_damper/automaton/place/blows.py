@@ -1,7 +1,4 @@
-"""Impacts of a step: first of grains on grains, then all impacts on the container together.
-
-Sums over grains are whole numbers, so that they do not depend on their order.
-"""
+"""Impacts of a step: first of grains on grains, then all impacts on the container together."""
 
 from typing import Any
 
@@ -31,11 +28,7 @@ from ca_damper.scenes.scene_fields import Part
 
 @ti.data_oriented
 class Collisions(Part):
-    """Carry out the collisions of a step; no two of them change the same grain.
-
-    approaches: velocities, seen from the container, of the grains that meet floor or ceiling
-    [quanta].
-    """
+    """Carry out the collisions of a step; no two of them change the same grain."""
 
     def __init__(self, automaton: Any):
         super().__init__(automaton)

@@ -1,7 +1,4 @@
-"""Transport by the rules of place: free flight, the lattice, and changes of cell.
-
-Along its column a grain changes its cell by its place, across it by chance.
-"""
+"""Transport by the rules of place: free flight, the lattice, and changes of cell."""
 
 from typing import Any
 
