@@ -126,10 +126,7 @@ class Job:
 
 
 class Runs:
-    """Runs that were made, each once; seconds: CPU time of all so far, without compiling.
-
-    results, cost: by level, Result of the undisturbed run and CPU time [s] of the first.
-    """
+    """Runs that were made, each once; seconds: CPU time of all so far, without compiling."""
 
     def __init__(self, job: Job, listen: Listener | None):
         self.job, self.listen = job, listen

@@ -39,10 +39,7 @@ _OF_EACH = 3
 
 @dataclass(frozen=True)
 class Beside:
-    """Measures errors that no shorter step reduces, by runs at the coarsest level.
-
-    They are as large there, and cost least.
-    """
+    """Measures errors that no shorter step reduces, by runs at the coarsest level."""
 
     job: Job
     runs: Runs

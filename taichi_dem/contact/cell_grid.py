@@ -23,12 +23,7 @@ _FAR = 1e30
 
 @ti.data_oriented
 class Reach:
-    """The positions for which the Verlet list knows the neighbours of each body.
-
-    reach: distance that a body may move from there, its skin included [m]; ball: radius of all that
-    it may touch with then [m]. Escaped bodies are listed again one by one: a few fragments are
-    fast.
-    """
+    """The positions for which the Verlet list knows the neighbours of each body."""
 
     def __init__(self, contacts: Contacts):
         n = contacts.tables.capacity.bodies
@@ -72,10 +67,7 @@ class Reach:
 
 @ti.data_oriented
 class CellGrid:
-    """Sorts bodies by cell, so that neighbours are sought in the cells nearby only.
-
-    number: gives the bodies to sort, all where the next search does so, else none.
-    """
+    """Sorts bodies by cell, so that neighbours are sought in the cells nearby only."""
 
     scratch_fields = (
         *("first", "member", "cell", "counts", "corner", "edge", "largest", "bounds"),

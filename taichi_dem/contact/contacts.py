@@ -255,12 +255,7 @@ class Contacts:
 
 @ti.data_oriented
 class Breaks:
-    """What breaks have set free, for the contact search: spheres on free faces, and their corners.
-
-    Around a free face lie bodies that reach the surface with an edge or a corner only. newest,
-    latest: last tick at which a face of a body, of any body, was set free; fresh: since the last
-    search.
-    """
+    """Spheres and corners that breaks have set free, for the contact search."""
 
     constant_fields = ("corner",)
     scratch_fields = ("newest", "is_open")

@@ -46,11 +46,7 @@ class PairListener(Protocol):
 
 @ti.data_oriented
 class BroadPhase:
-    """Finds the pairs that are near and their spheres, for the store of a ``Contacts``.
-
-    everywhere: 1 when the next search compares all pairs, as after bodies were moved by hand.
-    limits: ``StabilityLimits`` that are told of pairs, or None. full: the list without capacity.
-    """
+    """Finds the pairs that are near and their spheres, for the store of a ``Contacts``."""
 
     scratch_fields = ("free", "free_count", "mark")
 

@@ -1,7 +1,4 @@
-"""Verlet list of the contact search: bodies that are near each other, within several skins.
-
-It contains all bodies, free or not, so one list serves many searches.
-"""
+"""Verlet list of the contact search: bodies that are near each other, within several skins."""
 
 import taichi as ti
 
@@ -24,13 +21,7 @@ MOST_ESCAPED = 1024
 
 @ti.data_oriented
 class VerletList:
-    """For each body the bodies of higher index near it, in order.
-
-    first[i] .. last[i]: row of body i, then spare entries. slot: of the pair in the store, -1 while
-    it is not near; until: sum of both paths up to which the pair has no other contacts than it
-    holds [m]. stale: STALE when all rows are to be rebuilt; wanted: entries that each row is to
-    have.
-    """
+    """For each body the bodies of higher index near it, in order."""
 
     scratch_fields = ("wanted",)
 
@@ -253,11 +244,7 @@ class VerletList:
 
 @ti.data_oriented
 class NearPairs:
-    """Sorts the near pairs of a ``PairStore``: those with sphere pairs, or with a pending impulse.
-
-    row: slots of the near pairs of body i, from neighbours.first[i] on. wanted: slots and places of
-    sphere pairs that a body takes, and slots that it frees, then those of all bodies before.
-    """
+    """Sorts the pairs of a ``PairStore`` that are near or have an impulse pending."""
 
     scratch_fields = ("row_is_new", "wanted", "total")
 

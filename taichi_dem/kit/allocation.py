@@ -46,10 +46,7 @@ class CapacityError(InputError):
 
 
 class FieldTree:
-    """Fields declared in its ``with`` block, allocated together at the end of the block.
-
-    advice: what to do where memory is short; counted: how many of what the fields hold.
-    """
+    """Fields declared in its ``with`` block, allocated together at the end of the block."""
 
     scratch_fields = ("_anchor",)
 
@@ -153,10 +150,7 @@ def _given_back(address, memory):
 
 
 class _Declared:
-    """Fields and trees that Taichi holds to be declared and not yet allocated.
-
-    It refuses every later kernel while a failed declaration leaves such behind.
-    """
+    """Fields and trees that Taichi holds to be declared and not yet allocated."""
 
     def __init__(self):
         self._runtime, self._root = impl.get_runtime(), impl._root_fb

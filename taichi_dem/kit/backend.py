@@ -1,7 +1,4 @@
-"""Properties of the running device: the only module that distinguishes back ends.
-
-Double precision is required: Metal and most Vulkan drivers of telephones lack it.
-"""
+"""Properties of the running device: the only module that distinguishes back ends."""
 
 import math
 from collections import Counter

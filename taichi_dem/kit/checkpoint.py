@@ -98,10 +98,7 @@ class Interrupted(Portable, KeyboardInterrupt):
 
 
 class StopRequests:
-    """Notes the first stop signal in its block; a second one interrupts.
-
-    Python delivers signals to the main thread only: in others nothing changes.
-    """
+    """Notes the first stop signal in its block; a second one interrupts."""
 
     def __init__(self) -> None:
         self.asked = 0

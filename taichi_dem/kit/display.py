@@ -1,7 +1,4 @@
-"""Display of objects: a line or two at a prompt, HTML in a notebook.
-
-Nothing here reads a field: an object may be shown after its Taichi session has ended.
-"""
+"""Display of objects: a line or two at a prompt, HTML in a notebook."""
 
 import base64
 import html

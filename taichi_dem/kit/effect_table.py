@@ -1,8 +1,4 @@
-"""One table of the effects of a run, and two views of it: advice on them, and a certificate.
-
-A row each: whether it is listed, when and where it acted, its energy, evaluations made and skipped,
-the size of what was left out, advice. Plain data, no physics.
-"""
+"""One table of the effects of a run, and two views of it: advice on them, and a certificate."""
 
 import math
 from collections.abc import Iterator, Mapping

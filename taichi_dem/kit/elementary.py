@@ -1,7 +1,4 @@
-"""Sine, cosine and fifth root with the same bits on every processor and device, in kernels too.
-
-C libraries and versions of NumPy differ in the last place; plain sums and products do not.
-"""
+"""Sine, cosine and fifth root with the same bits on every processor and device, in kernels too."""
 
 import numpy as np
 import taichi as ti

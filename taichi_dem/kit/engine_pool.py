@@ -1,7 +1,4 @@
-"""Engines of a session: each is compiled once for a structure and runs any scene of it.
-
-One owner at a time: a scene that does not fit, or finds all engines in use, gets a new one.
-"""
+"""Engines of a session: each is compiled once for a structure and runs any scene of it."""
 
 import gc
 import weakref
@@ -91,10 +88,7 @@ def _made(kind, structure, capacity):
 
 
 class EnginePool:
-    """Engines of one kind, by structure.
-
-    Capacities are powers of two from ``least`` on, so that few engines are ever compiled.
-    """
+    """Engines of one kind, by structure."""
 
     def __init__(self, kind: type[Engine], least: Iterable[int]):
         self.kind, self.least = kind, tuple(least)

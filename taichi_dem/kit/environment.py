@@ -1,7 +1,4 @@
-"""Variables and folders on which Taichi depends; Taichi is imported here for the first time.
-
-Some variables TI_NAME overrule settings that keep bits equal; malformed ones end the process.
-"""
+"""Variables and folders on which Taichi depends; Taichi is imported here for the first time."""
 
 import atexit
 import contextlib

@@ -1,7 +1,4 @@
-"""Linear algebra of stacks of small matrices whose bits are the same on every processor.
-
-A BLAS rounds in another order on each kind of processor; elementwise operations do not.
-"""
+"""Linear algebra of stacks of small matrices whose bits are the same on every processor."""
 
 import numpy as np
 

@@ -1,7 +1,4 @@
-"""Cache of what Taichi looks up at every node of a kernel, so that it reads kernels faster.
-
-The compiled code is the same.
-"""
+"""Cache of what Taichi looks up at every node of a kernel, so that it reads kernels faster."""
 
 import functools
 import gc

@@ -1,8 +1,4 @@
-"""Several members computed side by side, one per lane of a vector.
-
-A lane computes the same, operation by operation, as one member alone: no bit depends on which
-members share a vector. A vector in space of all lanes is a matrix (components, lanes).
-"""
+"""Several members computed side by side, one per lane of a vector."""
 
 import taichi as ti
 

@@ -27,10 +27,7 @@ _LAUNCHING = (
 
 
 class Launch:
-    """A kernel, called with the same templates and other values each time.
-
-    The first call of a session is one of Taichi's own.
-    """
+    """A kernel, called with the same templates and other values each time."""
 
     def __init__(self, kernel: Any, *templates: Any):
         self._kernel, self._templates = kernel, templates

@@ -17,10 +17,7 @@ class UnitWarning(UserWarning):
 
 
 class Quantity(NamedTuple):
-    """Unit of a quantity, and the units in which its usual values lie between two numbers.
-
-    others: rows (least, less than, unit).
-    """
+    """Unit of a quantity, and the units in which its usual values lie between two numbers."""
 
     unit: str
     others: tuple[tuple[float, float, str], ...]

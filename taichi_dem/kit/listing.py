@@ -1,8 +1,4 @@
-"""Lists of the contents of a package, made from its modules and their docstrings.
-
-``python -m taichi_dem`` and ``python -m ca_damper`` print them; names are dotted, as ``import`` and
-``python -m pydoc`` take them.
-"""
+"""Lists of the contents of a package, made from its modules and their docstrings."""
 
 import argparse
 import ast

@@ -1,7 +1,4 @@
-"""Switch off passes of LLVM that cost time at each start and save none in a step.
-
-Taichi has no switch for them: they are called by their addresses in Taichi's library.
-"""
+"""Switch off passes of LLVM that cost time at each start and save none in a step."""
 
 import ctypes
 import functools

@@ -1,8 +1,4 @@
-"""Lists and sums in a fixed order, made by any number of threads to the same bits.
-
-Each class has ``phases``: pairs of a list and of what is done with each of its places. Places of
-one phase may be visited side by side; phases follow one another.
-"""
+"""Lists and sums in a fixed order, made by any number of threads to the same bits."""
 
 from collections.abc import Callable
 from itertools import zip_longest

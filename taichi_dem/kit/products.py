@@ -1,7 +1,4 @@
-"""Products of small matrices and vectors in kernels, summed from the first column to the last.
-
-Taichi's ``@`` starts every sum with a product times zero: without it a step is a tenth shorter.
-"""
+"""Products of small matrices and vectors in kernels, summed from the first column to the last."""
 
 from collections.abc import Callable
 from functools import cache, reduce

@@ -1,7 +1,4 @@
-"""Names of Taichi that it does not promise, and that another version may lack.
-
-Without those in ``NEEDED`` nothing runs; the others save time, for the same bits (``may_use``).
-"""
+"""Names of Taichi that it does not promise, and that another version may lack."""
 
 import functools
 import warnings

@@ -1,8 +1,4 @@
-"""Base class of effects, and null objects for roles in which a scene lists none.
-
-A user's effect holds numbers on the host; an engine holds a bound copy of it with fields and
-kernels, into which each scene loads its numbers. Members by role: ``laws.roles``.
-"""
+"""Base class of effects, and null objects for roles in which a scene lists none."""
 
 import copy
 import re

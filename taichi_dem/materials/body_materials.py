@@ -55,10 +55,7 @@ def _of_bonds(name) -> Any:
 
 
 class BodyMaterials:
-    """Materials of the bodies of a mesh; NumPy only.
-
-    Stands for a ``Material`` wherever constants of all bonds or bodies are asked for.
-    """
+    """Materials of the bodies of a mesh; NumPy only."""
 
     def __init__(self, mesh: Mesh, materials: tuple[Material, ...], of_body: np.ndarray):
         self.mesh, self.materials, self.of_body = mesh, materials, of_body

@@ -1,7 +1,4 @@
-"""Constants of bonds and contacts that follow from moduli and the size of the bodies (NumPy only).
-
-With stiffness = modulus / distance the modulus of a block does not depend on its elements' size.
-"""
+"""Constants of bonds and contacts from moduli and the size of the bodies (NumPy only)."""
 
 from __future__ import annotations
 
@@ -81,10 +78,7 @@ class Rule:
 
 
 class BondRule(Rule):
-    """Base of rules for a constant that each bond has of its own.
-
-    typical: median over the faces of bodies of one kind; NaN until their mesh is known.
-    """
+    """Base of rules for a constant that each bond has of its own."""
 
     typical: ClassVar[float] = math.nan
 
@@ -154,10 +148,7 @@ class FaceStiffness(ContactRule):
 
 @dataclass(frozen=True, repr=False)
 class ContactShareOfCritical(ContactRule):
-    """Dashpot of one sphere contact [N s/m], as a share of the critical one.
-
-    2 ratio sqrt(k m), k by ``FaceStiffness``, m half the median mass of a body.
-    """
+    """Dashpot of one sphere contact [N s/m], as a share of the critical one."""
 
     ratio: float
     modulus: float

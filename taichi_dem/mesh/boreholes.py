@@ -1,7 +1,4 @@
-"""Rock behind a plane face with holes drilled into it: their table, the mesh, where gas acts.
-
-The rock is a box from the origin, x to the right, y up, its free face at z = depth.
-"""
+"""Rock behind a plane face with holes drilled into it: their table, the mesh, where gas acts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace

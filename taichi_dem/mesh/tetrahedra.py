@@ -1,7 +1,4 @@
-"""Geometry and connectivity of bare tetrahedron arrays (NumPy only).
-
-Local face f of a tetrahedron is the face opposite its local vertex f.
-"""
+"""Geometry and connectivity of bare tetrahedron arrays (NumPy only)."""
 
 from __future__ import annotations
 

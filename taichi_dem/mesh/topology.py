@@ -1,7 +1,4 @@
-"""Bonds, free faces, parts, mass properties and contact spheres of bodies (NumPy only).
-
-Bonds of one colour share no body. Contact spheres: Konno et al., section 2.2 and Fig. 5.
-"""
+"""Bonds, free faces, parts, mass properties and contact spheres of bodies (NumPy only)."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""What broke, as tables: cracks by time, area and orientation, and fragments.
-
-A fragment is what unbroken bonds still join, one rigid piece each. Also values by which bodies are
-coloured, by name.
-"""
+"""What broke, as tables: cracks by time, area and orientation, and fragments."""
 
 from typing import Any
 

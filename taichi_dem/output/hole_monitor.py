@@ -27,11 +27,7 @@ def watched_groups(scene: Scene) -> tuple[str, ...]:
 
 
 class HoleMonitor:
-    """Displacement at the wall of a hole.
-
-    outward: in-plane unit direction from the axis to each body's first centre. monitored: the body
-    nearest to the closest free face at mid depth, or at mid depth alone where no such face is free.
-    """
+    """Displacement at the wall of a hole."""
 
     def __init__(self, model: Model, group: str):
         mesh, topology = model.mesh, model.topology

@@ -96,10 +96,7 @@ class Frame:
 
 
 class Recorder:
-    """Collects samples and frames of a simulation.
-
-    groups: face groups of the holes that are followed. brief: whether frames are without stress.
-    """
+    """Collects samples and frames of a simulation."""
 
     grows = "row.", "frame."
 

@@ -23,12 +23,7 @@ mat4, mat43 = ti.types.matrix(4, 4, real), ti.types.matrix(4, 3, real)
 
 
 def ray_ends(parts: int) -> np.ndarray:
-    """Where the rays of a body end, (4 parts^2, 4), as weights of its corners.
-
-    The ends are the centroids of parts^2 equal triangles of each face, turned about its middle: on
-    lines of symmetry they would run along the faces between bodies that fit each other. Face f is
-    opposite corner f, whose weight is 0.
-    """
+    """Where the rays of a body end, (4 parts^2, 4), as weights of its corners."""
     at = [(u + t, v + t) for t in (1 / 3, 2 / 3) for u in range(parts) for v in range(parts - u)]
     at = [(u, v) for u, v in at if u + v < parts]
     u, v = np.array(at).T / parts

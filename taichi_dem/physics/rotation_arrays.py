@@ -1,8 +1,4 @@
-"""Rotation of all bodies of a scene, from arrays to arrays, by the functions of the step.
-
-The kernels read no field: they are compiled once a session, whatever engines it has. On a CPU one
-thread does it all: to wake others takes longer, up to some thousand bodies.
-"""
+"""Rotation of all bodies of a scene, from arrays to arrays, by the functions of the step."""
 
 import numpy as np
 import taichi as ti

@@ -1,8 +1,4 @@
-"""Symmetric 6x6 blocks between the relative twist of two bodies and the wrench they exchange.
-
-A twist is (velocity, spin), a wrench (force, moment), both at one point. Blocks are kept as three
-3x3 matrices: unrolled 6x6 products would take seconds to compile.
-"""
+"""Symmetric 6x6 blocks between the relative twist of two bodies and the wrench they exchange."""
 
 import taichi as ti
 

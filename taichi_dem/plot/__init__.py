@@ -1,8 +1,4 @@
-"""Pictures of a run; the only part of the package that imports matplotlib.
-
-Each function returns a matplotlib figure, which a notebook shows, and writes it as PNG where a
-``path`` is given (InputError where it cannot). ``plot_energy(result)`` is ``result.plot.energy()``.
-"""
+"""Pictures of a run; the only part of the package that imports matplotlib."""
 
 from taichi_dem.plot.block import plot_acting, plot_cracks, plot_film, plot_steps
 from taichi_dem.plot.series import plot_energy

@@ -1,7 +1,4 @@
-"""Parts of all pictures of a block: a view along an axis, its faces from back to front.
-
-Corners are world positions (body_count, 4, 3) [m], as ``record.body_corners`` gives.
-"""
+"""Parts of all pictures of a block: a view along an axis, its faces from back to front."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -48,10 +45,7 @@ _STROKE = "#000000"
 
 
 class View:
-    """Projection along an axis; right, up, toward (3,): unit vectors of the picture.
-
-    Looking down a coordinate axis, the next two are right and up.
-    """
+    """Projection along an axis; right, up, toward (3,): unit vectors of the picture."""
 
     def __init__(self, axis: Sequence[float] = (0.0, 0.0, 1.0)):
         along = np.asarray(axis, dtype=float)

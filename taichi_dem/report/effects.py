@@ -1,7 +1,4 @@
-"""Effects of a run: which acted, since when, and with what share of the energy.
-
-And the certificate of a run with effects="auto": what was left out.
-"""
+"""Effects of a run: which acted, since when, and with what share of the energy."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,10 +1,4 @@
-"""Is an effect needed? Estimates from the numbers of a scene, before a run and after it.
-
-A dimensionless group compares the effect with the others. Far below one it is negligible, far above
-it is needed, and between it is unclear: holes and notches concentrate stresses by a factor of a
-few, which no such estimate includes. Each connected part is judged by its own size, stiffness,
-strength, loads and speed: values over all parts would hide a small or slow one.
-"""
+"""Is an effect needed? Estimates from the numbers of a scene, before a run and after it."""
 
 import math
 from collections.abc import Iterable
@@ -26,12 +20,7 @@ BENDS = "stress of the weight over tensile strength, at most"
 
 
 class PartScales:
-    """Numbers of connected parts, arrays (count,).
-
-    part, of_bonds: of each body and bond. first: lowest body. size: longest side of a part's box,
-    spacing: of its bodies [m]; wave: speed of sound [m/s]; damping: share of its energy that a bond
-    between bodies of mean size loses in a cycle.
-    """
+    """Numbers of connected parts, arrays (count,)."""
 
     def __init__(self, model: Model, part: np.ndarray):
         self.model, self.part = model, part

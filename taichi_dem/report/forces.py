@@ -24,17 +24,7 @@ def force_names(model: Model) -> list[str]:
 
 @ti.data_oriented
 class Forces:
-    """Reads what acts on single bodies; nothing changes in the run, and no step does more for it.
-
-    A load has its mean over a step about the present. Ground and supports have what they will do in
-    the coming step if bonds, contacts and loads stay as they are: a support gives what the motion
-    that it allows takes beside them. This is the leapfrog's own impulse over its step, with solved
-    dashpots but for what their sweeps change. A body that several supports hold is held by the
-    first of them, by the others as far as something is left. Between two largest steps, forces on
-    a body that waits for its time are those of its last one.
-
-    answers: whether anything acts that answers other forces, as supports do. count: of what acts.
-    """
+    """Reads what acts on single bodies; nothing changes in the run."""
 
     def __init__(self, readings: Readings):
         self.readings, self.loads = readings, readings.step.loads

@@ -1,7 +1,4 @@
-"""Bodies that hop: they lose contact and touch again, and slide on though friction could hold them.
-
-A bounce that dies away, a slide at the limit of friction and a body that only shakes are none.
-"""
+"""Bodies that hop: they touch again and again, and slide on though friction could hold them."""
 
 import numpy as np
 

@@ -74,11 +74,7 @@ def is_bounded(run: Run) -> bool:
 
 @dataclass(frozen=True)
 class BondSlip(MissingEffect):
-    """Largest residual slip of a bond that held, at the recording times of a run.
-
-    share: of the shortest edge of its face. count: largest number of bonds beyond ``MOST_SLIP`` at
-    a time. weakens: whether slip degrades cohesion.
-    """
+    """Largest residual slip of a bond that held, at the recording times of a run."""
 
     share: float = 0.0
     weakens: bool = False
@@ -97,17 +93,7 @@ class BondSlip(MissingEffect):
 
 
 class StepResolution(Kept):
-    """Follows at recording times what mesh and step do not resolve.
-
-    slip: largest residual slip of a bond that held over the shortest edge of its face, the bond,
-    when, and the number of bonds that slipped too far. share: least share of its dashpots that each
-    bond kept while it held, (bond_count,). step: shortest step of each body [s]; fastest: largest
-    ``rate`` of it and of bodies near it; pair_share: least recorded share of its contacts; taken:
-    largest part of a speed that they take in a step; all (body_count,). rate: of the dashpot of a
-    contact, by which a body slows [1/s]. longest: step of each body that is stable for sure in its
-    bonds and in contact [s]; over: largest step over these while a bond held, or once it touched;
-    both (2, body_count).
-    """
+    """Follows at recording times what mesh and step do not resolve."""
 
     kept = "slip", "share", "pair_share", "taken", "step", "fastest", "over"
 

@@ -1,8 +1,4 @@
-"""Volume that bodies share, counted in 512 parts of a body, and how deep they are in each other.
-
-Bodies are rigid, so two bodies without a bond share volume only where nothing keeps them apart:
-without contact, at faces that it leaves out, or where it is too soft or too sparse.
-"""
+"""Volume that bodies share, counted in 512 parts of a body, and how deep they are in each other."""
 
 import math
 from dataclasses import dataclass

@@ -1,7 +1,4 @@
-"""Mean stress of every body, from the forces on it and where they act (Love; Weber 1966).
-
-V sigma = sum of f (x) a over the forces f on a body, a their arms from its centre, symmetric part.
-"""
+"""Mean stress of every body, from the forces on it and where they act (Love; Weber 1966)."""
 
 from collections.abc import Iterator
 

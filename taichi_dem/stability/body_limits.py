@@ -1,8 +1,4 @@
-"""Stable steps: of springs and dashpots, of near contacts, and of each body.
-
-A body's rates change only where a bond breaks or a contact comes near or leaves: such bodies are
-listed, and their rates found anew at the start of the next substep.
-"""
+"""Stable steps: of springs and dashpots, of near contacts, and of each body."""
 
 from typing import Any
 
@@ -62,11 +58,7 @@ def largest_eigenvalue(a, b, c):
 
 @ti.data_oriented
 class ContactLimits:
-    """Sphere pairs that count as contacts, and the block they form on each body.
-
-    A sphere pair counts once it could touch within some steps of the finer of its bodies: the
-    coarser body is woken before. slides: 1 without friction, or where it is silent.
-    """
+    """Sphere pairs that count as contacts, and the block they form on each body."""
 
     constant_fields = ("ahead", "root_mass", "root_inertia", "slides")
 
@@ -189,13 +181,7 @@ def spring_limit(rate2):
 
 @ti.data_oriented
 class StabilityLimits(Places):
-    """Rates of every body, and the list of bodies whose rates must be updated.
-
-    dashpot_table, spring_table: largest eigenvalue of the bonds' block by the set of intact bonds,
-    [1/s] and [1/s^2]. limit_level, limit_by: level of the longest stable step, and what sets it.
-    events: why a body is listed, as bits. jump: levels between neighbours, where they are limited.
-    controlled: not by a method that only limits dashpots.
-    """
+    """Rates of every body, and the list of bodies whose rates must be updated."""
 
     constant_fields = ("dashpot_table", "spring_table")
 

@@ -1,8 +1,4 @@
-"""The pair store: everything that belongs to a pair of bodies that are near, in a slot of its own.
-
-A pair keeps its slot from its first near sphere pair until the last has left and no impulse is
-pending. Only the functions here allocate and free slots and places of sphere pairs.
-"""
+"""The pair store: everything that belongs to a near pair of bodies, in a slot of its own."""
 
 from typing import Any
 

@@ -1,7 +1,4 @@
-"""Everything that changes in a run; checkpoints hold this and the effects' own state.
-
-The law of a unit is evaluated only once its bond has come near a limit (``begins`` of the law).
-"""
+"""Everything that changes in a run; checkpoints hold this and the effects' own state."""
 
 import numpy as np
 import taichi as ti
@@ -31,11 +28,7 @@ _GIVEN = ("position", "orientation", "velocity", "spin")
 
 @ti.data_oriented
 class Activity:
-    """Where the law of a bond acts: since when, and how often it was evaluated.
-
-    since: tick at which a bond first came near the limit of each part of its law, or NEVER;
-    touched: tick from which contact and friction acted on each body, or LATER.
-    """
+    """Where the law of a bond acts: since when, and how often it was evaluated."""
 
     def __init__(self, tables: Tables):
         self.tables, bonds = tables, tables.capacity.bonds

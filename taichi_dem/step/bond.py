@@ -11,11 +11,7 @@ from taichi_dem.step.multirate.schedule import Schedule
 
 @ti.dataclass
 class BondAnswer:
-    """What the three units of a bond answer, per area and in its axes.
-
-    force [Pa], torque [N/m]. failed: 1 where a unit failed. Energies in the step [J/m^2], dragged
-    as a power [W/m^2]: taken by dashpots and by slip, worked by springs.
-    """
+    """What the three units of a bond answer, per area and in its axes."""
 
     force: vec3
     torque: vec3
@@ -27,11 +23,7 @@ class BondAnswer:
 
 @ti.data_oriented
 class BondForces:
-    """Evaluates bonds and releases them.
-
-    on_demand: whether the law of bonds is asked only near its limits. notes_limits: whether limits
-    of laws that the scene lacks are watched. dashed: whether dashpots act.
-    """
+    """Evaluates bonds and releases them."""
 
     def __init__(self, schedule: Schedule):
         self.schedule, self.tables, self.state = schedule, schedule.tables, schedule.state

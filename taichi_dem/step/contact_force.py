@@ -11,10 +11,7 @@ from taichi_dem.step.multirate.schedule import Schedule
 
 @ti.data_oriented
 class TangentialSprings:
-    """Calls a friction law with memory: vectors here are in world axes, there in the first body's.
-
-    evaluated: of a pair, one more than the tick at which it was last evaluated, 0 for never.
-    """
+    """Calls a friction law with memory, in the axes of the first body."""
 
     def __init__(self, schedule: Schedule):
         self.friction, self.schedule = schedule.tables.friction, schedule
@@ -66,16 +63,7 @@ class TangentialSprings:
 
 @ti.dataclass
 class PairForces:
-    """Forces between two bodies in contact, in world axes.
-
-    force: on the second [N]. moment_i, moment_j: about the centre of each [N m]. dragged, rubbed:
-    power that dashpots and friction take [W]. slipped: energy of springs that slipped or parted
-    [J]. rub, bound: sums of the sizes of friction and of its limits [N]. stored: elastic energy of
-    overlaps and of springs between spheres [J]. leverage: sum of the forces on the second times
-    their arms from the first [N m]. Neither is found in a step. deepest: largest overlap over the
-    sum of the radii. near_count: spheres within a margin. active: CONTACT and RUBBED, where
-    spheres push and rub.
-    """
+    """Forces between two bodies in contact, in world axes."""
 
     force: vec3
     moment_i: vec3

@@ -1,8 +1,4 @@
-"""Two ways to run the same phases: many substeps in one serial kernel, or a parallel loop a phase.
-
-Both read one tuple of phases, so that the order of a step is written once. They give the same bits:
-every item writes its own slots, and every sum has a fixed order.
-"""
+"""Two ways to run the same phases: substeps in one serial kernel, or a loop a phase."""
 
 import time
 from typing import Any
@@ -122,13 +118,7 @@ class Resident:
 
 @ti.data_oriented
 class Parallel:
-    """A phase a parallel loop: for large systems and for GPUs.
-
-    A GPU is given some substeps at a time, of which those after the end or a halt do nothing, and
-    as many sweeps as were needed before: the host waits for its answer once.
-
-    ended: bits by which the last substep ended, or 0; wanted: sweeps that the next one may need.
-    """
+    """A phase a parallel loop: for large systems and for GPUs."""
 
     name = "parallel"
     scratch_fields = ("ended", "wanted")

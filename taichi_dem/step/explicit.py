@@ -101,12 +101,7 @@ class ExplicitStep(Step):
 
     @ti.func
     def wake_up(self, i):
-        """Bring body i to the present tick when it wants a shorter step because of an event.
-
-        It waits for its own time with a step chosen before a contact came near, a bond broke or a
-        neighbour refined its step. Bonds that have applied their impulse ahead apply no more until
-        then.
-        """
+        """Bring body i to the present tick when it wants a shorter step because of an event."""
         limits = self.schedule.limits
         noticed = limits.events[i] != 0
         limits.events[i] = 0

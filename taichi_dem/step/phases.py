@@ -1,7 +1,4 @@
-"""What a step consists of: phases, each a list of members and what is done with each of them.
-
-A step names its phases once, in order, and says of each when it runs. Drivers loop over them.
-"""
+"""What a step consists of: phases, each a list of members and what is done with each of them."""
 
 from enum import Enum, auto
 from typing import Any, NamedTuple

@@ -1,7 +1,4 @@
-"""Error of the step, from runs at falling steps (grid convergence index, Roache 1994).
-
-Values that chance blurs have no order to be seen; each step then gives one draw more.
-"""
+"""Error of the step, from runs at falling steps (grid convergence index, Roache 1994)."""
 
 import math
 from collections.abc import Sequence
@@ -90,10 +87,7 @@ def _ratio(steps, order):
 
 @dataclass(frozen=True, eq=False)
 class StepPart:
-    """A value (places,) as its steps give it, and the half-width of its bar by the step.
-
-    regular: whether the steps show an order; then the value is the finest one, else the mean.
-    """
+    """A value (places,) as its steps give it, and the half-width of its bar by the step."""
 
     value: np.ndarray
     error: np.ndarray

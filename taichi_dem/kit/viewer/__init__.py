@@ -1,7 +1,4 @@
-"""Self-contained HTML pages that play recorded frames: page, player and packed data.
-
-The Content-Security-Policy of a page forbids any request.
-"""
+"""Self-contained HTML pages that play recorded frames: page, player and packed data."""
 
 import base64
 import html

@@ -15,18 +15,7 @@ from taichi_dem.step.multirate.schedule import Schedule
 
 @ti.data_oriented
 class Solver:
-    """Gauss-Seidel over bonds with dashpots, touching pairs, by their colours, then the ground.
-
-    Members of one colour share no body: they may be visited in parallel, and their order changes no
-    bit. So one core and many cores run the same sweeps to the same bits.
-
-    bounds: fewest and most sweeps of a step. tolerance: of the velocities. sweeps: number in the
-    present step. residual2: largest squared change of a velocity in the last sweep [m2/s2]. speed2:
-    largest squared speed of a body at the beginning of the step. unsolved: 1 while another sweep is
-    required. unconverged: steps whose sweeps ended without agreement; worst: largest residual of
-    them, over the fastest body's speed or, where that is larger, over the change by the first
-    sweep.
-    """
+    """Gauss-Seidel over bonds with dashpots, touching pairs, by their colours, then the ground."""
 
     def __init__(self, schedule: Schedule):
         self.schedule, tables = schedule, schedule.tables

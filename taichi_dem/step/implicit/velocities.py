@@ -15,16 +15,7 @@ from taichi_dem.step.multirate.schedule import Schedule
 
 @ti.data_oriented
 class Velocities:
-    """Present estimate of velocity and spin of every body at the end of the step.
-
-    twist: velocity [m/s] and spin [rad/s], world. turn: spin per moment, R I^-1 R^T [1/(kg m^2)],
-    as supports allow. lightness: velocity per impulse without them [1/kg]. These are stored
-    contiguously, 128 bytes a body: a sweep visits bodies out of order, and large blocks wait for
-    memory. With supports, hold: velocity per impulse [1/kg], and given: total impulse and moment on
-    a body in the step [N s, N m s].
-    change2: largest squared change of a velocity in the present sweep [m2/s2].
-    spare: number of a body that is none and stays at rest, for lanes without a bond.
-    """
+    """Present estimate of velocity and spin of every body at the end of the step."""
 
     scratch_fields = ("twist", "given")
 
@@ -108,11 +99,7 @@ class Velocities:
 
 @ti.data_oriented
 class GroundSweeps:
-    """Impulses of the ground, one row of impulse and moment for each effect of a body.
-
-    impulse: [N s] and [N m s], that of the step before as a first guess. They are those of the mean
-    of the velocities at both ends of the step, as of every ground.
-    """
+    """Impulses of the ground, one row of impulse and moment for each effect of a body."""
 
     def __init__(self, schedule: Schedule, velocities: Velocities):
         self.tables, self.state = schedule.tables, schedule.state

@@ -14,12 +14,7 @@ from taichi_dem.step.sleeping import ASLEEP
 
 @ti.data_oriented
 class ActiveLists:
-    """Bodies, bonds and pairs by the level at which they are due.
-
-    drifted: neighbours of an active body are brought to its time too, else only active ones move.
-    beside: where the pairs of a body begin, their slots, and the place of the other body in them.
-    changed: bodies whose level or bonds changed since the lists were ordered.
-    """
+    """Bodies, bonds and pairs by the level at which they are due."""
 
     def __init__(self, clock: Clock, drifted: bool):
         self.drifted = drifted
@@ -99,11 +94,7 @@ class ActiveLists:
         return side_by_side(*(one.listing.phases for one in lists or self.all))
 
     def reordering(self, move: Any, end: Any, *before: Any) -> Phases:
-        """Phases that bring changed members to their places, after phases before.
-
-        A CPU moves the members that have changed; a GPU, of which one thread is slow, lists all.
-        Where all have one level, members change when a bond breaks: seldom enough.
-        """
+        """Phases that bring changed members to their places, after phases before."""
         if backend.is_cpu() or self.uniform:
             return ((Once(), move),)
         due = tuple((When(self._has_changed, one), item) for one, item in self.filling())

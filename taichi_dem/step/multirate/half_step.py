@@ -1,9 +1,4 @@
-"""Motion and booked energies brought to the time of the positions.
-
-The leapfrog's velocities are half a step behind its positions, and its accounts with them. Half of
-the coming step's impulses brings them to one time, exact to second order in the step: an error of
-first order in a force becomes one of second order in half a step.
-"""
+"""Motion and booked energies brought to the time of the positions."""
 
 import taichi as ti
 
@@ -14,11 +9,7 @@ from taichi_dem.step.phases import Step
 
 @ti.data_oriented
 class HalfStep:
-    """Reads what the first half of the coming step does; nothing changes in the run.
-
-    Impulses of contacts come from the caller, as they are sums over pairs. Only bodies that stand
-    at the present time are brought forward: between two largest steps others wait for theirs.
-    """
+    """Reads what the first half of the coming step does; nothing changes in the run."""
 
     def __init__(self, step: Step):
         self.step, self.tables, self.state = step, step.tables, step.state

@@ -10,11 +10,7 @@ from taichi_dem.step.multirate.clock import Clock
 
 @ti.data_oriented
 class LevelLimit:
-    """A body takes a level at most jump below the finest of the bodies that it touches.
-
-    It touches those to which it is bonded and those with which contacts are near. listed_level:
-    levels at the last ordering of the lists, so that no result depends on the order of bodies.
-    """
+    """A body takes a level at most jump below the finest of the bodies that it touches."""
 
     def __init__(self, clock: Clock, lists: ActiveLists):
         self.tables, self.state, self.limits = clock.tables, clock.state, clock.limits

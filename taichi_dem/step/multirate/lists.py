@@ -11,11 +11,7 @@ from taichi_dem.state.timeline import MAX_LEVEL
 
 @ti.data_oriented
 class Everyone(Places):
-    """List of all bodies, bonds or near pairs of a scene, active or not.
-
-    number: field of how many. most: the largest. slots: field of their numbers, None for 0 ..
-    number - 1.
-    """
+    """List of all bodies, bonds or near pairs of a scene, active or not."""
 
     def __init__(self, number: ti.Field, most: int, slots: ti.Field | None = None):
         self.number, self.most = number, most
@@ -54,11 +50,7 @@ class Colour(Places):
 
 @ti.data_oriented
 class Coloured(Places):
-    """Members of all colours in their order; those of one share nothing.
-
-    colour_first: as of ``Colour``. colours: those whose members may be visited side by side. end:
-    number of all. rest: visits those after them, one after the other.
-    """
+    """Members of all colours in their order; those of one share nothing."""
 
     def __init__(
         self,

@@ -105,11 +105,7 @@ class Schedule(Clock):
         return self.lists.reordering(move, end, *before)
 
     def pair_phases(self) -> Phases:
-        """Phases that take in the pairs of a new contact search; neighbours may reach further.
-
-        All lists are filled again, which restores contiguous visits; moving entries destroys them
-        with time (5 % of the time of a run).
-        """
+        """Phases that take in the pairs of a new contact search; neighbours may reach further."""
         if self.sleeps:
             return self.waking.search_phases()
         return self.lists.filling(*((self.lists.pairs,) if self.uniform else ()))
