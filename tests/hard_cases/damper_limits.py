@@ -144,13 +144,9 @@ def lattice(trial, columns, rows, particles):
 def grains_by_place_full(trial):
     """Grains by the rules of place, every cell taken: their number and momentum are kept."""
     what = Automaton()
-    batch = Batch(what, SceneTable(what.capacity, 1, 1e-4, 6.0, 0.024), mount="base")
-    batch.start()
-    batch.run(2, 1)
-    place = batch.snapshot(0)["position"]
-    inside = (place > -SIZE).all(axis=1) & (place[:, 0] < 0.066) & (place[:, 1] < 0.105)
-    trial.limit("particles lost", what.capacity - inside.sum(), 0.0, "their number is exact")
-    trial.limit("momentum error", batch.report().momentum_error, 1e-9, "rounding")
+    run = damper_run.Run(trial, what, what.capacity, 1, transient=2, dt=1e-4)
+    run.kept_inside()
+    trial.limit("momentum error", run.batch.report().momentum_error, 1e-9, "rounding")
 
 
 @case(EXACT)

@@ -50,7 +50,7 @@ def test_method_bears_the_case_or_refuses_it_in_words(case, method):
     assert trial.status == ("refused" if method in case.refused else "passed"), trial.words
 
 
-def status(method, value=0.5, raises=None, warnings=(), refused=None):
+def status(method, value=0.5, raises=None, warnings=()):
     """Status of a case made up for a method, of a figure that may be 1."""
 
     def run(trial):
@@ -59,28 +59,23 @@ def status(method, value=0.5, raises=None, warnings=(), refused=None):
         trial.limit("asked", [0.0, value], 1.0, "one")
         trial.warnings += warnings
 
-    case = Case("made_up", "damper", "Nothing.", run, (), ("able",), refused or {})
+    case = Case("made_up", "damper", "Nothing.", run, (), ("able",), {"unable": "dt must"})
     return assess(case, method, True).status
 
 
-def test_a_figure_within_its_bound_passes_and_no_other():
-    assert status("able", 0.5) == "passed"
-    assert {status("able", value) for value in (1.001, math.inf, math.nan)} == {"failed"}
-
-
-def test_a_method_that_claims_a_case_may_not_refuse_it():
-    assert status("able", raises="dt must be short") == "failed"
-
-
 @pytest.mark.parametrize(
-    ("how", "found"),
+    ("method", "how", "found"),
     [
-        ({"raises": "dt must be short"}, "refused"),
-        ({"raises": "no"}, "failed"),
-        ({"warnings": ("first", "the dt must be short")}, "refused"),
-        ({"warnings": ("first",)}, "failed"),
-        ({}, "failed"),
+        ("able", {}, "passed"),
+        *(("able", {"value": value}, "failed") for value in (1.001, math.inf, math.nan)),
+        ("able", {"raises": "dt must be short"}, "failed"),
+        ("unable", {"raises": "dt must be short"}, "refused"),
+        ("unable", {"raises": "no"}, "failed"),
+        ("unable", {"warnings": ("first", "the dt must be short")}, "refused"),
+        ("unable", {"warnings": ("first",)}, "failed"),
+        ("unable", {}, "failed"),
     ],
 )
-def test_a_method_that_refuses_a_case_says_the_words_that_are_due(how, found):
-    assert status("unable", refused={"unable": "dt must"}, **how) == found
+def test_a_method_keeps_its_bounds_or_says_the_words_that_are_due(method, how, found):
+    """One that claims the case may not refuse it."""
+    assert status(method, **how) == found
