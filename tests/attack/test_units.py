@@ -20,7 +20,8 @@ from taichi_dem import (
     effects,
     simulate,
 )
-from taichi_dem.mesh.shapes import bar, placed_together
+from taichi_dem.mesh.shapes import bar
+from tests.scenes import beside
 
 pytestmark = pytest.mark.attack
 
@@ -35,12 +36,7 @@ DIMENSIONS = {
 }
 # Less damping of spheres, so that steps of any method are stable.
 MATERIAL = replace(CONCRETE, contact_damping=0.1 * CONCRETE.contact_damping)
-BLOCKS = placed_together(
-    {
-        "target": (bar(0.1, 0.05, (3, 2, 2)), (0.0, 0.0, 0.0)),
-        "thrown": (bar(0.05, 0.05, (1, 1, 1)), (0.101, 0.01, 0.02)),
-    }
-)
+BLOCKS = beside(bar(0.1, 0.05, (3, 2, 2)), bar(0.05, 0.05, (1, 1, 1)), (0.101, 0.01, 0.02))
 
 
 def run_in(length, mass, time, number, weight, speed):
@@ -52,8 +48,8 @@ def run_in(length, mass, time, number, weight, speed):
     constants = {name: getattr(MATERIAL, name) * of(*by) for name, by in DIMENSIONS.items()}
     laws = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
     laws += [(effects.SphereContact, effects.BodyContact)[number % 2](), effects.Friction()]
-    gas = effects.GasPressure("target_left", peak=2e9 * of(-1, 1, -2), rise=1e-5 * time)
-    thrown = effects.PrescribedMotion("thrown_right", tuple(speed * of(1, 0, -1)), 2e4 / time)
+    gas = effects.GasPressure("first_left", peak=2e9 * of(-1, 1, -2), rise=1e-5 * time)
+    thrown = effects.PrescribedMotion("second_right", tuple(speed * of(1, 0, -1)), 2e4 / time)
     scene = Scene(
         Mesh(BLOCKS.points * length, BLOCKS.tetrahedra, BLOCKS.groups),
         replace(MATERIAL, **constants),
