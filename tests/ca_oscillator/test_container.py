@@ -1,16 +1,28 @@
 """The container moves as its transfer function and the exact solution under blows and mass say."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from ca_damper import Automaton, Batch, Oscillator, RigidMass, SceneTable, Spheres
+from ca_damper import (
+    Batch,
+    Oscillator,
+    RigidMass,
+    SceneTable,
+    Sweep,
+    frequency_response,
+    sweep_up_and_down,
+)
 from tests.ca_oscillator.kicks import Kicks
-from tests.rounding import momentum_rounding
+from tests.made_response import response
 
 PAPER = Oscillator()
 F0 = PAPER.natural_frequency
 RATIOS = np.array([0.5, 0.8, 0.95, 0.99, 1.0, 1.01, 1.05, 1.2, 1.5])
+#: Of whole curves.
+FEW = np.linspace(0.9, 1.1, 5)
 
 
 def batch_of(filling, particles, ratios, dt=1e-4, **options):
@@ -116,24 +128,62 @@ def test_container_on_the_base_follows_it():
     assert np.array_equal(now["x"], now["y"])
 
 
-def shaken(filling):
-    """A batch after a few cycles of hard shaking of 1 and of 10 or 40 particles."""
-    table = SceneTable((1, min(40, filling.capacity)), 1, filling.default_dt, 6.0, 2e-3)
-    batch = Batch(filling, table)
-    batch.start()
-    batch.run(3, 0)
-    return batch
-
-
-@pytest.mark.parametrize("filling", [RigidMass(), Automaton(), Spheres()], ids=lambda f: f.label)
-def test_what_filling_and_container_exchange_is_accounted_for(filling):
-    """Momentum of the particles = -N m g t - what they gave to the container."""
-    batch = shaken(filling)
-    assert batch.report().momentum_error < momentum_rounding(batch) < 1e-8
-
-
 def test_blows_that_no_momentum_stands_for_are_found_out():
     """What is missing is of the order of what is counted: no rounding."""
-    report = shaken(Kicks(strength=2e-5, mass=0.005)).report()
+    batch = batch_of(Kicks(strength=2e-5, mass=0.005), 10, 1.0)
+    batch.start()
+    batch.run(3, 0)
+    report = batch.report()
     assert report.momentum_error > 0.1
     assert f"{report.momentum_error:.2g} of what was exchanged" in report.details()
+
+
+def wanted_rms(oscillator, particles, ratios):
+    frequency = np.asarray(ratios) * oscillator.natural_frequency
+    gain = [np.abs(oscillator.transfer(frequency, 0.2e-3 * number)) for number in particles]
+    return oscillator.base_amplitude * np.array(gain) / math.sqrt(2.0)
+
+
+def rigid_response(**changes):
+    few = {"particles": [0, 10], "ratios": FEW, "seeds": 2}
+    few.update(transient_cycles=0, measured_cycles=2, start="rigid")
+    return frequency_response(RigidMass(), **{**few, **changes})
+
+
+def test_response_of_the_user_s_oscillator_has_a_place_for_every_scene():
+    oscillator = Oscillator(mass=0.2, stiffness=500.0, damping=0.5, base_amplitude=1e-3)
+    made = rigid_response(oscillator=oscillator, dt=2e-4, seeds=[4, 9, 2])
+    wanted = wanted_rms(oscillator, [0, 10], FEW)
+    assert made.rms == pytest.approx(np.repeat(wanted[:, :, None], 3, axis=2), rel=1e-8)
+    assert made.apparent_mass[1] == pytest.approx(np.full((5, 3), 2e-3), rel=1e-8)
+    assert (1.9e-4 < made.dt).all() and (made.dt <= 2e-4).all()
+
+
+def test_a_linear_system_answers_alike_on_the_way_up_and_down():
+    job = {"particles": [0, 10], "ratios": FEW, "seeds": 1}
+    sweep = sweep_up_and_down(RigidMass(), **job, transient_cycles=150, measured_cycles=10)
+    # What is left of the frequency before: at most the two amplitudes, 17 and 1.8 mm RMS, times
+    # exp(-2 pi zeta 150 / ratio), against 1.8 mm.
+    zeta = Oscillator().damping_ratio
+    left = np.exp(-2.0 * np.pi * zeta * 150.0 / 1.1) * (17.0 + 1.8) / 1.8
+    assert np.abs(sweep.hysteresis).max() < 2.0 * left
+    for way in (sweep.up, sweep.down):
+        wanted = wanted_rms(Oscillator(), [0, 10], FEW)
+        assert way.rms[:, :, 0] == pytest.approx(wanted, rel=2.0 * left)
+
+
+def swept(up, down, error):
+    """Sweep of one particle number from RMS (ratios, seeds) and their half-widths."""
+    ratios, seeds = FEW[: len(up)], tuple(range(1, 1 + up.shape[1]))
+    ways = [response((10,), ratios, seeds, rms=rms[None]) for rms in (up, down)]
+    return Sweep(*ways, up_error=error[None], down_error=error[None])
+
+
+def test_a_difference_beyond_chance_is_hysteresis_unless_a_mean_still_changes():
+    rng = np.random.default_rng(5)
+    up, down = 1.0 + 0.01 * rng.normal(size=(2, 4, 5))
+    down[2] += 0.5
+    error = np.full(up.shape, 0.02)
+    assert swept(up, down, error).shows_hysteresis.tolist() == [[False, False, True, False]]
+    error[2, 3] = np.inf
+    assert not swept(up, down, error).shows_hysteresis.any()

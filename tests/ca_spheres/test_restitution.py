@@ -21,6 +21,8 @@ from tests.ca_spheres.rig import Rig
 SPEEDS = np.array([0.2, 0.5, 1.5] * 2)
 STEPS = np.repeat([5e-6, 1e-6], 3)
 DTS = 1e-5 * 0.5 ** np.arange(5)
+# Speed at which orders are found [m/s].
+SPEED = 0.5
 
 
 def rebound_by_scipy(alpha, power):
@@ -119,21 +121,23 @@ def test_printed_law_rebounds_less_at_higher_speed(partner):
     assert wanted[0] - wanted[-1] > 0.05 and wanted[1] == pytest.approx(0.75, abs=1e-9)
 
 
-def phases(options, dt, speed=0.5):
+def phases(options, dt):
     """Rebounds in which the wall is met at 16 phases of a step, eight scenes at a time.
 
     Returns speed after over speed before, and the time spent in contact [s]; arrays (16,).
     """
-    rebounds, contacts = [], []
-    for gaps in 0.5e-3 + (np.arange(16) / 16 * speed * dt).reshape(2, 8):
-        rig = Rig(options, [1] * 8, dt)
-        for s, gap in enumerate(gaps):
-            rig.put((0.03, options.radius + gap), (0.0, -speed), s)
-        places, velocities = rig.run(round(2e-3 / dt)).states()
-        out, height = velocities[:, 0, 1], places[:, 0, 1] - options.radius
-        rebounds.append(out / speed)
-        contacts.append(rig.done * dt - gaps / speed - height / out)
-    return np.concatenate(rebounds), np.concatenate(contacts)
+    gaps = 0.5e-3 + np.arange(16) / 16 * SPEED * dt
+    return np.hstack([met(options, some, dt) for some in gaps.reshape(2, 8)])
+
+
+def met(options, gaps, dt):
+    """The same of spheres thrown at the wall from so far [m]."""
+    rig = Rig(options, [1] * len(gaps), dt)
+    for s, gap in enumerate(gaps):
+        rig.put((0.03, options.radius + gap), (0.0, -SPEED), s)
+    places, velocities = rig.run(round(2e-3 / dt)).states()
+    out, height = velocities[:, 0, 1], places[:, 0, 1] - options.radius
+    return out / SPEED, rig.done * dt - gaps / SPEED - height / out
 
 
 def halvings(options):
@@ -149,14 +153,14 @@ def slope(dts, errors):
 def test_duration_of_a_contact_is_hertzs_with_an_error_of_second_order():
     options = Spheres(wall_restitution=1.0, gravity=0.0)
     numbers = wall_numbers(options)
-    wanted = contact_duration(numbers["mass"], numbers["stiffness"], 0.5)
+    wanted = contact_duration(numbers["mass"], numbers["stiffness"], SPEED)
     # Hertz: 2 D' / v times the integral below, with D' = (5/4)^(2/5) D; quad errs by 1e-9.
     integral = quad(lambda x: 2.0 / math.sqrt(1.0 - x**2.5), 0.0, 1.0)[0]
-    assert wanted == pytest.approx(integral * 1.25**0.4 * scale(numbers, 0.5), rel=1e-8)
+    assert wanted == pytest.approx(integral * 1.25**0.4 * scale(numbers, SPEED), rel=1e-8)
     _, contact = halvings(options)
     # The bisected dashpot of restitution 1 is off by 1e-12 at most; 0.2 tells 2 from 1 and 3.
     assert slope(DTS, contact / wanted - 1.0) == pytest.approx(2.0, abs=0.2)
-    assert np.abs(contact[-1] / wanted - 1.0).max() < 0.2 * (DTS[-1] / scale(numbers, 0.5)) ** 2
+    assert np.abs(contact[-1] / wanted - 1.0).max() < 0.2 * (DTS[-1] / scale(numbers, SPEED)) ** 2
 
 
 @pytest.mark.parametrize("damping", POWERS)
