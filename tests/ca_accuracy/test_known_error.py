@@ -13,15 +13,15 @@ from ca_damper import (
     frequency_response,
 )
 
-#: Steps at each of which the error is taken as RMS over 16 steps of about that length; halvings.
-COUNT, HALVINGS = 16, 4
+#: Steps at each of which the error is taken as RMS over 12 steps of about that length; halvings.
+COUNT, HALVINGS = 12, 4
 FILLINGS = [(Spheres(), 1, 1.6e-5), (Automaton(), 1, 2e-4), (RigidMass(), 10, 1e-3)]
 
 
 def errors(filling, particles, step):
     """Error of the RMS of the first cycle, by step; the truth is that of a step 64 times finer.
 
-    A contact that begins somewhere in its step makes each error a matter of chance: 16 steps
+    A contact that begins somewhere in its step makes each error a matter of chance: 12 steps
     between three quarters of a length and itself share it.
     """
     lengths = [step / 2**k * np.linspace(1.0, 0.75, COUNT) for k in range(HALVINGS + 1)]
