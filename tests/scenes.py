@@ -1,11 +1,13 @@
 """Scenes that several tests share."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, checked_mesh, effects, read_mesh
-from taichi_dem.mesh.shapes import placed_together, single
+from taichi_dem.mesh.shapes import bar, placed_together, single
+from tests.structures import filled
 from tests.turns import matrix
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -54,3 +56,53 @@ def quaternions(random, count):
     turn = random.standard_normal((count, 4))
     turn /= np.linalg.norm(turn, axis=1, keepdims=True)
     return turn, np.array([matrix(each) for each in turn])
+
+
+def bar_scene(*more, kind=effects.SphereContact):
+    """Bar of 72 bodies that is blown at one end: 16 bonds break, and what they held touches.
+
+    more: effects beside those of the paper. kind: of contact.
+    """
+    listed = paper_effects(kind=kind)[:-1]
+    gas = effects.GasPressure("left", peak=2e9, rise=1e-5)
+    return Scene(bar(0.1, 0.05, (3, 2, 2)), CONCRETE, [*listed, gas, *more])
+
+
+#: Ends of runs of the two bars below [s].
+UNTIL, BROKEN_UNTIL = 2e-5, 3e-4
+
+
+def struck_bar(damping=True):
+    """Bar of 72 bodies under a blow on its left end, damped unless told otherwise."""
+    blow = effects.GasPressure("left", peak=5e6, rise=1e-5)
+    acting = filled("bonds", blow, *([effects.BondDamping()] * damping))
+    return Scene(bar(0.1, 0.05, (3, 2, 2)), CONCRETE, acting)
+
+
+def broken_bar():
+    """Bar of twelve bodies that its blow breaks, as it comes back as tension."""
+    blow = effects.GasPressure("left", peak=9e8, rise=1e-5, decay_ratio=1.5)
+    bonds = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
+    touch = effects.SphereContact(), effects.Friction()
+    acting = filled("held", *bonds, *touch, effects.Fixed("right"), blow)
+    return Scene(bar(0.1, 0.05, (2, 1, 1)), CONCRETE, acting)
+
+
+#: Blocks that stand on a plate by weight and friction: acceleration [m/s2], down along x; springs
+#: softer than those of concrete, for long steps: a block sinks in by a micrometre; step [s].
+GRAVITY, SOFT, STEP = 9.81, 0.01, 1e-5
+
+
+def softened(friction):
+    """Concrete with all springs softer."""
+    names = ("normal_stiffness", "shear_stiffness", "contact_stiffness")
+    dashpots = ("normal_damping", "shear_damping", "contact_damping")
+    values = {name: SOFT * getattr(CONCRETE, name) for name in names}
+    values.update({name: SOFT**0.5 * getattr(CONCRETE, name) for name in dashpots})
+    return replace(CONCRETE, friction=friction, fracture_energy=1e5, **values)
+
+
+def loose(weight=(-GRAVITY, 0.0, 0.0), fixed=("plate_left",), **contact):
+    """Effects of blocks that touch and stick, on plates that are held at groups ``fixed``."""
+    touch = effects.BondDamping(), effects.BodyContact(**contact), effects.StickingFriction()
+    return [*touch, effects.Gravity(tuple(weight)), *map(effects.Fixed, fixed)]

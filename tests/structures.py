@@ -7,6 +7,7 @@ bit. A test that needs another set adds a row and says what it is for.
 
 from taichi_dem import effects
 from taichi_dem.engine import Structure
+from taichi_dem.mesh.shapes import single
 
 #: Effects by name of the set, in their order.
 STRUCTURES = {
@@ -17,13 +18,32 @@ STRUCTURES = {
         *(effects.BondDamping, effects.Softening, effects.ShearSlip),
         *(effects.SphereContact, effects.Friction, effects.GasPressure),
     ),
+    # That of the paper in solids that are held.
+    "held": (
+        *(effects.BondDamping, effects.Softening, effects.ShearSlip),
+        *(effects.SphereContact, effects.Friction, effects.GasPressure, effects.Fixed),
+    ),
+    # What loads and supports give a solid, and each other.
+    "supports": (
+        *(effects.BondDamping, effects.Fixed, effects.Roller, effects.PrescribedMotion),
+        *(effects.Softening, effects.Gravity, effects.Pressure, effects.GasPressure),
+        effects.QuietBoundary,
+    ),
+    # How whole bodies meet, rest and slide on each other.
+    "bodies": (
+        *(effects.BondDamping, effects.Softening, effects.BodyContact, effects.StickingFriction),
+        *(effects.Gravity, effects.Fixed, effects.GasPressure),
+    ),
 }
+
+#: A body far from all others, for supports and loads that never act: its group is "post_base".
+POST = {"post": (single(), (10.0, 0.0, 0.0))}
 
 
 def filled(name, *own, group="left"):
     """Effects of a set: own ones, and for the others some that never act.
 
-    group: of faces, which the gas that never comes would push on.
+    group: of faces of bodies that nothing moves, or that gas which never comes would push on.
     """
     given = {type(one): one for one in own}
     made = [given.pop(kind, None) or _idle(kind, group) for kind in STRUCTURES[name]]
@@ -33,7 +53,18 @@ def filled(name, *own, group="left"):
 
 def _idle(kind, group):
     """An effect that never acts."""
-    return kind(group, start=1.0) if kind is effects.GasPressure else kind().silent()
+    made = {
+        effects.Gravity: lambda: effects.Gravity((0.0, 0.0, 0.0)),
+        effects.GasPressure: lambda: effects.GasPressure(group, start=1.0),
+        effects.Pressure: lambda: effects.Pressure(group, 0.0),
+        effects.Fixed: lambda: effects.Fixed(group),
+        effects.Roller: lambda: effects.Roller(group, (1.0, 0.0, 0.0)),
+        effects.PrescribedMotion: lambda: effects.PrescribedMotion(group, (0.0, 0.0, 0.0)),
+        effects.QuietBoundary: lambda: effects.QuietBoundary(group, 1.0, 1.0),
+        # The material has no friction where it is not to act.
+        effects.StickingFriction: effects.StickingFriction,
+    }
+    return made[kind]() if kind in made else kind().silent()
 
 
 def name_of(structure):

@@ -1,11 +1,26 @@
-"""An answer of a real scene holds beside far finer runs, and has the same bits every time."""
+"""Answers of real scenes hold beside far finer runs, whose brief runs tell what whole ones tell.
 
+Values of goals are those of formulas of the tests' own.
+"""
+
+import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, ImplicitDashpots, Scene, effects, goals, simulate, solve
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    Scene,
+    Simulation,
+    SimulationDiverged,
+    effects,
+    goals,
+    simulate,
+    solve,
+)
 from taichi_dem.accuracy.runs import Job, Runs
-from tests.accuracy.small_bar import BROKEN_UNTIL, UNTIL, broken_bar, struck_bar
-from tests.scenes import apart
+from taichi_dem.mesh.shapes import placed_together, single
+from tests.scenes import BROKEN_UNTIL, UNTIL, apart, broken_bar, struck_bar
+from tests.structures import filled
 
 ENERGY = goals.kinetic_energy()
 
@@ -71,3 +86,94 @@ def test_bodies_that_fall_freely_have_an_answer_to_rounding():
     scene = Scene(apart(3), CONCRETE, [effects.Gravity((0.0, 0.0, -9.81))])
     answer = solve(scene, until=0.2, goal=goals.body_displacement(1), progress=None)
     assert answer.reached and answer.value == pytest.approx(1e3 * 0.5 * 9.81 * 0.2**2, rel=1e-9)
+
+
+GOALS = ENERGY, goals.displacement("left"), goals.broken_faces()
+
+
+def both(scene, until, goal=GOALS[0]):
+    """A brief run and a whole one of a scene."""
+    runs = Runs(Job(scene, until, goal, 0.01, 0.95), None)
+    return [runs._simulated(0, 0, False, 1, brief) for brief in (True, False)]
+
+
+@pytest.mark.parametrize("made, until", [(struck_bar, UNTIL), (broken_bar, BROKEN_UNTIL)])
+def test_a_brief_run_has_the_values_of_a_whole_one(made, until):
+    """Bit for bit, with the counts that say whether one rounding may decide."""
+    brief, whole = both(made(), until)
+    assert [goal.value(brief) for goal in GOALS] == [goal.value(whole) for goal in GOALS]
+    for name in ("broken_faces", "pair_evaluations", "energy_balance"):
+        assert getattr(brief.report, name) == getattr(whole.report, name)
+    # A brief run looks less often where bonds slip.
+    assert bool(brief.report.bond_slip) == bool(whole.report.bond_slip)
+    peak = goals.peak_speed(3)
+    brief, whole = both(made(), until, peak)
+    assert peak.value(brief) == peak.value(whole) > 0.0
+
+
+def test_a_question_about_bodies_within_each_other_is_refused():
+    """In the words of a whole run."""
+    parts = {"one": (single(0.05), (0.0, 0.0, 0.0)), "other": (single(0.05), (1e-3, 0.0, 0.0))}
+    contact = effects.SphereContact(outer_faces=True)
+    scene = Scene(placed_together(parts), CONCRETE, filled("held", contact, group="one_base"))
+    with pytest.raises(SimulationDiverged, match=r"shares .* starts so: move the bodies") as whole:
+        Simulation(scene, ImplicitDashpots(1e-8)).start()
+    with pytest.raises(SimulationDiverged) as asked:
+        solve(scene, until=1e-6, goal=GOALS[0], tolerance=0.1)
+    with pytest.raises(SimulationDiverged) as brief:
+        Runs(Job(scene, 1e-6, GOALS[0], 0.1, 0.95), None)._simulated(0, 0, False, 1, True)
+    words = {str(one.value).split("its step")[0] for one in (whole, asked, brief)}
+    assert len(words) == 1
+
+
+def test_a_brief_report_does_not_say_what_nobody_looked_for():
+    """Bodies that share 14 % where no contact is listed."""
+    parts = {"one": (single(0.05), (0.0, 0.0, 0.0)), "other": (single(0.05), (0.02, 0.0, 0.0))}
+    scene = Scene(placed_together(parts), CONCRETE, filled("bonds", group="one_base"))
+    runs = Runs(Job(scene, 1e-7, GOALS[0], 0.1, 0.95), None)
+    brief, whole = (runs._simulated(0, 0, False, 1, one).report for one in (True, False))
+    assert brief.interpenetration is None and whole.interpenetration.share > 0.1
+
+
+BODY = 5
+
+
+@pytest.fixture(scope="module")
+def blast():
+    """A bar that breaks into parts, with a frame at every sample."""
+    looks = {"until": BROKEN_UNTIL, "samples": 100, "frames": 100, "progress": None}
+    return simulate(broken_bar(), method=ImplicitDashpots(4e-7), **looks)
+
+
+def moved_mm(result, bodies):
+    """Distances from the centroids of the mesh at the end [mm]."""
+    mesh = result.scene.mesh
+    first = mesh.points[mesh.tetrahedra].mean(axis=1)
+    return 1e3 * np.linalg.norm((result.frames[-1].position - first)[bodies], axis=1)
+
+
+def bodies_at(mesh, group):
+    """Bodies with all corners of a face of a group."""
+    faces = [set(face) for face in mesh.group_faces(group).tolist()]
+    corners = [set(body) for body in mesh.tetrahedra.tolist()]
+    return [n for n, body in enumerate(corners) if any(face <= body for face in faces)]
+
+
+def test_values_of_a_run(blast):
+    """Each by a formula of its own; sums of other orders round in the last digits."""
+    mesh, last, history = blast.scene.mesh, blast.frames[-1], blast.series
+    speeds = np.array([frame.speed for frame in blast.frames])
+    work = history["gas_work_J"][-1]
+    wanted = {
+        goals.displacement("left"): moved_mm(blast, bodies_at(mesh, "left")).mean(),
+        goals.body_displacement(BODY): moved_mm(blast, BODY + np.arange(1)).mean(),
+        goals.broken_faces(): np.isfinite(blast.broken_time).sum(),
+        goals.kinetic_energy(): blast.report.energy_balance["kinetic"],
+        goals.peak_speed(BODY): speeds[:, BODY].max(),
+        goals.energy_share("bond_dashpot"): history["bond_dashpot_J"][-1] / work,
+    }
+    for goal, value in wanted.items():
+        assert goal.value(blast) == pytest.approx(value, rel=1e-12), goal
+    assert blast.report.broken_faces > 1
+    along = 0.5 * (blast.model.body_mass * (last.velocity**2).sum(axis=1)).sum()
+    assert along < goals.kinetic_energy().value(blast) < 1.5 * along

@@ -14,7 +14,7 @@ from taichi_dem.effects import BodyContact
 from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.report.energy_balance import TERMS
-from tests.accuracy.small_bar import UNTIL, struck_bar
+from tests.scenes import UNTIL, struck_bar
 
 #: An account of which no term is known.
 NOTHING = dict.fromkeys(TERMS, 0.0)

@@ -8,11 +8,14 @@ import pytest
 from _meshes import with_moved_nodes
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, in_space_order
 from taichi_dem.mesh.mesh import with_cut, with_inner_group
-from taichi_dem.mesh.shapes import bar, pair
+from taichi_dem.mesh.shapes import bar, pair, placed_together
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import parts_of, topology_of
+from tests.structures import POST, filled
 
-PAIR = with_inner_group(pair(), "middle", lambda x: x[:, 0] < 1.0)
+PAIR = with_inner_group(
+    placed_together({"pair": (pair(), (0.0, 0.0, 0.0))} | POST), "middle", lambda x: x[:, 0] < 1.0
+)
 AREA = float(np.linalg.norm(area_vectors(PAIR.points, PAIR.groups["middle"])[0]))
 BLOCK = with_cut(
     bar(0.2, 0.1, (4, 2, 2)), "notch", (0.1, 0, 0), (1, 0, 0), lambda x: x[:, 1] < 0.05
@@ -47,19 +50,18 @@ BOUNCY = replace(CONCRETE, contact_damping=0.0)
 def run_pair(listed, steps, speed, dt, **options):
     """Two bodies that move apart at a speed [m/s]."""
     simulation = Simulation(Scene(PAIR, BOUNCY, listed, **options), Uniform(dt))
-    velocity = [[-0.5 * speed, 0.0, 0.0], [0.5 * speed, 0.0, 0.0]]
+    velocity = speed * np.outer([-0.5, 0.5, 0.0], [1.0, 0.0, 0.0])
     simulation.state.set_motion(simulation.model.centre, velocity=velocity)
-    simulation.start()
     simulation.advance_to(steps)
     return simulation, simulation.energy_balance.account()
 
 
 def test_what_is_not_bonded_is_not_held_but_pushed_apart_by_a_pressure():
     """Each body gets p A t beside its velocity; together nothing."""
-    push = effects.Pressure("middle", 1e5)
-    simulation, account = run_pair([push], 100, 1.0, 2e-7, unbonded=["middle"])
+    push = filled("supports", effects.Pressure("middle", 1e5), group="post_base")
+    simulation, account = run_pair(push, 100, 1.0, 2e-7, unbonded=["middle"])
     gained = 1e5 * AREA * 2e-5 / simulation.model.body_mass[0]
-    velocity = simulation.motion()["velocity"][:, 0]
+    velocity = simulation.motion()["velocity"][:2, 0]
     assert velocity == pytest.approx([-0.5 - gained, 0.5 + gained], rel=1e-9)
     assert account["bond_strain"] == 0.0 and simulation.model.bond_count == 0
 
@@ -70,8 +72,8 @@ def test_unbonded_faces_carry_contact_spheres_where_outer_faces_have_none():
     k = 6 x 1.5 GN/m and m / 2 = 18 g: half a period takes 4.4 us, and w dt is 0.014.
     """
     contact = effects.SphereContact(outer_faces=False)
-    simulation, account = run_pair([contact], 600, -1.0, 2e-8, unbonded=["middle"])
-    assert simulation.motion()["velocity"][:, 0] == pytest.approx([-0.5, 0.5], rel=1e-3)
+    simulation, account = run_pair(filled("paper", contact), 600, -1.0, 2e-8, unbonded=["middle"])
+    assert simulation.motion()["velocity"][:2, 0] == pytest.approx([-0.5, 0.5], rel=1e-3)
     assert abs(account["residual"]) < 1e-3 * simulation.energy_balance.start_energy
     assert simulation.energy_balance.momentum_errors()[0] < 1e-12
 
@@ -83,12 +85,9 @@ def test_a_weaker_bond_has_a_share_of_strength_and_energy():
     of 3e-5 m: the energy by (2e-8 / 3e-5)^2.
     """
     share = 0.5
-    drive = [
-        effects.PrescribedMotion("left", (-0.05, 0.0, 0.0)),
-        effects.PrescribedMotion("right", (0.05, 0.0, 0.0)),
-        effects.Softening(),
-    ]
-    simulation, account = run_pair(drive, 200, 0.1, 2e-7, weaker={"middle": share})
+    drive = effects.PrescribedMotion("left", (-0.1, 0.0, 0.0)), effects.Fixed("right")
+    laws = filled("supports", effects.Softening(), *drive, group="post_base")
+    simulation, account = run_pair(laws, 200, 0.1, 2e-7, weaker={"middle": share})
     opening = 0.1 * 200 * 2e-7
     stiffness = share * AREA * CONCRETE.normal_stiffness
     assert account["bond_strain"] == pytest.approx(0.5 * stiffness * opening**2, rel=1e-6)

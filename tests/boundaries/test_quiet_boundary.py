@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from _meshes import with_moved_nodes
-from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
 from taichi_dem.elasticity.rates import wave_moduli
-from taichi_dem.mesh.shapes import bar, single
+from taichi_dem.mesh.shapes import bar, placed_together, single
+from taichi_dem.state.model import Model
 from tests.closed_forms import carried
+from tests.structures import POST, filled
 
 #: Concrete whose bonds have no dashpots, so that no wave fades.
 UNDAMPED = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0)
@@ -66,23 +68,26 @@ TWIST = np.array([1e-6, -2e-6, 5e-7, 2e-5, 1e-5, -3e-5])
 
 def braked_body(speeds, method, steps):
     """Twists of a single body on a quiet boundary after some steps, and the matrices M and C."""
-    scene = Scene(single(), CONCRETE, [effects.QuietBoundary("base", *speeds)])
+    mesh = placed_together({"body": (single(), (0.0, 0.0, 0.0))} | POST)
+    quiet = effects.QuietBoundary("body_base", *speeds)
+    scene = Scene(mesh, CONCRETE, filled("supports", quiet, group="post_base"))
     simulation = Simulation(scene, method)
     model = simulation.model
-    simulation.state.set_motion(model.centre, velocity=TWIST[:3], spin=TWIST[3:])
+    moves = np.array([[1.0], [0.0]])
+    simulation.state.set_motion(model.centre, velocity=moves * TWIST[:3], spin=moves * TWIST[3:])
     simulation.start()
     simulation.advance_to(steps)
     motion = simulation.motion()
     mass = np.zeros((6, 6))
     mass[:3, :3], mass[3:, 3:] = model.body_mass[0] * np.eye(3), model.body_inertia[0]
-    corners = model.mesh.points[model.mesh.groups["base"][0]]
+    corners = model.mesh.points[model.mesh.groups["body_base"][0]]
     vector = 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0])
     area = np.linalg.norm(vector)
     out = np.outer(vector, vector) / area**2
     law = CONCRETE.density * (speeds[0] * out + speeds[1] * (np.eye(3) - out))
     levers = [carried(corner - model.centre[0]) for corner in corners]
     block = sum(area / 3.0 * lever.T @ law @ lever for lever in levers)
-    return np.append(motion["velocity"], motion["spin"]), mass, block, simulation
+    return np.append(motion["velocity"][0], motion["spin"][0]), mass, block, simulation
 
 
 @pytest.mark.parametrize("method", [Uniform(2e-6), ImplicitDashpots(2e-6)], ids=lambda m: m.name)
@@ -156,3 +161,23 @@ def test_no_dashpot_is_too_stiff_for_a_step():
         assert held < 1.25 * simulation.energy_balance.start_energy
     assert np.isfinite(simulation.motion()["velocity"]).all()
     assert max(simulation.energy_balance.momentum_errors()) < 1e-10
+
+
+def test_the_record_tells_what_each_boundary_takes():
+    """Of a pulse near the left end, half of it first; columns add up to what both have taken."""
+    mesh = plane_bar(20)
+    moduli, _ = wave_moduli(Model(mesh, UNDAMPED, []), mesh.groups["right"])
+    speed = np.sqrt(moduli.mean() / UNDAMPED.density)
+    x = mesh.points[mesh.tetrahedra].mean(axis=1)[:, 0]
+    moves = np.exp(-(((x - 0.3) / 0.1) ** 2))[:, None] * np.array([1.0, 0.0, 0.0])
+    scene = Scene(mesh, UNDAMPED, [*rollers(), *QUIET], velocity=moves)
+    result = simulate(scene, method=Uniform(2e-7), until=1.0 / speed, samples=2)
+    names = [*result.report.effects][-2:]
+    assert names == ["quiet_boundary left", "quiet_boundary right"]
+    assert {*names} <= {*result.effects["effect"]}
+    left, right = (result.series[f"quiet_boundary_{side}_J"] for side in ("left", "right"))
+    assert left + right == pytest.approx(result.series["ground_dashpot_J"], rel=1e-12, abs=1e-12)
+    energy = result.series["kinetic_J"][0]
+    # Half way through the bar, and all the way.
+    assert right[1] < 1e-3 * energy < 0.4 * energy < left[1]
+    assert right[2] > 0.4 * energy

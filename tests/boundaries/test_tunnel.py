@@ -132,25 +132,6 @@ def test_an_exponent_that_is_no_multiple_of_a_fifth_is_refused(exponent):
         effects.ExpandingGas(exponent=exponent)
 
 
-def test_energy_that_sides_take():
-    """Columns of several grounds add up to what all have taken, and a wave ends where it goes."""
-    still = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0)
-    push = effects.Pressure.triangle("left", peak=1e6, rise=5e-5, fall=5e-5)
-    quiet = [effects.QuietBoundary(side) for side in ("right", "left")]
-    scene = Scene(bar(1.0, 0.1, (20, 2, 2)), still, [push, *quiet])
-    result = simulate(scene, method=Uniform(2e-7), until=1.5e-3, samples=3)
-    history = result.series
-    names = ["pressure left", "quiet_boundary right", "quiet_boundary left"]
-    assert list(result.report.effects) == [use.effect for use in result.report.effect_activity]
-    assert list(result.report.effects) == names and {*result.effects["effect"]} == {*names}
-    right, left = (history[f"quiet_boundary_{side}_J"] for side in ("right", "left"))
-    assert right + left == pytest.approx(history["ground_dashpot_J"], rel=1e-12, abs=1e-12)
-    # The left end takes its part while it is pushed, the right one what the wave brings later.
-    work = history["load_work_J"][-1]
-    assert right[1] < 1e-3 * work < 0.4 * work < left[1]
-    assert right[-1] > 0.8 * (work - left[1])
-
-
 def test_a_round_has_gas_by_delay_and_diameter_and_fits_an_engine():
     """Half the diameter is the radius of the gas; Taichi has room for a thousand components."""
     design = designs(delay=1e-4)["V cut"]

@@ -21,8 +21,7 @@ from taichi_dem import (
 from taichi_dem.kit.allocation import assign
 from taichi_dem.step.drivers import PARALLEL_FROM, driver_name
 from tests.again import Again
-from tests.bar_blast import bar_scene
-from tests.scenes import ROOT, brisk_scene
+from tests.scenes import ROOT, bar_scene, brisk_scene
 
 ENVIRONMENT = {**os.environ, "PYTHONPATH": ROOT}
 #: Breaks about 60 bonds and brings some pairs into contact.

@@ -3,7 +3,19 @@
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Checkpoint, InputError, Scene, Simulation, effects, simulate
+from taichi_dem import (
+    CONCRETE,
+    Checkpoint,
+    ImplicitDashpots,
+    InputError,
+    Multirate,
+    Scene,
+    Simulation,
+    StepControl,
+    Uniform,
+    effects,
+    simulate,
+)
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.checkpoint import read_checkpoint, write_checkpoint
 from taichi_dem.kit.field_memory import FieldMemory
@@ -12,9 +24,17 @@ from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.record import Recorder
 from taichi_dem.saved_run import saved_run
 from taichi_dem.state.timeline import MACRO_TICKS
-from tests.bar_blast import METHODS, UNTIL, bar_scene
+from tests.scenes import bar_scene
 from tests.structures import filled
 
+CONTROLLED = Multirate(8e-8, 1e-5, control=StepControl(dashpot_floor=1e-8), dashpot="limited")
+#: A kind of contact, and a method; the end [s].
+CASES = {
+    "controlled": (effects.SphereContact, CONTROLLED),
+    "implicit": (effects.SphereContact, ImplicitDashpots(4e-7, refresh=1e-5)),
+    "bodies": (effects.BodyContact, CONTROLLED),
+}
+UNTIL = 8.4e-5
 #: Share of the way at which a checkpoint is made: some of the bonds are broken, and bodies meet.
 SHARE = 0.5
 #: A resident call goes this many substeps before the checkpoint: an odd number, so that bodies
@@ -70,14 +90,6 @@ def differing(first, second):
     """Names under which the bits differ."""
     assert set(first) == set(second)
     return [name for name in first if first[name].tobytes() != second[name].tobytes()]
-
-
-#: A kind of contact, and a method.
-CASES = {
-    "controlled": (effects.SphereContact, METHODS["controlled"]),
-    "implicit": (effects.SphereContact, METHODS["implicit"]),
-    "bodies": (effects.BodyContact, METHODS["controlled"]),
-}
 
 
 @pytest.fixture(
@@ -147,7 +159,7 @@ def light_scene(pulse=5e6, share=1.0):
 def light(tmp_path_factory):
     """A straight run through ``simulate``, and the checkpoint at its half."""
     path = tmp_path_factory.mktemp("light") / "run.checkpoint"
-    job = {"method": METHODS["uniform"], "samples": 5, "frames": 2}
+    job = {"method": Uniform(2e-8), "samples": 5, "frames": 2}
     half = simulate(light_scene(), until=5e-6, checkpoint=Checkpoint(path), **job)
     assert half.report.substeps > 0
     return path, job

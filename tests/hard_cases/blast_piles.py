@@ -11,7 +11,7 @@ from taichi_dem.mesh.shapes import bar, placed_together
 from tests.hard_cases.blast_run import Run
 from tests.hard_cases.cases import Cases
 from tests.meshes import brick, hexahedron
-from tests.piles import GRAVITY, STEP, loose, softened
+from tests.scenes import GRAVITY, STEP, loose, softened
 
 case = CASES = Cases("blast")
 #: What counts as standing, and as falling, after TIME [m, s].

@@ -1,4 +1,4 @@
-"""Bodies have the material of their group, and bonds and contacts of two are joined by rule."""
+"""Constants of bonds and contacts follow from what is measured, and of two materials by rule."""
 
 from dataclasses import replace
 
@@ -9,10 +9,10 @@ from taichi_dem import CONCRETE, InputError, Scene, effects, step_report
 from taichi_dem.materials.body_materials import joined
 from taichi_dem.materials.bond_rules import bond_geometry
 from taichi_dem.materials.material import bond_moduli
-from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.mesh.topology import body_properties, topology_of
 from taichi_dem.state.model import Model
-from tests.material.blocks import NU, ORE, E, random_block, rock
+from tests.material.blocks import DENSITY, NU, ORE, E, random_block, rock
 
 HALF = ("half", lambda x: x[:, 0] > 0.5)
 
@@ -101,3 +101,29 @@ def test_a_body_in_two_groups_of_different_materials_is_refused():
     mesh = mesh.body_group("low", lambda x: x[:, 1] < 0.13)
     with pytest.raises(InputError, match="is in the groups half and low, which have different"):
         Scene(mesh, CONCRETE, materials={"half": ORE, "low": CONCRETE})
+
+
+def test_stiffness_and_dashpots_of_every_bond_follow_from_its_bodies():
+    """k = E_n / h, and c = 2 ratio sqrt(k m / A): the critical dashpot of mass m on A k is at 1."""
+    mesh = random_block(2, seed=0)
+    model = Model(mesh, rock(), [])
+    bonds = bond_geometry(mesh, topology_of(mesh), DENSITY)
+    for column, modulus in enumerate(bond_moduli(E, NU)):
+        stiffness = modulus / bonds.distance
+        assert model.bond_stiffness[:, column] == pytest.approx(stiffness, rel=1e-14)
+        whole = model.bond_damping[:, column] * bonds.area
+        critical = 2.0 * np.sqrt(stiffness * bonds.area * bonds.pair_mass)
+        assert whole == pytest.approx(0.05 * critical, rel=1e-12)
+
+
+def test_all_spheres_of_a_face_are_as_stiff_as_its_bond():
+    """In a mesh of equal faces, six spheres: 6 k = E_n A / h; a single body has one too."""
+    mesh = pair(0.05)
+    bonds = bond_geometry(mesh, topology_of(mesh), DENSITY)
+    normal, _ = bond_moduli(E, NU)
+    whole = float((normal * bonds.area / bonds.distance)[0])
+    for given in (mesh, single(0.05)):
+        material = Model(given, rock(), []).material
+        assert 6.0 * material.contact_stiffness == pytest.approx(whole, rel=1e-12)
+        critical = 2.0 * np.sqrt(material.contact_stiffness * float(bonds.pair_mass[0]))
+        assert material.contact_damping == pytest.approx(0.05 * critical, rel=1e-12)

@@ -8,7 +8,7 @@ from ca_damper import Batch, SceneTable, Spheres
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, placed_together
-from tests.piles import GRAVITY, STEP, loose, softened
+from tests.scenes import GRAVITY, STEP, loose, softened
 from tests.trust.cases import Number
 
 #: Time on the slope [s].

@@ -5,6 +5,7 @@ At quick size; ``experiments/trust.py`` has them at full size and draws them.
 
 import pytest
 
+from crack_direction import ALLOWED, TURN, broken_plate
 from tests.trust.blast import blast
 from tests.trust.bonds import disc, joint
 from tests.trust.cases import Effort
@@ -30,3 +31,10 @@ def test_published_numbers_hold_but_for_known_misses(measure):
     numbers, _ = measure(Effort())
     missed = {one.key: one.mean for one in numbers if not one.holds}
     assert set(missed) == {one.key for one in numbers if one.miss}, missed
+
+
+@pytest.mark.slow
+def test_a_crack_follows_rows_and_runs_straight_where_there_are_none():
+    """Pulled across its notch a plate breaks along it, by symmetry."""
+    assert abs(broken_plate(5e-3).angle) > TURN - 3.0
+    assert abs(broken_plate(4e-3, scatter=3).angle) < ALLOWED

@@ -90,13 +90,10 @@ def supported(method):
 
     Returns its model, motion and report.
     """
-    listed = [
-        effects.BondDamping(),
-        effects.Fixed("right"),
-        effects.Roller("bottom", (0.0, 2.0, 0.0)),
-        effects.PrescribedMotion("left", (0.3, 0.0, 0.1), frequency=2e4),
-        effects.GasPressure("right", peak=1e6, rise=1e-5),
-    ]
+    held = effects.Fixed("right"), effects.Roller("bottom", (0.0, 2.0, 0.0))
+    drive = effects.PrescribedMotion("left", (0.3, 0.0, 0.1), frequency=2e4)
+    gas = effects.GasPressure("right", peak=1e6, rise=1e-5)
+    listed = filled("supports", effects.BondDamping(), *held, drive, gas, group="right")
     simulation = Simulation(Scene(bar(0.3, 0.1, (3, 1, 1)), CONCRETE, listed), method)
     simulation.advance_to(round(2e-5 / method.dt0))
     return simulation.model, simulation.state.motion(), simulation.report()

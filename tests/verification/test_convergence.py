@@ -1,6 +1,7 @@
 """Order of the step, and one answer: one step for all, neighbours held or drifted, or solved."""
 
 import itertools
+from functools import cache
 
 import numpy as np
 import pytest
@@ -109,6 +110,37 @@ def blown(method, until):
     return simulation
 
 
+#: Time [s] until which some bonds have broken, and sweeps until what is left of them is small.
+BROKEN, SWEPT = 2.5e-5, {"sweeps": (2, 100), "tolerance": 1e-5}
+
+
+@cache
+def places_at(part):
+    """Positions [m] at BROKEN by one step for all, and contacts evaluated; part: of step and l."""
+    simulation = blown(Uniform(1e-8 * part, 2e-7 * part), BROKEN)
+    places, evaluated = simulation.motion()["position"], simulation.report().contact_evaluations
+    simulation.close()
+    return places, evaluated
+
+
+def explicit_error():
+    """Of first order: twice the difference to half the step and half of l [m]."""
+    return 2.0 * np.linalg.norm(places_at(1.0)[0] - places_at(0.5)[0])
+
+
+def test_solved_dashpots_come_to_the_motion_of_explicit_ones():
+    """Through breaks and contacts, which both meet up to a step late: an error of first order."""
+    places = []
+    for step in (5e-7, 2.5e-7):
+        simulation = blown(ImplicitDashpots(step, **SWEPT), BROKEN)
+        assert simulation.report().broken_faces > 0
+        places.append(simulation.motion()["position"])
+        simulation.close()
+    error = 2.0 * np.linalg.norm(places[0] - places[1]) + explicit_error()
+    assert np.linalg.norm(places[0] - places_at(1.0)[0]) < error
+    assert error < 0.01 * np.linalg.norm(places[0] - simulation.model.centre)
+
+
 def test_solved_dashpots_are_of_second_order_before_anything_breaks():
     """Half the step, a quarter of the difference of two runs: springs, dashpots, gas and slip.
 
@@ -117,7 +149,7 @@ def test_solved_dashpots_are_of_second_order_before_anything_breaks():
     """
     places = []
     for step in (8e-7, 4e-7, 2e-7):
-        simulation = blown(ImplicitDashpots(step, sweeps=(2, 100), tolerance=1e-5), 8e-6)
+        simulation = blown(ImplicitDashpots(step, **SWEPT), 8e-6)
         assert simulation.report().broken_faces == 0
         places.append(simulation.motion()["position"])
         simulation.close()
@@ -137,17 +169,13 @@ def test_multirate_stays_within_the_error_of_its_steps():
     whole one, of a partner's last time. The uniform run is of first order: its error at l is
     twice the difference to l / 2.
     """
-    until = 2.5e-5
-    simulation = blown(Uniform(1e-8, 2e-7), until)
-    coarse, evaluated = simulation.motion()["position"], simulation.report().contact_evaluations
-    simulation.close()
-    fine = blown(Uniform(5e-9, 1e-7), until).motion()["position"]
-    error = 2.0 * np.linalg.norm(coarse - fine)
-    several = blown(Multirate(1e-8, 2e-7), until)
+    coarse, evaluated = places_at(1.0)
+    error = explicit_error()
+    several = blown(Multirate(1e-8, 2e-7), BROKEN)
     report = several.report()
     assert len(np.unique(several.values(several.state.level))) >= 3
     assert report.ideal_gain > 1.5
-    assert error < 0.01 * np.linalg.norm(coarse - simulation.model.centre)
+    assert error < 0.01 * np.linalg.norm(coarse - several.model.centre)
     away = np.linalg.norm(several.motion()["position"] - coarse)
     assert away < (1.0 + 2.0 * report.ideal_gain) * error
     assert report.contact_evaluations < evaluated
