@@ -141,6 +141,23 @@ def test_with_static_contact_all_are_held_at_the_end():
         assert np.all(scene[held - 1] >= WALL)
 
 
+def mean_columns(seeds):
+    """Mean column of 40 particles after three cycles of shaking, in which pairs meet."""
+    box = Shaken(paper(), [40] * len(seeds), seeds, amplitude=20e-3)
+    kind = box.run(5000).state()[0][:, :-1]
+    present = (kind != EMPTY) & (kind != WALL)
+    columns = box.geometry.column_and_row(np.arange(kind.shape[1]))[0]
+    return (present * columns).sum(axis=1) / present.sum(axis=1)
+
+
+def test_left_and_right_are_alike_in_the_mean():
+    """Mean horizontal position over 128 seeds is the middle, within 4 of its standard errors."""
+    means = np.concatenate([mean_columns(seeds) for seeds in np.arange(128).reshape(2, 64)])
+    error = means.std() / np.sqrt(len(means))
+    assert error < 0.05
+    assert abs(means.mean() - 4.5) < 4 * error
+
+
 def displacement(step):
     """Of the container at the beginning of a step [m]."""
     return AMPLITUDE * np.sin(OMEGA * DT * step)
