@@ -10,9 +10,9 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-from _blast import METHODS, paper_scene
 from _threads import thread_gains, thread_job
 from ca_damper import Automaton, Spheres
+from cases.blast import METHODS, paper_scene
 from damper_cost import cycle_seconds, scenes
 from taichi_dem import (
     CONCRETE,

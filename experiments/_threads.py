@@ -5,7 +5,7 @@ import time
 import numpy as np
 import taichi as ti
 
-from _blast import METHODS, paper_effects
+from cases.blast import METHODS, paper_effects
 from taichi_dem import CONCRETE, InputError, Scene, Simulation, effects, read_mesh, runtime
 from taichi_dem.kit import backend
 from taichi_dem.kit.checkpoint import digest

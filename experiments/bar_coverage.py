@@ -22,8 +22,8 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-import _accuracy as judge
-import _questions as questions
+from cases import accuracy as judge
+from cases import questions as questions
 from taichi_dem.kit import study
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_text

@@ -27,7 +27,7 @@ from importlib.util import find_spec
 import numpy as np
 from matplotlib.colors import Normalize
 
-from _blast import (
+from cases.blast import (
     BLOCK_STEP,
     FROM_RADII,
     HOLE_RADIUS,
@@ -35,7 +35,7 @@ from _blast import (
     paper_effects,
     run_options,
 )
-from _meshes import crossings, mirrored_copies
+from cases.meshes import crossings, mirrored_copies
 from make_meshes import block_with_hole
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.kit import study

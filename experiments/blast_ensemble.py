@@ -27,8 +27,8 @@ from matplotlib.colors import Normalize
 from matplotlib.patches import Rectangle
 
 import taichi_dem as dem
-from _blast import BLOCK_STEP, blast_parser
-from _meshes import crossings
+from cases.blast import BLOCK_STEP, blast_parser
+from cases.meshes import crossings
 from taichi_dem import effects
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv

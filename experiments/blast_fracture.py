@@ -42,8 +42,8 @@ import sys
 from functools import partial
 
 import taichi_dem as dem
-from _blast import EFFECTS, blast_parser, run_options
-from _blast import METHODS as BLAST_METHODS
+from cases.blast import EFFECTS, blast_parser, run_options
+from cases.blast import METHODS as BLAST_METHODS
 from taichi_dem.demo import SETTINGS as DEMO_SETTINGS
 from taichi_dem.demo import figures_of, picture
 from taichi_dem.kit import study

@@ -22,7 +22,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from _blast import METHODS, blast_parser, paper_scene, run_costs, run_options
+from cases.blast import METHODS, blast_parser, paper_scene, run_costs, run_options
 from taichi_dem import ImplicitDashpots, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from _blast import blast_parser, paper_scene
+from cases.blast import blast_parser, paper_scene
 from taichi_dem import Collector, Every, Multirate, Simulation
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv

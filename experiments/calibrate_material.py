@@ -23,7 +23,7 @@ from functools import partial
 import numpy as np
 from scipy.optimize import root
 
-from _strength_tests import TESTS
+from cases.strength_tests import TESTS
 from taichi_dem import InputError, Material, mesh_stiffness, read_mesh
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import GREY, picture

@@ -26,7 +26,7 @@ import numpy as np
 import pandas as pd
 
 import taichi_dem as dem
-from _blast import EFFECTS
+from cases.blast import EFFECTS
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLUE, GREY, RED, area_key, picture
 from taichi_dem.mesh.mesh import volumes

@@ -29,7 +29,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-import _damper_trust as cases
+from cases import damper_trust as cases
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.plot_style import BLACK, picture, styles_of

@@ -23,7 +23,7 @@ from types import SimpleNamespace
 
 import pandas as pd
 
-from _blast import blast_parser, paper_effects, run_options
+from cases.blast import blast_parser, paper_effects, run_options
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, effects, read_mesh, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLUE, RED, picture

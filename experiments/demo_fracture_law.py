@@ -18,7 +18,7 @@ from functools import partial
 
 import numpy as np
 
-from _meshes import group_area
+from cases.meshes import group_area
 from taichi_dem import CONCRETE, Every, Scene, Simulation, Uniform, effects
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv

@@ -18,7 +18,7 @@ from types import SimpleNamespace
 import numpy as np
 
 import taichi_dem as dem
-from _blast import BLAST_DRIVERS, run_costs
+from cases.blast import BLAST_DRIVERS, run_costs
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import GREY, line_key, picture, styles_of

@@ -7,7 +7,8 @@
 A case is a scene at the edge of what can be computed, with figures that physics bounds by a formula
 in the table. A method that claims the case passes if all figures are within their bounds; the
 margin is the bound over the figure, of the worst figure. A method that cannot handle the case must
-refuse it in words: returning numbers counts as a failure. The cases are tests, in tests/hard_cases.
+refuse it in words: returning numbers counts as a failure. The cases are in
+experiments/cases/hard; tests run them too.
 
 In the picture each case is a square; cases that all methods refuse are grey. Writes hard_cases.png,
 hard_cases.csv and summary.json to results/hard_cases/.
@@ -21,6 +22,8 @@ from functools import partial
 
 from matplotlib.patches import Rectangle
 
+from cases.hard import CASES
+from cases.hard.cases import assess
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import (
     BLUE,
@@ -33,8 +36,6 @@ from taichi_dem.kit.plot_style import (
     picture,
 )
 from taichi_dem.kit.progress_bar import ProgressBar
-from tests.hard_cases.cases import assess
-from tests.hard_cases.test_hard_cases import CASES
 
 NAME = "hard_cases"
 #: Of a quick run, which compile little; the tests ask all, at quick size.

@@ -15,7 +15,7 @@ Needs gmsh: ``make mesh`` installs it and runs this script.
 import os
 import sys
 
-from _tunnel import KEPT, KEPT_NEAR, MESHES, designs, mesh_of, scene_of
+from cases.tunnel import KEPT, KEPT_NEAR, MESHES, designs, mesh_of, scene_of
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, read_mesh, step_report
 from taichi_dem.kit.files import output_folder, renamed_when_done
 from taichi_dem.kit.study import bare_parser, main_of_tool

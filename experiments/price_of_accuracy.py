@@ -33,10 +33,10 @@ import numpy as np
 import pandas as pd
 
 import taichi_dem as dem
-from _blast import blast_parser, paper_scene, run_costs
-from _meshes import with_moved_nodes
 from ca_damper import Automaton, solve_response
 from ca_damper import goals as damper_goals
+from cases.blast import blast_parser, paper_scene, run_costs
+from cases.meshes import with_moved_nodes
 from cost_of_accuracy_damper import Point, cheapest
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLUE, GREY, LIGHT_GREY, picture, seconds, styles_of

@@ -2,7 +2,7 @@
 
 Each case has a number from a formula, another program or a test of real material. Ours is the mean
 over random meshes, with half of their range. A miss is reported with its reason. The cases are
-tests, in tests/trust.
+in experiments/cases/trust; tests run them too.
 
     python experiments/trust.py
     python experiments/trust.py --only slope,rotation
@@ -18,12 +18,12 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
+from cases.trust import MEASURES
+from cases.trust.cases import Effort
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, picture
 from taichi_dem.kit.progress_bar import ProgressBar
-from tests.trust.cases import Effort
-from tests.trust.test_trust import MEASURES
 
 NAME = "trust"
 CASES = {measure.__name__: measure for measure in MEASURES}

@@ -30,8 +30,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-import _tunnel as tunnel
 import taichi_dem as dem
+from cases import tunnel as tunnel
 from taichi_dem.kit import study
 from taichi_dem.kit.bars.chance import t_quantile
 from taichi_dem.kit.plot_style import BLUE, GREEN, GREY, ORANGE, WINE, picture

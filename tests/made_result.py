@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from _meshes import with_moved_nodes
+from cases.meshes import with_moved_nodes
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, effects
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.record import ENERGY_COLUMNS, Frame

@@ -1,7 +1,6 @@
 """Scenes that several tests share."""
 
 import os
-from dataclasses import replace
 
 import numpy as np
 
@@ -86,23 +85,3 @@ def broken_bar():
     touch = effects.SphereContact(), effects.Friction()
     acting = filled("held", *bonds, *touch, effects.Fixed("right"), blow)
     return Scene(bar(0.1, 0.05, (2, 1, 1)), CONCRETE, acting)
-
-
-#: Blocks that stand on a plate by weight and friction: acceleration [m/s2], down along x; springs
-#: softer than those of concrete, for long steps: a block sinks in by a micrometre; step [s].
-GRAVITY, SOFT, STEP = 9.81, 0.01, 1e-5
-
-
-def softened(friction):
-    """Concrete with all springs softer."""
-    names = ("normal_stiffness", "shear_stiffness", "contact_stiffness")
-    dashpots = ("normal_damping", "shear_damping", "contact_damping")
-    values = {name: SOFT * getattr(CONCRETE, name) for name in names}
-    values.update({name: SOFT**0.5 * getattr(CONCRETE, name) for name in dashpots})
-    return replace(CONCRETE, friction=friction, fracture_energy=1e5, **values)
-
-
-def loose(weight=(-GRAVITY, 0.0, 0.0), fixed=("plate_left",), **contact):
-    """Effects of blocks that touch and stick, on plates that are held at groups ``fixed``."""
-    touch = effects.BondDamping(), effects.BodyContact(**contact), effects.StickingFriction()
-    return [*touch, effects.Gravity(tuple(weight)), *map(effects.Fixed, fixed)]

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import _questions as questions
-from _accuracy import ASKED, References, content_of, judged
 from bar_coverage import KINDS
+from cases import questions as questions
+from cases.accuracy import ASKED, References, content_of, judged
 
 NAMES = [*KINDS]
 

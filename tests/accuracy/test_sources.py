@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from _meshes import with_moved_nodes
+from cases.meshes import with_moved_nodes
 from taichi_dem import CONCRETE, InputError, Scene, effects, goals, solve
 from taichi_dem.accuracy import sources
 from taichi_dem.accuracy.runs import Job

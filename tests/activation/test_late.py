@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from _meshes import with_moved_nodes
+from cases.meshes import with_moved_nodes
 from taichi_dem import CONCRETE, Scene, Uniform, checked_mesh, effects, simulate
 from taichi_dem.mesh.shapes import bar, placed_together
 

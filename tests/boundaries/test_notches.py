@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from _meshes import with_moved_nodes
+from cases.meshes import with_moved_nodes
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, in_space_order
 from taichi_dem.mesh.mesh import with_cut, with_inner_group
 from taichi_dem.mesh.shapes import bar, pair, placed_together

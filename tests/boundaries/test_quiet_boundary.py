@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from _meshes import with_moved_nodes
+from cases.closed_forms import carried
+from cases.meshes import with_moved_nodes
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
 from taichi_dem.elasticity.rates import wave_moduli
 from taichi_dem.mesh.shapes import bar, placed_together, single
 from taichi_dem.state.model import Model
-from tests.closed_forms import carried
 from tests.structures import POST, filled
 
 #: Concrete whose bonds have no dashpots, so that no wave fades.

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from _tunnel import KEPT, SIZE, designs, mesh_of, scene_of
+from cases.tunnel import KEPT, SIZE, designs, mesh_of, scene_of
 from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, effects, simulate
 from taichi_dem.mesh.boreholes import Hole, check_holes, drilled_rock, read_holes, with_charges
 from taichi_dem.mesh.mesh import volumes

@@ -6,16 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from _meshes import group_area, mirrored_copies
 from blast_scaling import even_cuts, share_costs
 from ca_damper.theory.bouncing import Fall, RecordedFall
+from cases.meshes import group_area, mirrored_copies
+from cases.trust.blast import laws
 from cost_of_accuracy_damper import Point, cheapest, floor_of
 from taichi_dem import CONCRETE, PAPER_BLOCK, read_mesh
 from taichi_dem.mesh.mesh import volumes
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.output.hole_monitor import Attenuation, attenuation_of
 from taichi_dem.state.model import Model
-from tests.trust.blast import laws
 
 
 def point(step, error):

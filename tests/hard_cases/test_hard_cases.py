@@ -5,17 +5,15 @@ that share least code take turns in the fast tests; all others are slow.
 """
 
 import math
-from importlib import import_module
 
 import pytest
 
 from ca_damper import InputError
-from tests.hard_cases.cases import Case, assess
+from cases.hard import CASES
+from cases.hard.cases import Case, assess
 
 pytestmark = pytest.mark.experiment
 
-FILES = "blast_bonds blast_contacts blast_extremes blast_piles damper damper_limits".split()
-CASES = [case for name in FILES for case in import_module(f"tests.hard_cases.{name}").CASES]
 LEAST_ALIKE = ("multirate_drifted", "implicit")
 #: They differ from others by one law or account, which other tests are about.
 VARIANTS = ("spheres_printed", "automaton_ejection")

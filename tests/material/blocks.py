@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from _meshes import with_moved_nodes
+from cases.meshes import with_moved_nodes
 from taichi_dem import CONCRETE, Material, checked_mesh
 from taichi_dem.mesh.shapes import bar
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from calibrate_material import calibrate
+from cases.closed_forms import LinearBonds
 from taichi_dem import Material, mesh_stiffness
 from taichi_dem.materials.bond_rules import ModulusOverDistance
 from taichi_dem.materials.material import SPREAD
 from taichi_dem.mesh.shapes import bar
-from tests.closed_forms import LinearBonds
 from tests.material.blocks import DENSITY, E, disphenoids, random_block, rock
 
 #: Of the static solve: forces agree to 1e-10, and a mesh of some cells has a condition of 1e2.

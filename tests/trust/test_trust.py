@@ -5,18 +5,12 @@ At quick size; ``experiments/trust.py`` has them at full size and draws them.
 
 import pytest
 
+from cases.trust import MEASURES
+from cases.trust.cases import Effort
 from crack_direction import ALLOWED, TURN, broken_plate
-from tests.trust.blast import blast
-from tests.trust.bonds import disc, joint
-from tests.trust.cases import Effort
-from tests.trust.contacts import rotation, slope
-from tests.trust.cracks import branching, crack
-from tests.trust.waves import bar_wave, spall
 
 pytestmark = pytest.mark.experiment
 
-#: In the order of the page.
-MEASURES = bar_wave, spall, disc, crack, branching, joint, blast, slope, rotation
 #: Cases of a few seconds.
 FAST = ("bar_wave", "joint", "rotation")
 

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from _meshes import group_area
+from cases.meshes import group_area
 from taichi_dem import PAPER_BLOCK, InputError, join, read_mesh, shapes
 from taichi_dem.mesh.mesh import checked_mesh, volumes
 from taichi_dem.mesh.shapes import bar

@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 import pytest
 
-from _meshes import group_area
+from cases.meshes import group_area
 from make_meshes import write
 from taichi_dem import PAPER_BLOCK, InputError, read_mesh, shapes
 from taichi_dem.mesh.files import write_mesh

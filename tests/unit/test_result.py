@@ -11,7 +11,7 @@ import meshio
 import numpy as np
 import pytest
 
-from _blast import run_costs
+from cases.blast import run_costs
 from taichi_dem import (
     CONCRETE,
     PAPER_BLOCK,

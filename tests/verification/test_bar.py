@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from cases.closed_forms import LinearBonds
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.state.model import Model
-from tests.closed_forms import LinearBonds
 from tests.structures import filled
 
 EPS = np.finfo(float).eps

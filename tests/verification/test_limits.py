@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import taichi as ti
 
+from cases.closed_forms import LinearBonds, carried
 from taichi_dem import (
     CONCRETE,
     ImplicitDashpots,
@@ -26,7 +27,6 @@ from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.stability.body_limits import FOR_CONTACTS, LIMITED, dashpot_step, spring_step
 from taichi_dem.state.timeline import MACRO_TICKS, MAX_LEVEL
-from tests.closed_forms import LinearBonds, carried
 from tests.structures import POST, filled
 
 STILL = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))

@@ -6,14 +6,14 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from cases.closed_forms import LinearBonds
+from cases.hard.blast_run import ACCURACY, AREA, EPS, FREE, TOUCHING, Run, X, apart
+from cases.hard.cases import Cases
+from cases.meshes import with_neighbours
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.mesh.topology import faces_of_group, topology_of
-from tests.closed_forms import LinearBonds
-from tests.hard_cases.blast_run import ACCURACY, AREA, EPS, FREE, TOUCHING, Run, X, apart
-from tests.hard_cases.cases import Cases
-from tests.meshes import with_neighbours
 
 case = CASES = Cases("blast")
 LIMITED = ("limited", "controlled")

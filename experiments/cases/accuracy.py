@@ -8,7 +8,7 @@ import pandas as pd
 
 import ca_damper as ca
 import taichi_dem as dem
-from _questions import BlastQuestion, DamperQuestion
+from cases.questions import BlastQuestion, DamperQuestion
 from taichi_dem.accuracy.runs import Job, Runs
 from taichi_dem.kit import study
 from taichi_dem.kit.bars.chance import t_quantile

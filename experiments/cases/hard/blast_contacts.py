@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from cases.closed_forms import damped_opening, velocity_after_impact
+from cases.hard.blast_run import EDGE, FREE, TOUCHING, Run, X
+from cases.hard.cases import Cases
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.mesh.topology import body_properties, spheres_of_faces
-from tests.closed_forms import damped_opening, velocity_after_impact
-from tests.hard_cases.blast_run import EDGE, FREE, TOUCHING, Run, X
-from tests.hard_cases.cases import Cases
 
 case = CASES = Cases("blast")
 BASIC = {"uniform": Uniform, "multirate_held": Multirate, "implicit": ImplicitDashpots}

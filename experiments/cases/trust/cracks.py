@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cases.trust.cases import Number
+from cases.trust.plates import material_of, plate, springs_step
 from taichi_dem import ImplicitDashpots, Scene, Simulation, effects, simulate
 from taichi_dem.kit.errors import InputError
 from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.output.fracture import crack_areas
-from tests.trust.cases import Number
-from tests.trust.plates import material_of, plate, springs_step
 
 #: E [Pa], nu and density [kg/m3] of both plates.
 YOUNG, POISSON, DENSITY = 32e9, 0.2, 2450.0

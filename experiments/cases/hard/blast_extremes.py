@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from cases.hard.blast_bonds import free
+from cases.hard.blast_run import AREA, EDGE, FREE, MASS, TOUCHING, Run, X, apart
+from cases.hard.cases import Cases
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Uniform, simulate
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
-from tests.hard_cases.blast_bonds import free
-from tests.hard_cases.blast_run import AREA, EDGE, FREE, MASS, TOUCHING, Run, X, apart
-from tests.hard_cases.cases import Cases
 
 case = CASES = Cases("blast")
 MULTIRATE = ("multirate_held", "multirate_drifted")

@@ -3,9 +3,9 @@
 import numpy as np
 
 from ca_damper import Automaton, Batch, Empty, RigidMass, SceneTable, Spheres
-from tests.hard_cases import damper_run
-from tests.hard_cases.cases import Cases
-from tests.hard_cases.damper_run import AUTOMATA, EXACT, OSCILLATOR, SPHERES, drive, fall, filling
+from cases.hard import damper_run
+from cases.hard.cases import Cases
+from cases.hard.damper_run import AUTOMATA, EXACT, OSCILLATOR, SPHERES, drive, fall, filling
 
 case = CASES = Cases("damper")
 G, SIZE = 9.8, 6e-3

@@ -4,9 +4,9 @@ from functools import partial
 
 import numpy as np
 
+from cases.trust.cases import Number
+from cases.trust.plates import material_of, plate, springs_step
 from taichi_dem import ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
-from tests.trust.cases import Number
-from tests.trust.plates import material_of, plate, springs_step
 
 #: Bar: length, width and thickness [m], Young's modulus [Pa], Poisson's ratio, density [kg/m3].
 LENGTH, WIDTH, YOUNG, POISSON, DENSITY = 1.0, 0.2, 32e9, 0.2, 2450.0

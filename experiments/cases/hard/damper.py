@@ -4,9 +4,9 @@ import numpy as np
 
 from ca_damper import Batch, SceneTable, SimulationDiverged
 from ca_damper.plot.boxes import Box
-from tests.hard_cases import damper_run
-from tests.hard_cases.cases import Cases
-from tests.hard_cases.damper_run import ALL, AUTOMATA, EXACT, SPHERES, drive, fall, filling, spring
+from cases.hard import damper_run
+from cases.hard.cases import Cases
+from cases.hard.damper_run import ALL, AUTOMATA, EXACT, SPHERES, drive, fall, filling, spring
 
 case = CASES = Cases("damper")
 #: An amplitude [m] at which spheres are shaken at 2.2 g.

@@ -5,13 +5,13 @@ from functools import partial
 
 import numpy as np
 
-from _strength_tests import TESTS
-from _strength_tests import disc as disc_mesh
+from cases.strength_tests import TESTS
+from cases.strength_tests import disc as disc_mesh
+from cases.trust.cases import Number
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import checked_mesh, with_inner_group
 from taichi_dem.mesh.shapes import bar
-from tests.trust.cases import Number
 
 GRANITE = "Lac du Bonnet granite, Potyondy and Cundall, IJRMMS 41 (2004) 1329"
 #: Strength in the Brazilian test over that in direct tension, and what counts as agreement.

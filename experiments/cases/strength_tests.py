@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from _meshes import with_moved_nodes
+from cases.meshes import with_moved_nodes
 from taichi_dem import ImplicitDashpots, Scene, Simulation, step_report
 from taichi_dem.effects import (
     BodyContact,

@@ -13,8 +13,8 @@ import numpy as np
 
 import ca_damper as ca
 import taichi_dem as dem
-from _meshes import with_moved_nodes
 from ca_damper import goals as damper_goals
+from cases.meshes import with_moved_nodes
 from taichi_dem import effects, goals, shapes
 from taichi_dem.kit.display import counted
 from taichi_dem.mesh.mesh import checked_mesh

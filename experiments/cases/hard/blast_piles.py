@@ -5,13 +5,13 @@ from functools import partial
 import numpy as np
 from scipy.optimize import linprog
 
+from cases.hard.blast_run import Run
+from cases.hard.cases import Cases
+from cases.meshes import brick, hexahedron
+from cases.piles import GRAVITY, STEP, loose, softened
 from taichi_dem import ImplicitDashpots
 from taichi_dem.mesh.mesh import with_inner_group
 from taichi_dem.mesh.shapes import bar, placed_together
-from tests.hard_cases.blast_run import Run
-from tests.hard_cases.cases import Cases
-from tests.meshes import brick, hexahedron
-from tests.scenes import GRAVITY, STEP, loose, softened
 
 case = CASES = Cases("blast")
 #: What counts as standing, and as falling, after TIME [m, s].

@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from cases.closed_forms import damped_opening
 from taichi_dem import CONCRETE, Scene, Simulation, StepControl, effects
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.observers import Every, RunView
 from taichi_dem.output.fracture import body_spins
 from taichi_dem.simulate import run_simulation
-from tests.closed_forms import damped_opening
 
 EPS = np.finfo(float).eps
 SAMPLES = 40

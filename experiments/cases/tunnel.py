@@ -38,7 +38,7 @@ PARTS = {
 }
 #: Designs whose meshes lie beside the programs, for runs without Gmsh; edge at their holes [m].
 KEPT, KEPT_NEAR = {"parallel": "parallel.msh", "V cut": "V_cut.msh"}, 0.12
-MESHES = Path(__file__).resolve().parent / "tunnel_meshes"
+MESHES = Path(__file__).resolve().parents[1] / "tunnel_meshes"
 #: Edges far from holes over those near them.
 FAR = 7.0
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from _blast import BLOCK_STEP, FROM_RADII, HOLE_RADIUS, paper_effects
-from _meshes import mirrored_copies, with_moved_nodes
+from cases.blast import BLOCK_STEP, FROM_RADII, HOLE_RADIUS, paper_effects
+from cases.meshes import mirrored_copies, with_moved_nodes
+from cases.trust.cases import Number
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.mesh.shapes import in_space_order
 from taichi_dem.mesh.tetrahedra import all_faces, outer_rows
-from tests.trust.cases import Number
 
 #: Copies of the paper's block, one behind the other; end of a run [s].
 COPIES, UNTIL = 15, 1e-3

@@ -1,0 +1,1 @@
+"""Meshes, scenes and cases that experiments and tests share; they import neither."""
