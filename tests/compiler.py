@@ -4,6 +4,7 @@ The run fails where it compiles more than ``MOST_KERNELS``.
 """
 
 import collections
+import os
 import resource
 import sys
 import time
@@ -93,6 +94,8 @@ def pytest_sessionfinish(session):
     seconds = time.perf_counter() - _spent.pop("begun")
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _BYTES_OF_MAXRSS
     counted = {**_spent, "seconds": seconds, "bytes": memory, "structures": dict(_of_structure)}
+    # With that of processes that tests have started.
+    counted["cpu"] = sum(os.times()[:4])
     counted["engines"] = sum(_engines.values())
     counted["again"] = counted["engines"] - len(_engines)
     if hasattr(session.config, "workeroutput"):
@@ -120,6 +123,14 @@ def _sum(name):
     return sum(counted.get(name, 0) for counted in _of_workers)
 
 
+def _loop_seconds():
+    """CPU time of a fixed loop in Python [s], by which machines compare."""
+    begun = time.process_time()
+    for _ in range(20_000_000):
+        pass
+    return time.process_time() - begun
+
+
 def pytest_terminal_summary(terminalreporter, config):
     """The structures that took most kernels, then a line about all."""
     if not _of_workers:
@@ -135,5 +146,7 @@ def pytest_terminal_summary(terminalreporter, config):
         f" {_sum('LLVM'):.0f} s of {_sum('seconds'):.0f} s in {len(_of_workers)} processes; the"
         f" largest had {max(counted['bytes'] for counted in _of_workers) / 1e9:.2f} GB"
     )
+    loop = _loop_seconds()
+    say(f"CPU: {_sum('cpu'):.0f} s, on a machine that loops 20 million times in {loop:.2f} s")
     if _too_many(_sum("kernels"), config):
         say(f"too many kernels: at most {MOST_KERNELS} (see tests/structures.py)")
