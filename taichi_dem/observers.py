@@ -360,3 +360,27 @@ def write_receivers(path: FileName, receivers: Mapping[str, Received]) -> None:
         rows = np.vstack([getattr(one, kind) for one in receivers.values()])
         columns.update({f"{letter}{axis}_{unit}": rows[:, k] for k, axis in enumerate("xyz")})
     write_csv(path, columns)
+
+
+def checked_observers(observers: Any) -> Sequence[Any]:
+    """Observers as a tuple; InputError for one without a member, or with a wrong one."""
+    if not isinstance(observers, (list, tuple)):
+        raise InputError(f"observers must be a list of observers, got {shown(observers)}")
+    for place, one in enumerate(observers):
+        timed = isinstance(getattr(one, "when", None), (Every, At))
+        if isinstance(one, type) or not (timed and callable(getattr(one, "observe", None))):
+            raise InputError(
+                f"observers[{place}] must have a member when, an Every or an At, and a method "
+                f"observe(view), got {shown(one)}"
+            )
+    return observers
+
+
+def receivers_among(observers: Sequence[Any]) -> list[Receivers]:
+    """Receivers among observers; InputError where two have one name."""
+    found = [one for one in observers if isinstance(one, Receivers)]
+    names = [name for one in found for name in one.points]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f"observers must have receivers of different names, got {twice[0]} twice")
+    return found

@@ -17,13 +17,20 @@ from taichi_dem.kit.validation import (
     FileName,
     instance,
     progress_option,
-    shown,
     whole,
     word,
 )
 from taichi_dem.loads.history import unresolved_histories
 from taichi_dem.methods import Method
-from taichi_dem.observers import MOST_CALLS, At, Every, Observer, Receivers, RunView, macro_steps
+from taichi_dem.observers import (
+    MOST_CALLS,
+    Every,
+    Observer,
+    RunView,
+    checked_observers,
+    macro_steps,
+    receivers_among,
+)
 from taichi_dem.output.hole_monitor import watched_groups
 from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
@@ -200,12 +207,13 @@ class _Plan:
         progress_option("progress", progress)
         self.samples, self.frames = samples, frames
         self.observed = [
-            (one, one.when.marks(self.last, self.dt0, samples)) for one in _checked(observers)
+            (one, one.when.marks(self.last, self.dt0, samples))
+            for one in checked_observers(observers)
         ]
         for one in observers:
             if hasattr(one, "check_scene"):
                 one.check_scene(scene)
-        self.receivers = _receivers_among(observers)
+        self.receivers = receivers_among(observers)
 
     def calls(self, simulation: Simulation, recorder: Recorder, tell: Any) -> list[Call]:
         """Calls of a run: samples and frames come before the user's observers."""
@@ -234,30 +242,6 @@ class _Plan:
 
     def _evenly(self, count):
         return Every(samples=1).marks(self.last, self.dt0, count)
-
-
-def _checked(observers):
-    """Observers as a tuple; InputError for one without a member, or with a wrong one."""
-    if not isinstance(observers, (list, tuple)):
-        raise InputError(f"observers must be a list of observers, got {shown(observers)}")
-    for place, one in enumerate(observers):
-        timed = isinstance(getattr(one, "when", None), (Every, At))
-        if isinstance(one, type) or not (timed and callable(getattr(one, "observe", None))):
-            raise InputError(
-                f"observers[{place}] must have a member when, an Every or an At, and a method "
-                f"observe(view), got {shown(one)}"
-            )
-    return observers
-
-
-def _receivers_among(observers):
-    """Receivers among observers; InputError where two have one name."""
-    found = [one for one in observers if isinstance(one, Receivers)]
-    names = [name for one in found for name in one.points]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise InputError(f"observers must have receivers of different names, got {twice[0]} twice")
-    return found
 
 
 def _started(simulation, brief=False):

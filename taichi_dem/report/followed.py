@@ -67,11 +67,7 @@ class Followed:
     def report(
         self, scene: Scene, method: Method, figures: Mapping[str, Any], way: np.ndarray, brief: bool
     ) -> Report:
-        """Report of the run so far.
-
-        figures: of the report, that others count. way: of each body since the start [m], (n,).
-        brief: without the last comparison of all bodies, and so without missing effects.
-        """
+        """Report of the run so far; figures: counted by others; way: of each body [m], (n,)."""
         run, model, state = self.run, self.run.model, self.run.state
         here = slice(model.body_count)
         # A look of its own: to report changes nothing of what later samples find.
