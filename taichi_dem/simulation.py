@@ -44,11 +44,8 @@ def _part(name) -> Any:
 class Simulation:
     """One scene, one method, one driver, on an engine of the session.
 
-    ``simulate`` makes one; use it directly to control the steps. ``tables``,
-    ``state``, ``schedule``, ``contacts``, ``broad_phase``, ``step``, ``readings`` and
-    ``forces`` are the parts of its engine, which is its own as long as it lives; contacts and
-    broad_phase are None without contact. ``values`` reads their fields, which may have room for
-    more.
+    ``simulate`` makes one; use it directly to control the steps. Its parts are those of its engine
+    (contacts and broad_phase: None without contact); ``values`` reads their fields.
 
     Parameters
     ----------
