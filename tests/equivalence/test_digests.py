@@ -118,7 +118,10 @@ def test_a_run_has_the_bits_that_it_had(name):
 
 @pytest.mark.parametrize(
     "name",
-    ["implicit_parallel", pytest.param("controlled_parallel", marks=pytest.mark.slow)],
+    [
+        pytest.param("implicit_parallel", marks=pytest.mark.long),
+        pytest.param("controlled_parallel", marks=pytest.mark.slow),
+    ],
 )
 def test_chunks_of_one_member_change_no_bit(name, monkeypatch, compiled_anew):
     """Each phase a parallel loop over chunks; all contacts are coloured by what rounds leave."""
