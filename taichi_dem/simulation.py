@@ -344,10 +344,7 @@ class Simulation:
             "run_cpu_seconds": self.run_cpu_seconds,
         }
         with self.readings.held():
-            way = self.motion()["position"] - self.first_motion["position"]
-            return self.followed.report(
-                self.scene, self.method, figures, np.linalg.norm(way, axis=1), brief
-            )
+            return self.followed.report(self.scene, self.method, figures, brief)
 
     def acting_since(self) -> dict[str, np.ndarray]:
         """Time [s] from which each effect acted on each body, by name; with effects="auto"."""

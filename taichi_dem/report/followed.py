@@ -32,7 +32,7 @@ class Followed:
     """Energy, missing effects, shared volume and resolved steps of a run, from its start on."""
 
     def __init__(self, run: Run):
-        self.run = run
+        self.run, self.first = run, values(run.state.position, slice(run.model.body_count))
         self.energy_balance = EnergyBalance(run)
         self.divergence_check = DivergenceCheck(run, self.energy_balance)
         self.shared_volume = SharedVolume(run)
@@ -65,9 +65,9 @@ class Followed:
         self.step_resolution.sample(time_s)
 
     def report(
-        self, scene: Scene, method: Method, figures: Mapping[str, Any], way: np.ndarray, brief: bool
+        self, scene: Scene, method: Method, figures: Mapping[str, Any], brief: bool
     ) -> Report:
-        """Report of the run so far; figures: counted by others; way: of each body [m], (n,)."""
+        """Report of the run so far; figures: those that others count."""
         run, model, state = self.run, self.run.model, self.run.state
         here = slice(model.body_count)
         # A look of its own: to report changes nothing of what later samples find.
@@ -103,6 +103,7 @@ class Followed:
         )
         report = replace(report, known_error=known_error(report, scene, method))
         if scene.on_demand:
+            way = np.linalg.norm(values(state.position, here) - self.first, axis=1)
             certificate = certificate_of(run, self.energy_balance, report, way)
             report = replace(report, certificate=certificate)
         return report
