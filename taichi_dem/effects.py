@@ -1,14 +1,18 @@
 """Effects that a scene may list; all others are not computed, allocated or compiled."""
 
-from taichi_dem.laws.body_contact import BodyContact
+from taichi_dem.laws.body_geometry import BodyGeometry
 from taichi_dem.laws.bond import BondDamping, ShearSlip, SlipWeakening, Softening
+from taichi_dem.laws.contact import BodyContact, SphereContact
+from taichi_dem.laws.friction import Friction, StickingFriction
 from taichi_dem.laws.mixed_mode import MixedMode
-from taichi_dem.laws.sphere_contact import Friction, SphereContact, StickingFriction
+from taichi_dem.laws.sphere_geometry import SphereGeometry
+from taichi_dem.laws.walton_braun import WaltonBraun
 from taichi_dem.loads.pressure import ExpandingGas, GasPressure, Gravity, Pressure
 from taichi_dem.loads.supports import Fixed, PrescribedMotion, QuietBoundary, Roller
 
 __all__ = [
     "BodyContact",
+    "BodyGeometry",
     "BondDamping",
     "ExpandingGas",
     "Fixed",
@@ -24,5 +28,7 @@ __all__ = [
     "SlipWeakening",
     "Softening",
     "SphereContact",
+    "SphereGeometry",
     "StickingFriction",
+    "WaltonBraun",
 ]

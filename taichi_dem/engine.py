@@ -10,8 +10,9 @@ from taichi_dem.contact.contacts import Contacts
 from taichi_dem.contact.search import BroadPhase
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.engine_pool import Engine, EnginePool
-from taichi_dem.laws.base import ABSENT, PARTS_OF_BOND, Effect, bound
+from taichi_dem.laws.base import PARTS_OF_BOND, Effect, bound
 from taichi_dem.laws.bond import Separable
+from taichi_dem.laws.roles import ABSENT
 from taichi_dem.methods import Method, structure_of
 from taichi_dem.report.forces import Forces
 from taichi_dem.report.readings import Readings
@@ -32,7 +33,9 @@ class Structure:
 
     def __init__(self, effects: Iterable[Effect], method: Method, on_demand: bool = False):
         self.effects, self.method, self.on_demand = tuple(effects), method, on_demand
-        self.key = tuple(map(type, self.effects)), structure_of(method), on_demand
+        self.geometry = next((e.geometry for e in self.effects if e.role == "contact"), None)
+        kinds = tuple(map(type, (*self.effects, self.geometry)))
+        self.key = kinds, structure_of(method), on_demand
 
     def __eq__(self, other):
         return self.key == other.key
@@ -56,7 +59,10 @@ class BlastEngine(Engine):
         capacity.check()
         method = self.structure.method
         self.tables = Tables(capacity, self.structure.on_demand)
-        self.tables.take(*_bound_by_role(self.structure.effects, self.tables))
+        geometry = self.structure.geometry
+        if geometry is not None:
+            geometry = bound(geometry, self.tables)
+        self.tables.take(*_bound_by_role(self.structure.effects, self.tables), geometry)
         self.state = State(self.tables)
         self.contacts = Contacts(self.tables, self.state) if self.tables.has_contact else None
         self.schedule = Schedule(self.tables, self.state, self.contacts, method)

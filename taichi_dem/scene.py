@@ -310,7 +310,7 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     # A solid in one piece cannot meet itself until it breaks, which the run detects. Parts without
     # contact are not reported where they stay at rest, fall alike or are too far apart.
     contact = scene.effect("contact")
-    if contact and contact.outer_faces:
+    if contact and contact.geometry.outer_faces:
         return ()
     part = parts_of(scene.mesh)
     count = part.max() + 1

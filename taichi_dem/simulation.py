@@ -226,7 +226,7 @@ class Simulation:
         names = ("position", "orientation", "velocity", "spin")
         self.first_motion = {name: motion[name] for name in names}
         if self.model.has_contact:
-            self.state.expose(self.model.topology, self.model.contact.outer_faces is True)
+            self.state.expose(self.model.topology, self.model.geometry.outer_faces is True)
         self.driver.begin()
         if self.contacts is not None:
             compiling("contact search", 3, PARTS)

@@ -71,7 +71,7 @@ def name_of(structure):
     """Name of a structure: of its set of effects, or of its parts where it is in none; method."""
     if not isinstance(structure, Structure):
         return _words(getattr(structure, "key", structure))
-    kinds, method, _ = structure.key
+    kinds, method = tuple(map(type, structure.effects)), structure.key[1]
     name = next((name for name, row in STRUCTURES.items() if row == kinds), None)
     return f"{name or _words(kinds)}: {_words(method)}"
 

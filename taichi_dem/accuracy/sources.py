@@ -1,6 +1,7 @@
 """Sources of error beside the step: chance, the contact law, the mesh, effects left out."""
 
 import contextlib
+import copy
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,9 +14,9 @@ from taichi_dem.kit.bars.answer import Answer, branched, branches_of
 from taichi_dem.kit.bars.budget import Source
 from taichi_dem.kit.bars.chance import clusters_of, mean_and_deviation, t_quantile
 from taichi_dem.kit.errors import SimulationDiverged
-from taichi_dem.laws.body_contact import MOST_PARTS, BodyContact
+from taichi_dem.laws.body_geometry import MOST_PARTS, BodyGeometry
+from taichi_dem.laws.contact import BodyContact, SphereContact
 from taichi_dem.laws.roles import LISTED
-from taichi_dem.laws.sphere_contact import SphereContact
 from taichi_dem.scene import Scene
 
 #: Sources that ``solve`` measures when asked; chance and what is left out are always looked at.
@@ -62,7 +63,7 @@ class Beside:
         finer, share = finer_law(law)
         if finer is None:
             return Source("contact", math.nan, "not measured: no finer law is known")
-        words = f"one run with BodyContact(parts={finer.parts})"
+        words = f"one run with parts={finer.geometry.parts}"
         if not self._measures("contact", _RAYS):
             return self._unmeasured("contact", words, _RAYS)
         values, seconds = self._values([with_contact(self.job.scene, finer)])
@@ -121,19 +122,21 @@ def awake_price(runs: Runs, certificate: Any) -> float:
     return runs.seconds / max(_LEAST_AWAKE, 1.0 - certificate.asleep)
 
 
-def finer_law(law: Any) -> tuple[BodyContact | None, float]:
+def finer_law(law: Any) -> tuple[Any, float]:
     """A contact law of finer resolution, and the error of the given one over their difference."""
     # Rays converge with the second power of the parts of an edge; spheres do not converge to
     # bodies.
-    if isinstance(law, BodyContact):
-        parts = min(2 * law.parts, MOST_PARTS)
-        if parts == law.parts:
+    geometry: Any = getattr(law, "geometry", None)
+    if isinstance(geometry, BodyGeometry):
+        parts = min(2 * geometry.parts, MOST_PARTS)
+        if parts == geometry.parts:
             return None, math.nan
-        same = law.outer_faces, law.restitution, law.stiffness
-        lists = law.skin, law.neighbours_per_body, law.pairs_per_body
-        return BodyContact(parts, *same, *lists), 1.0 / (1.0 - (law.parts / parts) ** 2)
+        lists = geometry.skin, geometry.neighbours_per_body, geometry.pairs_per_body
+        made = copy.copy(law)
+        made.geometry = BodyGeometry(parts, geometry.outer_faces, *lists)
+        return made, 1.0 / (1.0 - (geometry.parts / parts) ** 2)
     if isinstance(law, SphereContact):
-        return BodyContact(_FINE, law.outer_faces), 1.0
+        return BodyContact(_FINE, geometry.outer_faces), 1.0
     return None, math.nan
 
 

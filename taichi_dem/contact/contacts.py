@@ -5,9 +5,9 @@ import taichi as ti
 
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.ordered import Once, Phases, Some
-from taichi_dem.kit.products import cross, matvec, norm, stacked
-from taichi_dem.kit.types import real, vec3
-from taichi_dem.laws.sphere_contact import ONCE_BROKEN
+from taichi_dem.kit.products import norm, stacked
+from taichi_dem.kit.types import real, vec3, vec4
+from taichi_dem.laws.contact_contracts import ONCE_BROKEN, Touch
 from taichi_dem.methods import Method
 from taichi_dem.physics.rotation import place_in
 from taichi_dem.physics.sphere_pair import DEEPEST_SHARE, SUNK, Nearest
@@ -39,8 +39,7 @@ class Contacts:
     def __init__(self, tables: Tables, state: State):
         n, capacity = tables.capacity.bodies, tables.capacity
         self.tables, self.state = tables, state
-        self.law, self.friction = tables.contact, tables.friction
-        self.remembers = getattr(self.friction, "remembers", False)
+        self.law, self.geometry, self.friction = tables.contact, tables.geometry, tables.friction
         self.pace = ti.field(real, shape=2)
         self.store = PairStore(n, capacity.pair_entries, capacity.sphere_entries)
         for effect in tables.effects:
@@ -50,12 +49,10 @@ class Contacts:
         self.skin, self.body_skin = (ti.field(real, shape=n) for _ in range(2))
         self.search_requested = ti.field(ti.i32, shape=())
         self.outer_waits = ti.field(ti.i32, shape=())
-        if self.law.meets_bodies:
-            self.clear_until = self.store.sphere_column("clear_until", real)
 
     def load(self, model: Model, method: Method) -> None:
         """Load the numbers of a scene and a method; no pairs exist yet."""
-        effect, n = model.contact, model.body_count
+        effect, n = model.geometry, model.body_count
         assign(self.outer_waits, int(effect.outer_faces == ONCE_BROKEN))
         assign(self.skin, effect.skin * model.spheres.extent)
         assign(self.pace, np.array([method.dt0, method.steps_ahead]))
@@ -65,45 +62,15 @@ class Contacts:
     @ti.func
     def gap(self, i, j, a, b):
         """Gap between bodies i and j by an entry (a, b) of the pair store [m]."""
-        gap = 0.0
-        if ti.static(self.law.meets_bodies):
-            gap = -self.nearest(i, j, a, b).reach
-        else:
-            gap = self._gap_of_spheres(i, j, a, b)
-        return gap
-
-    @ti.func
-    def nearest(self, i, j, a, b):
-        """Where bodies i and j are nearest by an entry (a, b), in the frame of the first."""
-        turn, offset = self.place(i, j)
-        return self.law.nearest(a, b, turn, offset)
+        state = self.state
+        first, second = state.position[i], state.position[j]
+        return self.geometry.gap(a, b, first, state.rotation(i), second, state.rotation(j))
 
     @ti.func
     def place(self, i, j):
         """Rotation and place [m] of body j in the frame of body i."""
         branch = self.state.position[j] - self.state.position[i]
         return place_in(self.state.rotation(i), self.state.rotation(j), branch)
-
-    @ti.func
-    def _gap_of_spheres(self, i, j, a, b):
-        on_first = matvec(self.state.rotation(i), self.tables.sphere[a].xyz)
-        on_second = matvec(self.state.rotation(j), self.tables.sphere[b].xyz)
-        apart = self.state.position[j] + on_second - self.state.position[i] - on_first
-        return norm(apart) - self.tables.sphere[a][3] - self.tables.sphere[b][3]
-
-    @ti.func
-    def overlap_energy(self, m, met):
-        """Elastic energy of an overlap where bodies meet, a ``Meeting`` [J]."""
-        return met.area * self.law.stored(m, ti.max(0.0, met.overlap))
-
-    @ti.func
-    def leverage(self, met, pushed, push):
-        """Forces on the second body times their arms from the first [N m], where bodies meet."""
-        # A pressed face also has a couple; its part along the normal changes no stress.
-        found = pushed.outer_product(met.arm)
-        if ti.static(self.law.meets_bodies):
-            found += met.normal.outer_product(cross(met.normal, push * met.couple))
-        return found
 
     @ti.func
     def closer(self, p, margin):
@@ -124,7 +91,7 @@ class Contacts:
     def note_depth(self, p, deepest):
         """Keep the depth of a pair, a share of its size, and for good where one body sinks in."""
         self.store.deepest[p] = deepest
-        if ti.static(self.law.meets_bodies):
+        if ti.static(not self.geometry.by_face):
             if deepest > DEEPEST_SHARE:
                 for side in ti.static(range(2)):
                     self.state.note_active(self.store.body[p][side], ti.i64(SUNK))
@@ -137,13 +104,6 @@ class Contacts:
         self.store.impulse[slot] = self.store.impulse[slot] + stacked(linear, angular)
 
     @ti.func
-    def book_friction(self, p, energy):
-        """Book energy [J] that friction took beside an impulse, for the first body to take."""
-        if energy != 0.0:
-            self.store.heat[p][1] = self.store.heat[p][1] + energy
-            self.store.waiting[p][0] = 1
-
-    @ti.func
     def gather(self, i):
         """Collect the pending impulse and moment of the contacts of body i."""
         linear, angular = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
@@ -152,7 +112,7 @@ class Contacts:
             if self.store.waiting[p][0] == 1:
                 linear, angular = self._gather_side(p, 0, linear, angular)
                 self.state.contact_heat[i] = self.state.contact_heat[i] + self.store.heat[p]
-                self.store.heat[p] = vec3(0.0)
+                self.store.heat[p] = vec4(0.0)
         for a in range(self.store.second_start[i], self.store.second_start[i + 1]):
             p = self.store.second_slot[a]
             if self.store.waiting[p][1] == 1:
@@ -180,23 +140,12 @@ class Contacts:
     def look(self, k, i, j, turn, offset, margin, stepping: ti.template()):
         """The ``Nearest`` of entry k, bodies i and j, of which a step takes note."""
         near = Nearest(reach=-AWAY)
-        if self.may_meet(k, i, j, margin):
-            near = self.law.nearest(self.store.sphere[k][0], self.store.sphere[k][1], turn, offset)
+        if self.geometry.may_meet(k, self.paths(i, j), margin):
+            entry = self.store.sphere[k]
+            near = self.geometry.nearest(entry[0], entry[1], turn, offset)
             if ti.static(stepping):
-                self.law.settle(near, k)
-                if ti.static(self.law.meets_bodies):
-                    # Rounding of paths is far below what is left of the gap.
-                    gap = ti.max(0.0, -near.reach) * (1.0 - 1e-6)
-                    self.clear_until[k] = self.path[i] + self.path[j] + gap
+                self.geometry.settle(near, k, self.paths(i, j))
         return near
-
-    @ti.func
-    def may_meet(self, k, i, j, margin):
-        """Whether bodies may be within a margin [m] by entry k, so far as their paths tell."""
-        meets = True
-        if ti.static(self.law.meets_bodies):
-            meets = not self.path[i] + self.path[j] + margin < self.clear_until[k]
-        return meets
 
     @ti.func
     def moved(self, i, velocity, spin, elapsed):
@@ -266,21 +215,21 @@ class Breaks:
         self.fresh = ti.field(ti.i32, shape=())
         self.latest = ti.field(ti.i64, shape=())
         self.newest = ti.field(ti.i64, shape=self.tables.capacity.bodies)
-        if contacts.law.meets_bodies:
+        if not contacts.geometry.by_face:
             self.corner, self.is_open = (
                 ti.field(ti.i32, shape=self.tables.capacity.faces) for _ in range(2)
             )
 
     def load(self, model: Model) -> None:
         """Load the corners of a scene."""
-        if self.contacts.law.meets_bodies:
+        if not self.contacts.geometry.by_face:
             assign(self.corner, model.mesh.tetrahedra.reshape(-1))
 
     def phases(self, bodies: Some) -> Phases:
         """Phases that note which faces are free now, and when the last of them were set free."""
         waiting = Some(self._bonds_waited_for, self.tables.capacity.bonds, light=True)
         phases: Phases = ((waiting, self._note_break), (bodies, self._note))
-        if self.contacts.law.meets_bodies:
+        if not self.contacts.geometry.by_face:
             phases += ((bodies, self._open_corners),)
         return (*phases, (Once(), self._end))
 
@@ -305,7 +254,7 @@ class Breaks:
                 if bare and self.tables.face_bond[face] < 0:
                     self.state.exposed_tick[face] = self.state.tick[None]
             newest = ti.max(newest, self.state.exposed_tick[face])
-            if ti.static(self.contacts.law.meets_bodies):
+            if ti.static(not self.contacts.geometry.by_face):
                 self.is_open[face] = 0
         self.newest[i] = newest
         if newest > self.latest[None]:
@@ -331,7 +280,7 @@ class Breaks:
     def is_free(self, i):
         """1 for a body that others may touch."""
         free = ti.cast(self.newest[i] >= 0, ti.i32)
-        if ti.static(self.contacts.law.meets_bodies):
+        if ti.static(not self.contacts.geometry.by_face):
             for c in range(4):
                 free |= self.is_open[self.corner[4 * i + c]]
         return free
@@ -378,5 +327,6 @@ class Breaks:
             born = ti.max(self.state.exposed_tick[a // size], self.state.exposed_tick[b // size])
             if fresh and (freed or born == tick):
                 overlap = ti.max(0.0, -self.contacts.gap(i, j, a, b))
-                energy += self.contacts.law.stored(self.tables.pair(i, j), overlap)
+                touch = Touch(overlap=overlap, rate=0.0, area=1.0)
+                energy += self.contacts.law.stored(self.tables.pair(i, j), k, touch)
         return energy

@@ -24,7 +24,7 @@ from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.ordered import Once, Phases, RunningSums, Some, tasks
 from taichi_dem.kit.products import norm
-from taichi_dem.kit.types import vec3
+from taichi_dem.kit.types import vec4
 from taichi_dem.methods import Method
 from taichi_dem.state.model import Model
 
@@ -68,7 +68,8 @@ class BroadPhase:
         ends = self._is_free, self._put_free, self._end_free
         self.listing = RunningSums(Some(self._body_count, n, light=True), 1, *ends)
         # No whole body is nearer to another for a face that is free now.
-        self.set_free = VISITED if contacts.law.meets_bodies else COMPARED
+        self.geometry = contacts.geometry
+        self.set_free = COMPARED if self.geometry.by_face else VISITED
         self.phases = self._phases(n)
         self.tasks = tasks(self.phases, n)
 
@@ -89,9 +90,9 @@ class BroadPhase:
 
     def search(self, everywhere: bool = True) -> None:
         """Renew the lists now. Raises InputError when they exceed their capacity."""
-        if everywhere and self.contacts.law.meets_bodies:
+        if everywhere:
             # Bodies may have been moved by hand.
-            assign(self.contacts.clear_until, 0.0)
+            self.geometry.forget_paths()
         self.ask(everywhere)
         self.renew()
         self.check_capacity()
@@ -101,8 +102,8 @@ class BroadPhase:
         option = _CAPACITIES[int(values(self.full))]
         if option:
             law = type(self.contacts.law).__name__
-            if self.contacts.law.meets_bodies and option == "spheres_per_body":
-                option = "pairs_per_body"
+            if option == "spheres_per_body":
+                option = self.geometry.entries_by
             raise InputError(
                 f"contact lists are full: give {law} a larger {option}, or move "
                 "overlapping solids apart"
@@ -269,8 +270,8 @@ class BroadPhase:
         if gap < far:
             turn, offset = self.contacts.place(i, j)
             faces = self.breaks.free_faces(i, j)
-            count, gap = self.contacts.law.find(i, j, turn, offset, faces, margin, far)
-        keeps = ti.static(self.contacts.law.meets_bodies) and count == self.neighbours.found[k]
+            count, gap = self.geometry.find(i, j, turn, offset, faces, margin, far)
+        keeps = ti.static(not self.geometry.by_face) and count == self.neighbours.found[k]
         self.neighbours.note_found(k, i, count, self.contacts.paths(i, j) + gap, keeps)
 
     @ti.func
@@ -314,12 +315,12 @@ class BroadPhase:
             turn, offset = self.contacts.place(i, j)
             faces, margin = self.breaks.free_faces(i, j), self.contacts.margin(i, j)
             place = self.store.sphere_place[p]
-            self.contacts.law.enter(i, j, turn, offset, faces, margin, place)
+            self.geometry.enter(i, j, turn, offset, faces, margin, place)
             self.store.replace_spheres(p, count)
-            if not ti.static(self.contacts.law.meets_bodies):
+            if ti.static(self.geometry.by_face):
                 injected = self.breaks.injected(p)
                 if injected > 0.0:
-                    self.store.heat[p] = self.store.heat[p] + vec3(0.0, 0.0, injected)
+                    self.store.heat[p] = self.store.heat[p] + vec4(0.0, 0.0, injected, 0.0)
                     self.store.waiting[p][0] = 1
         elif count == 0:
             self.store.remove_spheres(p)

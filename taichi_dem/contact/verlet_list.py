@@ -48,7 +48,7 @@ class VerletList:
     def load(self, model: Model, method: Method) -> None:
         """Set the limit of a scene; the next search rebuilds the list."""
         assign(self.stale, STALE)
-        each = model.contact.neighbours_per_body
+        each = model.geometry.neighbours_per_body
         assign(self.limit, model.body_count * each + SPARE_NEIGHBOURS)
 
     @ti.func

@@ -26,6 +26,12 @@ Travel = tuple[tuple[float, ...], tuple[float, ...]]
 NEAR = 1.0 - 1e-9
 
 
+def asked(method: Any) -> Any:
+    """Mark a method that each class of a role must give."""
+    method.is_asked = True
+    return method
+
+
 class Effect:
     """Base of all effects.
 
@@ -38,9 +44,7 @@ class Effect:
 
     role = ""
     name = ""
-    #: Each of the next four asks for members of its own (``laws.roles``).
-    #: Whether a friction law keeps a spring for each sphere pair.
-    remembers = False
+    #: Each of the next three asks for members of its own (``laws.roles``).
     #: Whether a shear law keeps a residual slip of each unit.
     remembers_slip = False
     #: Whether a shear law may release a face.
@@ -288,27 +292,5 @@ class NoDashpot(Effect):
         return vec3(0.0, 0.0, 0.0)
 
 
-@ti.data_oriented
-class NoFriction(Effect):
-    """Frictionless contacts."""
-
-    role = "friction"
-    is_null = True
-
-    @ti.func
-    def limit(self, m, force_normal):
-        """No friction at any normal force."""
-        return 0.0
-
-    @ti.func
-    def force(self, m, damping, force_normal, slide):
-        """No force at any sliding velocity."""
-        return vec3(0.0, 0.0, 0.0)
-
-
 #: Roles of which a law of the role bond takes the place.
 PARTS_OF_BOND = ("tension", "shear")
-#: Classes of the null objects by role.
-ABSENT: dict[str, Any] = {
-    kind.role: kind for kind in (ElasticTension, ElasticShear, NoDashpot, NoFriction)
-}

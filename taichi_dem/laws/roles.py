@@ -10,10 +10,11 @@ from typing import Any
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
-from taichi_dem.laws.base import PARTS_OF_BOND, Effect
-from taichi_dem.laws.body_contact import BodyContact
+from taichi_dem.laws.base import PARTS_OF_BOND, Effect, ElasticShear, ElasticTension, NoDashpot
 from taichi_dem.laws.bond import BondDamping, ShearSlip, Softening
-from taichi_dem.laws.sphere_contact import ONCE_BROKEN, StickingFriction
+from taichi_dem.laws.contact import BodyContact
+from taichi_dem.laws.contact_contracts import ONCE_BROKEN
+from taichi_dem.laws.friction import NoFriction, StickingFriction
 from taichi_dem.materials.body_materials import BodyMaterials
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import parts_of
@@ -70,38 +71,6 @@ MEMBERS = {
     # Damping of a bond's contact units: traction [Pa] at a relative velocity in the face frame
     # [m/s].
     "dashpot": ("traction(b, velocity)",),
-    # Normal law of contact spheres.
-    "contact": (
-        # Repulsion [N] at an overlap [m] of spheres that part at a rate [m/s].
-        "normal(m, overlap, opening_rate)",
-        # Part of it that is stored [N].
-        "elastic(m, overlap)",
-        # Coefficient of the dashpot [N s/m], which friction shares.
-        "damping(m)",
-        # Energy [J].
-        "stored(m, overlap)",
-        # Whether bodies meet (``BodyContact``), instead of their spheres.
-        "meets_bodies",
-        # The ``ContactSpheres`` of all faces of a ``Model``.
-        "spheres(model)",
-        # Where two bodies are nearest by an entry of the pair store (``SphereContact``).
-        "nearest(a, b, turn, offset)",
-        # How much of two bodies may touch soon, and the gap of all else; enters it.
-        "find(i, j, turn, offset, faces, margin, far)",
-        "enter(i, j, turn, offset, faces, margin, place)",
-        # Whether a ``Nearest`` is nearer than a margin [m], and the ``Meeting`` there.
-        "is_within(near, margin)",
-        "meeting(near, k, rotation)",
-        # Take note of a ``Nearest`` of entry k before its forces are asked.
-        "settle(near, k)",
-    ),
-    # Tangential law of contact spheres.
-    "friction": (
-        # Largest friction [N] at a normal force [N]; of impulses likewise.
-        "limit(m, force_normal)",
-        # Force [N] on the second sphere against its sliding velocity [m/s].
-        "force(m, damping, force_normal, slide)",
-    ),
     # Force on bodies.
     "load": (
         # Nonzero for a body on which it acts.
@@ -126,20 +95,6 @@ MEMBERS = {
         # world axes, about the centre, positive semidefinite.
         "resistance(i)",
     ),
-    # Springs across contacts, of which each sphere pair keeps its own: of friction. Vectors are in
-    # the first body's frame.
-    "remembers": (
-        # Turn the spring of pair k into the plane of contact and stretch it by ``way`` [m].
-        "follow(k, normal, way)",
-        # Shorten the spring to a limit [N]; return the energy dissipated [J].
-        "slip(m, k, limit, way)",
-        # Force [N] on the second sphere.
-        "spring(m, k)",
-        # Energy [J].
-        "stored(m, k)",
-        # Forget the spring as the spheres part; energy [J] that it had.
-        "part(m, k)",
-    ),
     # Slip of shear that stays when the traction is gone: in the face frame [m], two components.
     "remembers_slip": ("residual_slip(u)",),
     # Failure in shear: 1 once the unit transmits nothing any more at a pressure [Pa], else 0.
@@ -156,8 +111,12 @@ _DOES = {
     "tension": ("traction", "failed"),
     "shear": ("traction", "failed"),
     "dashpot": ("traction",),
-    "contact": ("normal", "elastic", "nearest"),
+    "contact": ("push",),
     "friction": ("limit", "force", "spring"),
+}
+#: Classes of the null objects by role.
+ABSENT: dict[str, Any] = {
+    kind.role: kind for kind in (ElasticTension, ElasticShear, NoDashpot, NoFriction)
 }
 AUTO, ALL, LISTED = "auto", "all", "listed"
 #: Words for the effects of a scene.
@@ -189,6 +148,10 @@ def _first(kind, member):
     return places[0] if places else len(kind.__mro__)
 
 
+def _is_asked(member):
+    return getattr(member, "is_asked", False)
+
+
 def check_effect(effect: Any) -> None:
     """Raise InputError unless an effect has a known role and every member of that role."""
     if effect.role not in ROLES:
@@ -197,7 +160,13 @@ def check_effect(effect: Any) -> None:
             f"{effect.role!r}"
         )
     further = [key for key in MEMBERS if key not in ROLES and getattr(effect, key, False)]
-    wanted = [member for key in (effect.role, *further) for member in MEMBERS[key]]
+    wanted = [member for key in (effect.role, *further) for member in MEMBERS.get(key, ())]
+    own = [name for name in dir(type(effect)) if _is_asked(getattr(type(effect), name))]
+    if own:
+        raise InputError(
+            f"effect {type(effect).__name__} must have {', '.join(own)}, as its role "
+            f"{effect.role} asks (taichi_dem/laws/contact_contracts.py)"
+        )
     for member in wanted:
         if not hasattr(type(effect), member.partition("(")[0]):
             raise InputError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
@@ -20,7 +20,6 @@ from taichi_dem.materials.bond_rules import (
     bond_geometry,
     joined_constants,
     per_bond,
-    typical_of,
 )
 from taichi_dem.materials.material import RULES, Material, check_energy, unchecked
 from taichi_dem.mesh.mesh import Mesh
@@ -107,12 +106,13 @@ class BodyMaterials:
         """Largest friction coefficient."""
         return max(material.friction for material in self.materials)
 
-    def of_contacts(self, name: str) -> Any:
-        """Largest constant of the contacts that a body can have, (body_count,)."""
+    def largest(self, of: Callable[[Material], Any]) -> Any:
+        """Largest value over the contacts of a body; of: one of a pair, for all bodies or each."""
         if self.is_one:
-            return typical_of(getattr(self.pairs[0][0], name))
-        most = [max(typical_of(getattr(pair, name)) for pair in row) for row in self.pairs]
-        return np.array(most)[self.of_body]
+            return of(self.pairs[0][0])
+        most = [np.max([of(pair) for pair in row], axis=0) for row in self.pairs]
+        each = np.array([np.broadcast_to(value, self.of_body.shape) for value in most])
+        return each[self.of_body, np.arange(len(self.of_body))]
 
     def checked_pairs(self) -> tuple[Material, ...]:
         """Every material and every pair in a bond, with the numbers of its softest bond."""

@@ -138,6 +138,8 @@ class Recorder:
             row[f"{body}monitor_displacement_mm"] = 1e3 * way
         row["broken_faces"] = int(sim.state.broken().sum())
         row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})
+        if self.model.has_contact and self.model.contact.has_memory:
+            row["hysteresis_J"] = account["hysteresis"]
         if self.model.ground:
             row["ground_dashpot_J"] = account["ground_dashpot"]
             row.update(self._ground_work())

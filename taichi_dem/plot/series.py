@@ -23,6 +23,7 @@ ENERGY_TERMS = {
     "release_J": ("release", "#5C1A00", "--"),
     "sphere_dashpot_J": ("contact dashpots", "#CDBDE3", "-."),
     "friction_J": ("friction", "#6F4FA0", "-."),
+    "hysteresis_J": ("contact hysteresis", "#3F007D", "-."),
     "ground_dashpot_J": ("ground dashpots", "#8C8C8C", (0, (8, 2))),
 }
 _GIVEN = {

@@ -97,7 +97,7 @@ class DivergenceCheck:
     def _check_pairs(self, contacts):
         bodies, _, deepest = contacts.store.near_table()
         pair = int(deepest.argmax())
-        if contacts.law.meets_bodies:
+        if not contacts.geometry.by_face:
             if deepest[pair] > DEEPEST_SHARE:
                 self._shares(*bodies[pair].tolist(), deepest[pair])
         elif deepest[pair] > DEEPEST_OVERLAP:
@@ -109,7 +109,7 @@ class DivergenceCheck:
     def keeps_bodies_apart(self) -> bool:
         """Whether contact of all faces is to keep bodies apart."""
         contact = self.run.model.contact
-        return contact is not None and bool(contact.outer_faces)
+        return contact is not None and bool(contact.geometry.outer_faces)
 
     def check_shared(self, volume: SharedVolume) -> None:
         """Raise SimulationDiverged where contact of all faces has not kept two bodies apart."""
@@ -177,7 +177,7 @@ class DivergenceCheck:
             words = "and the scene starts so: move the bodies apart"
             return self._error(body, what, (words, {}))
         law = self.run.model.contact
-        stiffness = law.firmness(self.run.model.materials)
+        stiffness = law.firmness(self.run.model.mesh, self.run.model.materials)
         firm = RAISED * float(np.broadcast_to(stiffness, self.run.model.body_count)[body])
         firmer = law.firmer.format(law=type(law).__name__, value=firm)
         firmer = f"its contacts are too soft: try {firmer}", {law.knob: float(f"{firm:.2g}")}

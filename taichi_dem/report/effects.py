@@ -26,7 +26,7 @@ _LAWS = {
     "tension": ("bonds softened", ("softening", "release"), "softening"),
     "shear": ("bonds slipped", ("slip",), "slip"),
     "dashpot": ("bonds damped", ("bond_dashpot",), ""),
-    "contact": ("bodies touched", ("sphere_dashpot", "sphere_strain"), "contact"),
+    "contact": ("bodies touched", ("sphere_dashpot", "sphere_strain", "hysteresis"), "contact"),
     "friction": ("bodies rubbed", ("friction",), "friction"),
 }
 _WITHOUT_WORK = ", and holds without doing work"

@@ -1,7 +1,8 @@
 """Energy and momentum account of a run, term by term.
 
 work of loads and supports + energy at the start = kinetic + bond strain + contact strain
-+ bond dashpots + slip + softening + release + friction + contact dashpots + ground dashpots
++ bond dashpots + slip + softening + release + friction + contact dashpots + contact hysteresis
++ ground dashpots
 - injected + residual. Terms of all contacts, also of whole bodies, are called ``sphere_*``.
 """
 
@@ -14,13 +15,14 @@ from taichi_dem.report.readings import Kept, Run
 #: Terms of the account in the order of tables and files, all in J.
 TERMS = tuple(
     "kinetic bond_strain sphere_strain bond_dashpot softening release slip sphere_dashpot friction "
-    "ground_dashpot injected load_work support_work residual".split()
+    "hysteresis ground_dashpot injected load_work support_work residual".split()
 )
 #: Terms that the columns of the three tables add to.
 _COLUMNS = (
-    "kinetic load_work support_work sphere_dashpot friction injected ground_dashpot".split(),
+    "kinetic load_work support_work sphere_dashpot friction injected hysteresis "
+    "ground_dashpot".split(),
     "bond_strain bond_dashpot slip release softening".split(),
-    "sphere_strain sphere_dashpot friction injected".split(),
+    "sphere_strain sphere_dashpot friction injected hysteresis".split(),
 )
 #: Terms that the bodies hold; all others are booked as they are given or taken.
 HELD = ("kinetic", "bond_strain", "sphere_strain")

@@ -13,6 +13,7 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.kit.launch import Launch
 from taichi_dem.kit.products import norm
 from taichi_dem.kit.types import vec2, vec3
+from taichi_dem.laws.contact_contracts import DEEP
 from taichi_dem.state.model import Model, sums
 from taichi_dem.state.state import PARTS, State
 from taichi_dem.step.multirate.half_step import HalfStep
@@ -28,7 +29,7 @@ PAIR = np.dtype(
     [
         *(("on_first", float, 6), ("on_second", float, 6), ("dragged", float), ("rubbed", float)),
         *(("rub", float), ("bound", float), ("rub_power", float), ("strain", float)),
-        *(("heat", float, 3), ("step", float), ("leverage", float, (3, 3))),
+        *(("heat", float, 4), ("spent", float), ("step", float), ("leverage", float, (3, 3))),
     ]
 )
 #: Record of a bond: its energies [J], mean damage, which parts of its law acted, and largest slip
@@ -44,10 +45,11 @@ BOND = np.dtype(
 
 def body_record(drives: int) -> np.dtype:
     """Record of a body: energy and works [J], heats of contacts [J], motion, work of each drive."""
-    vectors = ("contact_heat", "velocity", "spin", "angular_momentum")
+    vectors = ("velocity", "spin", "angular_momentum")
     return np.dtype(
         [
             *(("kinetic", float), ("load_work", float), ("support_work", float)),
+            ("contact_heat", float, 4),
             *((name, float, 3) for name in vectors),
             ("works", float, (drives + 1,)),
         ]
@@ -159,7 +161,9 @@ class Readings:
                 table[a, at.on_first + 3 + k] = half * found.moment_i[k]
                 table[a, at.on_second + k] = half * found.force[k]
                 table[a, at.on_second + 3 + k] = half * found.moment_j[k]
+            for k in ti.static(range(4)):
                 table[a, at.heat + k] = self.contacts.store.heat[p][k]
+            table[a, at.spent] = found.spent
             table[a, at.dragged], table[a, at.rubbed] = half * found.dragged, half * found.rubbed
             table[a, at.rub], table[a, at.bound] = found.rub, found.bound
             table[a, at.rub_power], table[a, at.strain] = found.rubbed, found.stored
@@ -186,7 +190,7 @@ class Readings:
         return found
 
     def bodies(self) -> np.ndarray:
-        """Kinetic energy, work of loads, supports, contact heats, ground's heat [J], (n, 7)."""
+        """Kinetic energy, work of loads, supports, contact heats, ground's heat [J], (n, 8)."""
         table, grounds = self._present(), len(self.tables.loads) + 1
         given = (table[name] for name in ("kinetic", "load_work", "support_work", "contact_heat"))
         return np.column_stack([*given, 0.0 - table["works"][:, grounds:].sum(axis=1)])
@@ -241,7 +245,8 @@ class Readings:
             for k in ti.static(range(3)):
                 table[i, at.velocity + k], table[i, at.spin + k] = velocity[k], spin[k]
                 table[i, at.angular_momentum + k] = momentum[k]
-                if ti.static(self.tables.has_contact):
+            if ti.static(self.tables.has_contact):
+                for k in ti.static(range(4)):
                     table[i, at.contact_heat + k] = self.state.contact_heat[i][k]
             for e in ti.static(range(len(self.tables.drives) + 1)):
                 table[i, at.works + e] = self.state.load_work[i][e] + works[e]
@@ -301,11 +306,13 @@ class Readings:
             table[b, at.acted + part] = ti.cast((acted >> part) & 1, ti.f64)
 
     def pairs(self) -> np.ndarray:
-        """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""
+        """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 5)."""
         table, _ = self._contacts()
         found = np.column_stack([table["strain"], table["heat"]])
         found[:, 1] += table["dragged"]
         found[:, 2] += table["rubbed"]
+        # What the law has taken since the last step took note of it.
+        found[:, 4] += table["spent"]
         return found
 
     def momentum(self) -> np.ndarray:
@@ -353,10 +360,11 @@ class Readings:
                 if ti.static(self.step.bonds.limited):
                     ti.atomic_min(share[i], self.step.pairs.share(i, j))
                 else:
-                    rate = count * self.contacts.law.damping(self.tables.pair(i, j))
-                    if ti.static(self.contacts.law.meets_bodies):
-                        area = self.contacts.law.largest_area(i, j)
-                        rate *= area * self.contacts.law.weight(i, j, area)
+                    law, geometry = self.contacts.law, self.contacts.geometry
+                    numbers, deep = law.row(self.tables.pair(i, j)), DEEP * self.tables.extent[i]
+                    area = geometry.largest_area(i, j)
+                    rate = count * law.damping_at(numbers, deep)
+                    rate *= area * geometry.weight(i, j, area)
                     rate *= 1.0 / self.tables.mass[i] + 1.0 / self.tables.mass[j]
                     ti.atomic_max(taken[i], rate * self.schedule.pair_step(i, j))
 

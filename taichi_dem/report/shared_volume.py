@@ -189,7 +189,7 @@ class SharedVolume(Kept):
             return tuple(found)
         law = type(contact).__name__
         advice = f"a larger {contact.knob}, or more points, of {law} keeps them apart"
-        if not contact.outer_faces:
+        if not contact.geometry.outer_faces:
             advice = f"{remedy(contact)} lets them touch there too"
         if worst.share > max(NOTABLE, first.share):
             found.append(f"{_words(worst, f't = {worst.time_s:.4g} s')}: {advice}")
@@ -204,7 +204,7 @@ class SharedVolume(Kept):
         if contact is None or not words:
             return ()
         rest = f", or {type(contact).__name__} takes their overlap as unloaded"
-        return (f"{words}: move them apart{rest * contact.meets_bodies}",)
+        return (f"{words}: move them apart{rest * (not contact.geometry.by_face)}",)
 
     def _compare(self, corners):
         """Find all pairs and their shares; corners (n, 4, 3) [m]."""

@@ -64,7 +64,7 @@ class ContactLimits:
 
     def __init__(self, tables: Tables, state: State, contacts: Contacts):
         self.tables, self.state, self.contacts = tables, state, contacts
-        self.store = contacts.store
+        self.store, self.law = contacts.store, contacts.law
         self.ahead = ti.field(real, shape=MAX_LEVEL + 1)
         self.count = self.store.column("count_within_margin", ti.i32)
         self.slides = ti.field(ti.i32, shape=())
@@ -109,37 +109,38 @@ class ContactLimits:
             else:
                 p, side = self.store.second_slot[second + k - swap], 1
             if self.count[p] != 0:
-                a, b, c = self._add_pair(p, side, a, b, c)
+                a, b, c, deepest = self._add_pair(p, side, a, b, c)
                 i, j = self.store.body[p][0], self.store.body[p][1]
-                m, weight = self.tables.pair(i, j), 1.0
-                if ti.static(self.contacts.law.meets_bodies):
-                    weight = self.contacts.law.weight(i, j, self.contacts.law.largest_area(i, j))
-                damping = weight * self.contacts.law.damping(m)
-                constants = ti.Vector([damping, self.contacts.law.elastic(m, 1.0)])
-                largest = ti.max(largest, constants)
+                numbers, geometry = self.law.row(self.tables.pair(i, j)), self.contacts.geometry
+                weight = geometry.weight(i, j, geometry.largest_area(i, j))
+                damping = weight * self.law.damping_at(numbers, deepest)
+                stiffness = self.law.stiffness_at(numbers, deepest)
+                largest = ti.max(largest, ti.Vector([damping, stiffness]))
         return largest_eigenvalue(a, b, c) * largest
 
     @ti.func
     def _add_pair(self, p, side, a, b, c):
-        """Add the near contacts of a pair to the block of its first (0) or second (1) body."""
+        """Add the near contacts of a pair to the block of its first (0) or second (1) body.
+
+        Also returns the deepest overlap [m] that they can reach before they are asked again.
+        """
         i, j = self.store.body[p][0], self.store.body[p][1]
         if side == 1:
             i, j = j, i
         branch, margin = self.state.position[j] - self.state.position[i], self.margin(i, j)
         turn, offset = place_in(self.state.rotation(i), self.state.rotation(j), branch)
+        area, deepest = self.contacts.geometry.largest_area(i, j), 0.0
         for k in range(self.store.first[p], self.store.last[p]):
             own, other = self.store.sphere[k][0], self.store.sphere[k][1]
             if side == 1:
                 own, other = other, own
-            near = self.contacts.law.nearest(own, other, turn, offset)
-            if self.contacts.law.is_within(near, margin):
+            near = self.contacts.geometry.nearest(own, other, turn, offset)
+            if self.contacts.geometry.is_within(near, margin):
                 normal = near.apart / ti.max(near.apart.norm(), 1e-30)
                 da, db, dc = self._contact(i, near.first.xyz + near.first[3] * normal, normal)
-                if ti.static(self.contacts.law.meets_bodies):
-                    area = self.contacts.law.largest_area(i, j)
-                    da, db, dc = area * da, area * db, area * dc
-                a, b, c = a + da, b + db, c + dc
-        return a, b, c
+                a, b, c = a + area * da, b + area * db, c + area * dc
+                deepest = ti.max(deepest, margin + self.contacts.geometry.overlap(near))
+        return a, b, c, deepest
 
     @ti.func
     def _contact(self, i, arm, normal):

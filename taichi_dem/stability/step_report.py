@@ -190,7 +190,7 @@ def step_limits(
     limits = bond_steps(mesh, material, multiply, bool(dashpot))
     if contact is not None:
         stiffness, damping = contact.strongest(mesh, material)
-        of_faces = mesh, material.density, contact.divisions, bool(friction)
+        of_faces = mesh, material.density, contact.geometry.divisions, bool(friction)
         whole_face = contact_eigenvalues(*of_faces, multiply)
         limits["contact_stiffness"] = spring_step(stiffness * whole_face)
         limits["contact_dashpot"] = dashpot_step(damping * whole_face)

@@ -71,6 +71,7 @@ class Model:
         self.loads, self.supports, self.ground = (tuple(self.by_role[role]) for role in MANY)
         self.contact: Any = next(iter(self.by_role["contact"]), None)
         self.has_contact = self.contact is not None
+        self.geometry: Any = self.contact.geometry if self.has_contact else None
         self.holes: dict[str, Any] = {}
 
     def harmless(self) -> "Model":
@@ -98,7 +99,7 @@ class Model:
     @cached_property
     def spheres(self) -> ContactSpheres:
         """``ContactSpheres`` of every face; with contact only."""
-        return self.contact.spheres(self)
+        return self.geometry.spheres(self)
 
     @cached_property
     def dashpot_rates(self) -> np.ndarray:

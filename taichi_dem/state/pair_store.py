@@ -7,7 +7,7 @@ import taichi as ti
 
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.types import real, vec3
+from taichi_dem.kit.types import real, vec4
 
 #: Sphere pairs that may be out of use, beside as many as are in use, before the rest is packed.
 SLACK = 4096
@@ -54,8 +54,9 @@ class PairStore:
 
     body: the two bodies of a slot, first < second; first .. last: places of its sphere pairs;
     impulse[2 p + side]: pending impulse [N s] and moment about the body's centre [N m s], valid
-    where waiting is 1; heat: of dashpots, friction and injected [J], until the first body takes it.
-    Columns of others are zero when their pair comes near, or their sphere pair is found.
+    where waiting is 1; heat: of dashpots, friction, injected and of the law [J], until the first
+    body takes it. Columns of others are zero when their pair comes near, or
+    their sphere pair is found.
 
     Pairs are visited by (first body, second body), whatever the order of slots, so that sums do not
     depend on the history of searches: first_of[i], second_start[i]: where those of body i begin.
@@ -82,7 +83,7 @@ class PairStore:
         self.first, self.last, self.is_new = (ti.field(ti.i32, shape=slots) for _ in range(3))
         self.sphere_place, self.free = (ti.field(ti.i32, shape=slots) for _ in range(2))
         self.impulse = ti.Vector.field(6, real, shape=2 * slots)
-        self.heat = ti.Vector.field(3, real, shape=slots)
+        self.heat = ti.Vector.field(4, real, shape=slots)
         self.deepest = ti.field(real, shape=slots)
         self.free_count, self.used_end = (ti.field(ti.i32, shape=()) for _ in range(2))
 
@@ -152,7 +153,7 @@ class PairStore:
     def clear_slot(self, p):
         """Reset the slot of a pair."""
         self.first[p], self.last[p], self.waiting[p], self.is_new[p] = 0, 0, [0, 0], 1
-        self.heat[p], self.deepest[p] = vec3(0.0), 0.0
+        self.heat[p], self.deepest[p] = vec4(0.0), 0.0
         for slot in range(2 * p, 2 * p + 2):
             self.impulse[slot] = ti.Vector.zero(real, 6)
         self.columns.clear(p)

@@ -128,7 +128,7 @@ class State:
             self.bond_heat = ti.Vector.field(2, real, shape=bonds)
         if tables.has_contact:
             self.exposed_tick = ti.field(ti.i64, shape=tables.capacity.faces)
-            self.contact_heat = ti.Vector.field(3, real, shape=n)
+            self.contact_heat = ti.Vector.field(4, real, shape=n)
             self.injected_tick = ti.field(ti.i64, shape=())
         self.active_effects = ti.field(ti.i64, shape=n)
         self.limits = ti.Vector.field(3, real, shape=MOST**2)

@@ -79,7 +79,7 @@ def capacity_of(model: Model) -> Capacity:
     """Capacity that a ``Model`` needs."""
     if not model.has_contact:
         return Capacity(model.body_count)
-    return Capacity(model.body_count, model.contact.face_spheres, *model.contact.lengths)
+    return Capacity(model.body_count, model.geometry.face_spheres, *model.geometry.lengths)
 
 
 #: Smallest engine: the paper's block and contact lists of the usual length find room in it.
@@ -109,6 +109,7 @@ class Tables:
     dashpot: Any
     friction: Any
     contact: Any
+    geometry: Any
 
     def __init__(self, capacity: Capacity, on_demand: bool = False):
         self.capacity, self.on_demand = capacity, on_demand
@@ -116,14 +117,16 @@ class Tables:
         self._declare_bodies(capacity.bodies)
         self._declare_bonds(capacity)
 
-    def take(self, by_role: dict[str, list[Any]], bond: Any) -> None:
-        """Take the effects that were bound to the tables, by role, and the law of bonds."""
-        self.bond = bond
+    def take(self, by_role: dict[str, list[Any]], bond: Any, geometry: Any) -> None:
+        """Take the effects bound to the tables, by role, law of bonds and geometry of contact."""
+        self.bond, self.geometry = bond, geometry
         self.dashpot, self.friction = by_role["dashpot"][0], by_role["friction"][0]
         self.contact = by_role["contact"][0] if by_role["contact"] else None
         self.loads, self.supports, self.ground = (tuple(by_role[role]) for role in MANY)
         self.effects = tuple(effect for role in ROLES for effect in by_role[role])
         self.has_contact = self.contact is not None
+        if self.has_contact:
+            self.effects = (*self.effects, geometry)
         if self.has_contact:
             self._declare_spheres(self.capacity)
 
@@ -186,7 +189,8 @@ class Tables:
     def matched(self, model: Model) -> list[tuple[Any, Any]]:
         """Pairs of an effect bound here and the corresponding one of a model; no null objects."""
         bound = {role: iter([e for e in self.effects if e.role == role]) for role in ROLES}
-        return [(next(bound[given.role]), given) for given in model.effects]
+        found = [(next(bound[given.role]), given) for given in model.effects]
+        return [*found, *([(self.geometry, model.geometry)] if self.has_contact else [])]
 
     def _load_bonds(self, model):
         bonds = model.bonds

@@ -1,9 +1,10 @@
-"""Contact forces of a pair of bodies; springs of friction."""
+"""The one evaluation of the contacts of a pair of bodies; springs of friction."""
 
 import taichi as ti
 
 from taichi_dem.kit.products import cross, dot, matvec, norm, transposed_matvec
-from taichi_dem.kit.types import mat3, real, vec3
+from taichi_dem.kit.types import mat3, real, vec3, vec4
+from taichi_dem.laws.contact_contracts import Touch
 from taichi_dem.physics.rotation import place_in
 from taichi_dem.physics.sphere_pair import active_bits, add_within
 from taichi_dem.step.multirate.schedule import Schedule
@@ -15,7 +16,7 @@ class TangentialSprings:
 
     def __init__(self, schedule: Schedule):
         self.friction, self.schedule = schedule.tables.friction, schedule
-        self.present = schedule.has_contact and schedule.contacts.remembers
+        self.present = schedule.has_contact and schedule.tables.friction.remembers
         if self.present:
             self.evaluated = schedule.store.column("evaluated", ti.i64)
 
@@ -63,7 +64,7 @@ class TangentialSprings:
 
 @ti.dataclass
 class PairForces:
-    """Forces between two bodies in contact, in world axes."""
+    """Forces between two bodies in contact, in world axes; spent: by the law of contact [J]."""
 
     force: vec3
     moment_i: vec3
@@ -71,6 +72,7 @@ class PairForces:
     dragged: real
     rubbed: real
     slipped: real
+    spent: real
     rub: real
     bound: real
     stored: real
@@ -80,6 +82,20 @@ class PairForces:
     active: ti.i64
 
 
+@ti.dataclass
+class Answer:
+    """Force of one contact on the second body [N], its normal part, its friction; powers [W].
+
+    slipped: energy that a spring of friction lost [J].
+    """
+
+    force: vec3
+    pressed: real
+    rub: vec3
+    rubbed: real
+    slipped: real
+
+
 @ti.data_oriented
 class ContactForces:
     """Evaluates the contacts of a pair of bodies, and what it gives in a step."""
@@ -87,6 +103,7 @@ class ContactForces:
     def __init__(self, schedule: Schedule):
         self.schedule, self.tables, self.state = schedule, schedule.tables, schedule.state
         self.contacts, self.store = schedule.contacts, schedule.store
+        self.law, self.geometry = self.contacts.law, self.contacts.geometry
         self.springs = TangentialSprings(schedule)
         self.limits, self.has_limits = schedule.limits, schedule.has_limits
         self.limited = self.has_limits and schedule.limits.limited
@@ -96,82 +113,129 @@ class ContactForces:
         """Add the impulses of a pair's forces in a time [s] to both bodies, and their heat."""
         self.contacts.add_impulse(p, 0, -found.force * dt, found.moment_i * dt)
         self.contacts.add_impulse(p, 1, found.force * dt, found.moment_j * dt)
-        heat = dt * vec3(found.dragged, found.rubbed, 0.0)
+        heat = dt * vec4(found.dragged, found.rubbed, 0.0, 0.0)
         self.store.heat[p] = self.store.heat[p] + heat
 
     @ti.func
     def book(self, p, found):
-        """Note what acted in a pair, its depth, and what its springs lost."""
+        """Note what acted in a pair, its depth, and what springs and law took for good."""
         pair = self.store.body[p]
         if found.active != 0:
             for side in ti.static(range(2)):
                 self.state.note_active(pair[side], found.active)
-        if ti.static(self.springs.present):
-            self.contacts.book_friction(p, found.slipped)
+        self.book_taken(p, found.slipped, found.spent)
         self.contacts.note_depth(p, found.deepest)
 
     @ti.func
-    def forces_of(self, p, elapsed, margin, stepping: ti.template()):
-        """Forces of a pair's sphere contacts now, a ``PairForces``."""
-        pair = self.store.body[p]
-        i, j = pair[0], pair[1]
+    def book_taken(self, p, slipped, spent):
+        """Book energy [J] that friction and the law of contact took beside an impulse."""
+        if ti.static(self.springs.present or self.law.has_memory):
+            if slipped != 0.0 or spent != 0.0:
+                self.store.heat[p] = self.store.heat[p] + vec4(0.0, slipped, 0.0, spent)
+                self.store.waiting[p][0] = 1
+
+    @ti.func
+    def frame(self, i, j):
+        """Way from body i to j [m], rotation of i, rotation and place of j in the frame of i."""
         branch = self.state.position[j] - self.state.position[i]
-        # Most candidates do not touch: tested in the first body's frame, at half the cost.
         rotation = self.state.rotation(i)
         turn, offset = place_in(rotation, self.state.rotation(j), branch)
+        return branch, rotation, turn, offset
+
+    @ti.func
+    def touch(self, k, i, j, near, rotation, branch):
+        """The ``Meeting`` of entry k, its ``Touch``, and the second body's velocity there [m/s]."""
+        met = self.geometry.meeting(near, k, rotation)
+        velocity = self.velocity_at(j, met.arm - branch) - self.velocity_at(i, met.arm)
+        rate = dot(velocity, met.normal)
+        if ti.static(not self.geometry.by_face):
+            rate += dot(met.couple, self.state.spin[j] - self.state.spin[i])
+        return met, Touch(overlap=ti.max(met.overlap, 0.0), rate=rate, area=met.area), velocity
+
+    @ti.func
+    def forces_of(self, p, elapsed, margin, stepping: ti.template()):
+        """Forces of a pair's contacts now; stepping: a step takes note of them."""
+        pair = self.store.body[p]
+        i, j = pair[0], pair[1]
+        # Most candidates do not touch: tested in the first body's frame, at half the cost.
+        branch, rotation, turn, offset = self.frame(i, j)
         found, scale, m = PairForces(), 1.0, self.tables.pair(i, j)
         if ti.static(self.limited):
             scale = self.share(i, j)
         for k in range(self.store.first[p], self.store.last[p]):
             near = self.contacts.look(k, i, j, turn, offset, margin, stepping)
             if ti.static(self.has_limits):
-                found.near_count += ti.cast(self.contacts.law.is_within(near, margin), ti.i32)
-            if self.contacts.law.is_within(near, 0.0):
-                met = self.contacts.law.meeting(near, k, rotation)
-                overlap, normal, arm = met.overlap, met.normal, met.arm
-                velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
-                rate = dot(velocity, normal)
-                slide = velocity - rate * normal
-                if ti.static(self.contacts.law.meets_bodies):
-                    rate += dot(met.couple, self.state.spin[j] - self.state.spin[i])
-                weighted = self._limited(met.weight * rate, scale)
-                push = met.area * self.contacts.law.normal(m, overlap, weighted)
-                drag = met.area * self._limited(met.weight * self.contacts.law.damping(m), scale)
-                spring = met.area * self.contacts.law.elastic(m, overlap)
-                rub, stuck, spent = self._rub(m, k, i, normal, push, drag, slide, elapsed, stepping)
-                pushed = push * normal + rub
-                found.active |= active_bits(push, rub)
-                found.force += pushed
-                found.moment_i -= cross(arm, pushed)
-                found.moment_j += cross(arm - branch, pushed)
-                if ti.static(self.contacts.law.meets_bodies):
-                    found.moment_i -= push * met.couple
-                    found.moment_j += push * met.couple
-                found.dragged += (spring - push) * rate
-                found.rubbed -= dot(rub - stuck, slide)
-                found.slipped += spent
-                found.rub += norm(rub)
-                found.bound += self.tables.friction.limit(m, push)
-                found.deepest = ti.max(found.deepest, self._depth(near, overlap))
+                found.near_count += ti.cast(self.geometry.is_within(near, margin), ti.i32)
+            if self.geometry.is_within(near, 0.0) or self.holds(k):
+                met, touch, velocity = self.touch(k, i, j, near, rotation, branch)
+                push, arm = self.law.push(m, k, touch), met.arm
+                given = self.answer(m, k, i, met, touch, push, velocity, scale, elapsed, stepping)
+                found.active |= active_bits(given.pressed, given.rub)
+                found.force += given.force
+                found.moment_i -= cross(arm, given.force)
+                found.moment_j += cross(arm - branch, given.force)
+                if ti.static(not self.geometry.by_face):
+                    found.moment_i -= given.pressed * met.couple
+                    found.moment_j += given.pressed * met.couple
+                found.dragged += (met.area * push.elastic - given.pressed) * touch.rate
+                found.rubbed += given.rubbed
+                found.slipped += given.slipped
+                found.spent += met.area * push.spent
+                found.rub += norm(given.rub)
+                found.bound += self.tables.friction.limit(m, given.pressed)
+                found.deepest = ti.max(found.deepest, self.geometry.depth(near, met.overlap))
                 if ti.static(not stepping):
-                    found.stored += self.contacts.overlap_energy(m, met)
-                    found.leverage += self.contacts.leverage(met, pushed, push)
+                    found.stored += met.area * self.law.stored(m, k, touch)
+                    found.leverage += self._leverage(met, given.force, given.pressed)
+                elif ti.static(self.law.has_memory):
+                    self.law.keep(m, k, touch)
             elif ti.static(stepping):
-                found.slipped += self.springs.part(m, k)
+                found.slipped += self.part(m, k)
             if ti.static(not stepping):
                 found.stored += self.springs.stored(m, k)
         return found
 
     @ti.func
-    def _depth(self, near, overlap):
-        """Depth of a contact as a share of its size; that of bodies counts what lies at rest."""
-        if ti.static(self.contacts.law.meets_bodies):
-            overlap = near.reach
-        return overlap / near.size
+    def _leverage(self, met, pushed, push):
+        """Forces on the second body times their arms from the first [N m], where bodies meet."""
+        # A pressed face also has a couple; its part along the normal changes no stress.
+        found = pushed.outer_product(met.arm)
+        if ti.static(not self.geometry.by_face):
+            found += met.normal.outer_product(cross(met.normal, push * met.couple))
+        return found
+
+    @ti.func
+    def holds(self, k):
+        """Whether entry k acts, though its surfaces are apart."""
+        return False
+
+    @ti.func
+    def part(self, m, k):
+        """Forget entry k, whose surfaces have parted; energy of its spring of friction [J]."""
+        if ti.static(self.law.has_memory):
+            self.law.part(m, k)
+        return self.springs.part(m, k)
+
+    @ti.func
+    def answer(self, m, k, i, met, touch, push, velocity, scale, elapsed, stepping: ti.template()):
+        """The ``Answer`` of the laws to a touch."""
+        damping = self.law.damping_at(self.law.row(m), touch.overlap)
+        weighted = self._limited(met.weight * touch.rate, scale)
+        drag = met.area * self._limited(met.weight * damping, scale)
+        pressed = met.area * ti.max(0.0, push.elastic - damping * weighted)
+        slide = velocity - dot(velocity, met.normal) * met.normal
+        rub, stuck, spent = self._rub(m, k, i, met.normal, pressed, drag, slide, elapsed, stepping)
+        return Answer(
+            force=pressed * met.normal + rub,
+            pressed=pressed,
+            rub=rub,
+            rubbed=-dot(rub - stuck, slide),
+            slipped=spent,
+        )
 
     @ti.func
     def _rub(self, m, k, i, normal, push, drag, slide, elapsed, stepping: ti.template()):
-        """Friction on the second sphere and the spring's part of it [N]; energy of slipping [J]."""
+        """Friction on the second body and the spring's part of it [N]; energy of slipping [J]."""
         rub, stuck, spent = vec3(0.0), vec3(0.0), 0.0
         if ti.static(self.springs.present):
             rotation, bound = self.state.rotation(i), self.tables.friction.limit(m, push)
@@ -204,7 +268,8 @@ class ContactForces:
         return dt
 
     @ti.func
-    def _velocity_at(self, i, arm):
+    def velocity_at(self, i, arm):
+        """Velocity of body i at an arm from its centre [m/s]."""
         return self.state.velocity[i] + cross(self.state.spin[i], arm)
 
     @ti.func

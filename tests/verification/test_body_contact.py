@@ -57,7 +57,7 @@ class Placed:
         turned[self.moving] = orientation
         self.state.set_motion(position, turned)
         self.simulation.broad_phase.search()
-        rest = self.simulation.contacts.law.rest
+        rest = self.simulation.contacts.geometry.rest
         if apart_before:
             assign(rest, np.tile([0.0, 1.0], (len(values(rest)), 1)))
 
@@ -70,7 +70,7 @@ def test_flat_sides_that_overlap_have_the_energy_of_their_bond():
     """k A d^2 / 2, less what pyramids are narrower at a depth d below the face: (1 - d / r)^2."""
     body = single(0.05)
     placed = Placed(body, mirrored(body))
-    law = placed.simulation.contacts.law
+    law = placed.simulation.contacts.geometry
     volume, area = values(law.volume)[0], values(law.face_area)[0]
     radius = 3.0 * volume / (4.0 * area)
     for depth in (1e-6, 1e-4):
@@ -83,7 +83,7 @@ def test_an_overlap_at_the_start_is_at_rest_until_it_shrinks():
     """Nothing is injected, and what the bodies part by counts when they come back."""
     body, depth = single(0.05), 1e-5
     placed = Placed(body, mirrored(body))
-    area, found = values(placed.simulation.contacts.law.face_area)[0], []
+    area, found = values(placed.simulation.contacts.geometry.face_area)[0], []
     image = placed.model.centre[0] * MIRROR
     for step, share in enumerate((1.0, 0.5, 1.0)):
         placed.simulation.advance_to(step)
@@ -95,22 +95,22 @@ def test_an_overlap_at_the_start_is_at_rest_until_it_shrinks():
 
 
 @ti.kernel
-def _gap(law: ti.template(), state: ti.template()) -> ti.f64:
+def _gap(geometry: ti.template(), state: ti.template()) -> ti.f64:
     branch = state.position[1] - state.position[0]
     turn, offset = place_in(state.rotation(0), state.rotation(1), branch)
-    return law.gap(0, 1, turn, offset, 0.0)
+    return geometry.outside(0, 1, turn, offset, 0.0)
 
 
 def test_bodies_that_move_less_than_their_gap_do_not_touch():
     """The gap bounds how far any point of one may go before a ray of one is in the other."""
     placed, random = Placed(single(0.05), single(0.06)), np.random.default_rng(3)
-    law, state, tried = placed.simulation.contacts.law, placed.state, 0
+    geometry, state, tried = placed.simulation.contacts.geometry, placed.state, 0
     while tried < 60:
         orientation = random.standard_normal(4)
         orientation /= np.linalg.norm(orientation)
         place = placed.model.centre[0] + random.standard_normal(3) * 0.03
         placed.put(place, orientation)
-        gap = _gap(law, state)
+        gap = _gap(geometry, state)
         if gap > 1e-5:
             tried += 1
             for way in (*np.eye(3), *-np.eye(3)):

@@ -22,7 +22,7 @@ from taichi_dem import (
     step_report,
 )
 from taichi_dem.kit.allocation import values
-from taichi_dem.laws.body_contact import damping_ratio
+from taichi_dem.laws.contact import damping_ratio
 from taichi_dem.mesh.shapes import bar, placed_together, single
 from taichi_dem.simulate import run_simulation
 from taichi_dem.simulation import Simulation

@@ -5,11 +5,11 @@ import taichi as ti
 from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import raise_to
 from taichi_dem.kit.ordered import CountingSort, Once, Phases, Some, is_serial
-from taichi_dem.kit.products import cross, dot, matvec, norm, squared
-from taichi_dem.kit.types import real, vec3
-from taichi_dem.physics.rotation import place_in, unit3
+from taichi_dem.kit.products import cross, dot, matvec, squared
+from taichi_dem.kit.types import real, vec3, vec4
+from taichi_dem.physics.rotation import unit3
 from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to
-from taichi_dem.step.contact_force import PairForces, TangentialSprings
+from taichi_dem.step.contact_force import Answer, ContactForces
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.multirate.lists import Coloured
 from taichi_dem.step.multirate.schedule import Schedule
@@ -35,8 +35,8 @@ def _lowest_free(taken):
 
 
 @ti.data_oriented
-class PairDashpots:
-    """Data of touching spheres used in sweeps.
+class PairDashpots(ContactForces):
+    """Contacts whose dashpots are solved. Data of touching spheres used in sweeps.
 
     One block for all spheres of a pair would let parting spheres pull on each other while others
     push: a rocking pair would stick. So each sphere has its own impulse.
@@ -54,16 +54,14 @@ class PairDashpots:
 
     scratch_fields = (
         *("elapsed", "pull"),
-        *("touching", "entry", "normal", "arm", "push", "share", "branch"),
+        *("touching", "entry", "normal", "arm", "push", "drag", "share", "branch"),
         *("order", "colour", "colour_first"),
     )
 
     def __init__(self, schedule: Schedule, velocities: Velocities):
-        self.tables, self.state, self.schedule = schedule.tables, schedule.state, schedule
-        self.contacts, self.store = schedule.contacts, schedule.store
+        super().__init__(schedule)
         self.velocities = velocities
         self.has_friction = bool(self.tables.friction.name)
-        self.springs = TangentialSprings(schedule)
         if self.springs.present:
             self.elapsed = ti.field(real, shape=self.store.slots)
             self.pull = ti.Vector.field(3, real, shape=self.store.spheres)
@@ -71,9 +69,9 @@ class PairDashpots:
         self.entry, self.push = ti.field(ti.i32, shape=spheres), ti.field(real, shape=spheres)
         self.normal, self.arm = (ti.Vector.field(3, real, shape=spheres) for _ in range(2))
         self.share = ti.Vector.field(2, real, shape=spheres)
-        self.of_bodies = self.contacts.law.meets_bodies
-        if self.of_bodies:
-            self.drag_area = ti.field(real, shape=spheres)
+        self.drag = ti.field(real, shape=spheres)
+        self.turns = not self.geometry.by_face
+        if self.turns:
             self.couple = ti.Vector.field(3, real, shape=spheres)
         self.impulse = self.store.sphere_column("solved_impulse", real, 3)
         self.branch = ti.Vector.field(3, real, shape=pairs)
@@ -164,14 +162,12 @@ class PairDashpots:
         pair = self.store.body[p]
         i, j = pair[0], pair[1]
         dt = self.schedule.step_seconds[0]
-        branch = self.state.position[j] - self.state.position[i]
-        rotation = self.state.rotation(i)
-        turn, offset = place_in(rotation, self.state.rotation(j), branch)
+        branch, rotation, turn, offset = self.frame(i, j)
         ahead, m = dt * self.contacts.approach(i, j), self.tables.pair(i, j)
-        if ti.static(self.of_bodies):
+        if ti.static(self.turns):
             # Bodies have no area of contact before they touch.
             ahead = 0.0
-        force, moment, deepest, parted = vec3(0.0), vec3(0.0), 0.0, 0.0
+        force, moment, deepest, parted, spent = vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0
         elapsed = 0.0
         if ti.static(self.springs.present):
             elapsed = self.springs.elapsed(p)
@@ -180,23 +176,25 @@ class PairDashpots:
         end = start
         for k in range(start, self.store.last[p]):
             near = self.contacts.look(k, i, j, turn, offset, ahead, True)
-            if self.contacts.law.is_within(near, ahead):
-                met = self.contacts.law.meeting(near, k, rotation)
-                overlap, normal, arm = met.overlap, met.normal, met.arm - branch
+            if self.geometry.is_within(near, ahead):
+                met, touch, _velocity = self.touch(k, i, j, near, rotation, branch)
+                push, normal, arm = self.law.push(m, k, touch), met.normal, met.arm - branch
+                damping = self.law.damping_at(self.law.row(m), touch.overlap)
                 self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
                 # Spheres still apart may approach until they touch, at the end of the step.
-                push = dt * self.contacts.law.elastic(m, ti.max(overlap, 0.0))
-                push += self.contacts.law.damping(m) * ti.min(overlap, 0.0)
-                self.push[end] = met.area * push
+                spring = dt * push.elastic + damping * ti.min(met.overlap, 0.0)
+                self.push[end], self.drag[end] = met.area * spring, damping * met.area * met.weight
                 self.share[end] = self._share(i, j, branch, arm, met)
                 force += self.impulse[k]
                 moment += cross(arm, self.impulse[k])
-                depth = overlap
-                if ti.static(self.of_bodies):
-                    self.drag_area[end], self.couple[end] = met.area * met.weight, met.couple
+                if ti.static(self.turns):
+                    self.couple[end] = met.couple
                     moment += dot(self.impulse[k], normal) * met.couple
-                    depth = near.reach
-                deepest = ti.max(deepest, depth / near.size)
+                depth = self.geometry.depth(near, met.overlap)
+                deepest = ti.max(deepest, depth)
+                if ti.static(self.law.has_memory):
+                    spent += met.area * push.spent
+                    self.law.keep(m, k, touch)
                 if ti.static(self.springs.present):
                     self.pull[end] = vec3(0.0)
                     if depth > 0.0:
@@ -206,52 +204,37 @@ class PairDashpots:
                 end += 1
             else:
                 self.impulse[k] = vec3(0.0)
-            if not self.contacts.law.is_within(near, 0.0):
-                parted += self.springs.part(m, k)
+            if not self.geometry.is_within(near, 0.0):
+                parted += self.part(m, k)
         self.contacts.note_depth(p, deepest)
         self.touching[p], self.branch[p], self.colour[p] = end - start, branch, NONE
         if end > start:
             around = moment + cross(branch, force)
             self.contacts.add_impulse(p, 0, -force, -around)
             self.contacts.add_impulse(p, 1, force, moment)
-        if ti.static(self.springs.present):
-            self.contacts.book_friction(p, parted)
+        self.book_taken(p, parted, spent)
 
     @ti.func
     def _turned(self, c, angular):
         """Part of a contact's rate of opening that its couple makes of a spin [m/s]."""
         rate = 0.0
-        if ti.static(self.of_bodies):
+        if ti.static(self.turns):
             rate = dot(self.couple[c], angular)
         return rate
-
-    @ti.func
-    def _damping(self, m, c):
-        """Impulse of a contact's dashpot per velocity in a step [kg]."""
-        damping = self.schedule.step_seconds[0] * self.contacts.law.damping(m)
-        if ti.static(self.of_bodies):
-            damping *= self.drag_area[c]
-        return damping
 
     @ti.func
     def _moment(self, c, impulse):
         """Moment of a contact's impulse about the second body's centre [N m s]."""
         moment = cross(self.arm[c], impulse)
-        if ti.static(self.of_bodies):
+        if ti.static(self.turns):
             moment += dot(impulse, self.normal[c]) * self.couple[c]
         return moment
 
     @ti.func
     def _way(self, i, j, branch, arm, normal, elapsed):
         """Tangential displacement of a contact's second sphere against the first in a time [m]."""
-        velocity = self._velocity(i, j, arm + branch, arm)
+        velocity = self.velocity_at(j, arm) - self.velocity_at(i, arm + branch)
         return elapsed * (velocity - dot(velocity, normal) * normal)
-
-    @ti.func
-    def _velocity(self, i, j, first, second):
-        """Velocity of body j at an arm against that of body i at another, at the present time."""
-        velocity = self.state.velocity[j] + cross(self.state.spin[j], second)
-        return velocity - (self.state.velocity[i] + cross(self.state.spin[i], first))
 
     @ti.func
     def _share(self, i, j, branch, arm, met):
@@ -271,7 +254,7 @@ class PairDashpots:
             across += dot(first, matvec(turn_i, first))
             across += dot(second, matvec(turn_j, second))
         across -= along
-        if ti.static(self.of_bodies):
+        if ti.static(self.turns):
             first, second = first_along + met.couple, second_along + met.couple
             along = dot(normal, matvec(slack, normal))
             along += dot(first, matvec(turn_i, first)) + dot(second, matvec(turn_j, second))
@@ -304,7 +287,8 @@ class PairDashpots:
     def _answer(self, m, c, linear, angular):
         """Impulse of a contact by its laws [N s], with those of all others as they are."""
         normal, share, held = self.normal[c], self.share[c], self.impulse[self.entry[c]]
-        velocity, damping = linear + cross(angular, self.arm[c]), self._damping(m, c)
+        velocity = linear + cross(angular, self.arm[c])
+        damping = self.schedule.step_seconds[0] * self.drag[c]
         pressed, along = dot(held, normal), dot(velocity, normal)
         rate = along + self._turned(c, angular)
         # The opening rate without this contact's own impulse, and the law solved for the impulse.
@@ -351,46 +335,23 @@ class PairDashpots:
             if active != 0:
                 self.state.note_active(i, active)
                 self.state.note_active(j, active)
-            self.store.heat[p] = self.store.heat[p] + vec3(dragged, rubbed, 0.0)
+            self.store.heat[p] = self.store.heat[p] + vec4(dragged, rubbed, 0.0, 0.0)
 
     @ti.func
-    def last_forces(self, p):
-        """Mean forces of the last step, at the spheres' present places, a ``PairForces``."""
-        pair, dt = self.store.body[p], self.schedule.step_seconds[0]
-        i, j = pair[0], pair[1]
-        branch = self.state.position[j] - self.state.position[i]
-        rotation = self.state.rotation(i)
-        turn, offset = place_in(rotation, self.state.rotation(j), branch)
-        found, m = PairForces(), self.tables.pair(i, j)
-        for k in range(self.store.first[p], self.store.last[p]):
-            pushed = self.impulse[k] / dt
-            # A pair that has stayed apart has no force, and need not be compared.
-            if squared(pushed) > 0.0 or self.contacts.may_meet(k, i, j, 0.0):
-                a, b = self.store.sphere[k][0], self.store.sphere[k][1]
-                near = self.contacts.law.nearest(a, b, turn, offset)
-                met = self.contacts.law.meeting(near, k, rotation)
-                arm = met.arm - branch
-                found.force += pushed
-                found.moment_i -= cross(met.arm, pushed)
-                found.moment_j += cross(arm, pushed)
-                velocity = self._velocity(i, j, met.arm, arm)
-                rate, pressed = dot(velocity, met.normal), dot(pushed, met.normal)
-                if ti.static(self.of_bodies):
-                    found.moment_i -= pressed * met.couple
-                    found.moment_j += pressed * met.couple
-                    rate += dot(met.couple, self.state.spin[j] - self.state.spin[i])
-                spring = met.area * self.contacts.law.elastic(m, ti.max(met.overlap, 0.0))
-                found.dragged += (spring - pressed) * rate
-                rub = pushed - pressed * met.normal
-                found.rub += norm(rub)
-                if ti.static(self.springs.present):
-                    rub -= self.springs.force(m, k, rotation)
-                found.rubbed -= dot(rub, velocity)
-                found.bound += self.tables.friction.limit(m, pressed)
-                found.stored += self.contacts.overlap_energy(m, met)
-                found.leverage += self.contacts.leverage(met, pushed, pressed)
-            found.stored += self.springs.stored(m, k)
-        return found
+    def holds(self, k):
+        """Whether entry k had an impulse in the last step."""
+        return squared(self.impulse[k]) > 0.0
+
+    @ti.func
+    def answer(self, m, k, i, met, touch, push, velocity, scale, elapsed, stepping: ti.template()):
+        """The mean force of the last step, an ``Answer``."""
+        force = self.impulse[k] / self.schedule.step_seconds[0]
+        pressed = dot(force, met.normal)
+        rub = force - pressed * met.normal
+        free = rub
+        if ti.static(self.springs.present):
+            free -= self.springs.force(m, k, self.state.rotation(i))
+        return Answer(force=force, pressed=pressed, rub=rub, rubbed=-dot(free, velocity))
 
     @ti.func
     def _slip(self, m, p, c, i, j, pressed):

@@ -1,8 +1,6 @@
-"""Contact of whole bodies, by the energy of their shared volume."""
+"""Geometry of contact: whole bodies, by the energy of their shared volume."""
 
-import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -18,15 +16,13 @@ from taichi_dem.kit.products import (
     transposed_matvec,
 )
 from taichi_dem.kit.types import real, vec3, vec4
-from taichi_dem.kit.validation import between, positive, whole
-from taichi_dem.laws.sphere_contact import SphereContact
-from taichi_dem.materials import Material
-from taichi_dem.materials.body_materials import BodyMaterials
-from taichi_dem.materials.bond_rules import typical_of
+from taichi_dem.kit.validation import whole
+from taichi_dem.laws.contact_contracts import Geometry
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES, all_faces, area_vectors
-from taichi_dem.mesh.topology import ContactSpheres
+from taichi_dem.mesh.topology import ContactSpheres, spheres_of_faces
 from taichi_dem.physics.body_overlap import raised, ray_ends, sum_of_rays, turning
+from taichi_dem.physics.rotation import place_in
 from taichi_dem.physics.sphere_pair import Meeting, Nearest
 from taichi_dem.state.model import Model
 from taichi_dem.state.pair_store import PairStore
@@ -35,37 +31,15 @@ from taichi_dem.state.tables import Capacity
 #: Largest number of parts of an edge, overlap [m2] that counts as none, and distance from which on
 #: the rays to a face are left out at once, as a share of the size of their body.
 MOST_PARTS, _NONE, _FAR = 8, 1e-28, 0.02
-#: Halvings of an interval until it is as short as a number can tell.
-_BISECTIONS = 64
-
-
-def damping_ratio(restitution: float) -> float:
-    """Share z of critical damping at which a spring and a dashpot that never pull rebound so."""
-    # Contact ends when its force is zero: -ln e = 2 z acos(z) / sqrt(1 - z^2), with acosh from z =
-    # 1 (e = 0.135) on (Schwager and Poeschel, Granular Matter 9 (2007) 465).
-    low, high = 0.0, 1.0 / restitution
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if _lost(middle) > -math.log(restitution) else (middle, high)
-    return low
-
-
-def _lost(ratio):
-    """-ln e of a damping ratio."""
-    if ratio < 1.0:
-        return 2.0 * math.acos(ratio) / math.tan(math.acos(ratio))
-    turns = math.acosh(ratio)
-    return 2.0 * turns / math.tanh(turns) if turns else 2.0
 
 
 @ti.data_oriented
-class BodyContact(SphereContact):
-    """Bodies repel each other by the gradient of an energy of their overlap, also at outer faces.
+class BodyGeometry(Geometry):
+    """Whole bodies meet each other, also at outer faces, by rays from their middles to their faces.
 
-    The contact of ``effects="auto"`` and ``"all"``. The energy of a pair is k (q - q0)^2 / 2 with k
-    the stiffness per area and q the size of the overlap (where flat sides meet: the root of the
-    contact area times the depth); q0 is the smallest q since the two could first touch. So a break
-    injects no energy. A dashpot acts on the rate of q, never as attraction.
+    The size of an overlap is q, where flat sides meet: the root of the contact area times the
+    depth. q0 is the smallest q since the two could first touch, so a break injects no energy. A
+    law gets the overlap (q - q0) / sqrt(area).
 
     Parameters
     ----------
@@ -74,39 +48,19 @@ class BodyContact(SphereContact):
         Those of the smaller body of a pair count more, by the square of the ratio of volumes.
     outer_faces : bool or str, default True
         True: outer faces meet from the start. ``"once_broken"``: from the first break of any bond.
-    restitution : float, default 0.1
-        Speed at which two loose bodies part over that at which they met, from 0.01 to 1 [-].
-    stiffness : float, optional
-        Stiffness per area [Pa/m]; by default that of a bond of the usual size.
     skin : float, default 0.0075
         Gap up to which pairs enter the candidate list, as a share of the radius of a body to its
         corners. It changes time, not results.
-    neighbours_per_body : int, default 192
-        Mean capacity of the list of neighbours.
-    pairs_per_body : int, default 48
-        Mean capacity of the list of body pairs.
-
-    Notes
-    -----
-    The dashpot is c = 2 z sqrt(k A m), z the damping ratio of ``restitution``, A the present area
-    of contact and m = m1 m2 / (m1 + m2) of the two bodies. Then q obeys, whatever its shape, one
-    linear law, so the restitution is exact for two bodies that meet along the line of their centres
-    at rest, faces, edges or vertices first, at any speed, but for 2 z sqrt(k A / m) times the step.
-    Bodies hit off their centres, or on several bodies at once, rebound less; bodies in a bonded
-    piece, which are heavier in effect, more. With the default a block of four elements in height
-    rests on slopes up to 0.94 of its friction, whatever the damping of its bonds.
+    neighbours_per_body, pairs_per_body : int, default 192, 48
+        Mean capacity of the lists of neighbours and of body pairs.
 
     References
     ----------
-    Munjiza, The combined finite-discrete element method (2004), for the potential. Schwager and
-    Poeschel, Granular Matter 9 (2007) 465, for the restitution of a dashpot that never pulls.
+    Munjiza, The combined finite-discrete element method (2004), for the potential.
     """
 
-    name = "body_contact"
-    activation = "bodies touch"
-    meets_bodies = True
-    knob, firmer = "stiffness", "{law}(stiffness={value:.2g}), in Pa/m"
-    calmer, undamped = "a smaller restitution of BodyContact", "its restitution is 1"
+    by_face = False
+    entries_by = "pairs_per_body"
     constant_fields = (
         *("corner", "outward", "plane", "incentre", "volume", "face_area", "far"),
         *("ends", "end_count", "least_weight"),
@@ -116,40 +70,18 @@ class BodyContact(SphereContact):
         self,
         parts: int = 3,
         outer_faces: bool | str = True,
-        restitution: float = 0.1,
-        stiffness: float | None = None,
         skin: float = 0.0075,
         neighbours_per_body: int = 192,
         pairs_per_body: int = 48,
     ):
         self.parts = whole("parts", parts, 2, MOST_PARTS)
-        self.restitution = between("restitution", restitution, 0.01, 1.0)
-        self.stiffness = None if stiffness is None else positive("stiffness", stiffness)
-        self.ratio = damping_ratio(self.restitution)
-        super().__init__(3, outer_faces, skin, neighbours_per_body, pairs_per_body, pairs_per_body)
-
-    def numbers(self, material: Material) -> tuple[float, ...]:
-        """Stiffness k [Pa/m] and 2 z sqrt(k), which ``weight`` makes a dashpot [Pa s/m]."""
-        stiffness = self.stiffness or typical_of(material.normal_stiffness)
-        return stiffness, 2.0 * self.ratio * math.sqrt(stiffness)
-
-    def strongest(self, mesh: Mesh, materials: BodyMaterials) -> tuple[Any, Any]:
-        """Largest stiffness [N/m] and dashpot [N s/m] of a contact of each body with its like."""
-        spring = self.firmness(materials) * length(_outward(mesh)).max(axis=1)
-        mass = 0.5 * materials.density * volumes(mesh)
-        return spring, 2.0 * self.ratio * np.sqrt(mass * spring)
-
-    def firmness(self, materials: BodyMaterials) -> Any:
-        """Largest stiffness per area [Pa/m] of each body, (n,) or one."""
-        return self.stiffness or materials.of_contacts("normal_stiffness")
-
-    def is_damped(self, material: Material) -> bool:
-        """Whether contacts have a dashpot."""
-        return self.ratio > 0.0
+        super().__init__(outer_faces, skin, pairs_per_body, pairs_per_body, neighbours_per_body)
 
     def spheres(self, model: Model) -> ContactSpheres:
-        """No spheres are needed: a body extends to its corners."""
-        return replace(super().spheres(model), extent=model.body_radius)
+        """A body extends to its corners; nothing reads the spheres."""
+        return replace(
+            spheres_of_faces(model.mesh, model.centre, self.divisions), extent=model.body_radius
+        )
 
     def declare(self, capacity: Capacity) -> None:
         """Corners, planes (4 x 3 normals, 4 distances) and ray ends of bodies, in their frames."""
@@ -164,9 +96,14 @@ class BodyContact(SphereContact):
         self.end_count, self.least_weight = ti.field(ti.i32, shape=()), ti.field(real, shape=())
 
     def declare_columns(self, store: PairStore) -> None:
-        """Keep q0 [m2] of each pair, and 1 once it is known."""
+        """Keep q0 [m2] of each pair, and 1 once it is known; paths [m] up to which it is apart."""
         super().declare_columns(store)
         self.rest = store.sphere_column("rest_overlap", real, 2)
+        self.clear_until = store.sphere_column("clear_until", real)
+
+    def forget_paths(self) -> None:
+        """Compare all pairs anew, wherever bodies have been put."""
+        assign(self.clear_until, 0.0)
 
     def load(self, model: Model) -> None:
         """Load the bodies of a scene."""
@@ -218,7 +155,7 @@ class BodyContact(SphereContact):
     @ti.func
     def find(self, i, j, turn, offset, faces, margin, far):
         """Bodies i and j make one contact where a ray of one may enter the other soon."""
-        count, gap = 0, self.gap(i, j, turn, offset, margin)
+        count, gap = 0, self.outside(i, j, turn, offset, margin)
         if gap < margin:
             count, gap = 1, margin
         return count, gap
@@ -229,7 +166,7 @@ class BodyContact(SphereContact):
         self.store.sphere[place] = [i, j]
 
     @ti.func
-    def gap(self, a, b, turn, offset, enough):
+    def outside(self, a, b, turn, offset, enough):
         """A bound of the way that bodies may go before a ray of one enters the other [m]."""
         outside = 1e30
         for side in range(2):
@@ -265,6 +202,22 @@ class BodyContact(SphereContact):
         return 2.0 / (1.0 + ratio * ratio)
 
     @ti.func
+    def gap(self, a, b, first, turned_first, second, turned_second):
+        """Gap of two bodies [m], by their rays."""
+        turn, offset = place_in(turned_first, turned_second, second - first)
+        return -self.nearest(a, b, turn, offset).reach
+
+    @ti.func
+    def overlap(self, near):
+        """Overlap of two bodies [m], with what lies at rest."""
+        return near.reach
+
+    @ti.func
+    def depth(self, near, overlap):
+        """How deep two bodies overlap, with what lies at rest."""
+        return near.reach / near.size
+
+    @ti.func
     def largest_area(self, a, b):
         """Bound of the area of contact of two bodies [m2]."""
         return ti.min(self.face_area[a], self.face_area[b])
@@ -274,6 +227,14 @@ class BodyContact(SphereContact):
         """Factor of the rate in a dashpot per area, sqrt(m1 m2 / (m1 + m2) / area) [kg^1/2 / m]."""
         slack = self.tables.mass_inverse[a] + self.tables.mass_inverse[b]
         return 1.0 / ti.sqrt(slack * ti.max(area, _NONE))
+
+    def largest_areas(self, mesh: Mesh) -> np.ndarray:
+        """Largest face of each body [m2], (n,)."""
+        return length(_outward(mesh)).max(axis=1)
+
+    def weights(self, mass: np.ndarray, area: np.ndarray) -> np.ndarray:
+        """Weight of each body and its like, (n,)."""
+        return np.sqrt(0.5 * mass / area)
 
     @ti.func
     def is_within(self, near, margin):
@@ -296,9 +257,16 @@ class BodyContact(SphereContact):
         )
 
     @ti.func
-    def settle(self, near, k):
+    def may_meet(self, k, paths, margin):
+        """Whether bodies may be within a margin [m] by entry k, so far as their paths tell."""
+        return not paths + margin < self.clear_until[k]
+
+    @ti.func
+    def settle(self, near, k, paths):
         """Take the present overlap of entry k as that at rest, if it is the smallest so far."""
         self.rest[k] = [self._rest(near, k), 1.0]
+        # Rounding of paths is far below what is left of the gap.
+        self.clear_until[k] = paths + ti.max(0.0, -near.reach) * (1.0 - 1e-6)
 
     @ti.func
     def _rest(self, near, k):
