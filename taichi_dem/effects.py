@@ -3,6 +3,7 @@
 from taichi_dem.laws.body_geometry import BodyGeometry
 from taichi_dem.laws.bond import BondDamping, ShearSlip, SlipWeakening, Softening
 from taichi_dem.laws.contact import BodyContact, SphereContact
+from taichi_dem.laws.contact_contracts import ContactLaw, FrictionLaw, Geometry
 from taichi_dem.laws.friction import Friction, StickingFriction
 from taichi_dem.laws.mixed_mode import MixedMode
 from taichi_dem.laws.sphere_geometry import SphereGeometry
@@ -14,10 +15,13 @@ __all__ = [
     "BodyContact",
     "BodyGeometry",
     "BondDamping",
+    "ContactLaw",
     "ExpandingGas",
     "Fixed",
     "Friction",
+    "FrictionLaw",
     "GasPressure",
+    "Geometry",
     "Gravity",
     "MixedMode",
     "PrescribedMotion",

@@ -32,6 +32,11 @@ def asked(method: Any) -> Any:
     return method
 
 
+def asked_of(kind: type) -> list[str]:
+    """Names of the methods that a class of a role still has to give."""
+    return [name for name in dir(kind) if getattr(getattr(kind, name), "is_asked", False)]
+
+
 class Effect:
     """Base of all effects.
 
@@ -69,7 +74,7 @@ class Effect:
     def __init_subclass__(cls, **options: Any) -> None:
         """Name a class that has no name: reports list effects by it."""
         super().__init_subclass__(**options)
-        if not cls.name and not cls.is_null:
+        if not cls.name and not cls.is_null and not asked_of(cls):
             cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).strip("_").lower()
 
     def __repr__(self):

@@ -10,7 +10,14 @@ from typing import Any
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
-from taichi_dem.laws.base import PARTS_OF_BOND, Effect, ElasticShear, ElasticTension, NoDashpot
+from taichi_dem.laws.base import (
+    PARTS_OF_BOND,
+    Effect,
+    ElasticShear,
+    ElasticTension,
+    NoDashpot,
+    asked_of,
+)
 from taichi_dem.laws.bond import BondDamping, ShearSlip, Softening
 from taichi_dem.laws.contact import BodyContact
 from taichi_dem.laws.contact_contracts import ONCE_BROKEN
@@ -148,10 +155,6 @@ def _first(kind, member):
     return places[0] if places else len(kind.__mro__)
 
 
-def _is_asked(member):
-    return getattr(member, "is_asked", False)
-
-
 def check_effect(effect: Any) -> None:
     """Raise InputError unless an effect has a known role and every member of that role."""
     if effect.role not in ROLES:
@@ -161,7 +164,7 @@ def check_effect(effect: Any) -> None:
         )
     further = [key for key in MEMBERS if key not in ROLES and getattr(effect, key, False)]
     wanted = [member for key in (effect.role, *further) for member in MEMBERS.get(key, ())]
-    own = [name for name in dir(type(effect)) if _is_asked(getattr(type(effect), name))]
+    own = asked_of(type(effect))
     if own:
         raise InputError(
             f"effect {type(effect).__name__} must have {', '.join(own)}, as its role "

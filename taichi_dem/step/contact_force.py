@@ -45,22 +45,6 @@ class TangentialSprings:
         """Force of the spring of sphere pair k on the second sphere [N]."""
         return matvec(rotation, self.friction.spring(m, k))
 
-    @ti.func
-    def part(self, m, k):
-        """Energy [J] that is lost as the spheres of a pair no longer touch; 0 without springs."""
-        energy = 0.0
-        if ti.static(self.present):
-            energy = self.friction.part(m, k)
-        return energy
-
-    @ti.func
-    def stored(self, m, k):
-        """Energy of the spring of sphere pair k [J]; 0 without springs."""
-        energy = 0.0
-        if ti.static(self.present):
-            energy = self.friction.stored(m, k)
-        return energy
-
 
 @ti.dataclass
 class PairForces:
@@ -104,7 +88,7 @@ class ContactForces:
         self.schedule, self.tables, self.state = schedule, schedule.tables, schedule.state
         self.contacts, self.store = schedule.contacts, schedule.store
         self.law, self.geometry = self.contacts.law, self.contacts.geometry
-        self.springs = TangentialSprings(schedule)
+        self.friction, self.springs = self.tables.friction, TangentialSprings(schedule)
         self.limits, self.has_limits = schedule.limits, schedule.has_limits
         self.limited = self.has_limits and schedule.limits.limited
 
@@ -182,7 +166,7 @@ class ContactForces:
                 found.slipped += given.slipped
                 found.spent += met.area * push.spent
                 found.rub += norm(given.rub)
-                found.bound += self.tables.friction.limit(m, given.pressed)
+                found.bound += self.friction.limit(m, given.pressed)
                 found.deepest = ti.max(found.deepest, self.geometry.depth(near, met.overlap))
                 if ti.static(not stepping):
                     found.stored += met.area * self.law.stored(m, k, touch)
@@ -192,7 +176,7 @@ class ContactForces:
             elif ti.static(stepping):
                 found.slipped += self.part(m, k)
             if ti.static(not stepping):
-                found.stored += self.springs.stored(m, k)
+                found.stored += self.friction.stored(m, k)
         return found
 
     @ti.func
@@ -214,7 +198,7 @@ class ContactForces:
         """Forget entry k, whose surfaces have parted; energy of its spring of friction [J]."""
         if ti.static(self.law.has_memory):
             self.law.part(m, k)
-        return self.springs.part(m, k)
+        return self.friction.part(m, k)
 
     @ti.func
     def answer(self, m, k, i, met, touch, push, velocity, scale, elapsed, stepping: ti.template()):
@@ -238,14 +222,14 @@ class ContactForces:
         """Friction on the second body and the spring's part of it [N]; energy of slipping [J]."""
         rub, stuck, spent = vec3(0.0), vec3(0.0), 0.0
         if ti.static(self.springs.present):
-            rotation, bound = self.state.rotation(i), self.tables.friction.limit(m, push)
+            rotation, bound = self.state.rotation(i), self.friction.limit(m, push)
             if ti.static(stepping):
                 self.springs.follow(k, rotation, normal, elapsed * slide)
                 spent = self.springs.slip(m, k, rotation, bound, elapsed * slide)
             stuck = self.springs.force(m, k, rotation)
             rub = add_within(stuck, -drag * slide, bound)
         else:
-            rub = self.tables.friction.force(m, drag, push, slide)
+            rub = self.friction.force(m, drag, push, slide)
         return rub, stuck, spent
 
     @ti.func

@@ -90,7 +90,7 @@ def test_the_effect_moves_a_body_as_the_leapfrog_must(left_by):
 
 
 def test_the_contact_law_stores_what_it_takes(left_by):
-    """m v^2 = 39 (2/5) k D^(5/2), and the speed comes back.
+    """m v^2 = 39 (2/5) k D^(5/2), for 2.943 D / (2 v), and the speed comes back.
 
     The leapfrog is of second order: relative errors of (w dt)^2 with the stiffness at the deepest
     place, w^2 = 39 (3/2) k sqrt(D) / (m / 2). That place is looked for every five steps: at most
@@ -100,9 +100,11 @@ def test_the_contact_law_stores_what_it_takes(left_by):
     left = left_by("docs/add_a_contact_law.md")
     mass, speed, stiffness = left["simulation"].model.body_mass[0], left["speed"], left["stiffness"]
     depth = (mass * speed**2 / (39 * 0.4 * stiffness)) ** 0.4
-    second_order = 117.0 * stiffness * np.sqrt(depth) / mass * 1e-7**2
+    second_order = 117.0 * stiffness * np.sqrt(depth) / mass * left["dt"] ** 2
     assert left["deepest"] == pytest.approx(depth, rel=(1 + 2.5**2 / 2) * second_order)
     assert left["rebound"] == pytest.approx(speed, rel=second_order)
+    # Counted every five steps.
+    assert left["lasted"] == pytest.approx(2.943 * depth / (2.0 * speed), abs=5 * left["dt"])
     energy, unexplained = left["account"]["kinetic"], left["unexplained"]
     assert max(unexplained) < 0.5 * np.sqrt(second_order) * energy
     assert unexplained[-1] < second_order * energy

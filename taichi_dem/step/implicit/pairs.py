@@ -61,7 +61,7 @@ class PairDashpots(ContactForces):
     def __init__(self, schedule: Schedule, velocities: Velocities):
         super().__init__(schedule)
         self.velocities = velocities
-        self.has_friction = bool(self.tables.friction.name)
+        self.has_friction = bool(self.friction.name)
         if self.springs.present:
             self.elapsed = ti.field(real, shape=self.store.slots)
             self.pull = ti.Vector.field(3, real, shape=self.store.spheres)
@@ -296,7 +296,7 @@ class PairDashpots(ContactForces):
         found = ti.max(0.0, (self.push[c] - damping * free) / (1.0 + damping * share[0])) * normal
         if ti.static(self.has_friction):
             slide = velocity - along * normal - share[1] * (held - pressed * normal)
-            bound = self.tables.friction.limit(m, dot(found, normal))
+            bound = self.friction.limit(m, dot(found, normal))
             stick = -damping / (1.0 + damping * share[1])
             if ti.static(self.springs.present):
                 pull = cut_to(self.pull[c], bound)
@@ -358,7 +358,7 @@ class PairDashpots(ContactForces):
         """Limit a spring in a step; return its impulse [N s] and the energy of slipping [J]."""
         k, normal, rotation = self.entry[c], self.normal[c], self.state.rotation(i)
         dt = self.schedule.step_seconds[0]
-        bound = self.tables.friction.limit(m, pressed) / dt
+        bound = self.friction.limit(m, pressed) / dt
         way = self._way(i, j, self.branch[p], self.arm[c], normal, self.elapsed[p])
         spent = self.springs.slip(m, k, rotation, bound, way)
         return dt * self.springs.force(m, k, rotation), spent
