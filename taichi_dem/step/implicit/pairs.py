@@ -43,18 +43,18 @@ class PairDashpots(ContactForces):
 
     touching: number of spheres of a pair that touch, or may within the step; they come first among
     the pair's candidates. entry: index of the candidate. normal: from first to second. arm: from
-    the second's centre to the contact [m]. push: impulse of the spring, or of the remaining gap [N
-    s]. share: velocity per impulse along the normal, and largest across it [1/kg]. impulse: on the
-    second, of spring, dashpot and friction [N s]; entries as in ``PairStore.sphere``. Where
-    friction sticks, pull: impulse of the spring across the contact [N s]; elapsed: time since a
-    pair was last evaluated [s].
+    the second's centre to the contact [m]. given: impulse of the spring, or of the remaining gap [N
+    s]; of the dashpot per velocity [kg]; velocity per impulse along the normal, and largest across
+    it [1/kg]. impulse: on the second, of spring, dashpot and friction [N s]; entries as in
+    ``PairStore.sphere``. Where friction sticks, pull: impulse of the spring across the contact [N
+    s]; elapsed: time since a pair was last evaluated [s].
     colour: of each pair that touches; order: those pairs by colour, those of colour c from
     colour_first[c] on, and without one from colour_first[COLOURS] to colour_first[LEFT].
     """
 
     scratch_fields = (
         *("elapsed", "pull"),
-        *("touching", "entry", "normal", "arm", "push", "drag", "share", "branch"),
+        *("touching", "entry", "normal", "arm", "given", "branch"),
         *("order", "colour", "colour_first"),
     )
 
@@ -66,10 +66,9 @@ class PairDashpots(ContactForces):
             self.elapsed = ti.field(real, shape=self.store.slots)
             self.pull = ti.Vector.field(3, real, shape=self.store.spheres)
         pairs, spheres = self.store.slots, self.store.spheres
-        self.entry, self.push = ti.field(ti.i32, shape=spheres), ti.field(real, shape=spheres)
+        self.entry = ti.field(ti.i32, shape=spheres)
         self.normal, self.arm = (ti.Vector.field(3, real, shape=spheres) for _ in range(2))
-        self.share = ti.Vector.field(2, real, shape=spheres)
-        self.drag = ti.field(real, shape=spheres)
+        self.given = ti.Vector.field(4, real, shape=spheres)
         self.turns = not self.geometry.by_face
         if self.turns:
             self.couple = ti.Vector.field(3, real, shape=spheres)
@@ -183,8 +182,9 @@ class PairDashpots(ContactForces):
                 self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
                 # Spheres still apart may approach until they touch, at the end of the step.
                 spring = dt * push.elastic + damping * ti.min(met.overlap, 0.0)
-                self.push[end], self.drag[end] = met.area * spring, damping * met.area * met.weight
-                self.share[end] = self._share(i, j, branch, arm, met)
+                along, across = self._share(i, j, branch, arm, met)
+                drag = dt * (damping * met.area * met.weight)
+                self.given[end] = [met.area * spring, drag, along, across]
                 force += self.impulse[k]
                 moment += cross(arm, self.impulse[k])
                 if ti.static(self.turns):
@@ -258,7 +258,7 @@ class PairDashpots(ContactForces):
             first, second = first_along + met.couple, second_along + met.couple
             along = dot(normal, matvec(slack, normal))
             along += dot(first, matvec(turn_i, first)) + dot(second, matvec(turn_j, second))
-        return ti.Vector([along, across])
+        return along, across
 
     @ti.func
     def visit(self, a):
@@ -268,13 +268,13 @@ class PairDashpots(ContactForces):
         m = self.tables.pair(pair[0], pair[1])
         start = self.store.first[p]
         for c in range(start, start + self.touching[p]):
-            k, share = self.entry[c], self.share[c]
+            k, along = self.entry[c], self.given[c][2]
             linear, angular = self.velocities.apart(pair[0], pair[1], self.branch[p])
             found = self._answer(m, c, linear, angular)
             step = self.impulse[k] - found
             self.impulse[k] = found
             self.velocities.pull(pair[0], pair[1], self.branch[p], step, self._moment(c, step))
-            change2 = ti.max(change2, share[0] * share[0] * squared(step))
+            change2 = ti.max(change2, along * along * squared(step))
         raise_to(self.velocities.change2, change2)
 
     @ti.func
@@ -286,21 +286,21 @@ class PairDashpots(ContactForces):
     @ti.func
     def _answer(self, m, c, linear, angular):
         """Impulse of a contact by its laws [N s], with those of all others as they are."""
-        normal, share, held = self.normal[c], self.share[c], self.impulse[self.entry[c]]
+        normal, given, held = self.normal[c], self.given[c], self.impulse[self.entry[c]]
+        push, damping, giving, across = given[0], given[1], given[2], given[3]
         velocity = linear + cross(angular, self.arm[c])
-        damping = self.schedule.step_seconds[0] * self.drag[c]
         pressed, along = dot(held, normal), dot(velocity, normal)
         rate = along + self._turned(c, angular)
         # The opening rate without this contact's own impulse, and the law solved for the impulse.
-        free = rate - share[0] * pressed
-        found = ti.max(0.0, (self.push[c] - damping * free) / (1.0 + damping * share[0])) * normal
+        free = rate - giving * pressed
+        found = ti.max(0.0, (push - damping * free) / (1.0 + damping * giving)) * normal
         if ti.static(self.has_friction):
-            slide = velocity - along * normal - share[1] * (held - pressed * normal)
+            slide = velocity - along * normal - across * (held - pressed * normal)
             bound = self.friction.limit(m, dot(found, normal))
-            stick = -damping / (1.0 + damping * share[1])
+            stick = -damping / (1.0 + damping * across)
             if ti.static(self.springs.present):
                 pull = cut_to(self.pull[c], bound)
-                found += add_within(pull, stick * (slide + share[1] * pull), bound)
+                found += add_within(pull, stick * (slide + across * pull), bound)
             else:
                 found += cut_to(stick * slide, bound)
         return found
@@ -324,7 +324,7 @@ class PairDashpots(ContactForces):
                 impulse = self._answer(m, c, after, turned)
                 pressed = dot(impulse, normal)
                 rate = dot(velocity, normal) + self._turned(c, angular)
-                dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
+                dragged += (ti.max(self.given[c][0], 0.0) - pressed) * rate
                 rub = impulse - pressed * normal
                 active |= active_bits(pressed, rub)
                 if ti.static(self.springs.present):

@@ -1,0 +1,93 @@
+"""A law of contact with memory: what it gives back, what it takes, and what it forgets."""
+
+import math
+
+import numpy as np
+import pytest
+
+from taichi_dem import ImplicitDashpots, Material, Scene, Uniform, effects, step_report
+from taichi_dem.kit.allocation import values
+from taichi_dem.mesh.shapes import placed_together, single
+from taichi_dem.simulation import Simulation
+from tests.verification.test_body_contact import mirrored
+from tests.verification.test_contact_rebound import MU, slope, speeds
+
+EDGE, RESTITUTION, STEP = 0.05, 0.5, 5e-8
+AREA = 0.25 * 3**0.5 * EDGE**2
+STIFF = Material.from_elastic(
+    young=3e10,
+    poisson=0.2,
+    density=2400.0,
+    damping_ratio=1.0,
+    tensile_strength=1e7,
+    fracture_energy=1e3,
+    cohesion=1e7,
+    friction_angle=0.0,
+)
+
+
+class Impact:
+    """Two equal tetrahedra that fly face to face, mirror images of each other."""
+
+    def __init__(self, method, geometry, stiffness):
+        left, right = single(EDGE), mirrored(single(EDGE))
+        apart = left.points.mean(axis=0) - right.points.mean(axis=0)
+        parts = {"left": (left, (0.0,) * 3), "right": (right, [1e-9, *apart[1:]])}
+        law = effects.WaltonBraun(RESTITUTION, stiffness, geometry)
+        mesh = placed_together(parts, keep_coincident=True)
+        self.scene, self.method = Scene(mesh, STIFF, [law]), method(STEP)
+        self.stiffness = stiffness * (39 if geometry.by_face else AREA)
+
+    def meet(self, speed):
+        """Simulation in which they have met and parted, and the rate of loading [1/s]."""
+        simulation = Simulation(self.scene, self.method)
+        rate = math.sqrt(self.stiffness / (0.5 * simulation.model.body_mass[0]))
+        way = np.outer([0.5, -0.5], [speed, 0.0, 0.0])
+        simulation.state.set_motion(simulation.model.centre, [1.0, 0.0, 0.0, 0.0], way)
+        # A quarter period of loading, a shorter one of unloading, the way out of what is pressed in.
+        contact = 0.5 * math.pi * (1.0 + RESTITUTION) + (1.0 - RESTITUTION**2) / RESTITUTION
+        length = 1.2 * contact / rate + 1e-9 / speed
+        simulation.advance_to(round(length / STEP))
+        return simulation, rate
+
+
+@pytest.mark.parametrize("method", [Uniform, ImplicitDashpots])
+@pytest.mark.parametrize(
+    ("geometry", "stiffness"),
+    [(effects.BodyGeometry(), 1e13), (effects.SphereGeometry(), 3e8)],
+    ids=["bodies", "spheres"],
+)
+def test_what_comes_back_does_not_depend_on_the_speed(method, geometry, stiffness):
+    """e of the speed and 1 - e^2 of the energy come back; what has parted is forgotten.
+
+    A step finds the largest overlap to (w dt)^2 / 8, and the end of the contact to a step, in which
+    the spring of unloading, w / e, changes the speed by up to (w dt / e)^2 of its own.
+    """
+    impact = Impact(method, geometry, stiffness)
+    for speed in (1e-3, 0.1, 1.0, 10.0, 30.0):
+        simulation, rate = impact.meet(speed)
+        near = (rate * STEP / RESTITUTION) ** 2
+        velocity = simulation.motion()["velocity"][:, 0]
+        taken = simulation.energy_balance.account()["hysteresis"]
+        assert near < 0.01
+        assert velocity[1] - velocity[0] == pytest.approx(RESTITUTION * speed, rel=near)
+        given = 0.25 * simulation.model.body_mass[0] * speed**2
+        assert taken == pytest.approx((1.0 - RESTITUTION**2) * given, rel=near)
+        assert not values(simulation.tables.contact.largest).any()
+        simulation.close()
+
+
+def test_a_block_rests_on_what_it_has_pressed_in():
+    """Bonds damp what the contact, elastic below its largest overlap, does not."""
+    scene = slope(0.67 * MU, 1.0)
+    law = effects.WaltonBraun(RESTITUTION)
+    own = [law if effect.role == "contact" else effect for effect in scene.effects]
+    assert abs(speeds(Scene(scene.mesh, scene.material, own), [0.3])[0]) < 1e-6
+
+
+def test_steps_are_judged_by_the_stiffness_of_unloading():
+    """Four times that of loading: half the step of a law that gives all back."""
+    laws = effects.BodyContact(), effects.WaltonBraun(1.0), effects.WaltonBraun(RESTITUTION)
+    reports = (step_report(Scene(single(EDGE), STIFF, [law])) for law in laws)
+    linear, lossless, lossy = (report.limits["contact_stiffness"][0] for report in reports)
+    assert lossless == linear and lossy == pytest.approx(RESTITUTION * linear, rel=1e-12)
