@@ -1,9 +1,15 @@
-"""Effects that a scene may list; all others are not computed, allocated or compiled."""
+"""Effects that a scene may list; all others are not computed, allocated or compiled.
+
+``BondLaw``, ``TensionLaw``, ``ShearLaw``, ``Dashpot``, ``ContactLaw``, ``FrictionLaw``, ``Load``,
+``Support`` and ``Ground`` are the contracts from which users derive effects of their own;
+``BodyGeometry`` and ``SphereGeometry`` are what a contact law holds.
+"""
 
 from taichi_dem.laws.body_geometry import BodyGeometry
 from taichi_dem.laws.bond import BondDamping, ShearSlip, SlipWeakening, Softening
 from taichi_dem.laws.contact import BodyContact, SphereContact
 from taichi_dem.laws.contact_contracts import ContactLaw, FrictionLaw, Geometry
+from taichi_dem.laws.contracts import BondLaw, Dashpot, Ground, Load, ShearLaw, Support, TensionLaw
 from taichi_dem.laws.friction import Friction, StickingFriction
 from taichi_dem.laws.mixed_mode import MixedMode
 from taichi_dem.laws.sphere_geometry import SphereGeometry
@@ -15,7 +21,9 @@ __all__ = [
     "BodyContact",
     "BodyGeometry",
     "BondDamping",
+    "BondLaw",
     "ContactLaw",
+    "Dashpot",
     "ExpandingGas",
     "Fixed",
     "Friction",
@@ -23,16 +31,21 @@ __all__ = [
     "GasPressure",
     "Geometry",
     "Gravity",
+    "Ground",
+    "Load",
     "MixedMode",
     "PrescribedMotion",
     "Pressure",
     "QuietBoundary",
     "Roller",
+    "ShearLaw",
     "ShearSlip",
     "SlipWeakening",
     "Softening",
     "SphereContact",
     "SphereGeometry",
     "StickingFriction",
+    "Support",
+    "TensionLaw",
     "WaltonBraun",
 ]

@@ -10,8 +10,9 @@ from taichi_dem.contact.contacts import Contacts
 from taichi_dem.contact.search import BroadPhase
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.engine_pool import Engine, EnginePool
-from taichi_dem.laws.base import PARTS_OF_BOND, Effect, bound
+from taichi_dem.laws.base import Effect, bound
 from taichi_dem.laws.bond import Separable
+from taichi_dem.laws.contracts import PARTS_OF_BOND
 from taichi_dem.laws.roles import ABSENT
 from taichi_dem.methods import Method, structure_of
 from taichi_dem.report.forces import Forces

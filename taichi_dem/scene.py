@@ -22,7 +22,8 @@ from taichi_dem.kit.validation import (
     told_apart,
     word,
 )
-from taichi_dem.laws.base import PARTS_OF_BOND, Effect, check_one_material
+from taichi_dem.laws.base import Effect, check_one_material
+from taichi_dem.laws.contracts import PARTS_OF_BOND
 from taichi_dem.laws.roles import AUTO, LISTED, ChosenEffects, check_effect, chosen_effects
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials, body_materials

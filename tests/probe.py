@@ -108,7 +108,8 @@ class BondProbe(Probe):
     @ti.kernel
     def _spent(self, spent: ti.types.ndarray(dtype=ti.f64, ndim=1)):
         for q in range(3):
-            spent[q] = self.tables.bond.spent(0, q)
+            m, stiffness = self.tables.bond_pair[0], self.tables.bond_stiffness[0]
+            spent[q] = self.tables.bond.spent(m, q, stiffness)
 
 
 @ti.data_oriented

@@ -14,6 +14,7 @@ from taichi_dem.kit.bars.answer import share_in_words
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.progress import Listener, Progress
 from taichi_dem.kit.timing import clock
+from taichi_dem.laws.contracts import BodyEffect
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import topology_of
 from taichi_dem.methods import ImplicitDashpots, Method, Uniform
@@ -74,7 +75,8 @@ class Job:
     @cached_property
     def _coarsest(self):
         """Steps at level 0, the fewest that are stable, and order of the error from there on."""
-        change = min((effect.change_time() for effect in self.scene.effects), default=math.inf)
+        drives = (one for one in self.scene.effects if isinstance(one, BodyEffect))
+        change = min((one.change_time() for one in drives), default=math.inf)
         longest = self._longest_step()
         step = max(min(longest, change), longest / _MOST_TIMES)
         # A pulse within a step is a kick, which lies between the steps of two levels by chance.

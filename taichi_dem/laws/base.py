@@ -1,4 +1,4 @@
-"""Base class of effects, and null objects for roles in which a scene lists none."""
+"""Base class of effects, and what an engine does with one."""
 
 import copy
 import re
@@ -11,8 +11,7 @@ from taichi.lang import impl
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.products import dot
-from taichi_dem.kit.types import real, vec3
+from taichi_dem.kit.types import real
 from taichi_dem.kit.validation import shown, told_apart
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.materials.body_materials import MOST, BodyMaterials
@@ -20,21 +19,8 @@ from taichi_dem.state.model import MANY, Model
 from taichi_dem.state.pair_store import PairStore
 from taichi_dem.state.tables import Capacity, Tables
 
-#: Lowest and highest displacement along x, y and z [m].
-Travel = tuple[tuple[float, ...], tuple[float, ...]]
 #: Share of a limit from which on a law is evaluated: rounding is far below the rest.
 NEAR = 1.0 - 1e-9
-
-
-def asked(method: Any) -> Any:
-    """Mark a method that each class of a role must give."""
-    method.is_asked = True
-    return method
-
-
-def asked_of(kind: type) -> list[str]:
-    """Names of the methods that a class of a role still has to give."""
-    return [name for name in dir(kind) if getattr(getattr(kind, name), "is_asked", False)]
 
 
 class Effect:
@@ -49,22 +35,10 @@ class Effect:
 
     role = ""
     name = ""
-    #: Each of the next three asks for members of its own (``laws.roles``).
-    #: Whether a shear law keeps a residual slip of each unit.
-    remembers_slip = False
-    #: Whether a shear law may release a face.
-    releases = False
-    #: Whether a law of bonds spends energy in slip, and whether it limits tension and shear alike.
-    rubs = False
-    is_whole = True
-    #: Whether a load acts by its mean from a time to a later one.
-    varies = False
     law: ti.Field
     tables: Tables
     _count: int
 
-    #: When it begins to act, in words; a scene with effects="auto" refuses a law that says nothing.
-    activation = ""
     #: Whether it stands for no effect, which no report lists.
     is_null = False
     #: Whether it never acts with a harmless material, as ``silent`` needs, and is such a copy.
@@ -72,10 +46,11 @@ class Effect:
     is_silent = False
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Name a class that has no name: reports list effects by it."""
+        """Name a class that states no name of its own; reports list no null object."""
         super().__init_subclass__(**options)
-        if not cls.name and not cls.is_null and not asked_of(cls):
-            cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).strip("_").lower()
+        if "name" not in vars(cls):
+            words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).strip("_").lower()
+            cls.name = "" if cls.is_null else words
 
     def __repr__(self):
         return by_arguments(self)
@@ -111,24 +86,6 @@ class Effect:
 
     def load(self, model: Model) -> None:
         """Fill the declared fields for a scene; they are zero before."""
-
-    def stress(self, material: Material, size: float) -> float:
-        """Stress [Pa] that a load or support may cause in a block of a size [m]; NaN if unknown."""
-        return np.nan
-
-    def change_time(self) -> float:
-        """Shortest time [s] within which a load or support changes; longer steps lose its shape.
-
-        Infinite by default.
-        """
-        return np.inf
-
-    def travel(self) -> Travel:
-        """Lowest and highest displacement [m] (3,) that a load or support may cause.
-
-        Used to decide whether parts of a mesh may meet. Infinite by default.
-        """
-        return (-np.inf,) * 3, (np.inf,) * 3
 
     def stand_for(self, given: "Effect") -> None:
         """Take the attributes of this bound effect from an effect of a scene."""
@@ -234,68 +191,3 @@ def check_sliding_energy(effect: Effect, option: str, material: Material) -> Non
             f"{option} of {effect.name} must be larger than cohesion^2 / (2 shear_stiffness) = "
             f"{bound} J/m2, or a bond would fail at once, got {got}"
         )
-
-
-@ti.data_oriented
-class ElasticTension(Effect):
-    """No softening: a unit stays elastic in tension and compression and never fails."""
-
-    role = "tension"
-    is_null = True
-
-    @ti.func
-    def traction(self, m, stiffness, u, opening):
-        """Linear traction [Pa] at a normal opening [m]."""
-        return stiffness * opening
-
-    @ti.func
-    def failed(self, m, u):
-        """An elastic unit never fails."""
-        return 0
-
-    @ti.func
-    def stored(self, b, u, opening):
-        """Elastic energy per area [J/m^2]."""
-        return 0.5 * self.tables.bond_stiffness[b][0] * opening * opening
-
-    @ti.func
-    def spent(self, b, u):
-        """Nothing is spent, and no unit damaged."""
-        return 0.0
-
-    damage = spent
-
-
-@ti.data_oriented
-class ElasticShear(Effect):
-    """No slip: a unit stays elastic in shear."""
-
-    role = "shear"
-    is_null = True
-
-    @ti.func
-    def traction(self, m, stiffness, u, sliding, pressure):
-        """Linear shear traction [Pa] (eq. 1) and no energy slipped away."""
-        return stiffness * sliding, 0.0
-
-    @ti.func
-    def stored(self, b, u, sliding):
-        """Elastic energy per area [J/m^2]."""
-        return 0.5 * self.tables.bond_stiffness[b][1] * dot(sliding, sliding)
-
-
-@ti.data_oriented
-class NoDashpot(Effect):
-    """Bonds without damping."""
-
-    role = "dashpot"
-    is_null = True
-
-    @ti.func
-    def traction(self, b, velocity):
-        """No traction at any velocity."""
-        return vec3(0.0, 0.0, 0.0)
-
-
-#: Roles of which a law of the role bond takes the place.
-PARTS_OF_BOND = ("tension", "shear")

@@ -1,7 +1,5 @@
 """The paper's law of bonds (Konno et al., section 2.1, Table 1), and linear slip weakening."""
 
-from typing import Any
-
 import numpy as np
 import taichi as ti
 
@@ -9,7 +7,8 @@ from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.products import dot, norm, squared
 from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.kit.validation import positive
-from taichi_dem.laws.base import NEAR, Effect, check_sliding_energy
+from taichi_dem.laws.base import NEAR, check_sliding_energy
+from taichi_dem.laws.contracts import BondLaw, Dashpot, ShearLaw, TensionLaw
 from taichi_dem.materials import Material
 from taichi_dem.physics.fracture import (
     coulomb_limit,
@@ -26,7 +25,7 @@ NORMAL, TANGENTIAL = 1, 2
 
 
 @ti.data_oriented
-class Softening(Effect):
+class Softening(TensionLaw):
     """Beyond the strength a unit softens along a straight line to zero (Konno et al., Fig. 2).
 
     Notes
@@ -36,8 +35,6 @@ class Softening(Effect):
     those of the material.
     """
 
-    role = "tension"
-    activation = "a unit is opened to its tensile strength"
     may_be_silent = True
 
     def numbers(self, material: Material) -> tuple[float, ...]:
@@ -56,16 +53,12 @@ class Softening(Effect):
         assign(self.unit, np.stack([onset, stiffness], axis=1))
 
     @ti.func
-    def _onset(self, b):
-        return self.law[self.tables.bond_pair[b], 0] / self.tables.bond_stiffness[b][0]
-
-    @ti.func
     def begins(self, m, stiffness, opening):
         """1 where an intact unit comes near its strength at an opening [m], else 0."""
         return ti.cast(stiffness * opening > NEAR * self.law[m, 0], ti.i32)
 
     @ti.func
-    def traction(self, m, stiffness, u, opening):
+    def traction(self, m, u, stiffness, opening):
         """Traction [Pa] at a normal opening [m]; raises the elastic limit beyond it."""
         traction = stiffness * opening
         if opening > 0.0:
@@ -79,38 +72,37 @@ class Softening(Effect):
         return traction
 
     @ti.func
-    def failed(self, m, u):
+    def failed(self, m, u, traction):
         """1 once the unit has been opened to the failure opening, else 0."""
         return ti.cast(self.unit[u][0] >= self.law[m, 1], ti.i32)
 
     @ti.func
-    def is_active(self, b, u):
+    def acted(self, m, u, stiffness):
         """1 for a unit that has been opened beyond its elastic limit, else 0."""
-        return ti.cast(self.unit[u][0] > self._onset(b), ti.i32)
+        return ti.cast(self.unit[u][0] > self.law[m, 0] / stiffness, ti.i32)
 
     @ti.func
-    def stored(self, b, u, opening):
+    def stored(self, m, u, stiffness, opening):
         """Elastic energy per area [J/m^2] at the present stiffness."""
-        stiffness = self.tables.bond_stiffness[b][0]
+        present = stiffness
         if opening > 0.0:
-            stiffness = self.unit[u][1]
-        return 0.5 * stiffness * opening * opening
+            present = self.unit[u][1]
+        return 0.5 * present * opening * opening
 
     @ti.func
-    def spent(self, b, u):
+    def spent(self, m, u, stiffness):
         """Energy per area [J/m^2] that softening has spent in this unit."""
-        m = self.tables.bond_pair[b]
-        return softening_energy(self.law[m, 0], self._onset(b), self.law[m, 1], self.unit[u][0])
+        strength = self.law[m, 0]
+        return softening_energy(strength, strength / stiffness, self.law[m, 1], self.unit[u][0])
 
     @ti.func
-    def damage(self, b, u):
+    def damage(self, m, u, stiffness):
         """Share of the fracture energy that is spent, 0 intact to 1 failed."""
-        m = self.tables.bond_pair[b]
-        return self.spent(b, u) / (0.5 * self.law[m, 0] * self.law[m, 1])
+        return self.spent(m, u, stiffness) / (0.5 * self.law[m, 0] * self.law[m, 1])
 
 
 @ti.data_oriented
-class ShearSlip(Effect):
+class ShearSlip(ShearLaw):
     """Shear traction is bounded by cohesion + friction * pressure (Konno et al., eq. 1 and 2).
 
     Notes
@@ -119,10 +111,7 @@ class ShearSlip(Effect):
     Cohesion does not degrade, and slip alone never releases a face.
     """
 
-    role = "shear"
-    activation = "a unit is sheared to its Coulomb limit"
     may_be_silent = True
-    remembers_slip = True
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Cohesion [Pa] and friction coefficient."""
@@ -139,7 +128,7 @@ class ShearSlip(Effect):
         return ti.cast(stiffness * stiffness * squared(sliding) > limit * limit, ti.i32)
 
     @ti.func
-    def traction(self, m, stiffness, u, sliding, pressure):
+    def traction(self, m, u, stiffness, sliding, pressure):
         """Shear traction [Pa] and the energy per area slipped away now [J/m^2]."""
         limit = coulomb_limit(self.law[m, 0], self.law[m, 1], pressure)
         elastic = sliding - self.slip[u]
@@ -154,28 +143,20 @@ class ShearSlip(Effect):
         return stiffness * elastic, spent
 
     @ti.func
-    def is_active(self, b, u):
+    def acted(self, m, u, stiffness):
         """1 for a unit that has slipped, else 0."""
         return ti.cast(squared(self.slip[u]) > 0.0, ti.i32)
 
     @ti.func
-    def residual_slip(self, u):
+    def residual_slip(self, m, u):
         """Residual slip of a unit in the face frame [m]."""
         return self.slip[u]
 
-    @ti.func
-    def stored(self, b, u, sliding):
-        """Elastic energy per area [J/m^2]."""
-        elastic = sliding - self.residual_slip(u)
-        return 0.5 * self.tables.bond_stiffness[b][1] * dot(elastic, elastic)
-
 
 @ti.data_oriented
-class BondDamping(Effect):
+class BondDamping(Dashpot):
     """Normal and tangential dashpots of bonds, at full strength until the face is released."""
 
-    role = "dashpot"
-    activation = "bonds are strained at a rate"
     may_be_silent = True
 
     def declare(self, capacity: Capacity) -> None:
@@ -187,79 +168,68 @@ class BondDamping(Effect):
         assign(self.coefficient, model.bond_damping)
 
     @ti.func
-    def traction(self, b, velocity):
+    def traction(self, m, b, velocity):
         """Traction [Pa] of bond b at a relative velocity in the face frame [m/s]."""
         c = self.coefficient[b]
         return vec3(c[0] * velocity[0], c[1] * velocity[1], c[1] * velocity[2])
 
 
 @ti.data_oriented
-class Separable:
+class Separable(BondLaw):
     """A normal and a tangential law that share only the pressure, as in the paper."""
 
-    def __init__(self, tension: Any, shear: Any):
+    def __init__(self, tension: TensionLaw, shear: ShearLaw):
         self.tension, self.shear = tension, shear
         self.is_null = tension.is_null and shear.is_null
-        self.is_whole = not (tension.is_null or shear.is_null)
-        self.rubs, self.remembers_slip = not shear.is_null, shear.remembers_slip
 
     @ti.func
     def begins(self, m, stiffness, jump):
         """Bits of the laws near whose limit an intact unit comes at a jump [m], else 0."""
-        bits, sliding = 0, vec2(jump[1], jump[2])
-        if ti.static(not self.tension.is_null):
-            bits |= NORMAL * self.tension.begins(m, stiffness[0], jump[0])
-        if ti.static(not self.shear.is_null):
-            pressure = -(stiffness[0] * jump[0])
-            bits |= TANGENTIAL * self.shear.begins(m, stiffness[1], sliding, pressure)
+        bits = NORMAL * self.tension.begins(m, stiffness[0], jump[0])
+        pressure, sliding = -(stiffness[0] * jump[0]), vec2(jump[1], jump[2])
+        bits |= TANGENTIAL * self.shear.begins(m, stiffness[1], sliding, pressure)
         return bits
 
     @ti.func
     def traction(self, m, u, stiffness, jump):
         """Traction [Pa] at a jump [m], and energy per area slipped away now [J/m^2]."""
-        pull = self.tension.traction(m, stiffness[0], u, jump[0])
+        pull = self.tension.traction(m, u, stiffness[0], jump[0])
         sliding = vec2(jump[1], jump[2])
-        shear, slipped = self.shear.traction(m, stiffness[1], u, sliding, -pull)
+        shear, slipped = self.shear.traction(m, u, stiffness[1], sliding, -pull)
         return vec3(pull, shear[0], shear[1]), slipped
 
     @ti.func
     def failed(self, m, u, traction):
         """1 once the unit transmits nothing any more, else 0."""
-        failed = self.tension.failed(m, u)
-        if ti.static(self.shear.releases):
-            failed |= self.shear.failed(m, u, -traction[0])
-        return failed
+        failed = self.tension.failed(m, u, traction[0])
+        return failed | self.shear.failed(m, u, -traction[0])
 
     @ti.func
-    def stored(self, b, u, jump):
+    def stored(self, m, u, stiffness, jump):
         """Elastic energy per area of opening and of sliding [J/m^2]."""
-        normal = self.tension.stored(b, u, jump[0])
-        return normal, self.shear.stored(b, u, vec2(jump[1], jump[2]))
+        normal = self.tension.stored(m, u, stiffness[0], jump[0])
+        return normal, self.shear.stored(m, u, stiffness[1], vec2(jump[1], jump[2]))
 
     @ti.func
-    def spent(self, b, u):
+    def spent(self, m, u, stiffness):
         """Energy per area [J/m^2] that damage has spent in the unit."""
-        return self.tension.spent(b, u)
+        return self.tension.spent(m, u, stiffness[0])
 
     @ti.func
-    def damage(self, b, u):
+    def damage(self, m, u, stiffness):
         """0 intact to 1 failed."""
-        return self.tension.damage(b, u)
+        return self.tension.damage(m, u, stiffness[0])
 
     @ti.func
-    def acted(self, b, u):
+    def acted(self, m, u, stiffness):
         """Bits of the laws that have changed the unit."""
-        bits = 0
-        if ti.static(hasattr(self.tension, "is_active")):
-            bits |= NORMAL * self.tension.is_active(b, u)
-        if ti.static(hasattr(self.shear, "is_active")):
-            bits |= TANGENTIAL * self.shear.is_active(b, u)
-        return bits
+        bits = NORMAL * self.tension.acted(m, u, stiffness[0])
+        return bits | TANGENTIAL * self.shear.acted(m, u, stiffness[1])
 
     @ti.func
-    def residual_slip(self, u):
+    def residual_slip(self, m, u):
         """Slip that stays when the traction is gone, in the face frame [m]."""
-        return self.shear.residual_slip(u)
+        return self.shear.residual_slip(m, u)
 
 
 @ti.data_oriented
@@ -287,10 +257,7 @@ class SlipWeakening(ShearSlip):
     Ida, J. Geophys. Res. 77 (1972) 3796; Andrews, J. Geophys. Res. 81 (1976) 3575.
     """
 
-    name = "slip_weakening"
-    releases = True
     # It begins where ShearSlip does, as it says itself of its other traction.
-    activation = ShearSlip.activation
     begins = ShearSlip.begins
     may_be_silent = True
 
@@ -311,7 +278,7 @@ class SlipWeakening(ShearSlip):
         self.unit = ti.Vector.field(3, ti.f64, shape=capacity.units)
 
     @ti.func
-    def traction(self, m, stiffness, u, sliding, pressure):
+    def traction(self, m, u, stiffness, sliding, pressure):
         """Shear traction [Pa] and the energy per area slipped away now [J/m^2]."""
         unit = self.unit[u]
         cohesion = self.law[m, 0] - self.law[m, 3] * unit[2]
@@ -336,11 +303,11 @@ class SlipWeakening(ShearSlip):
         return ti.cast(self.unit[u][2] >= self.law[m, 2] and pressure <= 0.0, ti.i32)
 
     @ti.func
-    def is_active(self, b, u):
+    def acted(self, m, u, stiffness):
         """1 for a unit that has slipped, else 0."""
         return ti.cast(self.unit[u][2] > 0.0, ti.i32)
 
     @ti.func
-    def residual_slip(self, u):
+    def residual_slip(self, m, u):
         """Residual slip of a unit in the face frame [m]."""
         return vec2(self.unit[u][0], self.unit[u][1])

@@ -79,8 +79,6 @@ class SphereContact(LinearContact):
         of the next search, before those that they replace are freed.
     """
 
-    name = "sphere_contact"
-    activation = "spheres of free faces touch"
     knob, firmer = "contact_stiffness", "a contact_stiffness of {value:.2g} N/m"
     calmer, undamped = "a larger contact_damping", "contact_damping of the material is 0"
 
@@ -145,8 +143,6 @@ class BodyContact(LinearContact):
     Poeschel, Granular Matter 9 (2007) 465, for the restitution of a dashpot that never pulls.
     """
 
-    name = "body_contact"
-    activation = "bodies touch"
     knob, firmer = "stiffness", "{law}(stiffness={value:.2g}), in Pa/m"
     calmer, undamped = "a smaller restitution of BodyContact", "its restitution is 1"
 

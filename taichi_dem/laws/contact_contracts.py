@@ -4,6 +4,7 @@ m: pair of materials, the row of numbers ``self.law[m, 0]`` and on. k: entry of 
 spheres or two bodies.
 """
 
+from abc import abstractmethod
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import taichi as ti
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import between, flag, instance, shown, whole
-from taichi_dem.laws.base import Effect, asked
+from taichi_dem.laws.base import Effect
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials
 from taichi_dem.mesh.mesh import Mesh, volumes
@@ -105,12 +106,12 @@ class Geometry(Effect):
         """Keep the pair store, which takes the contacts that are found."""
         self.store = store
 
-    @asked
+    @abstractmethod
     def spheres(self, model: Model) -> ContactSpheres:
         """Balls that hold all that can touch of a face, or of a body."""
         raise NotImplementedError
 
-    @asked
+    @abstractmethod
     def find(self, i, j, turn, offset, faces, margin, far):
         """Number of contacts of bodies i, j with a gap below a margin [m]; least gap of all else.
 
@@ -118,27 +119,27 @@ class Geometry(Effect):
         ``far`` [m]: the search does not ask again before the bodies can have closed it.
         """
 
-    @asked
+    @abstractmethod
     def enter(self, i, j, turn, offset, faces, margin, place):
         """Enter those contacts in the pair store, from a place on."""
 
-    @asked
+    @abstractmethod
     def nearest(self, a, b, turn, offset):
         """Where two bodies are nearest by an entry (a, b) of the pair store, a ``Nearest``."""
 
-    @asked
+    @abstractmethod
     def is_within(self, near, margin):
         """Whether the surfaces of a ``Nearest`` are nearer than a margin [m]."""
 
-    @asked
+    @abstractmethod
     def gap(self, a, b, first, turned_first, second, turned_second):
         """Gap [m] of an entry (a, b), by centre [m] and rotation of both bodies."""
 
-    @asked
+    @abstractmethod
     def meeting(self, near, k, rotation):
         """The ``Meeting`` of entry k; rotation: of the first body."""
 
-    @asked
+    @abstractmethod
     def overlap(self, near):
         """Overlap of two surfaces [m], negative while they are apart."""
 
@@ -197,15 +198,15 @@ class ContactLaw(Effect):
     def __init__(self, geometry: Geometry):
         self.geometry = instance("geometry", geometry, Geometry)
 
-    @asked
+    @abstractmethod
     def push(self, m, k, touch):
         """The ``Push`` of entry k at a ``Touch``, as its memory stands; nothing changes."""
 
-    @asked
+    @abstractmethod
     def stored(self, m, k, touch):
         """Energy [J] that the spring of entry k gives back; of bodies per area."""
 
-    @asked
+    @abstractmethod
     def stiffness_at(self, numbers, overlap):
         """Largest slope [N/m] of the repulsion up to an overlap [m]: ``ti.pyfunc``."""
 
@@ -256,11 +257,11 @@ class FrictionLaw(Effect):
     #: Whether it keeps a spring of each entry.
     remembers = False
 
-    @asked
+    @abstractmethod
     def limit(self, m, force_normal):
         """Largest friction [N] at a normal force [N]; of impulses likewise."""
 
-    @asked
+    @abstractmethod
     def force(self, m, damping, force_normal, slide):
         """Force [N] on the second body against its sliding velocity [m/s], without springs."""
 

@@ -25,14 +25,13 @@ class NoFriction(FrictionLaw):
     @ti.func
     def force(self, m, damping, force_normal, slide):
         """No force at any sliding velocity."""
-        return vec3(0.0, 0.0, 0.0)
+        return vec3(0.0)
 
 
 @ti.data_oriented
 class Friction(FrictionLaw):
     """Sliding friction of contacts, without a tangential spring (Konno et al., section 2.2)."""
 
-    activation = "bodies that touch slide"
     may_be_silent = True
 
     def numbers(self, material: Material) -> tuple[float, ...]:
@@ -66,8 +65,6 @@ class StickingFriction(Friction):
         a Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
     """
 
-    name = "sticking_friction"
-    activation = "bodies that touch slide"
     remembers = True
     #: Its springs let bodies that touch remember: without a limit they would still slip.
     may_be_silent = False

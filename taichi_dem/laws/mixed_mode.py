@@ -6,7 +6,8 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.products import squared
 from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.kit.validation import positive, shown
-from taichi_dem.laws.base import NEAR, Effect, check_sliding_energy
+from taichi_dem.laws.base import NEAR, check_sliding_energy
+from taichi_dem.laws.contracts import BondLaw
 from taichi_dem.materials import Material
 from taichi_dem.state.tables import Capacity
 
@@ -16,7 +17,7 @@ _MOST, _QUARTER = 8.0, 0.25
 
 
 @ti.data_oriented
-class MixedMode(Effect):
+class MixedMode(BondLaw):
     """Bonds soften along a straight line, by opening and sliding together, and fail.
 
     Replaces ``Softening`` and ``ShearSlip``.
@@ -44,8 +45,6 @@ class MixedMode(Effect):
     1; Camanho and Davila, NASA/TM-2002-211737.
     """
 
-    role = "bond"
-    activation = "a unit is opened and sheared to its limit"
     may_be_silent = True
 
     def __init__(self, shear_energy: float, exponent: float = 2.0):
@@ -124,26 +123,26 @@ class MixedMode(Effect):
         return ti.cast(self.unit[u][0] >= 1.0, ti.i32)
 
     @ti.func
-    def acted(self, b, u):
+    def acted(self, m, u, stiffness):
         """1 for a damaged unit, else 0."""
         return ti.cast(self.unit[u][0] > 0.0, ti.i32)
 
     @ti.func
-    def stored(self, b, u, jump):
+    def stored(self, m, u, stiffness, jump):
         """Elastic energy per area of opening and of sliding [J/m^2]."""
-        stiffness, left = self.tables.bond_stiffness[b], 1.0 - self.unit[u][0]
+        left = 1.0 - self.unit[u][0]
         normal = 0.5 * stiffness[0] * jump[0] * jump[0]
         if jump[0] > 0.0:
             normal *= left
         return normal, 0.5 * left * stiffness[1] * squared(vec2(jump[1], jump[2]))
 
     @ti.func
-    def spent(self, b, u):
+    def spent(self, m, u, stiffness):
         """Energy per area [J/m^2] that damage has spent in the unit."""
         return self.unit[u][1]
 
     @ti.func
-    def damage(self, b, u):
+    def damage(self, m, u, stiffness):
         """0 intact to 1 failed."""
         return self.unit[u][0]
 

@@ -30,7 +30,6 @@ class WaltonBraun(ContactLaw):
         What touches: whole bodies (``BodyGeometry()``, the default) or ``SphereGeometry()``.
     """
 
-    activation = "bodies touch"
     has_memory = True
     calmer, undamped = "a smaller restitution", "this law has none"
 

@@ -10,6 +10,7 @@ from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import real
 from taichi_dem.kit.validation import real_numbers, shown
+from taichi_dem.laws.contracts import BodyEffect
 from taichi_dem.state.model import names_of
 
 #: Points that a history may have.
@@ -39,7 +40,8 @@ def shortest_piece(times: tuple[float, ...], values: tuple[float, ...]) -> float
 def unresolved_histories(effects: Any, step: float) -> tuple[str, ...]:
     """A sentence about each load or support that changes within less than a step [s]."""
     listed = tuple(effects)
-    times = ((name, one.change_time()) for name, one in zip(names_of(listed), listed))
+    named = zip(names_of(listed), listed)
+    times = ((name, one.change_time()) for name, one in named if isinstance(one, BodyEffect))
     return tuple(
         f"{name} changes within {time:.3g} s, "
         f"less than the largest step, {step:.3g} s: its shape over time may be lost, though loads "

@@ -1,6 +1,7 @@
 """Weight, pressure on a group of outer faces, gas of a blast (Konno et al., eq. 4)."""
 
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,7 +16,7 @@ from taichi_dem.kit.likely_units import ACCELERATION, BLAST_RISE, EDGE, PRESSURE
 from taichi_dem.kit.products import cross, dot, matvec, norm
 from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import direction, finite, positive, real_numbers, shown, word
-from taichi_dem.laws.base import Effect, Travel
+from taichi_dem.laws.contracts import Load, Travel
 from taichi_dem.loads.history import History, history_points, shortest_piece
 from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
@@ -28,7 +29,7 @@ _MOST_EXPONENT, _CLOSED = 5.0, -0.5
 
 
 @ti.data_oriented
-class Gravity(Effect):
+class Gravity(Load):
     """Uniform acceleration of all bodies.
 
     Parameters
@@ -36,8 +37,6 @@ class Gravity(Effect):
     acceleration : sequence of float, default (0.0, -9.81, 0.0)
         Acceleration along x, y and z [m/s^2].
     """
-
-    role = "load"
 
     def __init__(self, acceleration: Sequence[float] = (0.0, -9.81, 0.0)):
         self._acceleration = direction("acceleration", acceleration)
@@ -57,26 +56,25 @@ class Gravity(Effect):
         return low, tuple(math.inf if x > 0.0 else 0.0 for x in self._acceleration)
 
     @ti.func
-    def acts_on(self, i):
-        """Every body has weight."""
-        return 1
-
-    @ti.func
     def wrench(self, i, motion):
         """Force [N] and torque about the centre [N m] on body i."""
         return self.tables.mass[i] * vec3(self.law[0], self.law[1], self.law[2]), vec3(0.0)
 
 
 @ti.data_oriented
-class FacePressure(Effect):
+class FacePressure(Load):
     """Base of loads that push on the faces of a group along their current normal.
 
-    The area stays the mesh's. A derived class has ``mean_pressure(since, until)`` [Pa], and
-    ``changes(since, until)``, nonzero where the pressure changes between two times [s].
+    The area stays the mesh's.
     """
 
-    role = "load"
-    varies = True
+    @abstractmethod
+    def mean_pressure(self, since, until):
+        """Mean pressure [Pa] from a time to a later one [s]."""
+
+    @abstractmethod
+    def changes(self, since, until):
+        """Nonzero where the pressure changes between two times [s]."""
 
     def declare(self, capacity: Capacity) -> None:
         """Loaded faces of every body: area vectors [m^2] and arms from the centre [m]."""
@@ -125,8 +123,6 @@ class Pressure(FacePressure):
     times : sequence of float, default (0.0,)
         Times [s], ascending.
     """
-
-    name = "pressure"
 
     def __init__(self, group: str, values: Any, times: Any = (0.0,)):
         self.group = word("group", group)
@@ -243,8 +239,6 @@ class GasPressure(FacePressure):
     Konno et al., section 4.1, eq. 4, Fig. 11.
     """
 
-    name = "gas_pressure"
-
     def __init__(
         self,
         group: str = "hole",
@@ -322,8 +316,6 @@ class ExpandingGas(GasPressure):
     The volume is local: a face whose wall has moved by u along its normal, away from the gas, has a
     hole (1 + u / radius)^2 times as large. Gas does not flow along a hole, nor into cracks.
     """
-
-    name = "expanding_gas"
 
     def __init__(
         self, group: str = "hole", radius: float = 0.025, exponent: float = 1.4, **pulse: Any

@@ -16,7 +16,7 @@ from taichi_dem.kit.fixed_order import length, product, transposed
 from taichi_dem.kit.products import dot, matvec, squared, transposed_matvec
 from taichi_dem.kit.types import mat3, real, vec3
 from taichi_dem.kit.validation import direction, positive, shown, unit_vector, word
-from taichi_dem.laws.base import Effect, Travel
+from taichi_dem.laws.contracts import Ground, Support, Travel
 from taichi_dem.loads.history import History, history_points, shortest_piece
 from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
@@ -30,10 +30,8 @@ _PARALLEL = 1e-6
 
 
 @ti.data_oriented
-class _Support(Effect):
+class _Support(Support):
     """Marks the bodies that have a face in a group."""
-
-    role = "support"
 
     def __init__(self, group: str):
         self.group = word("group", group)
@@ -68,8 +66,6 @@ class Fixed(_Support):
         Face group.
     """
 
-    name = "fixed"
-
     @ti.func
     def held(self, i, t, step, rotation, velocity, angular_momentum):
         """Zero velocity and angular momentum."""
@@ -90,8 +86,6 @@ class Roller(_Support):
     normal : sequence of float
         Normal of the plane [-]; its length does not matter.
     """
-
-    name = "roller"
 
     def __init__(self, group: str, normal: Sequence[float]):
         super().__init__(group)
@@ -163,8 +157,6 @@ class PrescribedMotion(_Support):
         (times [s], shares), in place of a ramp: the velocity is multiplied by the shares, linear
         between the times and constant before the first and after the last.
     """
-
-    name = "prescribed_motion"
 
     def __init__(
         self,
@@ -273,7 +265,7 @@ def _allows(effect, motion):
 
 
 @ti.data_oriented
-class QuietBoundary(Effect):
+class QuietBoundary(Ground):
     """Dashpots between the faces of a group and the ground, which reflect little of a wave.
 
     Parameters
@@ -298,8 +290,6 @@ class QuietBoundary(Effect):
     J. Lysmer and R. L. Kuhlemeyer, Finite dynamic model for infinite media, J. Eng. Mech. Div. ASCE
     95(EM4), 1969, 859-877, eq. 1 and 2.
     """
-
-    role = "ground"
 
     def __init__(self, group: str, p_speed: float | None = None, s_speed: float | None = None):
         self.group = word("group", group)

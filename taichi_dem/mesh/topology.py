@@ -195,8 +195,8 @@ def any_overlap(low: np.ndarray, high: np.ndarray) -> bool:
 
 def may_meet(scene: Any, part: np.ndarray) -> bool:
     """Whether parts of a scene at rest may meet, as far as can be known before a run."""
-    # Each part may move by ``NEARNESS`` of its size, by ``Effect.travel``, and without end along
-    # its velocity relative to the mean; displacements that all parts share do not count.
+    # Each part may move by ``NEARNESS`` of its size, by ``BodyEffect.travel``, and without end
+    # along its velocity relative to the mean; displacements that all parts share do not count.
     drives = [effect for effect in scene.effects if effect.role in ("load", "support")]
     travels = np.array([effect.travel() for effect in drives]).reshape(-1, 2, 3)
     anywhere = np.isinf(travels).all(axis=(1, 2))

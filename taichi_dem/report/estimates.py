@@ -143,10 +143,10 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
 
     Notes
     -----
-    The stress is that of the loads and supports on a part (``Effect.stress``) and of the motion at
-    the start, of all parts where they may meet; the speed is that of a wave of this stress, stress
-    / (density wave speed), or the largest at the start, of the part alone. Of several materials the
-    least strengths and the largest friction count.
+    The stress is that of the loads and supports on a part (``BodyEffect.stress``) and of the motion
+    at the start, of all parts where they may meet; the speed is that of a wave of this stress,
+    stress / (density wave speed), or the largest at the start, of the part alone. Of several
+    materials the least strengths and the largest friction count.
     """
     instance("scene", scene, Scene)
     until, part = positive("until", until), parts_of(scene.mesh)

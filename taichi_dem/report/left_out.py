@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from taichi_dem.kit.allocation import values
+from taichi_dem.loads.pressure import Gravity
 from taichi_dem.mesh.topology import parts_of
 from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.report.effects import Certificate, on_demand
@@ -66,7 +67,7 @@ def _not_served(run, scales, energy, way, until):
     """Estimates of what no law of the scene serves, from where the run has brought the bodies."""
     model, found = run.model, []
     speed = np.linalg.norm(run.readings.motion()[:, :3], axis=1)
-    if not any(effect.name == "gravity" for effect in model.loads):
+    if not any(isinstance(effect, Gravity) for effect in model.loads):
         active = values(run.state.active_effects, slice(model.body_count))
         borne = scales.under((*model.supports, *model.ground))
         borne |= scales.sum(active & np.int64(CONTACT)) > 0

@@ -278,6 +278,7 @@ class Readings:
         # Each place is written once: to add to it takes longer, and what a kernel does not write
         # into an array that it does not read is not zero on a card.
         energy, drag, spent, damage, slip = 0.0, 0.0, 0.0, 1.0, 0.0
+        stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
         heat, acted = vec2(0.0), ti.cast(0, ti.i32)
         if ti.static(self.step.bonds.has_dashpot):
             drag = self.state.bond_drag[b]
@@ -285,8 +286,8 @@ class Readings:
             heat = self.state.bond_heat[b]
         for q in range(3):
             u = 3 * b + q
-            spent += self.tables.unit_area[b] * self.tables.bond.spent(b, u)
-            acted |= ti.cast(self.tables.bond.acted(b, u), ti.i32)
+            spent += self.tables.unit_area[b] * self.tables.bond.spent(m, u, stiffness)
+            acted |= ti.cast(self.tables.bond.acted(m, u, stiffness), ti.i32)
         if self.state.broken_tick[b] < 0:
             motion = self.state.bond_motion(b)
             energy, damage = self.step.bonds.energy(b, motion), 0.0
@@ -294,9 +295,8 @@ class Readings:
                 drag += self.half_step.bond_drag(b, motion)
             for q in range(3):
                 u = 3 * b + q
-                damage += self.tables.bond.damage(b, u) / 3.0
-                if ti.static(self.tables.bond.remembers_slip):
-                    slip = ti.max(slip, norm(self.tables.bond.residual_slip(u)))
+                damage += self.tables.bond.damage(m, u, stiffness) / 3.0
+                slip = ti.max(slip, norm(self.tables.bond.residual_slip(m, u)))
         at = self.of_bond
         table[b, at.strain], table[b, at.dashpot] = energy, drag
         table[b, at.slip], table[b, at.release] = heat[0], heat[1]

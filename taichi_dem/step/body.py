@@ -109,20 +109,18 @@ class BodyLoads:
         begin = now - elapsed
         since = begin - self.state.lag[i][e]
         until, length = since + elapsed, elapsed
-        if ti.static(self.tables.loads[e].varies):
-            middle = begin + 0.5 * elapsed
-            if self.tables.loads[e].changes(since, ti.max(until, middle)):
-                until, length = middle, middle - since
-                self.state.lag[i][e] = 0.5 * elapsed
+        middle = begin + 0.5 * elapsed
+        if self.tables.loads[e].changes(since, ti.max(until, middle)):
+            until, length = middle, middle - since
+            self.state.lag[i][e] = 0.5 * elapsed
         return self.state.body_motion(i, begin, elapsed, since, until), length
 
     @ti.func
     def load_up_to(self, i, e: ti.template(), now, step):
         """The same from there to the present, half of the coming step [s]; nothing changes."""
         since, length = now - self.state.lag[i][e], 0.5 * step
-        if ti.static(self.tables.loads[e].varies):
-            if self.tables.loads[e].changes(since, now):
-                length = self.state.lag[i][e]
+        if self.tables.loads[e].changes(since, now):
+            length = self.state.lag[i][e]
         return self.state.body_motion(i, now, step, since, now), length
 
     @ti.func

@@ -4,6 +4,7 @@ import taichi as ti
 
 from taichi_dem.kit.products import cross, dot, squared, stacked, transposed_matvec
 from taichi_dem.kit.types import real, vec2, vec3
+from taichi_dem.laws.contracts import PARTS_OF_BOND
 from taichi_dem.physics.bond import unit_arm, unit_opening, unit_velocity
 from taichi_dem.stability.body_limits import RELEASE
 from taichi_dem.step.multirate.schedule import Schedule
@@ -29,7 +30,8 @@ class BondForces:
         self.schedule, self.tables, self.state = schedule, schedule.tables, schedule.state
         self.law, self.dashpot = self.tables.bond, self.tables.dashpot
         self.on_demand = self.tables.on_demand and not self.law.is_null
-        self.notes_limits = not self.law.is_whole
+        parts = (effect for effect in self.tables.effects if effect.role in PARTS_OF_BOND)
+        self.notes_limits = any(part.is_null for part in parts)
         # Without fast_math a product with zero is not folded: absent terms must not be written.
         self.has_dashpot = bool(self.dashpot.name)
         self.limits, self.has_limits = schedule.limits, schedule.has_limits
@@ -54,20 +56,20 @@ class BondForces:
             u = 3 * b + q
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-            before = self._residual_slip(u)
+            before = self.law.residual_slip(m, u)
             traction, spent, broken = self.by_law(m, b, u, stiffness, opening)
             way = dt * unit_velocity(moved, arm)
             found.worked += dot(traction, way)
             if spent != 0.0:
                 # Booked at the mean of the tractions before and after the step.
-                slip = self._residual_slip(u) - before
+                slip = self.law.residual_slip(m, u) - before
                 spent -= 0.5 * stiffness[1] * dot(vec2(way[1], way[2]), slip)
             if ti.static(self.notes_limits):
                 across = vec2(traction[1], traction[2])
                 self.state.note_passed(m, b, traction[0], squared(across))
             if ti.static(self.has_dashpot):
                 velocity = unit_velocity(motion, arm)
-                drag = scale * self.dashpot.traction(b, velocity)
+                drag = scale * self.dashpot.traction(m, b, velocity)
                 traction += drag
                 found.dragged += dot(drag, velocity)
             found.force += traction
@@ -91,14 +93,6 @@ class BondForces:
         return traction, slipped, failed
 
     @ti.func
-    def _residual_slip(self, u):
-        """Slip of a unit that its law remembers, in the face frame [m], else zero."""
-        slip = vec2(0.0)
-        if ti.static(self.law.remembers_slip):
-            slip = self.law.residual_slip(u)
-        return slip
-
-    @ti.func
     def share(self, b):
         """Share of its coefficient that a limited dashpot of a bond keeps: the smaller of two."""
         share = 1.0
@@ -118,7 +112,7 @@ class BondForces:
         self._push(slots[0], stacked(linear, angular + cross(motion.branch, linear)))
         self._push(slots[1], stacked(-linear, -angular))
         self.book_drag(b, area * (found.dragged * dt))
-        if ti.static(self.law.rubs):
+        if ti.static(not self.law.is_null):
             if found.slipped != 0.0:
                 self._book_heat(b, area * vec2(found.slipped, 0.0))
 
@@ -161,12 +155,12 @@ class BondForces:
     @ti.func
     def _stored(self, b, motion):
         """Elastic energy per area summed over the units of a bond [J/m^2]."""
-        energy = 0.0
+        stiffness, m, energy = self.tables.bond_stiffness[b], self.tables.bond_pair[b], 0.0
         for q in range(3):
             u = 3 * b + q
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-            normal, tangential = self.law.stored(b, u, opening)
+            normal, tangential = self.law.stored(m, u, stiffness, opening)
             energy += normal
             energy += tangential
         return energy
@@ -179,8 +173,8 @@ class BondForces:
     @ti.func
     def power(self, b, motion):
         """Power that the dashpots of an intact bond take at a motion [W]."""
-        power, scale = 0.0, self.share(b)
+        m, power, scale = self.tables.bond_pair[b], 0.0, self.share(b)
         for q in range(3):
             velocity = unit_velocity(motion, unit_arm(motion, self.tables.vertex_slave[3 * b + q]))
-            power += scale * dot(self.dashpot.traction(b, velocity), velocity)
+            power += scale * dot(self.dashpot.traction(m, b, velocity), velocity)
         return power * self.tables.unit_area[b]

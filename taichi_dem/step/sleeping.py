@@ -117,14 +117,14 @@ class Sleeping(Places):
     @ti.func
     def _withheld(self, b, elapsed, last, rounding):
         """Impulse [N s] and energy [J] of a bond that was not evaluated for a time [s]."""
-        stiffness, force, energy = self.tables.bond_stiffness[b], vec3(0.0), 0.0
-        motion = self.state.bond_motion(b)
+        stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
+        motion, force, energy = self.state.bond_motion(b), vec3(0.0), 0.0
         for u in range(3 * b, 3 * b + 3):
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
             before = beyond(opening - last * unit_velocity(motion, arm), rounding)
             pull = vec3(stiffness[0], stiffness[1], stiffness[1]) * before
-            force += pull + self.tables.dashpot.traction(b, before / elapsed)
+            force += pull + self.tables.dashpot.traction(m, b, before / elapsed)
             energy += 0.5 * dot(pull, opening)
         return self.tables.unit_area[b] * vec2(elapsed * norm(force), ti.abs(energy))
 

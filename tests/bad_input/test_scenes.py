@@ -18,6 +18,7 @@ from ca_damper import (
 )
 from taichi_dem import CONCRETE, Scene, Simulation, StepControl, Uniform, checked_mesh, effects
 from taichi_dem.kit.validation import told_apart
+from taichi_dem.laws.base import Effect
 from taichi_dem.mesh.mesh import with_inner_group
 from taichi_dem.mesh.shapes import pair, single
 from tests.bad_input.refusals import assert_refused
@@ -35,6 +36,11 @@ def scene(*listed, mesh=PAIR, **options):
 def on_demand(*loads, **options):
     """The same with effects on demand."""
     return Scene(PAIR, CONCRETE, "auto", loads=loads, **options)
+
+
+def own(base, **members):
+    """An effect of a user's own."""
+    return type("Mine", (base,), members)()
 
 
 NOTCHED = {"mesh": CUT, "weaker": {"notch": 0.5}}
@@ -66,6 +72,14 @@ SCENES = {
     ),
     "sleep of a list": (lambda: scene(sleep=1e-6), "sleep must be 0 unless effects is 'auto'"),
     "loads of a list": (lambda: scene(loads=[effects.Gravity()]), "loads must be left out"),
+    "a load by its role alone": (
+        lambda: scene(own(Effect, role="load")),
+        "derive from taichi_dem.effects.Load",
+    ),
+    "a load without its force": (
+        lambda: scene(own(effects.Load)),
+        "Mine must have wrench(i, motion)",
+    ),
     "a silent law on demand": (lambda: on_demand(effects.Softening().silent()), "that act"),
 }
 
@@ -102,11 +116,8 @@ def test_what_contradicts_itself_is_refused(name):
 
 #: What a law of a user's own may change, by the law that it is made of.
 CHANGED = {
-    effects.SphereContact: "normal",
-    effects.Friction: "limit",
     effects.Softening: "traction",
     effects.SlipWeakening: "failed",
-    effects.BondDamping: "traction",
 }
 
 
@@ -115,7 +126,7 @@ def test_a_law_that_does_not_say_when_it_begins_is_not_taken_on_demand(law):
     """It would never be evaluated."""
     mine = type("Mine", (law,), {CHANGED[law]: lambda *_: 0.0})
     made = mine(1e3) if law is effects.SlipWeakening else mine()
-    assert_refused(lambda: on_demand(made), "when they begin to act: Mine has no activation")
+    assert_refused(lambda: on_demand(made), "when they begin to act: Mine has no begins")
 
 
 def test_a_scene_that_is_changed_keeps_its_loads():

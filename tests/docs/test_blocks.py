@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ca_damper.automaton.accounting import ACCOUNTINGS
-from taichi_dem import runtime
+from taichi_dem import CONCRETE, runtime
 from tests.docs.pages import FOLDER, PAGES, blocks, lines
 from tests.processes import users_environment
 from tests.terminal import phases_of
@@ -87,6 +87,17 @@ def test_the_effect_moves_a_body_as_the_leapfrog_must(left_by):
     mass = left["result"].model.body_mass[0]
     most = 0.5 * mass * (amplitude * period / np.pi) ** 2
     assert abs(left["result"].report.energy_balance["residual"]) < 200 * 2.0**-52 * most
+
+
+def test_the_plastic_bond_takes_its_strength_times_its_flow(left_by):
+    """f_t A (d - f_t / k_n); a step overshoots by k_n v dt, of which flow takes half."""
+    left = left_by("docs/add_a_bond_law.md")
+    strength, stiffness = CONCRETE.tensile_strength, CONCRETE.normal_stiffness
+    area = 3.0 * left["simulation"].model.bonds["area"][0]
+    flow = left["count"] * left["step"] * left["speed"] - strength / stiffness
+    overshoot = stiffness * left["speed"] * left["step"] / strength
+    assert left["balance"]["slip"] == pytest.approx(strength * area * flow, rel=overshoot)
+    assert abs(left["balance"]["residual"]) < overshoot * left["balance"]["support_work"]
 
 
 def test_the_contact_law_stores_what_it_takes(left_by):

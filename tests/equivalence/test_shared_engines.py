@@ -19,7 +19,6 @@ from taichi_dem.engine import ENGINES
 from taichi_dem.kit import allocation
 from taichi_dem.kit.allocation import FieldTree, assign, values
 from taichi_dem.kit.types import vec3
-from taichi_dem.laws.base import Effect
 from taichi_dem.mesh.shapes import bar, single
 from tests import arch
 from tests.structures import filled
@@ -147,19 +146,11 @@ def test_cleared_memory_is_zero_to_the_last_byte():
 
 
 @ti.data_oriented
-class Careless(Effect):
+class Careless(effects.Load):
     """A load whose kernel reads a number of the host, which the compiler takes as a constant."""
-
-    role = "load"
-    name = "careless"
 
     def __init__(self, push):
         self.push = push
-
-    @ti.func
-    def acts_on(self, i):
-        """Every body."""
-        return 1
 
     @ti.func
     def wrench(self, i, motion):

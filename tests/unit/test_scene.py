@@ -187,3 +187,8 @@ def test_pressure_turns_with_the_body():
     assert given == pytest.approx(impulse * force, rel=1e-13)
     assert motion["angular_momentum"][0] == pytest.approx(impulse * torque, rel=1e-12)
     assert booked[:3] == pytest.approx(impulse * force, rel=1e-13)
+
+
+def test_effects_that_are_absent_have_no_fields():
+    fields = Simulation(Scene(single(), CONCRETE, []), METHOD).state.fields()
+    assert fields.keys().isdisjoint({"bond_drag", "bond_heat"})

@@ -44,7 +44,7 @@ class Impact:
         rate = math.sqrt(self.stiffness / (0.5 * simulation.model.body_mass[0]))
         way = np.outer([0.5, -0.5], [speed, 0.0, 0.0])
         simulation.state.set_motion(simulation.model.centre, [1.0, 0.0, 0.0, 0.0], way)
-        # A quarter period of loading, a shorter one of unloading, the way out of what is pressed in.
+        # Quarter periods of loading and unloading, and the way out of what stays pressed in.
         contact = 0.5 * math.pi * (1.0 + RESTITUTION) + (1.0 - RESTITUTION**2) / RESTITUTION
         length = 1.2 * contact / rate + 1e-9 / speed
         simulation.advance_to(round(length / STEP))

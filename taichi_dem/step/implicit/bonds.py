@@ -173,7 +173,8 @@ class BondDashpots:
     def _refresh(self, b, g, n, i, j, branch):
         dt = self.schedule.step_seconds[0]
         axes = matmul_transposed(self.tables.bond_frame[b], self.state.rotation(i))
-        along = self.tables.dashpot.traction(b, vec3(1.0, 1.0, 1.0))
+        m = self.tables.bond_pair[b]
+        along = self.tables.dashpot.traction(m, b, vec3(1.0, 1.0, 1.0))
         # A trace of the springs keeps the block invertible where a coefficient is zero.
         stiffness = self.tables.bond_stiffness[b]
         along += 1e-9 * dt * vec3(stiffness[0], stiffness[1], stiffness[1])
