@@ -4,7 +4,8 @@
     python -m tests.mutants --only contact  mutants whose area or name has this word
     python -m tests.mutants --check         only ask whether each mutant can be made
 
-Each is made in a copy of the checkout.
+Each is made in a copy of the checkout. Only tests that a change must pass count: none of the second
+tier is run.
 """
 
 import argparse

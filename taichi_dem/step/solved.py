@@ -24,6 +24,7 @@ from taichi_dem.step.phases import (
     STEP,
     SWEEP,
     Step,
+    given,
 )
 
 
@@ -80,9 +81,9 @@ class SolvedStep(Step):
             (STEP, schedule.reordering()),
             # Bonds give the impulse of their springs, and break where a unit fails.
             (ALWAYS, lists.bonds, self.bond),
-            # At the start bonds have acted once for a step that there was not.
+            # At the start bonds have acted once, also those that sleep, and booked a step before.
             (STARTED, waking.leaving),
-            (STARTED, bonds, self.undo),
+            (STARTED, given(self.solver.has_bonds, bonds), self.undo),
         )
 
     @ti.func
@@ -203,12 +204,9 @@ class SolvedStep(Step):
 
     @ti.func
     def undo(self, b):
-        """Book no heat of bond b, whose evaluation booked a step before the start."""
-        if ti.static(self.bonds.has_dashpot):
-            self.state.bond_drag[b] = 0.0 * self.state.bond_drag[b]
-        if ti.static(not self.tables.bond.is_null):
-            self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
-        if ti.static(self.schedule.sleeps and self.solver.has_bonds):
+        """Take back the dashpot heat of bond b, and take it out of the sweeps if it sleeps."""
+        self.state.bond_drag[b] = 0.0
+        if ti.static(self.schedule.sleeps):
             if self.schedule.lists.bonds.key[b] < 0:
                 self.solver.bonds.end(b)
 

@@ -53,6 +53,8 @@ def test_a_truth_is_kept_for_the_same_question_and_no_finer_answers(asked, tmp_p
     assert asked(kept.of(0, 6, WHAT), 9.0).true == 9.0
     assert asked(kept.of(0, 5, OTHER), 9.0, question=OTHER).true == 9.0
     assert asked(kept.of(0, 5, WHAT), 9.0, step=0.5).true == 9.0
+    # It is known to 0.01, which is no truth for a narrower bar.
+    assert kept.of(0, 5, WHAT)(1.0, 0.009, lambda: (9.0, 0.0, 1.0)) == (9.0, 0.0)
     kept.write(path)
     assert sorted(References(path).kept.index) == [(0, 5), (0, 6)]
 

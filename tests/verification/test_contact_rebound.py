@@ -123,6 +123,15 @@ def test_controlled_steps_know_the_dashpot_of_the_pair():
     assert known == pytest.approx(dashpot / pair.mass, rel=1e-9)
 
 
+def test_one_controlled_step_is_from_the_start_the_shortest_that_a_body_needs():
+    """One of three turns by 0.1 rad in the largest step, where 0.02 are borne: an eighth of it."""
+    simulation = Simulation(Pair(0.2, 1e-7).smooth, Uniform(1e-7, control=StepControl()))
+    spin = np.outer([0.0, 1.0, 0.0], [1e6, 0.0, 0.0])
+    simulation.state.set_motion(simulation.model.centre, spin=spin)
+    simulation.start()
+    assert values(simulation.state.level, slice(3)).tolist() == [3, 3, 3]
+
+
 def test_a_body_that_sinks_in_is_advised_of_the_stiffness_of_contact():
     """And not of a constant that all bonds share."""
     soft = Pair(EDGE, 1e-6, stiffness=1e6)

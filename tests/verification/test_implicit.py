@@ -54,30 +54,40 @@ def openings(rig, dt, marks, speed=0.0):
 
 
 def recurrence(dt, steps, stiff, rate, theta, speed=0.0):
-    """v' = v - dt stiff u - dt rate (theta v' + (1 - theta) v), u' = u + dt v'; all openings."""
-    opening, found = STRETCH, [STRETCH]
+    """v' = v - dt stiff u - dt rate (theta v' + (1 - theta) v), u' = u + dt v'; all openings.
+
+    And the heat of all steps up to each one per reduced mass, dt rate (theta v' + (1 - theta) v)^2.
+    """
+    opening, heat, found = STRETCH, 0.0, [(STRETCH, 0.0)]
     for _ in range(steps):
         kept = (1.0 - (1.0 - theta) * dt * rate) * speed - dt * stiff * opening
-        speed = kept / (1.0 + theta * dt * rate)
+        before, speed = speed, kept / (1.0 + theta * dt * rate)
         opening += dt * speed
-        found.append(opening)
-    return np.array(found)
+        heat += dt * rate * (theta * speed + (1.0 - theta) * before) ** 2
+        found.append((opening, heat))
+    return np.transpose(found)
 
 
 @pytest.mark.parametrize("theta", [0.5, 1.0])
 def test_an_overdamped_pair_follows_the_recurrence_to_round_off(rigs, theta):
     """At 20 times the step that explicit dashpots bear, where an error of the block would show.
 
-    A step rounds the opening by NOISE; dashpots this strong hold it, so that roundings add up.
+    A step rounds the opening by NOISE; dashpots this strong hold it, so that roundings add up. The
+    pair moves at the start: no heat is booked of a step before that. Heats are known as speeds are,
+    from differences of openings.
     """
     rig = rigs(theta)
     stiff, rate = damped(rig, 10.0)
     dt, marks = 20.0 * 2.0 / rate, [1, 2, 3, 10, 100]
     assert dt**2 * stiff < 4.0
-    expected = recurrence(dt, marks[-1], stiff, rate, theta)[marks]
-    found = openings(rig, dt, marks)
+    speed = -0.01 * STRETCH / dt
+    expected, heats = recurrence(dt, marks[-1], stiff, rate, theta, speed)[:, marks]
+    found = openings(rig, dt, marks, speed)
     assert expected[-1] < 0.9 * STRETCH
     assert np.all(np.abs(found - expected) < np.array(marks) * NOISE)
+    heat = rig.state.bond_drag[0] / (0.5 * rig.simulation.model.body_mass[0])
+    known = 2.0 * marks[-1] * NOISE / (STRETCH - expected[-1])
+    assert heat == pytest.approx(heats[-1], rel=known)
 
 
 @pytest.mark.parametrize("theta, order", [(0.5, 2), (1.0, 1)])

@@ -254,6 +254,21 @@ def test_limited_dashpots_of_a_bond_are_stable_at_any_step():
     assert not wild(1.0)
 
 
+def test_a_broken_bond_leaves_the_others_what_a_step_bears():
+    """Limited dashpots: the rate of each body is that of its bonds which held as the step began."""
+    gas = effects.GasPressure("left", peak=2e9, rise=1e-5)
+    laws = filled("bonds", effects.BondDamping(), effects.Softening(), gas)
+    scene = Scene(bar(0.1, 0.05, (3, 1, 1)), CONCRETE, laws)
+    simulation = Simulation(scene, Uniform(1e-7, dashpot="limited"))
+    simulation.advance_to(500)
+    model, state = simulation.model, simulation.state
+    broken = np.append(simulation.values(state.broken_tick), 0)[model.topology.body_bond]
+    holds = (broken < 0) | (broken == state.tick[None])
+    rates = model.dashpot_rates[np.arange(model.body_count), holds @ [1, 2, 4, 8]]
+    assert simulation.report().broken_faces > 0
+    assert np.array_equal(simulation.values(simulation.schedule.limits.bond_damping), rates)
+
+
 @ti.kernel
 def shares(limits: ti.template(), step: ti.f64) -> ti.types.vector(2, ti.f64):
     return ti.Vector([limits.bond_share(0, step), limits.contact_share(0, step)])
