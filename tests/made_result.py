@@ -1,7 +1,5 @@
 """A result made up without a run: bodies that move, bonds that break, everything at random."""
 
-import dataclasses
-
 import numpy as np
 
 from cases.meshes import with_moved_nodes
@@ -63,28 +61,3 @@ def made_result(seed=1, mesh=None, frames=4, share=0.5):
     peak = np.max([np.zeros(model.body_count), *(frame.speed for frame in shots)], axis=0)
     method = ImplicitDashpots(1e-7)
     return Result(scene, method, model, history, shots, broken, peak, None)
-
-
-def moved_rigidly(result, of_body, rng):
-    """The result, every fragment of its last frame moved and moving as a rigid piece.
-
-    Returns it, the velocities (n, 3) and spins (n, 3) of the fragments.
-    """
-    model, count = result.model, of_body.max() + 1
-    rotation = turned(rng.normal(size=(count, 3)), rng.uniform(0.0, 3.0, count))
-    velocity, spin = rng.normal(size=(2, count, 3))
-    mass = np.bincount(of_body, model.body_mass)
-    centre = [np.bincount(of_body, model.body_mass * x) / mass for x in model.centre.T]
-    rest = np.stack(centre, axis=1)
-    own = rotation[of_body]
-    arm = np.einsum("nij,nj->ni", own, model.centre - rest[of_body])
-    inertia = own @ model.body_inertia @ np.swapaxes(own, 1, 2)
-    last = dataclasses.replace(
-        result.frames[-1],
-        position=rest[of_body] + 0.1 + arm,
-        rotation=own,
-        velocity=velocity[of_body] + np.cross(spin[of_body], arm),
-        angular_momentum=np.einsum("nij,nj->ni", inertia, spin[of_body]),
-    )
-    moved = dataclasses.replace(result, frames=(*result.frames[:-1], last))
-    return moved, velocity, spin

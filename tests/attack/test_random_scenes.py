@@ -5,18 +5,16 @@ process counts as a failure with pytest-xdist.
 """
 
 import time
-import warnings
 
 import numpy as np
 import pytest
 
-from ca_damper import Batch, RigidMass, SceneTable
+from ca_damper import RigidMass
 from ca_damper.plot.boxes import Box
-from taichi_dem import InputError, Simulation, SimulationDiverged, runtime
+from taichi_dem import InputError, SimulationDiverged, runtime, simulate
 from taichi_dem.observers import Every
 from taichi_dem.report.energy_balance import unexplained_share
-from taichi_dem.simulate import run_simulation
-from tests.attack.scenes import BLASTS, DAMPERS, Blast, Damper
+from tests.attack.scenes import BLASTS, DAMPERS, Draws, blast, damper
 from tests.paper import expected
 from tests.rounding import momentum_rounding
 
@@ -70,14 +68,12 @@ def assert_sound(values, names):
         assert np.isfinite(np.asarray(values[name])).all(), f"no finite {name}, without a word"
 
 
-def same(first, second, names):
-    """Whether values are the same to the bit."""
-    return all(np.asarray(first[n]).tobytes() == np.asarray(second[n]).tobytes() for n in names)
-
-
-def run_blast(trial):
+def run_blast(draws, kind):
     """No number that is none, no momentum from nowhere, no account left open, without a word."""
-    result = moving(trial, "resident")
+    scene, method = blast(draws, kind)
+    until = method.dt0 * int(draws.power(1.0, 2.7))
+    watch = {"samples": 8, "frames": 1, "progress": None, "observers": [Clock()]}
+    result = simulate(scene, method=method, until=until, driver="resident", **watch)
     report = result.report
     assert_sound(result.series, result.series)
     assert_sound(vars(result.frames[-1]), ("position", "rotation", "velocity", "damage"))
@@ -86,40 +82,25 @@ def run_blast(trial):
         assert report.linear_momentum_error <= MOMENTUM
     share = unexplained_share(report.energy_balance, report.round_off_J)
     assert share <= UNEXPLAINED or report.unresolved, f"{share:.3g} of the energy unexplained"
-    if trial.kind.both and trial.draws.chance(0.2):
-        other = moving(trial, "parallel")
-        assert same(result.series, other.series, result.series), "other bits by parallel loops"
-        assert same(vars(result.frames[-1]), vars(other.frames[-1]), ("velocity",))
 
 
-def moving(trial, driver):
-    """Result of a run with the first motion of a scene."""
-    simulation = Simulation(trial.scene, trial.method, driver)
-    place = simulation.model.centre + trial.motion["shift"]
-    simulation.state.set_motion(place, None, trial.motion["velocity"], trial.motion["spin"])
-    watch = {"samples": 8, "frames": 1, "progress": None, "observers": [Clock()]}
-    return run_simulation(simulation, until=trial.steps * trial.method.dt0, **watch)
-
-
-def run_damper(trial):
+def run_damper(draws, kind):
     """No particle is lost, no number is none, and no momentum comes from nowhere."""
-    filling, (batch, shots) = trial.filling, shaken(trial, trial.table)
-    for count, shot in zip(batch.table.column("particles"), shots):
+    batch = damper(draws, kind)
+    filling = batch.fillings.kinds[0]
+    run_from_rest(batch)
+    for scene, count in enumerate(batch.table.column("particles")):
+        shot = batch.snapshot(scene)
         assert_sound(shot, shot)
         if not isinstance(filling, RigidMass):
             assert len(shot["position"]) == count
             assert_inside(filling, shot["position"])
     if getattr(filling, "accounting", "all") not in LOSSY:
         assert batch.report().momentum_error <= momentum_rounding(batch)
-    if trial.draws.chance(0.2) and trial.table.count > 1:
-        last = trial.table.count - 1
-        (alone,) = shaken(trial, SceneTable(**trial.table.row(last)))[1]
-        assert same(shots[last], alone, alone), "other bits alone than in a batch"
 
 
-def shaken(trial, table):
-    """Batch and snapshots of its scenes after a run from rest."""
-    batch = Batch(trial.filling, table, mount=trial.mount)
+def run_from_rest(batch):
+    """A cycle, or as many steps as are allowed."""
     with expected(batch):
         batch.start()
     if batch.steps_per_cycle.max() <= STEPS:
@@ -130,7 +111,6 @@ def shaken(trial, table):
     # The other scenes of a batch go on, and a warning names those that diverged.
     if batch.diverged.any():
         raise batch.divergences()[0]
-    return batch, [batch.snapshot(s) for s in range(table.count)]
 
 
 def assert_inside(filling, place):
@@ -143,17 +123,13 @@ def assert_inside(filling, place):
 
 
 @pytest.mark.parametrize("kind", [*BLASTS, *DAMPERS], ids=lambda kind: "-".join(map(str, kind)))
+# Sentences of the packages about what a scene lists in vain.
+@pytest.mark.filterwarnings("error", "ignore::UserWarning")
 def test_a_random_scene_is_explained(kind, seed):
     """A refusal is one sentence, and all else than it a failure."""
-    make, run = (Blast, run_blast) if kind in BLASTS else (Damper, run_damper)
-    trial = make(seed, kind)
+    run = run_blast if kind in BLASTS else run_damper
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            # Sentences of the packages about what a scene lists in vain.
-            warnings.simplefilter("ignore", UserWarning)
-            trial.build()
-            run(trial)
+        run(Draws(seed), kind)
     except OutOfTime:
         pass
     except (InputError, SimulationDiverged) as error:

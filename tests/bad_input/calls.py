@@ -8,8 +8,7 @@ import inspect
 import re
 from typing import Any, NamedTuple
 
-import taichi_dem as td
-from tests.bad_input.arguments import ALWAYS, BOUND, METHODS, OWN, VALUES
+from tests.bad_input.arguments import ALWAYS, BOUND, BY_TYPE, OBJECTS, OWN, VALUES
 
 #: Classes that users are given and do not make.
 GIVEN = """goals.Result Answer Branch Progress Received RunView AmplitudeResponse
@@ -18,6 +17,8 @@ GIVEN = """goals.Result Answer Branch Progress Received RunView AmplitudeRespons
 #: Functions that need more than values to be tried: processes, an STL file, or a session.
 APART = """sweep parameter_grid shapes.from_surface methods.order_of methods.structure_of
     runtime.check_session runtime.check_thread runtime.when_cleared""".split()
+#: Methods that the packages call themselves.
+INSIDE = {"values", "take_up", "checkpointed", "record"}
 
 
 class Call(NamedTuple):
@@ -48,14 +49,20 @@ def parameters(thing):
     return dict(re.findall(r"^(\S.*?) : (.*)$", section[1] if section else "", re.MULTILINE))
 
 
+def methods(thing):
+    """Names of what users call of an object: methods whose parameters are described."""
+    names = {name for name in dir(thing) if not name.startswith("_")} - INSIDE
+    return sorted(name for name in names if parameters(getattr(type(thing), name, None)))
+
+
 def calls(package):
     """All calls of a package, each variant of one after those that are tried as a whole."""
     things = {name: one for name, one in offered(package).items() if name not in (*GIVEN, *APART)}
-    made = {**things, **BOUND} if package is td else {**things}
-    for owner, (names, make) in METHODS[package].items():
+    made = {**things, **BOUND}
+    for owner, make in OBJECTS[package].items():
         one = make()
-        things.update({f"{owner}.{name}": getattr(one, name) for name in names.split()})
-        made.update({f"{owner}.{name}": _method(make, name) for name in names.split()})
+        things.update({f"{owner}.{name}": getattr(one, name) for name in methods(one)})
+        made.update({f"{owner}.{name}": _method(make, name) for name in methods(one)})
     own = OWN[package]()
     variants = {label: label.partition("#")[0] for label in own if "#" in label}
     whole = [name for name in things if name in own or name not in variants.values()]
@@ -72,8 +79,9 @@ def _method(made, name):
 def _call(package, label, function, thing, types, own):
     signature, valid = inspect.signature(thing).parameters, {}
     for name in [name for name in types if name in signature]:
-        default = signature[name].default
-        value = VALUES.get(name) if default is inspect.Parameter.empty else default
+        value = signature[name].default
+        if value is inspect.Parameter.empty:
+            value = VALUES.get(name, BY_TYPE.get(types[name].partition(" ")[0]))
         valid[name] = ALWAYS[package].get(name, value)
     valid.update(own)
     others = next((kind for name, kind in types.items() if name.startswith("**")), "Any")

@@ -2,8 +2,10 @@
 
 import hashlib
 import json
+import re
 import tracemalloc
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -84,31 +86,33 @@ NUMBERS = ("-1", "0", "2147483648", "99999999999999999999", "nan", "inf", "x", "
 
 
 def read(path, lines):
-    """The mesh of a file with these lines, or the sentence that refuses it."""
+    """The mesh of a file with these lines, or the sentence that refuses it under its own name."""
     path.write_text("\n".join(lines))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        return answer(lambda: read_mesh(path), str(path))
+        found = answer(lambda: read_mesh(path), str(path))
+    # meshio reads a copy of a Gmsh file, of whose place a user knows nothing.
+    assert not isinstance(found, str) or {*re.findall(r"\S+\.msh", found)} == {str(path)}
+    return found
 
 
-@pytest.mark.attack
+@pytest.mark.parametrize("count", [12, pytest.param(500, marks=pytest.mark.attack)])
 @pytest.mark.parametrize("version", ["2.2", "4.1"])
-def test_a_changed_gmsh_file_is_refused_or_read_as_the_same_bodies(tmp_path, version, seed):
+def test_a_changed_gmsh_file_is_refused_or_read_as_the_same_bodies(tmp_path, version, count):
     """Any word of the structure: heads, numbers and corners; places may be anywhere."""
-    draw, path = np.random.default_rng(seed), tmp_path / "mesh.msh"
+    draw, path = np.random.default_rng(0), tmp_path / "mesh.msh"
     write_mesh(path, bar(0.2, 0.1, (2, 1, 1)))
-    with open(path if version == "2.2" else PAPER_BLOCK, encoding="utf-8") as file:
-        lines = [*file.read().splitlines(), ""]
+    text = (path if version == "2.2" else Path(PAPER_BLOCK)).read_text(encoding="utf-8")
+    lines = text.splitlines()
     whole = read(path, lines)
-    first, last = lines.index("$Elements") + 1, lines.index("$EndElements")
-    for _ in range(12):
-        row = int(draw.integers(first, last))
+    first, last = lines.index("$Elements"), lines.index("$EndElements")
+    for _ in range(count):
+        row = draw.choice([*range(3), *range(first, last)])
         words = lines[row].split()
-        words[draw.integers(len(words))] = NUMBERS[draw.integers(len(NUMBERS))]
+        words[draw.integers(len(words))] = draw.choice(NUMBERS)
         found = read(path, [*lines[:row], " ".join(words), *lines[row + 1 :]])
         if not isinstance(found, str):
             assert np.array_equal(found.points, whole.points), (row, words)
             assert np.array_equal(found.tetrahedra, whole.tetrahedra), (row, words)
-    text = "\n".join(lines)
     cut = int(draw.integers(1, text.index("$EndElements") + len("$EndElements") - 1))
     assert isinstance(read(path, [text[:cut]]), str)

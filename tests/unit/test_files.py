@@ -1,6 +1,7 @@
 """Files are whole or refused, whatever ends a run from outside, and tables are no programs."""
 
 import csv
+import itertools
 import os
 import signal
 import subprocess
@@ -125,19 +126,16 @@ def test_what_identifies_a_run_is_shown_in_full(thing):
     assert eval(repr(thing), {**vars(taichi_dem), **vars(ca_damper)}) == thing
 
 
-class FullDisk:
-    """Refuses files of an ending, as a full disk does, from a call on."""
+def fill_disk(monkeypatch, ending, after=0):
+    """Refuse files of an ending, as a full disk does, from a call on."""
+    opened, calls = open, itertools.count()
 
-    def __init__(self, monkeypatch, ending, after=0):
-        self.opened, self.ending, self.left = open, ending, after
-        monkeypatch.setattr("builtins.open", self)
+    def refuse(name, mode="r", *rest, **options):
+        if "w" in mode and str(name).endswith(ending) and next(calls) >= after:
+            raise OSError(28, os.strerror(28))
+        return opened(name, mode, *rest, **options)
 
-    def __call__(self, name, mode="r", *rest, **options):
-        if "w" in mode and str(name).endswith(self.ending):
-            self.left -= 1
-            if self.left < 0:
-                raise OSError(28, os.strerror(28))
-        return self.opened(name, mode, *rest, **options)
+    monkeypatch.setattr("builtins.open", refuse)
 
 
 @pytest.fixture(scope="module")
@@ -150,7 +148,7 @@ def whole(taichi_session):
 def test_a_full_disk_at_the_end_does_not_lose_the_result(whole, tmp_path, monkeypatch, ending):
     """Whatever file finds no room; the result is that of a run that wrote nothing."""
     kept = {"output": tmp_path / "out", "checkpoint": Checkpoint(tmp_path / "run.checkpoint")}
-    FullDisk(monkeypatch, ending)
+    fill_disk(monkeypatch, ending)
     with pytest.raises(InputError, match="No space left") as refused:
         simulate(flying(), frames=2, **kept, **JOB)
     assert_same(whole, refused.value.result)
@@ -162,7 +160,7 @@ def test_a_checkpoint_that_finds_no_room_leaves_the_one_before_and_the_result(wh
     path = tmp_path / "run.checkpoint"
     saved = {"checkpoint": Checkpoint(path, every_steps=25), "output": tmp_path / "out"}
     with pytest.MonkeyPatch.context() as change:
-        FullDisk(change, ".checkpoint", after=2)
+        fill_disk(change, ".checkpoint", after=2)
         with pytest.raises(InputError, match="holds the run at t = 5e-07 s") as refused:
             simulate(flying(), **saved, **JOB)
     times = refused.value.result.series["time_s"]

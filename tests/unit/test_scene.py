@@ -13,7 +13,6 @@ from ca_damper import Spheres
 from taichi_dem import (
     CONCRETE,
     InputError,
-    Multirate,
     Scene,
     Simulation,
     Uniform,
@@ -25,7 +24,7 @@ from taichi_dem import (
 from taichi_dem.kit.likely_units import UnitWarning
 from taichi_dem.mesh.shapes import bar, placed_together, single
 from taichi_dem.scene import outer_faces_warnings
-from tests.scenes import apart, beside
+from tests.scenes import beside
 from tests.structures import filled
 from tests.turns import matrix, quaternion
 
@@ -89,22 +88,6 @@ def test_body_groups_move_and_turn_each_for_itself_as_one_rigid_body():
     assert (motion["velocity"][:COUNT] == [1.0, 0.0, 0.0]).all()
     assert not motion["spin"][:COUNT].any() and (motion["spin"][COUNT:] == spin).all()
     np.testing.assert_allclose(motion["velocity"][COUNT:], expected, atol=1e-14)
-
-
-def test_no_body_moves_further_than_the_distance_in_a_step():
-    """dt_i <= l / |v_i| (Konno et al., 3.1), and none could be twice as long; dt0 is a step of all.
-
-    Every body is visited when its own step ends, and not more often.
-    """
-    count, dt0, distance = 40, 1e-6, 1e-8
-    speed = 10.0 ** np.random.default_rng(5).uniform(-4.0, 0.5, count)
-    velocity = speed[:, None] * [1.0, 0.0, 0.0]
-    scene = Scene(apart(count), CONCRETE, velocity=velocity)
-    simulation = Simulation(scene, Multirate(dt0, distance))
-    simulation.advance_to(3)
-    wanted = np.maximum(0, np.ceil(np.log2(speed * dt0 / distance))).astype(int)
-    assert simulation.values(simulation.state.level).tolist() == wanted.tolist()
-    assert simulation.report().body_updates == 3 * (2**wanted).sum()
 
 
 #: Builder, a value in the wrong unit, how many of the unit it is read in are one of the likely one.
