@@ -168,13 +168,7 @@ def _give_back():
 
 @pytest.fixture
 def compiled_anew(monkeypatch):
-    """Engines of this test alone: for constants of kernels that a test changes; calls drop them."""
-    set_aside(monkeypatch)
-    return functools.partial(set_aside, monkeypatch)
-
-
-def set_aside(monkeypatch):
-    """Leave all pools without an engine until the patches are undone."""
+    """Engines of this test alone: for constants of kernels that a test changes."""
     for pool in (ENGINES, damper_engine._POOL):
         # With its session: engines come back only while theirs goes on. One of an ended session
         # ends the process, or writes into the fields of others.

@@ -128,15 +128,17 @@ def test_several_steady_motions_come_as_branches(monkeypatch):
 
 def test_scenes_go_on_from_where_they_are_each_as_far_as_asked():
     """40 + 30 cycles of one and 70 of the other are the bits of a batch of 70."""
-    runs = SceneRuns(Automaton(), 9, PAPER, None)
-    keys = [SceneKey(0.95, 3, 2e-4), SceneKey(1.0, 4, 2e-4)]
-    runs.go_on({keys[0]: 40, keys[1]: 70})
-    runs.go_on({keys[0]: 30, keys[1]: 0})
     frequency = np.array([0.95, 1.0]) * PAPER.natural_frequency
     table = SceneTable(9, [3, 4], 2e-4, frequency, 0.6e-3)
     batch = Batch(Automaton(), table, measured_cycles=70)
     batch.start("rest")
     whole = batch.run(0, 70)
+    # Its engine goes on to the next.
+    del batch
+    runs = SceneRuns(Automaton(), 9, PAPER, None)
+    keys = [SceneKey(0.95, 3, 2e-4), SceneKey(1.0, 4, 2e-4)]
+    runs.go_on({keys[0]: 40, keys[1]: 70})
+    runs.go_on({keys[0]: 30, keys[1]: 0})
     for s, key in enumerate(keys):
         assert runs.cycles(key) == 70
         found = runs.by_cycle(key)

@@ -108,6 +108,7 @@ def test_long_steps_are_divided_and_the_error_follows_the_tolerance():
         cycles = batch.run(0, 5)
         errors.append(np.abs(cycles.harmonic("x") / steady(1.0) - 1.0)[0])
         attempts.append(batch.attempts()[0] / (5 * batch.steps_per_cycle[0]))
+        del batch
     slope = np.polyfit(np.log(tolerances), np.log(errors), 1)[0]
     assert slope == pytest.approx(1.0, abs=0.1)
     assert attempts[0] > 3.0

@@ -85,24 +85,16 @@ def test_each_scene_is_as_in_a_batch_of_its_filling_and_momentum_closes(name):
         assert same_bits(mine, *run(name, [k]))
 
 
-def test_a_second_batch_compiles_nothing_and_has_its_bits_as_alone(compilations, compiled_anew):
-    run("placed spheres", [2])
-    compilations.clear()
-    (later,) = run("placed spheres", [0])
-    assert compilations == []
-    compiled_anew()
-    assert same_bits(later, *run("placed spheres", [0]))
-    assert "advance" in compilations
-
-
-def test_batches_that_live_at_once_have_an_engine_each_and_their_bits_as_alone():
-    """Two batches in turns of 37 steps."""
+def test_batches_that_live_at_once_have_an_engine_each_and_their_bits_as_alone(compilations):
+    """Two batches in turns of 37 steps; of those that run alone a second one compiles nothing."""
     alone = []
     for k in (0, 1):
+        compilations.clear()
         batch = started("placed spheres", [k])
         batch.advance(10 * 37)
         alone += now_of(batch)
-    del batch
+        del batch
+    assert compilations == []
     both = [started("placed spheres", [k]) for k in (0, 1)]
     for _ in range(10):
         for batch in both:
@@ -158,9 +150,7 @@ class Bounded(RigidMass):
 def test_a_bound_that_one_of_the_fillings_has_is_told(place):
     fillings = [Bounded(), Bounded()]
     fillings[place] = Bounded(step_bound=(1e-3, "it says so"))
-    batch = Batch(fillings, table(2))
-    batch.start()
-    assert batch.report().step_bound == (1e-3, "it says so")
+    assert Batch(fillings, table(2)).report().step_bound == (1e-3, "it says so")
 
 
 def test_a_film_of_several_fillings_is_refused_before_it_runs():

@@ -64,26 +64,28 @@ def drawn(friction):
     return rig
 
 
+def passed(friction, steps):
+    """Places and velocities of all spheres before each of some steps, and after it."""
+    rig, found = drawn(friction), []
+    for step in steps:
+        for until in (step, step + 1):
+            found.append(np.array(rig.run(until - rig.done).states()))
+    return found
+
+
 def test_friction_is_said_to_begin_in_the_first_step_that_it_changes():
     """Without friction the bits are the same until then, and other ones after it.
 
     The least coefficient there is computes friction that no place and no speed but 0 can feel.
     """
-
-    def same():
-        apart = [np.abs(a - b).max(axis=(1, 2)) for a, b in zip(rubbing.states(), smooth.states())]
-        return np.max(apart, axis=0) < 1e-50
-
     first = drawn(0.5).run(4000).device.first_steps(("friction",))["friction"]
     assert np.isinf(first).any() and first.min() < 500 and first[np.isfinite(first)].max() > 1500
-    rubbing, smooth = drawn(0.5), drawn(1e-60)
-    for step in np.unique(np.minimum(first, 3999)).astype(int):
-        for rig in (rubbing, smooth):
-            rig.run(step - rig.done)
-        assert same()[first >= step].all()
-        for rig in (rubbing, smooth):
-            rig.run(1)
-        assert not same()[first == step].any()
+    steps = np.unique(np.minimum(first, 3999)).astype(int)
+    apart = [np.abs(a - b) for a, b in zip(passed(0.5, steps), passed(1e-60, steps))]
+    same = np.max(apart, axis=(1, 3, 4)) < 1e-50
+    for step, before, after in zip(steps, same[::2], same[1::2]):
+        assert before[first >= step].all()
+        assert not after[first == step].any()
 
 
 def test_auto_has_the_bits_of_what_it_chose():

@@ -21,6 +21,7 @@ from taichi_dem.kit.allocation import FieldTree, assign, values
 from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.shapes import bar, single
 from tests import arch
+from tests.scenes import struck_bar
 from tests.structures import filled
 
 #: Largest steps of a run: bonds break at the left end, and what they held touches.
@@ -90,12 +91,16 @@ def test_other_numbers_compile_nothing_and_leave_no_trace(alone, compilations):
     assert compilations == [] and ENGINES.count == engines
 
 
-def test_two_live_simulations_have_an_engine_each_and_the_bits_of_each_alone(alone):
-    together = [Simulation(*drawn(seed), "resident") for seed in (1, 2)]
+def test_two_live_simulations_have_an_engine_each_and_the_bits_of_each_alone():
+    """Of bars under a blow with and without dashpots, in turns of twelve steps."""
+    given = [(struck_bar(damping), Uniform(2e-8)) for damping in (True, False)]
+    alone = [outcome(ran(*one)) for one in given]
+    together = [Simulation(*one, "resident") for one in given]
     assert together[0].engine is not together[1].engine
     for step in range(0, STEPS + 1, 12):
         for simulation in together:
             simulation.advance_to(step)
+    assert not same(*alone)
     assert all(same(outcome(one), bits) for one, bits in zip(together, alone))
 
 

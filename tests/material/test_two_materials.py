@@ -77,6 +77,7 @@ def test_the_account_closes_where_two_materials_break():
         assert report.angular_momentum_error < 1e-12
         residual = abs(report.energy_balance["residual"])
         open_shares.append(residual / simulation.energy_balance.start_energy)
+        simulation.close()
     assert open_shares[1] < 2.0 * open_shares[0] + 1e-3
 
 
@@ -96,11 +97,8 @@ def test_numbers_of_bodies_change_results_by_the_turn_alone():
     ]
     assert order != sorted(order)
     given = {"ore": rock(young=3 * E, density=5000.0)}
-    found = [
-        moved(Scene(each, rock(), LAWS, materials=given), method, 12, 1e-3)
-        for each in (mesh, other)
-    ]
-    first, second = (simulation.state.motion()["velocity"] for simulation in found)
+    scenes = (Scene(each, rock(), LAWS, materials=given) for each in (mesh, other))
+    first, second = (outcome(moved(one, method, 12, 1e-3))[1]["velocity"] for one in scenes)
     assert second[order] == pytest.approx(first, abs=1e-5 * np.abs(first).max())
 
 
@@ -122,6 +120,7 @@ def test_two_bodies_of_two_materials_move_as_if_both_had_what_joins_them(speed):
     mixed = stretched(mesh, CONCRETE, {"right": other}, speed)
     found, broken = mixed.state.motion(), mixed.state.broken_tick[0] >= 0
     account = mixed.energy_balance.account()
+    mixed.close()
     alone = stretched(mesh, joined(CONCRETE, other), {}, speed)
     assert broken == (speed > 0.0)
     for name, values in alone.state.motion().items():

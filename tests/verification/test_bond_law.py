@@ -10,6 +10,7 @@ import pytest
 from taichi_dem import CONCRETE, effects
 from taichi_dem.mesh import shapes as mesh_shapes
 from tests.probe import BondProbe
+from tests.structures import filled
 from tests.turns import matrix, product, quaternion
 
 EDGE = 0.05
@@ -25,8 +26,8 @@ SHEAR_ERROR = K_S * OPENING_ERROR + FRICTION * PULL_ERROR
 @pytest.fixture(scope="module")
 def built():
     """The pair with everything a bond can have; at rest the dashpots give nothing."""
-    listed = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
-    return BondProbe(mesh_shapes.pair(EDGE), listed)
+    laws = effects.BondDamping(), effects.Softening(), effects.ShearSlip()
+    return BondProbe(mesh_shapes.pair(EDGE), filled("paper", *laws, effects.SphereContact()))
 
 
 @pytest.fixture

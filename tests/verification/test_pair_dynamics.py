@@ -98,8 +98,9 @@ def probe():
     first = np.array([[0, 0, 0], [0.05, 0, 0], [0, 0.06, 0], [0, 0, 0.055]])
     second = np.array([[0, 0, 0], [0.045, 0.01, 0], [0, 0.05, 0.01], [0.01, 0, 0.06]])
     points = np.vstack([first, second + np.array([0.5, 0, 0])])
-    mesh = checked_mesh(points, [[0, 1, 2, 3], [4, 5, 6, 7]], {})
-    listed = [effects.SphereContact(outer_faces=True), effects.Friction()]
+    mesh = checked_mesh(points, [[0, 1, 2, 3], [4, 5, 6, 7]], {"base": [[0, 1, 2]]})
+    touch = effects.SphereContact(outer_faces=True), effects.Friction()
+    listed = filled("paper", *touch, group="base")
     return ContactProbe(mesh, listed)
 
 
