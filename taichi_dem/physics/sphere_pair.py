@@ -13,15 +13,6 @@ DEEPEST_SHARE = 0.5
 
 
 @ti.func
-def normal_force(stiffness, damping, overlap, opening_rate):
-    """Repulsion [N] of two overlapping spheres, never an attraction.
-
-    stiffness [N/m], damping [N s/m], overlap [m], opening_rate: speed at which they part [m/s].
-    """
-    return ti.max(0.0, stiffness * overlap - damping * opening_rate)
-
-
-@ti.func
 def friction_force(coefficient, damping, force_normal, slide):
     """Friction [N] on the second sphere, against its sliding velocity slide [m/s].
 

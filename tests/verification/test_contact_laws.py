@@ -1,12 +1,22 @@
-"""A law of contact with memory: what it gives back, what it takes, and what it forgets."""
+"""Laws of contact: what one with memory gives back, takes and forgets; steps by the overlap."""
 
 import math
 
 import numpy as np
 import pytest
+import taichi as ti
 
-from taichi_dem import ImplicitDashpots, Material, Scene, Uniform, effects, step_report
+from taichi_dem import (
+    ImplicitDashpots,
+    Material,
+    Scene,
+    StepControl,
+    Uniform,
+    effects,
+    step_report,
+)
 from taichi_dem.kit.allocation import values
+from taichi_dem.laws.contact_contracts import Push
 from taichi_dem.mesh.shapes import placed_together, single
 from taichi_dem.simulation import Simulation
 from tests.verification.test_body_contact import mirrored
@@ -91,3 +101,51 @@ def test_steps_are_judged_by_the_stiffness_of_unloading():
     reports = (step_report(Scene(single(EDGE), STIFF, [law])) for law in laws)
     linear, lossless, lossy = (report.limits["contact_stiffness"][0] for report in reports)
     assert lossless == linear and lossy == pytest.approx(RESTITUTION * linear, rel=1e-12)
+
+
+@ti.data_oriented
+class Stiffening(effects.ContactLaw):
+    """A spring whose force grows with the square of the overlap."""
+
+    def numbers(self, material):
+        """Force per square of the overlap [N/m^2]."""
+        return (1e15,)
+
+    @ti.func
+    def push(self, m, k, touch):
+        """Repulsion [N]."""
+        return Push(elastic=self.law[m, 0] * touch.overlap * touch.overlap, spent=0.0)
+
+    @ti.func
+    def stored(self, m, k, touch):
+        """Energy [J]."""
+        return self.law[m, 0] * touch.overlap**3 / 3.0
+
+    @ti.pyfunc
+    def stiffness_at(self, numbers, overlap):
+        """Slope [N/m]."""
+        return 2.0 * numbers[0] * overlap
+
+
+@ti.kernel
+def _stiffness(limits: ti.template()) -> ti.f64:
+    p = limits.store.near_slot[0]
+    limits.count[p] = limits.count_within_margin(p)
+    return limits.rates(0)[1]
+
+
+def test_controlled_steps_follow_the_stiffness_at_the_present_overlap():
+    """Sixteen times as deep, at rest, is sixteen times as stiff; places of 0.05 m keep 1e-16."""
+    left, right = single(EDGE), mirrored(single(EDGE))
+    apart = left.points.mean(axis=0) - right.points.mean(axis=0)
+    parts = {"left": (left, (0.0,) * 3), "right": (right, [1e-9, *apart[1:]])}
+    mesh = placed_together(parts, keep_coincident=True)
+    law = Stiffening(effects.SphereGeometry())
+    simulation = Simulation(Scene(mesh, STIFF, [law]), Uniform(1e-6, control=StepControl()))
+    place, found = simulation.model.centre.copy(), []
+    for depth in (1e-6, 1.6e-5):
+        place[1, 0] = simulation.model.centre[1, 0] - depth - 1e-9
+        simulation.state.set_motion(place)
+        simulation.broad_phase.search()
+        found.append(_stiffness(simulation.schedule.limits.contact_limits))
+    assert found[1] == pytest.approx(16.0 * found[0], rel=1e-9) and found[0] > 0.0
