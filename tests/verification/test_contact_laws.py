@@ -142,6 +142,7 @@ def test_controlled_steps_follow_the_stiffness_at_the_present_overlap():
     mesh = placed_together(parts, keep_coincident=True)
     law = Stiffening(effects.SphereGeometry())
     simulation = Simulation(Scene(mesh, STIFF, [law]), Uniform(1e-6, control=StepControl()))
+    simulation.start()
     place, found = simulation.model.centre.copy(), []
     for depth in (1e-6, 1.6e-5):
         place[1, 0] = simulation.model.centre[1, 0] - depth - 1e-9
