@@ -142,3 +142,20 @@ def test_all_that_touches_is_listed_however_seldom_a_pair_is_looked_at():
         assert met[-1] <= set(listed(simulation))
         simulation.broad_phase.search(everywhere=False)
     assert len(set().union(*met) - met[0]) > 20
+
+
+def test_a_pair_in_which_impulses_wait_keeps_its_slot_though_it_moves_apart():
+    """And all others leave theirs."""
+    simulation, random = scattered(1e-3, 0.02), np.random.default_rng(0)
+    store, slots = simulation.contacts.store, near_slots(simulation.contacts.store)
+    kept, bodies = slots[::2], values(store.body, slots[::2])
+    impulse = np.zeros((store.slots, 2, 6))
+    impulse[kept] = random.standard_normal((len(kept), 2, 6))
+    assign(store.impulse, impulse.reshape(-1, 6))
+    assign(store.waiting, impulse.any(axis=2))
+    centre = simulation.model.centre
+    simulation.state.set_motion(centre + 1e3 * random.standard_normal(centre.shape), None)
+    simulation.broad_phase.search()
+    assert sorted(near_slots(store)) == sorted(kept)
+    assert np.array_equal(values(store.body, kept), bodies)
+    assert np.array_equal(values(store.impulse).reshape(impulse.shape)[kept], impulse[kept])
