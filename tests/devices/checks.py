@@ -7,6 +7,7 @@ then do not hold what was written to them before all others were written; the ro
 the driver allows, 0 for any; and the sentences with which longer ones are refused, by package.
 """
 
+import functools
 import json
 import math
 import sys
@@ -37,12 +38,9 @@ def drawn(random):
 
 def entry_of(random, **shape):
     """A field of numbers, vectors or matrices."""
-    kind, entry = KINDS[random.integers(len(KINDS))], random.integers(4)
-    if entry == 0:
-        return ti.Vector.field(int(random.integers(2, 7)), kind, **shape)
-    if entry == 1:
-        return ti.Matrix.field(3, 3, kind, **shape)
-    return ti.field(kind, **shape)
+    vector = functools.partial(ti.Vector.field, int(random.integers(2, 7)))
+    makers = ti.field, vector, functools.partial(ti.Matrix.field, 3, 3)
+    return makers[random.integers(3)](KINDS[random.integers(len(KINDS))], **shape)
 
 
 def damaged(seed):

@@ -66,10 +66,9 @@ def blast(method):
     """Motion, breaks and counts at the end of a run by the parallel driver."""
     simulation = Simulation(scene(), method, "parallel")
     simulation.advance_to(round(UNTIL / method.dt0))
-    state = simulation.state
-    motion = {key: state.motion()[key] for key in ("position", "velocity", "spin")}
-    counted = {"evaluations": simulation.schedule.evaluations, "broken_tick": state.broken_tick}
-    return {**motion, **{key: simulation.values(field) for key, field in counted.items()}}
+    counted = {"broken_tick": simulation.values(simulation.state.broken_tick)}
+    counted["evaluations"] = simulation.values(simulation.schedule.evaluations)
+    return {**simulation.state.motion(), **counted}
 
 
 def resumed(half):
