@@ -8,7 +8,7 @@
 from taichi_dem.laws.body_geometry import BodyGeometry
 from taichi_dem.laws.bond import BondDamping, ShearSlip, SlipWeakening, Softening
 from taichi_dem.laws.contact import BodyContact, SphereContact
-from taichi_dem.laws.contact_contracts import ContactLaw, FrictionLaw, Geometry
+from taichi_dem.laws.contact_contracts import ContactLaw, FrictionLaw
 from taichi_dem.laws.contracts import BondLaw, Dashpot, Ground, Load, ShearLaw, Support, TensionLaw
 from taichi_dem.laws.friction import Friction, StickingFriction
 from taichi_dem.laws.mixed_mode import MixedMode
@@ -29,7 +29,6 @@ __all__ = [
     "Friction",
     "FrictionLaw",
     "GasPressure",
-    "Geometry",
     "Gravity",
     "Ground",
     "Load",

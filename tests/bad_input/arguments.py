@@ -131,7 +131,13 @@ BY_TYPE = {"int": 1, "float": 1.0, "str": "x", "callable": len, "path": path("x.
 VALUES = {
     **{"amplitude": 1.0, "amplitudes": 1e-3, "boxes": ca.Box(0, 2), "clearance": 0.024},
     **{"damping_ratios": 0.01, "excitation": SIGNAL, "filling": ca.RigidMass(), "gap": 1e-3},
-    **{"folder": path("out"), "group": "left", "groups": PAIR.groups, "masses": [1.0, 2.0]},
+    **{
+        "folder": path("out"),
+        "geometry": effects.BodyGeometry(),
+        "group": "left",
+        "groups": PAIR.groups,
+        "masses": [1.0, 2.0],
+    },
     **{"material": td.CONCRETE, "mesh": PAIR, "method": METHOD, "normal": (1.0, 0.0, 0.0)},
     **{"points": PAIR.points, "ratios": [0.9, 1.0], "s": 0, "scene": ALONE, "time_s": 0.01},
     **{"structure": STRUCTURE, "term": "kinetic", "tetrahedra": PAIR.tetrahedra, "until": 3e-7},

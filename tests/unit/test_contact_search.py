@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import taichi as ti
 
 from taichi_dem import CONCRETE, Scene, Uniform, effects
 from taichi_dem.kit.allocation import assign, values
@@ -14,14 +15,14 @@ DT = 1e-9
 
 
 @cache
-def loose():
+def loose(law):
     """A bar to be thrown about."""
-    return Again(Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [effects.SphereContact()]), Uniform(DT))
+    return Again(Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [law()]), Uniform(DT))
 
 
-def scattered(skin, spread):
+def scattered(skin, spread, law=effects.SphereContact):
     """The bar, bodies thrown about by `spread` [m], half of its faces broken."""
-    again, random = loose(), np.random.default_rng(2)
+    again, random = loose(law), np.random.default_rng(2)
     simulation = again.simulation
     model, state = simulation.model, simulation.state
     again.restart(DT)
@@ -116,14 +117,37 @@ def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once():
         simulation.broad_phase.search()
 
 
-def test_all_that_touches_is_listed_however_seldom_a_pair_is_looked_at():
+@ti.kernel
+def _gaps(contacts: ti.template(), gaps: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+    for i, j in gaps:
+        if i < j:
+            gaps[i, j] = contacts.gap(i, j, i, j)
+
+
+def overlapping(simulation):
+    """Pairs of bodies without a bond that overlap and have a corner on a free face each."""
+    corner = simulation.model.mesh.tetrahedra
+    shown = simulation.values(simulation.state.exposed_tick).reshape(-1, 4) >= 0
+    opposite = ~np.eye(4, dtype=bool)
+    on_free = np.unique(corner[:, None].repeat(4, 1)[shown[..., None] & opposite])
+    free = np.isin(corner, on_free).any(axis=1)
+    gaps = np.ones((len(corner), len(corner)))
+    _gaps(simulation.contacts, gaps)
+    top, holds = simulation.model.topology, ~simulation.state.broken()
+    meets = np.outer(free, free) & (gaps < 0.0)
+    meets[tuple(np.sort([top.master[holds], top.slave[holds]], axis=0))] = False
+    return set(zip(*np.nonzero(meets)))
+
+
+@pytest.mark.parametrize("law", [effects.SphereContact, effects.BodyContact])
+def test_all_that_touches_is_listed_however_seldom_a_pair_is_looked_at(law):
     """Bodies drift and turn, each its own way, by up to a share of the skin between two searches.
 
     A search leaves out the pairs that cannot meet yet, by how far their bodies have gone; half the
     skin is what a body may go before the next one.
     """
     skin, far, turn, random = 2e-3, 0.2, 5e-4, np.random.default_rng(0)
-    simulation = scattered(skin, 0.03)
+    simulation = scattered(skin, 0.03, law)
     contacts, motion = simulation.contacts, simulation.state.motion()
     way = random.standard_normal(motion["position"].shape)
     way *= far * skin * random.random((len(way), 1)) / np.linalg.norm(way, axis=1, keepdims=True)
@@ -138,8 +162,14 @@ def test_all_that_touches_is_listed_however_seldom_a_pair_is_looked_at():
         before = turned
         path = simulation.values(contacts.path) + np.linalg.norm(way, axis=1) + extent * angle
         assign(contacts.path, np.where(simulation.values(contacts.free) == 1, path, 0.0))
-        met.append(expected(simulation, 0.0))
-        assert met[-1] <= set(listed(simulation))
+        if law is effects.BodyContact:
+            store = contacts.store
+            near = {tuple(pair) for pair in values(store.body, near_slots(store)).tolist()}
+            met.append(overlapping(simulation))
+        else:
+            near = set(listed(simulation))
+            met.append(expected(simulation, 0.0))
+        assert met[-1] <= near
         simulation.broad_phase.search(everywhere=False)
     assert len(set().union(*met) - met[0]) > 20
 
