@@ -74,7 +74,7 @@ class SolvedStep(Step):
             (SWEEP, lists.bodies, ground.visit),
             (SWEEP, one, solver.check_convergence),
             # What contacts took is booked.
-            (STEP, lists.pairs, pairs.book),
+            (STEP, lists.pairs, pairs.book_sweeps),
             # Bodies take these velocities and move.
             (STEP, lists.bodies, self.body),
             # Bonds that broke leave the lists, bodies that were woken enter them.

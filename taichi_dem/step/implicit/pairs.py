@@ -306,7 +306,7 @@ class PairDashpots(ContactForces):
         return found
 
     @ti.func
-    def book(self, p):
+    def book_sweeps(self, p):
         """Book the energy taken by dashpots and friction of a pair, at its mean motion."""
         if self.touching[p] > 0:
             pair = self.store.body[p]
