@@ -214,5 +214,6 @@ def test_every_array_of_a_checkpoint_must_be_there_and_like_its_own(light, tmp_p
                 run.restore(given, path)
     forged = tmp_path / "forged.checkpoint"
     write_checkpoint(forged, run.identity, {**arrays, "field/state.tick": np.array(np.nan)})
+    simulation.close()
     with pytest.raises(InputError, match=r"field state\.tick differs"):
         simulate(light_scene(), resume=forged, until=1e-5, **job)

@@ -14,7 +14,7 @@ import taichi as ti
 from taichi._snode.fields_builder import FieldsBuilder
 from taichi.lang import impl
 
-from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, runtime
+from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform
 from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import CapacityError, FieldTree, assign, values
 from taichi_dem.kit.launch import Launch
@@ -120,13 +120,13 @@ def test_a_machine_without_a_device_is_told_what_it_lacks():
     assert "no CUDA device and no Vulkan driver" in said
 
 
+@pytest.mark.usefixtures("compiled_anew")
 def test_a_scene_that_a_device_cannot_hold_is_refused_with_the_number_that_fits(monkeypatch):
     """Room for the whole tree, less a byte, is room for one body less."""
     scene = Scene(bar(0.1, 0.05, (3, 2, 2)), CONCRETE, [])
-    whole = Simulation(scene, Uniform(1e-8)).engine
-    bodies = whole.capacity[0]
-    runtime.clear()
-    monkeypatch.setattr(backend, "most_bytes", lambda: whole.tree.bytes - 1)
+    whole = Simulation(scene, Uniform(1e-8))
+    most, bodies = whole.engine.tree.bytes - 1, whole.engine.capacity[0]
+    monkeypatch.setattr(backend, "most_bytes", lambda: most)
     with pytest.raises(InputError, match=f"about {bodies - 1} bodies fit"):
         Simulation(scene, Uniform(1e-8))
 

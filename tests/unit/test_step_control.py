@@ -112,7 +112,7 @@ def test_limited_dashpots_take_the_share_that_the_step_bears_and_name_it(dt, is_
 
     A run begins half a step back: the step ends at 1 - s rate dt / 2, of the velocity at zero.
     """
-    scene = Scene(pair(), CONCRETE, [effects.BondDamping()])
+    scene = Scene(pair(), CONCRETE, filled("bonds", effects.BondDamping()))
     simulation = Simulation(scene, Uniform(dt, dashpot="limited"))
     apart = [[-1e-3, 0.0, 0.0], [1e-3, 0.0, 0.0]]
     simulation.state.set_motion(simulation.model.centre, velocity=apart)
@@ -208,8 +208,8 @@ def test_a_diverged_run_leaves_its_last_good_output(diverged):
 
 def test_a_motion_that_is_no_number_is_named_and_not_searched_with():
     """Bodies in contact, one of them moving beyond all numbers: none is without a cell."""
-    touch = effects.BodyContact(outer_faces=True)
-    scene = Scene(bar(0.1, 0.05, (2, 1, 1)), CONCRETE, [touch])
+    touch = filled("bodies", effects.BodyContact(outer_faces=True), group="right")
+    scene = Scene(bar(0.1, 0.05, (2, 1, 1)), CONCRETE, touch)
     simulation = Simulation(scene, Uniform(1e-8))
     simulation.start()
     simulation.state.velocity[3] = [np.nan, 0.0, 0.0]
