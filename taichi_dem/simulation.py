@@ -233,6 +233,10 @@ class Simulation:
             self.broad_phase.ask(everywhere=True)
         self.driver.prepare()
         self._check_capacity()
+        if self.schedule.controlled and len(self.readings.near_bodies()):
+            # Steps follow the contacts that were found, before velocities are set half a step back.
+            self.step.start(0)
+            self.step.start(1)
         compiling("energy balance", 4, PARTS)
         self.readings.step_back()
         with self.readings.held():

@@ -134,14 +134,18 @@ def _stiffness(limits: ti.template()) -> ti.f64:
     return limits.rates(0)[1]
 
 
-def test_controlled_steps_follow_the_stiffness_at_the_present_overlap():
-    """Sixteen times as deep, at rest, is sixteen times as stiff; places of 0.05 m keep 1e-16."""
+def stiffening(gap):
+    """Two tetrahedra face to face, a gap [m] apart, that meet by this law."""
     left, right = single(EDGE), mirrored(single(EDGE))
     apart = left.points.mean(axis=0) - right.points.mean(axis=0)
-    parts = {"left": (left, (0.0,) * 3), "right": (right, [1e-9, *apart[1:]])}
-    mesh = placed_together(parts, keep_coincident=True)
+    parts = {"left": (left, (0.0,) * 3), "right": (right, [gap, *apart[1:]])}
     law = Stiffening(effects.SphereGeometry())
-    simulation = Simulation(Scene(mesh, STIFF, [law]), Uniform(1e-6, control=StepControl()))
+    return Scene(placed_together(parts, keep_coincident=True), STIFF, [law])
+
+
+def test_controlled_steps_follow_the_stiffness_at_the_present_overlap():
+    """Sixteen times as deep, at rest, is sixteen times as stiff; places of 0.05 m keep 1e-16."""
+    simulation = Simulation(stiffening(1e-9), Uniform(1e-6, control=StepControl()))
     simulation.start()
     place, found = simulation.model.centre.copy(), []
     for depth in (1e-6, 1.6e-5):
@@ -150,3 +154,14 @@ def test_controlled_steps_follow_the_stiffness_at_the_present_overlap():
         simulation.broad_phase.search()
         found.append(_stiffness(simulation.schedule.limits.contact_limits))
     assert found[1] == pytest.approx(16.0 * found[0], rel=1e-9) and found[0] > 0.0
+
+
+def test_bodies_that_overlap_at_the_start_part_by_the_step_that_their_contact_asks_for():
+    """The first kick was that of the longest step, which pressed them into each other."""
+    controlled = Simulation(stiffening(-1e-6), Uniform(1e-6, control=StepControl()))
+    controlled.advance_to(1)
+    step = 1e-6 / 2.0 ** int(values(controlled.state.level)[0])
+    equal = Simulation(stiffening(-1e-6), Uniform(step))
+    equal.advance_to(round(1e-6 / step))
+    assert step < 1e-6
+    assert np.array_equal(controlled.motion()["velocity"], equal.motion()["velocity"])
