@@ -21,6 +21,7 @@ from taichi_dem.mesh.shapes import bar, placed_together, single
 from taichi_dem.mesh.tetrahedra import all_faces, penetration
 from taichi_dem.report.shared_volume import DEEP, DEPTH, SharedVolume
 from tests.scenes import apart, quaternions
+from tests.structures import POST, filled
 
 EDGE = 1.0
 #: In how many parts a body is counted.
@@ -77,7 +78,8 @@ def test_shares_are_those_of_the_intersections_of_all_pairs():
 def test_bodies_that_overlap_at_the_start_are_told_at_once_and_rest_as_they_are(shift, share):
     """Nothing of their overlap becomes energy; one within the other is refused."""
     parts = {"one": (single(EDGE), (0.0, 0.0, 0.0)), "other": (single(EDGE), (shift, 0.0, 0.0))}
-    scene = Scene(placed_together(parts), CONCRETE, [TOUCH])
+    touch = filled("bodies", TOUCH, group="post_base")
+    scene = Scene(placed_together(parts | POST), CONCRETE, touch)
     asked = {"method": Uniform(1e-7), "until": 1e-5, "samples": 1, "progress": None}
     if share > 50.0:
         with pytest.raises(SimulationDiverged, match=r"t = 0 s: .* the scene starts so"):
