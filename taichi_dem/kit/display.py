@@ -45,10 +45,12 @@ def _short(value):
     return f"{value:.6g}" if isinstance(value, float) else shown(value)
 
 
-def by_arguments(thing: object) -> str:
-    """Representation of an object as the call that made it, from its attributes."""
-    names = signature(type(thing)).parameters
-    kept = {name: vars(thing).get(f"_{name}", vars(thing).get(name)) for name in names}
+def by_arguments(thing: object, *parts: object) -> str:
+    """Representation of an object as the call that made it, from its attributes and its parts'."""
+    names, found = signature(type(thing)).parameters, {}
+    for part in (*parts, thing):
+        found.update(vars(part))
+    kept = {name: found.get(f"_{name}", found.get(name)) for name in names}
     texts = {name: _argument(value) for name, value in kept.items()}
     arguments = ", ".join(f"{name}={text}" for name, text in texts.items() if text)
     return f"{type(thing).__name__}({arguments})"

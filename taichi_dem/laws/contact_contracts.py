@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
+from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import between, flag, instance, shown, whole
@@ -197,6 +198,9 @@ class ContactLaw(Effect):
 
     def __init__(self, geometry: Geometry):
         self.geometry = instance("geometry", geometry, Geometry)
+
+    def __repr__(self):
+        return by_arguments(self, self.geometry)
 
     @abstractmethod
     def push(self, m, k, touch):

@@ -61,7 +61,7 @@ def found(monkeypatch):
 def by_rays(scene):
     """3 + 0.9 / parts^2: what a law of second order gives; spheres are off by 0.5."""
     law = scene.effect("contact")
-    return 3.5 if type(law) is SphereContact else 3.0 + 0.9 / law.parts**2
+    return 3.5 if type(law) is SphereContact else 3.0 + 0.9 / law.geometry.parts**2
 
 
 @pytest.mark.parametrize("parts", [2, 3, 4, 5])
@@ -109,7 +109,9 @@ def _length(scene):
 def test_runs_that_diverge_leave_no_bound(found):
     diverging = found(
         touching(BodyContact(3)),
-        lambda scene: 3.0 if scene.effect("contact").parts == 3 and scene.mesh is BAR else None,
+        lambda scene: (
+            3.0 if scene.effect("contact").geometry.parts == 3 and scene.mesh is BAR else None
+        ),
         ("step", "contact", "mesh"),
         [bar(0.2, 0.05, (2, 1, 1))] * 2,
     )
@@ -126,7 +128,7 @@ def test_a_certificate_that_does_not_hold_is_a_source_without_a_measure(found, c
 def test_a_scene_with_another_contact_keeps_all_else(word):
     scene = touching(BodyContact(3), word)
     other = with_contact(scene, BodyContact(6))
-    assert other.effect("contact").parts == 6 and other.on_demand == scene.on_demand
+    assert other.effect("contact").geometry.parts == 6 and other.on_demand == scene.on_demand
     assert [type(one) for one in other.effects] == [type(one) for one in scene.effects]
 
 

@@ -101,7 +101,7 @@ def mass_ratio_1e4(trial):
 def sphere_on_base(mesh):
     """Where the first contact sphere of a single body's face in x = 0 touches it [m], (3,)."""
     _, centre, _ = body_properties(mesh, 1.0)
-    spheres = spheres_of_faces(mesh, centre, effects.SphereContact().divisions)
+    spheres = spheres_of_faces(mesh, centre, effects.SphereGeometry().divisions)
     apex = int(abs(mesh.points[mesh.tetrahedra[0]][:, 0]).argmax())
     return (centre[0] + spheres.centre[0, apex, 0]) * [0.0, 1.0, 1.0]
 
