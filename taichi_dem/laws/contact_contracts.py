@@ -34,7 +34,7 @@ ONCE_BROKEN = "once_broken"
 class Touch:
     """Two surfaces that touch: overlap [m], rate at which they part [m/s], area of contact.
 
-    The overlap is negative while they are apart. area: 1 for spheres, [m2] for bodies.
+    The overlap is 0 while they are apart. area: 1 for spheres, [m2] for bodies.
     """
 
     overlap: real

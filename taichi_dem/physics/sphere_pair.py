@@ -60,7 +60,7 @@ class Nearest:
 
     first: centre of the first's sphere and its radius [m]. apart: from there to the second's
     centre [m]. reach: their distance when they touch [m]. size: the sum of the radii [m]. Of bodies
-    see ``BodyContact.nearest``; area, couple: as in ``Meeting``.
+    see ``BodyGeometry.nearest``; area, couple: as in ``Meeting``.
     """
 
     first: ti.types.vector(4, ti.f64)
@@ -86,7 +86,7 @@ class Meeting:
     of the overlap, world [m]. area: by which the numbers of a law are multiplied; 1 for spheres, of
     contact [m2] for bodies. couple: moment of the contact about its point, per force along the
     normal, world [m]; 0 for spheres. weight: by which the rate of a dashpot is multiplied, 1 for
-    spheres, as ``BodyContact.weight`` for bodies.
+    spheres, as ``BodyGeometry.weight`` for bodies.
     """
 
     overlap: ti.f64

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cases.meshes import with_moved_nodes
-from taichi_dem import CONCRETE, Scene, Uniform, effects, simulate
+from taichi_dem import CONCRETE, Scene, Uniform, checked_mesh, effects, simulate
 from taichi_dem.mesh.shapes import bar, placed_together
 
 STEP, UNTIL, START = 4e-7, 2.4e-4, 6e-5
@@ -148,6 +148,16 @@ def test_sleep_leaves_the_motion_and_what_acts_as_they_are_and_says_what_it_leav
     found, known = (one.report.energy_balance["residual"] for one in (auto, awake))
     given = max(auto.series["kinetic_J"].max(), abs(report.energy_balance["load_work"]))
     assert abs(found - known) <= share * given
+
+
+def test_far_from_the_origin_bodies_at_rest_sleep():
+    """The rounding of coordinates of 10 km opens no bond by more than is expected of it."""
+    mesh = rod(20)
+    far = checked_mesh(mesh.points + np.array([1e4, -1e4, 1e4]), mesh.tetrahedra, dict(mesh.groups))
+    scene = Scene(far, SOFT, "auto", loads=2 * [pulse("left", 0.0)])
+    result = simulate(scene, method=Uniform(STEP), until=2 * STEP, samples=1, progress=None)
+    beyond = result.model.centre[:, 0] > far.points[:, 0].min() + 2 * WIDE
+    assert np.isnan(result.acting_since["awake"][beyond]).all()
 
 
 CELLS, APART = 5, 5.0
