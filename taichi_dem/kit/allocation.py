@@ -4,9 +4,7 @@ Taichi crashes beyond 512 field trees a session and never frees one by itself.
 """
 
 import contextlib
-import ctypes
 import math
-import mmap
 import os
 import weakref
 from typing import Any
@@ -16,29 +14,22 @@ import taichi as ti
 from numpy.typing import ArrayLike
 from taichi._snode.fields_builder import FieldsBuilder
 from taichi.lang import impl
-from taichi.lang.matrix import MatrixField
 from taichi.lang.snode import SNode
 from taichi.lang.util import to_numpy_type
 
 from taichi_dem.kit import backend
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.taichi_names import may_use
+from taichi_dem.kit.taichi_patches import addresses
+from taichi_dem.kit.taichi_patches.addresses import array_of, lies_here
 
 #: Trees beyond which no new one is begun; a few more complete those begun.
 MOST_TREES = 480
 #: Share of the free memory that a tree may take.
 _SHARE = 0.9
-#: Bytes of a tree from which on giving its pages back is faster than to overwrite them.
-_LARGE = 2**23
 #: Taichi's lists of fields without a place.
 _FIELDS = ("global_vars", "grad_vars", "dual_vars", "matrix_fields")
-
-
-#: Names of Taichi by which a field is found in its tree.
-_PLACES = (
-    "taichi._lib.core.SNode.cell_size_bytes",
-    "taichi._lib.core.SNode.offset_bytes_in_parent_cell",
-)
+#: Numbers of the trees whose memory has been freed, by session; Taichi still lists them.
+_destroyed: weakref.WeakKeyDictionary = weakref.WeakKeyDictionary()
 
 
 class CapacityError(InputError):
@@ -102,51 +93,21 @@ class FieldTree:
                 f"({' '.join(str(error).split())}): {self.advice}"
             ) from None
         if lies_here():
-            address = _address(self._anchor) - _offset(self._anchor.snode.ptr)[1]
-            _base(self._builder.root.ptr)
-            _bases[self._builder.root.ptr.id] = address
+            addresses.remember(self._builder.root.ptr, self._anchor)
             # Taichi has written zeros to every page.
             self.clear()
 
     def clear(self) -> None:
         """Set all bytes to zero; only where it ``lies_here``."""
         ti.sync()
-        root = self._builder.root.ptr
-        memory = _array_at(_base(root), np.uint8, (root.cell_size_bytes,))
-        first, end = _given_back(_base(root), memory)
-        memory[:first], memory[end:] = 0, 0
+        addresses.clear(self._builder.root.ptr)
 
     def destroy(self) -> None:
         """Free the memory; the fields must not be used any more."""
-        number = self._builder.root.ptr.id
-        _bases.pop(number, None)
-        _destroyed.add(number)
-        for field in [field for field in _arrays if _layout(field)[0].id == number]:
-            del _arrays[field]
+        addresses.forget(self._builder.root.ptr)
+        _destroyed.setdefault(impl.get_runtime(), set()).add(self._builder.root.ptr.id)
         self._tree.destroy()
         self._tree = None
-
-
-def lies_here() -> bool:
-    """Whether memory of trees is read and written in place: on a CPU, where Taichi says where."""
-    return backend.is_cpu() and may_use(*_PLACES)
-
-
-def _given_back(address, memory):
-    """Range of the bytes that are zero now, as their pages went back to the system."""
-    # Most lists are long and hardly used: pages given back take no memory until they are written.
-    page = mmap.PAGESIZE
-    first, end = -address % page, (address + len(memory)) // page * page - address
-    if len(memory) < _LARGE or not hasattr(mmap, "MADV_DONTNEED"):
-        return 0, 0
-    memory[first] = 1
-    words = [*map(ctypes.c_size_t, (address + first, end - first))]
-    advise = ctypes.CDLL(None).madvise
-    refused = advise(*words, mmap.MADV_DONTNEED)
-    if hasattr(mmap, "MADV_HUGEPAGE"):
-        advise(*words, mmap.MADV_HUGEPAGE)
-    # Of memory that is shared with others, the system keeps what is in it.
-    return (0, 0) if refused or memory[first] else (first, end)
 
 
 class _Declared:
@@ -169,72 +130,6 @@ class _Declared:
             self._runtime.unfinalized_fields_builder.pop(tree, None)
             for name, fields in self._fields.items():
                 setattr(self._runtime, name, list(fields))
-
-
-#: Addresses of the trees of the session by their roots, and the session's program.
-_bases: dict = {}
-_bases_of = None
-#: Roots whose memory has been freed; Taichi still lists them.
-_destroyed: set = set()
-
-
-def _base(root) -> int:
-    """Address of a tree of the present session by its root; 0 for one that is no ``FieldTree``."""
-    _forget_other_sessions()
-    return _bases.get(root.id, 0)
-
-
-def _forget_other_sessions() -> None:
-    """Restart the numbers of roots, as each session does."""
-    global _bases_of
-    if _bases_of is not impl.get_runtime().prog:
-        _bases_of = impl.get_runtime().prog
-        _bases.clear()
-        _arrays.clear()
-        _destroyed.clear()
-
-
-def in_tree(field: ti.Field) -> bool:
-    """Whether a field lies in a ``FieldTree`` that ``lies_here``."""
-    return lies_here() and _base(_layout(field)[0]) != 0
-
-
-def array_of(field: ti.Field) -> np.ndarray | None:
-    """Array that lies where a field of a ``FieldTree`` does, on a CPU; else None."""
-    _forget_other_sessions()
-    array = _arrays.get(field)
-    if array is None and in_tree(field):
-        root, offset, kind, shape, strides = _layout(field)
-        array = _arrays[field] = _array_at(_base(root) + offset, kind, shape, strides)
-    return array
-
-
-#: Where fields lie in their trees, and their arrays, which are asked for thousands of times a run.
-_layouts: weakref.WeakKeyDictionary = weakref.WeakKeyDictionary()
-_arrays: weakref.WeakKeyDictionary = weakref.WeakKeyDictionary()
-
-
-def _layout(field):
-    """Root of a field's tree, bytes from there to its first entry, type, shape and strides."""
-    if field not in _layouts:
-        _layouts[field] = _found_layout(field)
-    return _layouts[field]
-
-
-def _found_layout(field):
-    first = _first_scalar(field).snode.ptr
-    kind = np.dtype(to_numpy_type(field.dtype))
-    shape: tuple[int, ...] = tuple(field.shape)
-    strides: tuple[int, ...] = ()
-    if shape:
-        strides = (first.parent.cell_size_bytes,)
-        for length in reversed(shape[1:]):
-            strides = (strides[0] * length, *strides)
-    if isinstance(field, MatrixField):
-        entry = (field.n,) if field.ndim == 1 else (field.n, field.m)
-        steps = (kind.itemsize,) if field.ndim == 1 else (field.m * kind.itemsize, kind.itemsize)
-        shape, strides = shape + entry, strides + steps
-    return (*_offset(first), kind, shape, strides)
 
 
 def values(field: ti.Field, wanted: Any = ...) -> np.ndarray:
@@ -296,43 +191,6 @@ def check_memory(needed: float, advice: str) -> None:
         )
 
 
-def _first_scalar(field):
-    if not isinstance(field, MatrixField):
-        return field
-    return field.get_scalar_field(*((0,) if field.ndim == 1 else (0, 0)))
-
-
-def _offset(node) -> tuple:
-    """Root of the tree of a node, and bytes from the tree's beginning to the node."""
-    offset = 0
-    while node.parent is not None:
-        offset += node.offset_bytes_in_parent_cell
-        node = node.parent
-    return node, offset
-
-
-def _address(field) -> int:
-    """Address of the first entry of a field of one dimension."""
-    found = np.zeros(1, dtype=np.uint64)
-
-    @ti.kernel
-    def ask(found: ti.types.ndarray(dtype=ti.u64, ndim=1)):
-        for _ in range(1):
-            found[0] = ti.get_addr(field, 0)
-
-    ask(found)
-    return int(found[0])
-
-
-def _array_at(address, kind, shape, strides=None) -> np.ndarray:
-    kind = np.dtype(kind)
-    size = int(np.prod(shape, dtype=np.int64)) * kind.itemsize
-    if strides is not None and shape:
-        size = sum((n - 1) * step for n, step in zip(shape, strides)) + kind.itemsize
-    memory = (ctypes.c_char * size).from_address(address)
-    return np.ndarray(shape, kind, memory, strides=strides)
-
-
 def check_capacity() -> None:
     """Raise InputError when the session has no room for more fields."""
     trees = tree_count()
@@ -354,9 +212,8 @@ def field_bytes() -> int:
 
 
 def _live_roots() -> list:
-    _forget_other_sessions()
-    roots = FieldsBuilder._finalized_roots()
-    return [root for root in roots if root.ptr.id not in _destroyed]
+    gone = _destroyed.get(impl.get_runtime(), ())
+    return [root for root in FieldsBuilder._finalized_roots() if root.ptr.id not in gone]
 
 
 @ti.func

@@ -8,9 +8,10 @@ from typing import Any
 import taichi as ti
 
 from taichi_dem.kit import runtime
-from taichi_dem.kit.allocation import CapacityError, FieldTree, lies_here
+from taichi_dem.kit.allocation import CapacityError, FieldTree
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.field_memory import fields_of
+from taichi_dem.kit.taichi_patches.addresses import lies_here
 
 
 @ti.data_oriented

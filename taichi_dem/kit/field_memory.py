@@ -10,7 +10,8 @@ from taichi.lang.matrix import MatrixField
 from taichi.lang.struct import StructField
 from taichi.lang.util import to_numpy_type
 
-from taichi_dem.kit.allocation import array_of, assign
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.taichi_patches.addresses import array_of
 
 #: Libraries whose objects are not searched for fields.
 _FOREIGN = ("taichi", "numpy", "builtins")

@@ -11,14 +11,15 @@ from dataclasses import dataclass
 from typing import Optional
 
 # First, out of order: it prepares the environment for ``import taichi``.
-from taichi_dem.kit.environment import kernel_cache, taichi_alone  # isort: skip
+from taichi_dem.kit.taichi_patches.environment import kernel_cache, taichi_alone  # isort: skip
 
 import taichi as ti
 from taichi.lang import impl
 
-from taichi_dem.kit import backend, llvm_options
+from taichi_dem.kit import backend
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.kernel_source_cache import remember
+from taichi_dem.kit.taichi_patches import llvm_options
+from taichi_dem.kit.taichi_patches.kernel_source_cache import remember
 from taichi_dem.kit.validation import choice, flag, whole
 
 # Before any other module has Taichi decorate its functions.

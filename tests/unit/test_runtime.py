@@ -12,12 +12,11 @@ import time
 import pytest
 import taichi as ti
 from taichi._snode.fields_builder import FieldsBuilder
-from taichi.lang import impl
 
 from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform
 from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import CapacityError, FieldTree, assign, values
-from taichi_dem.kit.launch import Launch
+from taichi_dem.kit.taichi_patches.prepared_launch import PreparedLaunch
 from taichi_dem.mesh.shapes import bar
 from tests.scenes import ROOT
 
@@ -143,12 +142,10 @@ class Lost:
 
 
 def test_a_lost_device_is_told_with_what_to_do(monkeypatch):
-    monkeypatch.setattr(impl.get_runtime(), "prog", Lost())
+    launch = PreparedLaunch(Lost(), None, Lost, [0], returns=True)
     monkeypatch.setattr(backend, "is_cpu", lambda: False)
-    launch = Launch(None)
-    launch._ready = (impl.get_runtime().prog, None, Lost, [0], True)
     with pytest.raises(InputError, match=r"^the device no longer answers .*checkpoint, or"):
-        launch(1)
+        launch([1])
 
 
 def test_memory_that_a_device_refuses_is_told_with_its_size(monkeypatch):

@@ -19,21 +19,18 @@ from taichi.lang.ast.ast_transformer_utils import Builder
 
 from ca_damper import Automaton, Batch, SceneTable
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, effects, read_mesh, simulate
-from taichi_dem.kit import allocation, kernel_source_cache, launch
 from taichi_dem.kit.study import call_in_process
-from taichi_dem.kit.taichi_names import NEEDED, WANTED, named
+from taichi_dem.kit.taichi_patches.names import NEEDED, SAVING, SWITCH, WANTED, named, paths
 from tests.attack import bits
 from tests.equivalence.test_digests import STORED
 from tests.scenes import ROOT
 from tests.unit.test_source_rules import PATHS, parsed
 
-#: All that saves time only, but for what Taichi itself looks up on a class, or promises.
-SAVING = {
-    path.removesuffix(".get_pos_info")
-    for place, name, _, more in kernel_source_cache._REPLACED
-    for path in (f"{place}.{name}", *more.split())
-    if place != "taichi"
-} | {launch._ERRORS, allocation._PLACES[0]}
+#: All that saves time only, but for what Taichi itself looks up on a class.
+OF_PATCHES = {
+    *(path for path in paths(SAVING) if not isinstance(named(path.rpartition(".")[0]), type)),
+    "taichi._lib.core.SNode.cell_size_bytes",
+}
 #: Deletes names from Taichi, where Taichi itself still finds those that it needs, then imports us.
 _WITHOUT = """
 import builtins, importlib, json, sys
@@ -54,10 +51,11 @@ print(json.dumps([getattr(bits, work)() for work in sys.argv[3:]]))
 """
 
 
-def without(names, version, *works):
+def without(names, version, *works, switch="on"):
     """What a program of these works says and warns of, without some names of Taichi."""
     given = json.dumps(sorted(names)), json.dumps(version)
     environment = {**os.environ, "PYTHONPATH": ROOT, "ENABLE_TAICHI_HEADER_PRINT": "0"}
+    environment[SWITCH] = switch
     line = [sys.executable, "-c", _WITHOUT, *given, *works]
     return subprocess.run(line, capture_output=True, text=True, cwd=ROOT, env=environment)
 
@@ -67,13 +65,25 @@ def of_the_version(done):
     return [line for line in done.stderr.splitlines() if "taichi must be 1.7.4" in line]
 
 
-def test_without_what_saves_time_the_bits_are_the_same_and_one_sentence_says_it():
-    done = without(SAVING, (1, 7, 5), "blast", "damper")
-    assert done.returncode == 0, done.stderr
+def test_without_patches_the_bits_are_the_same():
+    """Nothing is said of it, as it was asked for."""
+    done = without(OF_PATCHES, WANTED, "blast", "damper", switch="off")
+    assert (done.returncode, done.stderr) == (0, "")
     stored = json.loads(STORED.read_text())[bits.RUN]
     assert json.loads(done.stdout.splitlines()[-1]) == [stored, bits.damper()]
+
+
+def test_another_taichi_runs_without_patches_and_one_sentence_says_it():
+    done = without(OF_PATCHES, (1, 7, 5))
+    assert done.returncode == 0, done.stderr
     (sentence,) = of_the_version(done)
     assert "got 1.7.5" in sentence
+
+
+def test_the_switch_is_on_or_off():
+    done = without((), WANTED, switch="of")
+    assert done.returncode == 1
+    assert SWITCH in done.stderr.splitlines()[-1]
 
 
 def test_without_a_name_that_is_needed_a_sentence_says_which_taichi_is():
@@ -86,7 +96,7 @@ def test_without_a_name_that_is_needed_a_sentence_says_which_taichi_is():
 
 def test_every_private_name_that_a_module_imports_is_looked_for():
     """Modules of Taichi are private; what is imported from them is in a table."""
-    known = {*NEEDED} | {f"{place}.{name}" for place in NEEDED for name in NEEDED[place].split()}
+    known = {*NEEDED, *paths(NEEDED)}
     nodes = [node for path in PATHS for node in ast.walk(parsed(path))]
     taken = [node for node in nodes if isinstance(node, ast.ImportFrom)]
     private = [node for node in taken if (node.module or "").startswith("taichi.")]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from taichi_dem.kit.taichi_names import may_use
+from taichi_dem.kit.taichi_patches.names import are_on
 
 #: Of the ELF format: an entry of a table of symbols, and the kind of section that is one.
 _SYMBOL = np.dtype([("name", "<u4"), ("kind", "<u4"), ("value", "<u8"), ("size", "<u8")])
@@ -30,7 +30,7 @@ _PARSE, _KNOWN = b"LLVMParseCommandLineOptions", b"PyInit_taichi_python"
 def switch_off() -> bool:
     """Switch them off for all kernels to come; whether that could be done."""
     path = getattr(sys.modules.get(_LIBRARY), "__file__", None)
-    if path is None or sys.platform != "linux" or not may_use():
+    if path is None or sys.platform != "linux" or not are_on():
         return False
     found = addresses(path, (_PARSE, _KNOWN))
     if len(found) < 2:

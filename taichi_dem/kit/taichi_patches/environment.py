@@ -87,4 +87,4 @@ def _remove_stale_lock(folder):
 # In Jupyter Taichi would say that it found a graphical shell.
 with taichi_alone(TI_LOG_LEVEL="error"):
     importlib.import_module("taichi")
-    importlib.import_module("taichi_dem.kit.taichi_names").check_needed()
+    importlib.import_module("taichi_dem.kit.taichi_patches.names").check_needed()

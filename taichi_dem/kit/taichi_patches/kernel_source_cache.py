@@ -9,13 +9,12 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-from taichi_dem.kit.taichi_names import may_use, named
+from taichi_dem.kit.taichi_patches.names import are_on, named
 
 #: Numbers of which each range is kept; the kernels of a step have some hundred.
 _MOST = 1 << 14
 _KERNELS = "taichi.lang.kernel_impl"
 _CONTEXT = "taichi.lang.ast.ast_transformer_utils.ASTTransformerContext"
-_STATEMENTS, _BOUND = "_KERNEL_CLASS_STACKFRAME_STMT_RES", "_BoundedDifferentiableMethod"
 
 
 def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -77,7 +76,7 @@ def inside_class(level_of_class_stackframe: int) -> bool:
     except ValueError:
         return False
     line = linecache.getline(frame.f_code.co_filename, frame.f_lineno, frame.f_globals).strip()
-    return any(one.match(line) for one in named(f"{_KERNELS}.{_STATEMENTS}"))
+    return any(one.match(line) for one in named(f"{_KERNELS}._KERNEL_CLASS_STACKFRAME_STMT_RES"))
 
 
 class BoundKernel:
@@ -90,7 +89,7 @@ class BoundKernel:
     def __get__(self, owner: Any, kind: type | None = None) -> Any:
         if owner is None:
             return self.kernel
-        bound = named(f"{_KERNELS}.{_BOUND}")(owner, self.kernel)
+        bound = named(f"{_KERNELS}._BoundedDifferentiableMethod")(owner, self.kernel)
         bound.__name__ = self.kernel.__name__
         return bound
 
@@ -106,27 +105,26 @@ def data_oriented(kind: Any) -> Any:
     return kind
 
 
-#: What is replaced in Taichi: where, by what made of its own, and names that this uses besides.
-_REPLACED: tuple[tuple[str, str, Callable[[Any], Any], str], ...] = (
-    (_KERNELS, "getsourcelines", remembering, ""),
-    (_KERNELS, "getsourcefile", remembering, ""),
-    (_KERNELS, "textwrap", lambda own: SimpleNamespace(fill=filled, dedent=own.dedent), ""),
-    (_KERNELS, "transform_tree", undisturbed, ""),
-    (_KERNELS, "_inside_class", lambda own: inside_class, f"{_KERNELS}.{_STATEMENTS}"),
-    (_KERNELS, "data_oriented", lambda own: data_oriented, f"{_KERNELS}.{_BOUND}"),
-    ("taichi", "data_oriented", lambda own: data_oriented, f"{_KERNELS}.{_BOUND}"),
-    (_CONTEXT, "get_pos_info", lambda own: position, ""),
-    ("taichi.lang.impl", "get_traceback", lambda own: declared_at, ""),
-    ("taichi.lang.snode", "get_traceback", lambda own: declared_at, ""),
-    ("taichi.lang.expr", "_check_in_range", functools.lru_cache(_MOST), ""),
-    ("taichi.lang.expr", "_clamp_unsigned_to_range", functools.lru_cache(_MOST), ""),
+#: What is replaced in Taichi: where, and by what made of its own.
+_REPLACED: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
+    (_KERNELS, "getsourcelines", remembering),
+    (_KERNELS, "getsourcefile", remembering),
+    (_KERNELS, "textwrap", lambda own: SimpleNamespace(fill=filled, dedent=own.dedent)),
+    (_KERNELS, "transform_tree", undisturbed),
+    (_KERNELS, "_inside_class", lambda own: inside_class),
+    (_KERNELS, "data_oriented", lambda own: data_oriented),
+    ("taichi", "data_oriented", lambda own: data_oriented),
+    (_CONTEXT, "get_pos_info", lambda own: position),
+    ("taichi.lang.impl", "get_traceback", lambda own: declared_at),
+    ("taichi.lang.snode", "get_traceback", lambda own: declared_at),
+    ("taichi.lang.expr", "_check_in_range", functools.lru_cache(_MOST)),
+    ("taichi.lang.expr", "_clamp_unsigned_to_range", functools.lru_cache(_MOST)),
 )
 
 
 @functools.cache
 def remember() -> None:
-    """Install all of it that the names of this Taichi allow."""
-    for place, name, made, more in _REPLACED:
-        if may_use(f"{place}.{name}", *more.split()):
-            owner = named(place)
-            setattr(owner, name, made(getattr(owner, name)))
+    """Install all of it."""
+    for place, name, made in _REPLACED if are_on() else ():
+        owner = named(place)
+        setattr(owner, name, made(getattr(owner, name)))
