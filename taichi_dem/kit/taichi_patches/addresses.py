@@ -1,6 +1,7 @@
 """Where fields lie, so that they are read, written and cleared in place on a CPU."""
 
 import ctypes
+import math
 import mmap
 import weakref
 from typing import Any
@@ -46,7 +47,7 @@ def forget(root: Any) -> None:
 
 def clear(root: Any) -> None:
     """Set all bytes of a tree to zero."""
-    memory = _array_at(_base(root), np.uint8, (root.cell_size_bytes,))
+    memory = _array_at(_base(root), np.dtype(np.uint8), (root.cell_size_bytes,), (1,))
     first, end = _given_back(_base(root), memory)
     memory[:first], memory[end:] = 0, 0
 
@@ -74,7 +75,7 @@ def _base(root):
     return _bases.get(root.id, 0)
 
 
-def _forget_other_sessions() -> None:
+def _forget_other_sessions():
     """Restart the numbers of roots, as each session does."""
     global _bases_of
     if _bases_of is not impl.get_runtime().prog:
@@ -101,25 +102,19 @@ def _layout(field):
 
 
 def _found_layout(field):
-    first = _first_scalar(field).snode.ptr
-    kind = np.dtype(to_numpy_type(field.dtype))
-    shape: tuple[int, ...] = tuple(field.shape)
-    strides: tuple[int, ...] = ()
-    if shape:
-        strides = (first.parent.cell_size_bytes,)
-        for length in reversed(shape[1:]):
-            strides = (strides[0] * length, *strides)
+    kind, entry, first = np.dtype(to_numpy_type(field.dtype)), (), field
     if isinstance(field, MatrixField):
-        entry = (field.n,) if field.ndim == 1 else (field.n, field.m)
-        steps = (kind.itemsize,) if field.ndim == 1 else (field.m * kind.itemsize, kind.itemsize)
-        shape, strides = shape + entry, strides + steps
-    return (*_offset(first), kind, shape, strides)
+        entry = (field.n, field.m)[: field.ndim]
+        first = field.get_scalar_field(*(0,) * field.ndim)
+    node = first.snode.ptr
+    outer = _strides(field.shape, node.parent.cell_size_bytes)
+    strides = outer + _strides(entry, kind.itemsize)
+    return (*_offset(node), kind, (*field.shape, *entry), strides)
 
 
-def _first_scalar(field):
-    if not isinstance(field, MatrixField):
-        return field
-    return field.get_scalar_field(*((0,) if field.ndim == 1 else (0, 0)))
+def _strides(shape, size):
+    """Bytes from an entry to the next along each axis; size: of an entry [bytes]."""
+    return tuple(size * math.prod(shape[k + 1 :]) for k in range(len(shape)))
 
 
 def _offset(node):
@@ -144,10 +139,7 @@ def _address(field):
     return int(found[0])
 
 
-def _array_at(address, kind, shape, strides=None):
-    kind = np.dtype(kind)
-    size = int(np.prod(shape, dtype=np.int64)) * kind.itemsize
-    if strides is not None and shape:
-        size = sum((n - 1) * step for n, step in zip(shape, strides)) + kind.itemsize
+def _array_at(address, kind, shape, strides):
+    size = sum((n - 1) * step for n, step in zip(shape, strides)) + kind.itemsize
     memory = (ctypes.c_char * size).from_address(address)
     return np.ndarray(shape, kind, memory, strides=strides)

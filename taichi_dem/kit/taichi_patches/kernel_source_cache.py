@@ -28,7 +28,6 @@ def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
             cached[key] = find(function)
         return cached[key]
 
-    found.cached = cached  # type: ignore[attr-defined]
     return found
 
 
@@ -112,7 +111,6 @@ _REPLACED: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
     (_KERNELS, "textwrap", lambda own: SimpleNamespace(fill=filled, dedent=own.dedent)),
     (_KERNELS, "transform_tree", undisturbed),
     (_KERNELS, "_inside_class", lambda own: inside_class),
-    (_KERNELS, "data_oriented", lambda own: data_oriented),
     ("taichi", "data_oriented", lambda own: data_oriented),
     (_CONTEXT, "get_pos_info", lambda own: position),
     ("taichi.lang.impl", "get_traceback", lambda own: declared_at),
@@ -122,7 +120,6 @@ _REPLACED: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
 )
 
 
-@functools.cache
 def remember() -> None:
     """Install all of it."""
     for place, name, made in _REPLACED if are_on() else ():

@@ -27,19 +27,18 @@ _PARSE, _KNOWN = b"LLVMParseCommandLineOptions", b"PyInit_taichi_python"
 
 
 @functools.cache
-def switch_off() -> bool:
-    """Switch them off for all kernels to come; whether that could be done."""
+def switch_off() -> None:
+    """Switch them off for all kernels to come, where that can be done."""
     path = getattr(sys.modules.get(_LIBRARY), "__file__", None)
     if path is None or sys.platform != "linux" or not are_on():
-        return False
+        return
     found = addresses(path, (_PARSE, _KNOWN))
     if len(found) < 2:
-        return False
+        return
     known = ctypes.cast(ctypes.CDLL(path)[_KNOWN.decode()], ctypes.c_void_p).value or 0
     parse = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.c_void_p, ctypes.c_char_p)
     words = (ctypes.c_char_p * (1 + len(_OPTIONS)))(b"taichi", *_OPTIONS)
     parse(known + found[_PARSE] - found[_KNOWN])(len(words), words, None)
-    return True
 
 
 def addresses(path: str, names: Sequence[bytes]) -> dict[bytes, int]:
