@@ -11,7 +11,7 @@ from statistics import median
 from typing import NamedTuple
 
 from _threads import thread_gains, thread_job
-from ca_damper import Automaton, Spheres
+from ca_damper import Automaton, Paper, Spheres
 from cases.blast import METHODS, paper_scene
 from damper_cost import cycle_seconds, scenes
 from taichi_dem import (
@@ -90,8 +90,8 @@ def damper(quick):
     """Yield the damper's cells and particles a second."""
     repeats, least = (3, 0.03) if quick else (7, 0.06)
     cases = {
-        "automaton, scan, N = 50": (Automaton(rules="paper", traversal="scan"), 50, CELLS, 500),
-        "automaton, list, N = 50": (Automaton(rules="paper"), 50, 50, 100),
+        "automaton, scan, N = 50": (Automaton(Paper(), traversal="scan"), 50, CELLS, 500),
+        "automaton, list, N = 50": (Automaton(Paper()), 50, 50, 100),
         "automaton, rules of place, N = 50": (Automaton(), 50, 50, 80),
         **{f"spheres, N = {n}": (Spheres(), n, n, wanted) for n, wanted in WANTED.items()},
     }

@@ -17,13 +17,19 @@ Writes work_precision.png, points.csv and summary.json to results/cost_of_accura
 import itertools
 import math
 import sys
-from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from ca_damper import Automaton, ProgressBar, SimulationDiverged, Spheres, frequency_response
+from ca_damper import (
+    Automaton,
+    Paper,
+    ProgressBar,
+    SimulationDiverged,
+    Spheres,
+    frequency_response,
+)
 from ca_damper.report.measures import curve_distance, seed_variance
 from taichi_dem import InputError
 from taichi_dem.kit import study
@@ -34,13 +40,13 @@ PARTICLES, SPHERES = 30, "dem_tsuji"
 CA_STEPS = (2e-3, 1.1e-3, 7e-4, 5e-4, 3e-4, 2e-4, 1e-4, 5e-5)
 DEM_STEPS = (1e-4, 6e-5, 4e-5, 3e-5, 2e-5, 1.4e-5)
 SOFT, SOFT_STEPS = Spheres(young=5e6, wall_young=5e6), (4e-4, 2.5e-4, 2e-4, 1e-4, 5e-5)
-PRINTED, PAPER = Spheres(damping="printed"), Automaton(rules="paper")
+PRINTED, PAPER = Spheres(damping="printed"), Automaton(Paper())
 #: A filling, its steps [s] from coarse to fine, those of the quick job, step and seeds of the
 #: reference.
 METHODS = {
     "ca_static": (PAPER, CA_STEPS, (2e-3, 2e-4), 1e-5, 6),
-    "ca_ejection": (replace(PAPER, accounting="landing+ejection"), CA_STEPS, (), 1e-5, 6),
-    "ca_landing": (replace(PAPER, accounting="landing"), CA_STEPS, (2e-3, 2e-4), 1e-5, 6),
+    "ca_ejection": (Automaton(Paper("landing+ejection")), CA_STEPS, (), 1e-5, 6),
+    "ca_landing": (Automaton(Paper("landing")), CA_STEPS, (2e-3, 2e-4), 1e-5, 6),
     SPHERES: (Spheres(), DEM_STEPS, (1e-4, 3e-5), 5e-6, 3),
     "dem_printed": (PRINTED, (6e-5, 4e-5, 2e-5), (), 5e-6, 3),
     "dem_soft": (SOFT, SOFT_STEPS, (2e-4,), 2.5e-5, 3),

@@ -18,7 +18,7 @@ from statistics import median
 import pandas as pd
 
 import ca_damper
-from ca_damper import Automaton, Batch, InputError, SceneTable, Spheres
+from ca_damper import Automaton, Batch, InputError, Paper, SceneTable, Spheres
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
 from taichi_dem.kit.study import several, whole
@@ -30,7 +30,7 @@ SOME = 50
 NUMBERS = [1, 2, 5, 10, 20, 30, 40, 50, 60, 80, 100, 120, 140, 160]
 #: Steps tried for stability [s].
 STEPS = (1e-5, 2e-5, 3e-5, 5e-5, 7e-5, 1e-4, 2e-4, 3e-4, 5e-4, 7e-4, 1e-3, 1.5e-3, 2e-3, 3e-3)
-PAIRS, PAPER = Spheres(search="all_pairs"), Automaton(rules="paper")
+PAIRS, PAPER = Spheres(search="all_pairs"), Automaton(rules=Paper())
 SCAN = replace(PAPER, traversal="scan")
 #: Label: filling, step [s], search or traversal with the step, marker, line. The paper's way is
 #: dashed, markers tell the automaton's steps apart.
@@ -141,7 +141,7 @@ def run(options):
             own, seconds = cost_of(label, options)
             rows, compiling = rows + own, compiling + seconds
             bar.count(k + 1, len(options.variants))
-    automata = [replace(PAPER, accounting=word) for word in options.accountings]
+    automata = [Automaton(Paper(word)) for word in options.accountings]
     tried = [
         {"filling": one.label, "dt_s": dt, "outcome": outcome(one, dt, options.cycles)}
         for one in (Spheres(), *automata)

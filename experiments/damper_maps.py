@@ -32,7 +32,7 @@ from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_maps"
 #: Spheres, and the automaton by the rules of the paper and of place, without gravity.
-PAPER = ca.Automaton(rules="paper", gravity=0.0)
+PAPER = ca.Automaton(ca.Paper(), gravity=0.0)
 WEIGHTLESS = ca.Spheres(gravity=0.0), PAPER, ca.Automaton(gravity=0.0)
 SETTINGS = {
     "particles": (30, 30, study.whole(1, 100), "grains of the chart, 30"),

@@ -17,7 +17,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ca_damper import Automaton, Batch, SceneTable, Spheres, film
+from ca_damper import Automaton, Batch, Paper, SceneTable, Spheres, film
 from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.plot.boxes import Box, animate_films, picture_film_strips
 from ca_damper.plot.curves import FilmMeasures, picture_cycle
@@ -60,7 +60,7 @@ def options_parser():
 
 def run(options):
     """Shake both fillings, compare, picture."""
-    automaton = Automaton(rules="paper", accounting=options.accounting)
+    automaton = Automaton(Paper(options.accounting))
     jobs = {"ca": (automaton, CA_DT), "dem": (Spheres(), options.dt)}
     scenes = (
         np.repeat(PARTICLES, options.seeds),

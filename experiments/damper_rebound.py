@@ -16,13 +16,12 @@ Writes rebound.png, heights.csv, impacts.csv and summary.json to results/damper_
 
 import math
 import sys
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pandas as pd
 
-from ca_damper import Automaton, Batch, SceneTable, Spheres, film
+from ca_damper import Automaton, Batch, Paper, SceneTable, Spheres, film
 from ca_damper.automaton.transport import READINGS
 from ca_damper.theory.bouncing import Fall, RecordedFall
 from taichi_dem.kit import study
@@ -46,7 +45,7 @@ COUNTED, ALLOWED_MS = 4, 2.0
 FREQUENCY = 10.0
 #: Column from which the particle falls; the second is one of those that stand lower.
 COLUMN = 1
-DEFAULT = Automaton(rules="paper").accumulator
+DEFAULT = Paper().accumulator
 TITLES = {
     "signed": "automaton\nsigned (default)",
     "signed_through_walls": "automaton\nsigned through walls",
@@ -83,10 +82,10 @@ def run(options):
 def fillings(options):
     """Title, filling with one particle at the top, step [s], and how far it falls [m]."""
     both = {"restitution": options.restitution, "wall_restitution": options.restitution}
-    lattice, spheres = Automaton(rules="paper"), Spheres()
+    lattice, spheres = Automaton(), Spheres()
     top = lattice.rows - 1
     for reading in options.readings:
-        filling = replace(lattice, accumulator=reading, start=((COLUMN, top),), **both)
+        filling = Automaton(Paper(accumulator=reading), start=((COLUMN, top),), **both)
         yield reading, filling, options.ca_dt, top * lattice.width
     place = 0.5 * spheres.width, spheres.height - spheres.radius
     filling = Spheres(start=(place,), **both)

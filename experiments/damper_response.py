@@ -42,7 +42,7 @@ RATIOS = np.round(np.concatenate([COARSE[0], np.arange(0.90, 1.0201, 0.005), COA
 #: Of both fillings [kg].
 PARTICLE_MASS = ca.Spheres().particle_mass
 #: Those of the paper with and without static contact.
-PAPER = [ca.Automaton(rules="paper", accounting=word) for word in ("all", "landing")]
+PAPER = [ca.Automaton(ca.Paper(word)) for word in ("all", "landing")]
 #: The fillings compared, by label.
 FILLINGS = {filling.label: filling for filling in (ca.Spheres(), ca.Automaton(), *PAPER)}
 #: Number of grains beside fixed ones, and amplitude of the base of their curves [m].

@@ -5,11 +5,13 @@ from functools import partial
 
 import pytest
 
-from ca_damper import Automaton
+from ca_damper import Automaton, Paper
 from ca_damper.report.certificate import checked_range
 
 #: An Automaton with other options than the rules.
-paper = partial(Automaton, rules="paper")
+paper = partial(Automaton, Paper())
+#: The same where landings and pushes alone act on the container.
+ejecting = partial(Automaton, Paper("landing+ejection"))
 
 
 def outside():

@@ -70,9 +70,11 @@ class Cells:
     stair: displacement of the container in whole cells; offset: what is left of it [m].
     """
 
-    def __init__(self, table: SceneFields, lattice: Lattice, listed: bool, follower: Any):
-        self.lattice, self.traversal = lattice, Traversal(table, lattice, listed)
-        self.follower = follower
+    def __init__(
+        self, table: SceneFields, lattice: Lattice, parameters: Any, listed: bool, follower: Any
+    ):
+        self.table, self.lattice, self.parameters = table, lattice, parameters
+        self.traversal, self.follower = Traversal(table, lattice, listed), follower
         self.kind = table.field(ti.i8, "cells")
         self.speed, self.travelled = table.field(ti.f64, "cells"), table.field(ti.f64, "cells")
         self.stair, self.offset = table.field(ti.i32), table.field(ti.f64)
@@ -122,6 +124,14 @@ class Cells:
         self.stair[s] = self.stair[s] + way
         self.offset[s] = motion.x - width * self.stair[s]
         return way
+
+
+class OnCells:
+    """Base of what acts on cells: these, and the numbers and the lattice of their scenes."""
+
+    def __init__(self, cells: Cells):
+        self.cells, self.table = cells, cells.table
+        self.lattice, self.parameters = cells.lattice, cells.parameters
 
 
 def _named_cells(options):

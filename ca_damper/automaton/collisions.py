@@ -1,15 +1,14 @@
 """Collisions of particles with each other and with walls (Komatsuzaki et al., 5.3 and 5.4)."""
 
-from typing import Any
-
 import taichi as ti
 
+from ca_damper.automaton.cells import OnCells
 from ca_damper.automaton.conflict_resolution import rank
 from ca_damper.automaton.device import HOLDS, PAIRS, WALLS
 from ca_damper.automaton.lattice import DIRECTIONS, EMPTY, WALL, mirrored, turned_back
+from ca_damper.automaton.transport import Transport
 from ca_damper.engine.random_numbers import DEFLECT, EVENT, bits, unit
 from ca_damper.filling import Recoil
-from ca_damper.scenes.scene_fields import Part
 
 NOTHING, JOIN, FLOOR, SIDE, PAIR = range(5)
 _CELL_BITS = 16
@@ -41,12 +40,16 @@ def deflected(direction, draw):
 
 
 @ti.data_oriented
-class Collisions(Part):
+class Collisions(OnCells):
     """Judge and carry out the events of a step."""
 
-    def __init__(self, automaton: Any, both: bool):
-        super().__init__(automaton)
-        self.both, self.events = both, self.table.field(ti.i32, "cells")
+    def __init__(self, transport: Transport, both: bool):
+        super().__init__(transport.cells)
+        self.transport, self.both = transport, both
+        self.resting, self.accumulator = transport.resting, transport.accumulator
+        self.accounting, self.conflicts = transport.accounting, transport.conflicts
+        self.event_counts = transport.event_counts
+        self.events = self.table.field(ti.i32, "cells")
         self.other = self.table.field(ti.f64, "cells")
         self.ranks = self.table.field(ti.i64, "cells")
 
@@ -112,9 +115,9 @@ class Collisions(Part):
     def claim(self, s, cell, event, ranked):
         """Claim the particles that an event changes."""
         if ti.static(self.both):
-            self.conflict_resolution.claim(s, cell, ranked)
+            self.conflicts.claim(s, cell, ranked)
             if event == PAIR:
-                self.conflict_resolution.claim(
+                self.conflicts.claim(
                     s, self.lattice.cell_ahead(s, cell, self.cells.at(s, cell)), ranked
                 )
 
@@ -123,10 +126,10 @@ class Collisions(Part):
         """Whether the event takes place; where each particle updates itself only, it does."""
         result = True
         if ti.static(self.both):
-            result = self.conflict_resolution.holds(s, cell, ranked)
+            result = self.conflicts.holds(s, cell, ranked)
             if event == PAIR and result:
                 ahead = self.lattice.cell_ahead(s, cell, self.cells.at(s, cell))
-                result = self.conflict_resolution.holds(s, ahead, ranked)
+                result = self.conflicts.holds(s, ahead, ranked)
         return result
 
     @ti.func

@@ -27,35 +27,21 @@ _COUNTED = {
 _BY = {name: (kind,) for name, (kind, _) in _COUNTED.items()}
 
 
-@ti.dataclass
-class Parameters:
-    """Numbers of the options of a scene.
+def parameters_of(automaton: Any) -> dict[str, float]:
+    """Numbers that kernels read, and those of the rules.
 
-    gravity downwards and sideways, to the right [m/s^2]; threshold of static contact in units of g
-    dt.
+    gravity downwards and sideways, to the right [m/s^2]; restitution of particles and at walls;
+    threshold of static contact in units of g dt.
     """
-
-    width: ti.f64
-    mass: ti.f64
-    gravity: ti.f64
-    sideways: ti.f64
-    particle: ti.f64
-    wall: ti.f64
-    threshold: ti.f64
-    friction: ti.f64
-    wall_friction: ti.f64
-
-
-def _parameters(options: Any) -> dict[str, float]:
     return {
-        "width": options.width,
-        "mass": options.particle_mass,
-        "gravity": gravity_along(options),
-        "sideways": gravity_across(options),
-        "particle": options.restitution,
-        "wall": options.wall_restitution,
-        "threshold": options.static_threshold,
-        **dict(zip(("friction", "wall_friction"), options.frictions)),
+        "width": automaton.width,
+        "mass": automaton.particle_mass,
+        "gravity": gravity_along(automaton),
+        "sideways": gravity_across(automaton),
+        "particle": automaton.restitution,
+        "wall": automaton.wall_restitution,
+        "threshold": automaton.static_threshold,
+        **automaton.rules.numbers,
     }
 
 
@@ -70,29 +56,30 @@ class LatticeDevice:
 
     constant_fields = ("parameters",)
 
-    def __init__(self, table: SceneFields, looks_ahead: bool):
+    def __init__(self, automaton: Any, table: SceneFields, looks_ahead: bool):
         self.table, self.lattice = table, Lattice(table, looks_ahead)
-        self.parameters = table.structs(Parameters)
-        self.conflict_resolution = ConflictResolution(table, self.lattice)
+        numbers = ti.types.struct(**dict.fromkeys(parameters_of(automaton), ti.f64))
+        self.parameters = table.structs(numbers)
+        self.conflicts = ConflictResolution(table, self.lattice)
         self.event_counts = EventCounts(table, len(_BY), _BY)
         self.velocity, self.gained = table.field(ti.f64), table.field(ti.i64)
 
-    def _fill(self, options: Any, cells: Cells, resting: Any, way: int) -> None:
+    def fill(self, automaton: Any, cells: Cells, resting: Any, way: int) -> None:
         """Add cells, what rests in them, and how they are filled."""
         self.cells, self.resting = cells, resting
-        self.placement = Placement(self.table, cells, way, options.start is not None)
+        self.placement = Placement(self.table, cells, way, automaton.start is not None)
 
     def load(self, fillings: Fillings) -> None:
         """Take over the numbers of the automaton of each scene."""
         self.lattice.load(fillings)
-        fillings.write(self.parameters, _parameters)
+        fillings.write(self.parameters, parameters_of)
         self.placement.load(fillings)
 
     @ti.func
     def reset(self, s):
         """Particles at rest in their first cells; nothing has happened."""
         self.cells.clear(s)
-        self.conflict_resolution.clear(s)
+        self.conflicts.clear(s)
         self.resting.held[s] = 0
         self.event_counts.clear(s)
         self.placement.fill(s)

@@ -8,16 +8,18 @@ from typing import Any
 
 import taichi as ti
 
+from ca_damper.automaton.cells import Cells, OnCells
 from ca_damper.automaton.lattice import DOWN, HELD, UP, WALL
 
 
 @ti.data_oriented
-class StaticContact:
+class StaticContact(OnCells):
     """Particles held by the container; rests: whether any is ever held."""
 
-    def __init__(self, automaton: Any, cells: Any, accumulator: Any, rests: bool):
-        self.cells, self.accumulator, self.rests = cells, accumulator, rests
-        self.parameters, self.held = automaton.parameters, automaton.table.field(ti.i32)
+    def __init__(self, cells: Cells, accumulator: Any, rests: bool):
+        super().__init__(cells)
+        self.accumulator, self.rests = accumulator, rests
+        self.held = self.table.field(ti.i32)
 
     @ti.func
     def supported(self, s, cell):

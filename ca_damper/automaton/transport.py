@@ -5,15 +5,16 @@ stay in place in the room, one cell the other way; the cluster that touches the 
 pushed along, at least at the wall's velocity. A column always has room for this.
 """
 
-from typing import Any
-
 import taichi as ti
 
-from ca_damper.automaton.conflict_resolution import rank
+from ca_damper.automaton.accounting import Uncounted
+from ca_damper.automaton.cells import Cells, OnCells
+from ca_damper.automaton.conflict_resolution import ConflictResolution, rank
 from ca_damper.automaton.device import PUSHES
 from ca_damper.automaton.lattice import DIRECTIONS, DOWN, EMPTY, HELD, UP, Lattice
+from ca_damper.automaton.static_contact import StaticContact
 from ca_damper.engine.random_numbers import MOVE
-from ca_damper.scenes.scene_fields import Part
+from ca_damper.engine.recorder import EventCounts
 
 #: Effects of a turn on the distance travelled.
 READINGS = ("signed", "signed_through_walls", "reset", "kept")
@@ -72,11 +73,21 @@ class Accumulator:
 
 
 @ti.data_oriented
-class Transport(Part):
+class Transport(OnCells):
     """Flight of the particles, and how they follow the lattice."""
 
-    def __init__(self, automaton: Any):
-        super().__init__(automaton)
+    def __init__(
+        self,
+        cells: Cells,
+        resting: StaticContact,
+        accumulator: Accumulator,
+        accounting: Uncounted,
+        conflicts: ConflictResolution,
+        event_counts: EventCounts,
+    ):
+        super().__init__(cells)
+        self.resting, self.accumulator, self.accounting = resting, accumulator, accounting
+        self.conflicts, self.event_counts = conflicts, event_counts
         table = self.table
         self.touching, self.crossing = table.field(ti.i32, "cells"), table.field(ti.i16, "cells")
         self.touching_count, self.crossing_count = table.field(ti.i32), table.field(ti.i32)
@@ -137,13 +148,13 @@ class Transport(Part):
             if self.cells.travelled[s, cell] >= self.parameters.width[s]:
                 target = self.lattice.cell_ahead(s, cell, self.cells.at(s, cell))
                 if self.cells.at(s, target) == EMPTY:
-                    self.conflict_resolution.claim(s, target, rank(step, shared, cell, MOVE))
+                    self.conflicts.claim(s, target, rank(step, shared, cell, MOVE))
                     self.crossing[s, claimants] = ti.cast(cell, ti.i16)
                     claimants += 1
         for k in range(claimants):
             cell = ti.cast(self.crossing[s, k], ti.i32)
             target = self.lattice.cell_ahead(s, cell, self.cells.at(s, cell))
-            if self.conflict_resolution.holds(s, target, rank(step, shared, cell, MOVE)):
+            if self.conflicts.holds(s, target, rank(step, shared, cell, MOVE)):
                 left = self.cells.travelled[s, cell] - self.parameters.width[s]
                 self.cells.relocate(s, cell, target, left)
                 self.accounting.arrive(s, target)

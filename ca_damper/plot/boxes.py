@@ -52,7 +52,8 @@ class Box:
     def of(cls, filling: Any) -> Any:
         """Of an Automaton or Spheres."""
         rules = getattr(filling, "rules", None)
-        return cls(*inner_size(filling), rules is not None, rules == "paper")
+        by_cells = rules is not None and rules.by_cells
+        return cls(*inner_size(filling), rules is not None, by_cells)
 
     def lift(self, x: Any) -> Any:
         """Height of the box [m] when the container is displaced by x [m]."""

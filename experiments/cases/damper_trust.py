@@ -13,7 +13,7 @@ from ca_damper.runs.grains import DENSITY, Grains, diameter_of
 
 FILLINGS = {
     "dem": ca.Spheres(),
-    "paper": ca.Automaton(rules="paper"),
+    "paper": ca.Automaton(ca.Paper()),
     "place": ca.Automaton(),
 }
 OWN, GRAVITY, CELL = ca.Oscillator(), 9.81, 6e-3
@@ -41,6 +41,14 @@ PLUG_GRAINS, PLUG_HZ, JUMP, BEYOND = 40, 6.0, np.arange(17e-3, 27.1e-3, 1e-3), (
 def with_restitution(filling, value, **more):
     """A filling with one restitution for grains and walls."""
     return replace(filling, restitution=value, wall_restitution=value, **more)
+
+
+def with_friction(filling, value):
+    """A filling with one friction for grains and walls."""
+    own = {"friction": value, "wall_friction": value}
+    if isinstance(filling, ca.Automaton):
+        own = {"rules": ca.Place(**own)}
+    return replace(filling, **own)
 
 
 def masri(filling, options):
@@ -111,7 +119,8 @@ def equal_mass(filling, options):
         size = diameter_of(own, DENSITY)
         columns, rows = int(60e-3 / size), int(96e-3 / size)
         box = Grains(count, own, size, columns * size, rows * size)
-        made = with_restitution(box.put_into(filling), e, friction=friction, wall_friction=friction)
+        rough = with_friction(box.put_into(filling), friction)
+        made = with_restitution(rough, e)
         run = {"transient_cycles": 2 * options.driven, "measured_cycles": options.driven // 2}
         job = {"particles": count, "ratios": EQUAL_RATIOS, "seeds": options.few, **SILENT}
         peaks.append(1e3 * float(ca.frequency_response(made, **job, **run).rms[0].mean(-1).max()))

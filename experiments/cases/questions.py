@@ -31,11 +31,11 @@ LASTS, RISES, TOLERANCE = (0.0, 1.3), (-1.0, 0.5), (-2.5, -1.0)
 DAMPED, BREAKING, FIXED = 0.85, 0.6, 0.4
 #: Room in the lists of contacts: a bar that is crushed needs more than a block that is blasted.
 LISTS = {"pairs_per_body": 200, "neighbours_per_body": 500}
-PAPER = ca.Automaton(rules="paper")
+PAPER = ca.Automaton(ca.Paper())
 #: Fillings by how often they are drawn, in tenths.
 FILLINGS = (
     *((ca.Empty(), 1), (ca.RigidMass(), 1), (ca.Spheres(), 2), (PAPER, 3)),
-    *((replace(PAPER, accounting=word), 1.5) for word in ("landing", "landing+ejection")),
+    *((ca.Automaton(ca.Paper(word)), 1.5) for word in ("landing", "landing+ejection")),
 )
 #: CPU seconds that an answer may take, and a peak of spheres, which are dearer.
 BUDGET_S, PEAK_OF_SPHERES_S = 4.0, 12.0

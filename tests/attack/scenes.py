@@ -34,9 +34,9 @@ BLASTS = (
 )
 #: Structures of a damper: filling, its words, and the mount.
 DAMPERS = (
-    ("Automaton", {"rules": "paper"}, "spring"),
-    ("Automaton", {"rules": "paper", "accounting": "landing", "traversal": "scan"}, "base"),
-    ("Automaton", {"rules": "place"}, "spring"),
+    ("Automaton", {"rules": ca.Paper()}, "spring"),
+    ("Automaton", {"rules": ca.Paper("landing"), "traversal": "scan"}, "base"),
+    ("Automaton", {}, "spring"),
     ("Spheres", {}, "spring"),
     ("Spheres", {"friction_law": "history", "rotation": True}, "base"),
     ("Spheres", {"damping": "printed", "search": "all_pairs"}, "floor"),

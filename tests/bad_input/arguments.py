@@ -195,7 +195,6 @@ def _of_damper():
     return {
         "needed_effects": {"result": on_demand()},
         "Automaton.with_clearance": {"particles": 10},
-        "Automaton#": {"rules": "place", "friction": 0.3, "wall_friction": 0.3},
         "Spheres": {},
         "Spheres#two": {"start": [(0.01, 0.01), (0.03, 0.03)], "start_velocity": [(0.0, 0.0)] * 2},
         "Spheres#sizes": {"sizes": [(3, 6e-3), (2, 4e-3)]},

@@ -77,6 +77,8 @@ CASES = {
     "particles must be 0": lambda: ca.Batch(ca.Empty(), TABLE),
     "call start() first": lambda: ca.Batch(ca.RigidMass(), TABLE).run(1, 1),
     "ratios must ascend": falling,
+    "pass rules=Paper(accounting=...)": lambda: ca.Automaton(accounting="landing"),
+    "pass rules=Place(friction=...)": lambda: ca.Automaton(friction=0.3),
     "must not name a cell twice": lambda: ca.Automaton(start=[(1, 1), (1, 1)]),
     "off the walls": lambda: ca.Spheres(start=[(0.0, 0.03)]),
     "59.9999 s, got 60 s": outlasting,

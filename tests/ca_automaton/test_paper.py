@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from ca_damper import Automaton, Paper
 from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.automaton.accounting import QUANTUM
 from ca_damper.automaton.lattice import DOWN, DOWN_LEFT, DOWN_RIGHT, EMPTY, HELD, UP, WALL
 from tests.ca_automaton.shaken import Shaken
-from tests.paper import paper
+from tests.paper import ejecting, paper
 
 WIDTH, MASS, GRAVITY, DT, RESTITUTION = 6e-3, 0.2e-3, 10.0, 1e-4, 0.75
 FREQUENCY = 6.0
@@ -32,7 +33,7 @@ def impacts(count):
 def found_impacts(dt, column):
     """Times at which the container takes a blow of one particle let go in the top row [s]."""
     steps = round(0.9 / dt)
-    automaton = paper(accounting="landing+ejection", start=((column, TOP),))
+    automaton = ejecting(start=((column, TOP),))
     trace = Shaken(automaton, 1, dt=dt, traced=steps).run(steps).traces()[:, 0]
     return np.flatnonzero(trace[:, 0] != 0.0)[:5] * dt
 
@@ -54,13 +55,13 @@ def rise(step):
     return speed[1] - speed[0]
 
 
-def missing(**options):
+def missing(rules):
     """Momentum that no force explains after 3000 steps of hard shaking [kg m/s], (scenes,).
 
     p = -N m g t - (given to the container): blows, and what the carried mass takes,
     K' = -(carried) (V' + g) dt.
     """
-    box = Shaken(paper(**options), EXCHANGED, 3, DT, HARD, FREQUENCY, traced=STEPS)
+    box = Shaken(Automaton(rules), EXCHANGED, 3, DT, HARD, FREQUENCY, traced=STEPS)
     trace = box.run(STEPS).traces()
     rises = np.array([rise(step) for step in range(len(trace))])[:, None]
     given = (trace[:, :, 0] - trace[:, :, 1] * (rises + GRAVITY * DT)).sum(axis=0)
@@ -68,18 +69,18 @@ def missing(**options):
     return momentum + EXCHANGED * MASS * GRAVITY * DT * STEPS + given
 
 
-@pytest.mark.parametrize("options", [{}, {"pair_rule": "one_sided", "accumulator": "kept"}])
-def test_all_momentum_goes_into_the_container(options):
+@pytest.mark.parametrize("rules", [Paper(), Paper(pair_rule="one_sided", accumulator="kept")])
+def test_all_momentum_goes_into_the_container(rules):
     """Blows are rounded to half a quantum, at most three for a particle and step; gravity's
     additions to a speed below 4 m/s round by 4 EPS each.
     """
     tolerance = EXCHANGED * MASS * STEPS * (1.5 * QUANTUM + 4 * EPS)
-    assert np.all(abs(missing(**options)) < tolerance)
+    assert np.all(abs(missing(rules)) < tolerance)
 
 
 def test_landings_leave_out_what_others_count():
     """Pushes and the heap's rest; fewer where pushes count. A single particle meets only walls."""
-    left = {name: abs(missing(accounting=name)) for name in ACCOUNTINGS if name != "all"}
+    left = {name: abs(missing(Paper(name))) for name in ACCOUNTINGS if name != "all"}
     tolerance = EXCHANGED * MASS * STEPS * (1.5 * QUANTUM + 4 * EPS)
     assert np.all(left["landing"][1:] > 1e6 * tolerance[1:])
     assert np.all(left["landing+ejection"][1:] != left["landing"][1:])
@@ -100,7 +101,7 @@ def test_particles_stay():
 
 def claimed(seeds):
     """Whether cells are taken, the left and the right and the one that both claim, (seeds, 3)."""
-    automaton = paper(accounting="landing+ejection", start=((3, 9), (5, 9)))
+    automaton = ejecting(start=((3, 9), (5, 9)))
     box = Shaken(automaton, [2] * len(seeds), seed=seeds)
     geometry = box.geometry
     left, right = geometry.cell_of(3, 9), geometry.cell_of(5, 9)
@@ -165,7 +166,7 @@ def displacement(step):
 
 def test_a_particle_in_mid_air_stays_in_the_room():
     """Without gravity a particle at rest moves against the staircase round(x / 6 mm), +-4 cells."""
-    automaton = paper(accounting="landing+ejection", gravity=0.0, start=((4, 8),))
+    automaton = ejecting(gravity=0.0, start=((4, 8),))
     box = Shaken(automaton, 1, amplitude=AMPLITUDE)
     start = box.device.snapshot(0)["position"][0]
     for _ in range(40):
@@ -183,7 +184,7 @@ def test_the_floor_pushes_what_lies_on_it():
     """
     step = int(np.ceil(np.arcsin(0.5 * WIDTH / AMPLITUDE) / OMEGA / DT))
     start = ((4, 0), (4, 1), (8, 5))
-    automaton = paper(accounting="landing+ejection", gravity=0.0, start=start)
+    automaton = ejecting(gravity=0.0, start=start)
     box = Shaken(automaton, 3, amplitude=AMPLITUDE, traced=step + 1)
     kind = box.state()[0]
     kind[kind == DOWN] = UP

@@ -68,5 +68,5 @@ def test_gravity_is_a_number_that_compiles_nothing():
 
 
 def test_the_paper_s_lattice_stands_along_gravity():
-    with pytest.raises(InputError, match="gravity must be one number with rules 'paper'"):
+    with pytest.raises(InputError, match="gravity must be one number with rules Paper"):
         paper(gravity=(9.8, 0.0))

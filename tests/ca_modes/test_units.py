@@ -85,7 +85,7 @@ NUMBERS = ti.types.ndarray(dtype=ti.f64, ndim=2)
 def columns(share, boxes):
     """Columns of cells with a grain of a share of a mass each, driven at resonance for 3 s."""
     structure = two_storeys()
-    grain = Automaton(rules="place", columns=1, rows=7, particle_mass=share * MASS)
+    grain = Automaton(columns=1, rows=7, particle_mass=share * MASS)
     sine = excitation.sines([structure.frequencies[0]], [3e-3], 3.0)
     return shake_structure(grain, structure, boxes, sine, seeds=1, progress=None)
 
@@ -139,7 +139,7 @@ def batch_on(structure, places):
     mount = ModalMount(structure, places)
     count = [1] * len(places) + [0] * (mount.group - len(places))
     base = {"excitation": excitation.sines(1.0, 0.0, 1.0), "recorded_samples": 1}
-    grains = Automaton(rules="place", gravity=0.0)
+    grains = Automaton(gravity=0.0)
     batch = Batch(grains, SceneTable(count, 1, 1e-4, 1.0), structure=mount, **base)
     batch.start()
     return batch

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from ca_damper import Automaton, Batch, RigidMass, SceneTable, Spheres, film
+from ca_damper import Automaton, Batch, Place, RigidMass, SceneTable, Spheres, film
 from ca_damper.errors import InputError
 from tests.paper import expected, paper
 
@@ -19,7 +19,7 @@ HIGH = {"width": 0.07, "height": 0.2, "gravity": 7.0, "restitution": 0.9, "wall_
 THREE = {
     "place": (
         [
-            Automaton(**SMALL, friction=0.1, start=((0, 0), (3, 8))),
+            Automaton(Place(friction=0.1), **SMALL, start=((0, 0), (3, 8))),
             Automaton(start=((5, 2),)),
             Automaton(**LARGE, start=((12, 29), (0, 3), (7, 7))),
         ],

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ca_damper import Automaton, Batch, SceneTable, Spheres
+from ca_damper import Automaton, Batch, Paper, SceneTable, Spheres
 from taichi_dem import (
     CONCRETE,
     Checkpoint,
@@ -39,7 +39,7 @@ METHODS = {
 UNTIL = 4.8e-6
 FILLINGS = {
     "automaton of places": (Automaton(), 60),
-    "automaton of the paper": (Automaton(rules="paper"), 60),
+    "automaton of the paper": (Automaton(Paper()), 60),
     "spheres": (Spheres(), 30),
 }
 

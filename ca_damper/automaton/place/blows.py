@@ -1,10 +1,9 @@
 """Impacts of a step: first of grains on grains, then all impacts on the container together."""
 
-from typing import Any
-
 import taichi as ti
 
 from ca_damper.automaton.accounting import QUANTUM, quanta
+from ca_damper.automaton.cells import OnCells
 from ca_damper.automaton.device import HOLDS, PAIRS, WALLS
 from ca_damper.automaton.place.contacts import (
     BRUSH,
@@ -22,19 +21,20 @@ from ca_damper.automaton.place.contacts import (
 )
 from ca_damper.engine.random_numbers import LINE as LINE_DRAW
 from ca_damper.engine.random_numbers import bits, unit
+from ca_damper.engine.recorder import EventCounts
 from ca_damper.filling import Blows, Recoil
-from ca_damper.scenes.scene_fields import Part
 
 
 @ti.data_oriented
-class Collisions(Part):
+class Collisions(OnCells):
     """Carry out the collisions of a step; no two of them change the same grain."""
 
-    def __init__(self, automaton: Any):
-        super().__init__(automaton)
-        table, self.contacts = self.table, Contacts(automaton)
-        self.count, self.ends = table.field(ti.i32), table.field(ti.i32)
-        self.approaches = table.field(ti.i64)
+    def __init__(self, contacts: Contacts, event_counts: EventCounts, tilted: bool):
+        super().__init__(contacts.cells)
+        self.contacts, self.resting = contacts, contacts.resting
+        self.event_counts, self.tilted = event_counts, tilted
+        self.count, self.ends = self.table.field(ti.i32), self.table.field(ti.i32)
+        self.approaches = self.table.field(ti.i64)
 
     @ti.func
     def resolve(self, s, step, shared, motion, pull, pressed):
@@ -75,15 +75,20 @@ class Collisions(Part):
         self.resting.free(s, cell, carried)
         self.resting.free(s, other, carried)
         relative = self.cells.velocity(s, cell) - self.cells.velocity(s, other)
-        change = speed_change(
-            relative, line, self.parameters.particle[s], self.parameters.friction[s]
-        )
+        change = self.change(s, relative, line)
         if kind == LINE:
             # They cannot pass each other within their column: what is left of the approach is lost.
             change[1] = ti.min(change[1], -0.5 * relative[1])
             self.part(s, cell, other)
         self.cells.accelerate(s, cell, change)
         self.cells.accelerate(s, other, -change)
+
+    @ti.func
+    def change(self, s, relative, line):
+        """Change of velocity [m/s] of the first of two grains; the second has the opposite."""
+        return speed_change(
+            relative, line, self.parameters.particle[s], self.parameters.friction[s]
+        )
 
     @ti.func
     def note_blows(self, s, count):

@@ -8,14 +8,13 @@ that pass each other meet with the probability 1/2: with its own column and thos
 disc sweeps two diameters, as discs do.
 """
 
-from typing import Any
-
 import taichi as ti
 
-from ca_damper.automaton.conflict_resolution import SLOTS, rank_in_phase
+from ca_damper.automaton.cells import OnCells
+from ca_damper.automaton.conflict_resolution import SLOTS, ConflictResolution, rank_in_phase
 from ca_damper.automaton.lattice import HELD, UP, WALL
+from ca_damper.automaton.place.grains import Grains, Heap
 from ca_damper.engine.random_numbers import GLANCE, SIDE, bits, scrambled, unit
-from ca_damper.scenes.scene_fields import Part
 
 #: Kinds of event: at floor or ceiling, at a side wall, coming to rest, in a column, across columns.
 END, BRUSH, JOIN, LINE, OBLIQUE = range(5)
@@ -89,15 +88,16 @@ def most_drag(slip, share):
 
 
 @ti.data_oriented
-class Contacts(Part):
+class Contacts(OnCells):
     """Find the events of a step and the grains that each of them needs.
 
     shared: hash of seed and step, read where an event is noted: it keeps the compiler from
     computing ranks of all cells ahead.
     """
 
-    def __init__(self, automaton: Any):
-        super().__init__(automaton)
+    def __init__(self, grains: Grains, resting: Heap, conflicts: ConflictResolution):
+        super().__init__(grains)
+        self.resting, self.conflicts = resting, conflicts
         self.events = self.table.field(ti.i32, "cells", SLOTS)
         self.ranks = self.table.field(ti.i64, "cells", SLOTS)
         self.shared = self.table.field(ti.u32)
@@ -124,9 +124,9 @@ class Contacts(Part):
     def note(self, s, step, count, owner, slot, cell, other, kind: ti.template()):
         """Note an event and claim its grains; other: second grain, 0 for none."""
         ranked = rank_in_phase(step, self.shared[s], _BLOWS, owner, slot)
-        self.conflict_resolution.claim(s, cell, ranked)
+        self.conflicts.claim(s, cell, ranked)
         if other != 0:
-            self.conflict_resolution.claim(s, other, ranked)
+            self.conflicts.claim(s, other, ranked)
         self.write(s, count, cell, other, kind)
         self.ranks[s, count // SLOTS, count % SLOTS] = ranked
         return count + 1
@@ -149,8 +149,8 @@ class Contacts(Part):
         """Whether event number k has all the grains that it needs."""
         ranked = self.ranks[s, k // SLOTS, k % SLOTS]
         cell, other, _ = self.read(s, k)
-        result = self.conflict_resolution.holds(s, cell, ranked)
-        return result and (other == 0 or self.conflict_resolution.holds(s, other, ranked))
+        result = self.conflicts.holds(s, cell, ranked)
+        return result and (other == 0 or self.conflicts.holds(s, other, ranked))
 
     @ti.func
     def at_ends(self, s, step, count, cell, pull, pressed):

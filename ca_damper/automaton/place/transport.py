@@ -1,15 +1,14 @@
 """Transport by the rules of place: free flight, the lattice, and changes of cell."""
 
-from typing import Any
-
 import taichi as ti
 
 from ca_damper.automaton.accounting import quanta
-from ca_damper.automaton.conflict_resolution import rank_in_phase
+from ca_damper.automaton.cells import OnCells
+from ca_damper.automaton.conflict_resolution import ConflictResolution, rank_in_phase
 from ca_damper.automaton.lattice import EMPTY, UP
 from ca_damper.automaton.place.contacts import dragged, most_drag
+from ca_damper.automaton.place.grains import Grains
 from ca_damper.engine.random_numbers import HOP, bits, unit
-from ca_damper.scenes.scene_fields import Part
 
 #: Phases of a step after that of the blows, by rising rank.
 _ACROSS, _ALONG = 1, 2
@@ -17,12 +16,12 @@ _NOWHERE = -1
 
 
 @ti.data_oriented
-class Transport(Part):
+class Transport(OnCells):
     """Grains keep their places in the room when the lattice steps, and fly under full gravity."""
 
-    def __init__(self, automaton: Any):
-        super().__init__(automaton)
-        self.traversal = self.cells.traversal
+    def __init__(self, grains: Grains, conflicts: ConflictResolution, tilted: bool):
+        super().__init__(grains)
+        self.conflicts, self.tilted, self.traversal = conflicts, tilted, grains.traversal
         self.movers = self.table.field(ti.i16, "cells")
         self.targets = self.table.field(ti.i16, "cells")
 
@@ -108,14 +107,14 @@ class Transport(Part):
                     if target != _NOWHERE:
                         ranked = rank_in_phase(step, shared, _ACROSS, cell, 0)
                         for near in range(target - 1, target + 2):
-                            self.conflict_resolution.claim(s, near, ranked)
+                            self.conflicts.claim(s, near, ranked)
                         count = self.note(s, count, cell, target)
         for k in range(count):
             cell, target = ti.cast(self.movers[s, k], ti.i32), ti.cast(self.targets[s, k], ti.i32)
             ranked = rank_in_phase(step, shared, _ACROSS, cell, 0)
             alone = True
             for near in range(target - 1, target + 2):
-                alone = alone and self.conflict_resolution.holds(s, near, ranked)
+                alone = alone and self.conflicts.holds(s, near, ranked)
             if alone:
                 width = self.parameters.width[s]
                 centre = self.lattice.height_of(s, target) * width
@@ -159,11 +158,11 @@ class Transport(Part):
                 target = cell + (1 if away > 0.0 else -1)
                 if self.cells.at(s, target) == EMPTY:
                     ranked = rank_in_phase(step, shared, _ALONG, cell, 0)
-                    self.conflict_resolution.claim(s, target, ranked)
+                    self.conflicts.claim(s, target, ranked)
                     count = self.note(s, count, cell, target)
         for k in range(count):
             cell, target = ti.cast(self.movers[s, k], ti.i32), ti.cast(self.targets[s, k], ti.i32)
             ranked = rank_in_phase(step, shared, _ALONG, cell, 0)
-            if self.conflict_resolution.holds(s, target, ranked):
+            if self.conflicts.holds(s, target, ranked):
                 way = width * (target - cell)
                 self.cells.relocate(s, cell, target, self.cells.travelled[s, cell] - way)

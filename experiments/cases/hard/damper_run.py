@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ca_damper import Automaton, Batch, Empty, Oscillator, SceneTable, Spheres, film
+from ca_damper import Automaton, Batch, Empty, Oscillator, Paper, SceneTable, Spheres, film
 from ca_damper.plot.boxes import Box
 from ca_damper.report.measures import COLUMNS
 
 FILLINGS = {
-    "automaton": Automaton(rules="paper"),
-    "automaton_ejection": Automaton(rules="paper", accounting="landing+ejection"),
-    "automaton_landing": Automaton(rules="paper", accounting="landing"),
+    "automaton": Automaton(Paper()),
+    "automaton_ejection": Automaton(Paper("landing+ejection")),
+    "automaton_landing": Automaton(Paper("landing")),
     "spheres": Spheres(),
     "spheres_printed": Spheres(damping="printed"),
     "empty": Empty(),

@@ -1,0 +1,1 @@
+"""Rule sets of the automaton, a file each."""

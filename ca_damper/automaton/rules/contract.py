@@ -1,0 +1,58 @@
+"""What a rule set of the automaton is: options of a user, and what they decide."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Hashable, Iterator
+from typing import Any, ClassVar
+
+from ca_damper.automaton.device import LatticeDevice
+from ca_damper.report.certificate import CheckedRange, Driven
+
+
+class Rules(ABC):
+    """Base of all rule sets: frozen dataclasses of options, checked when they are made."""
+
+    #: What carries out the rules, made with an Automaton and the SceneFields of an engine.
+    device: ClassVar[type[LatticeDevice]]
+    #: Range in which the rules were checked, in words.
+    checked_in: ClassVar[str]
+    #: Whether gravity may pull across the columns; whether walls and particles move by whole cells.
+    may_tilt: ClassVar[bool] = True
+    by_cells: ClassVar[bool] = False
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """Short word for tables and files."""
+
+    @property
+    @abstractmethod
+    def effects(self) -> tuple[str, ...]:
+        """Effects that are computed, in words for the report."""
+
+    @property
+    @abstractmethod
+    def particles_rest(self) -> bool:
+        """Whether particles come to rest on the floor and on the heap there."""
+
+    @property
+    def order(self) -> int | None:
+        """Order of the error in the step; None where not all impulses count."""
+        return 1
+
+    @property
+    @abstractmethod
+    def compiled(self) -> Hashable:
+        """Options that decide what is compiled."""
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Options that kernels read as ``self.parameters.NAME[s]``, by name."""
+        return {}
+
+    @abstractmethod
+    def beyond(self, automaton: Any, driven: Driven) -> Iterator[str]:
+        """What of the scenes lies outside the range, in words."""
+
+    def known_range(self, automaton: Any, driven: Driven) -> CheckedRange:
+        """The range in which the rules were checked, and what of the scenes lies outside it."""
+        return CheckedRange(self.checked_in, tuple(self.beyond(automaton, driven)))
