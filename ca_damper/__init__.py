@@ -4,7 +4,9 @@
 from taichi_dem.kit import runtime  # isort: skip
 
 from ca_damper import excitation, goals
-from ca_damper.automaton import Automaton, Paper, Place
+from ca_damper.automaton import Automaton
+from ca_damper.automaton.rules.paper import Paper
+from ca_damper.automaton.rules.place import Place
 from ca_damper.batch import Batch
 from ca_damper.errors import InputError, SimulationDiverged
 from ca_damper.fixed_mass import Empty, RigidMass

@@ -4,6 +4,7 @@ from typing import Any
 
 import taichi as ti
 
+from ca_damper.automaton.conflict_resolution import ConflictResolution
 from ca_damper.automaton.lattice import EMPTY, WALL, Lattice, geometry_of
 from ca_damper.engine.random_numbers import START, uniform
 from ca_damper.filling import Fillings
@@ -75,6 +76,7 @@ class Cells:
     ):
         self.table, self.lattice, self.parameters = table, lattice, parameters
         self.traversal, self.follower = Traversal(table, lattice, listed), follower
+        self.conflicts = ConflictResolution(table, lattice)
         self.kind = table.field(ti.i8, "cells")
         self.speed, self.travelled = table.field(ti.f64, "cells"), table.field(ti.f64, "cells")
         self.stair, self.offset = table.field(ti.i32), table.field(ti.f64)
@@ -132,6 +134,7 @@ class OnCells:
     def __init__(self, cells: Cells):
         self.cells, self.table = cells, cells.table
         self.lattice, self.parameters = cells.lattice, cells.parameters
+        self.conflicts = cells.conflicts
 
 
 def _named_cells(options):

@@ -47,8 +47,7 @@ class Collisions(OnCells):
         super().__init__(transport.cells)
         self.transport, self.both = transport, both
         self.resting, self.accumulator = transport.resting, transport.accumulator
-        self.accounting, self.conflicts = transport.accounting, transport.conflicts
-        self.event_counts = transport.event_counts
+        self.accounting, self.event_counts = transport.accounting, transport.event_counts
         self.events = self.table.field(ti.i32, "cells")
         self.other = self.table.field(ti.f64, "cells")
         self.ranks = self.table.field(ti.i64, "cells")

@@ -1,9 +1,8 @@
 """Resolve conflicting claims to a cell by random rank, in whatever order they come."""
 
-from typing import Any
-
 import taichi as ti
 
+from ca_damper.automaton.lattice import Lattice
 from ca_damper.engine.random_numbers import EVENT, bits, scrambled
 from ca_damper.scenes.scene_fields import SceneFields
 
@@ -32,7 +31,7 @@ def rank_in_phase(step, shared, phase: ti.template(), cell, slot):
 class ConflictResolution:
     """Largest rank that ever claimed a cell, shape (scenes, cells + 1)."""
 
-    def __init__(self, table: SceneFields, lattice: Any):
+    def __init__(self, table: SceneFields, lattice: Lattice):
         self.lattice, self.claims = lattice, table.field(ti.i64, "cells")
 
     @ti.func

@@ -7,7 +7,6 @@ import taichi as ti
 
 from ca_damper.automaton.accounting import QUANTUM
 from ca_damper.automaton.cells import Cells, Placement
-from ca_damper.automaton.conflict_resolution import ConflictResolution
 from ca_damper.automaton.lattice import EMPTY, HELD, WALL, Lattice
 from ca_damper.engine.random_numbers import stream
 from ca_damper.engine.recorder import EventCounts
@@ -60,7 +59,6 @@ class LatticeDevice:
         self.table, self.lattice = table, Lattice(table, looks_ahead)
         numbers = ti.types.struct(**dict.fromkeys(parameters_of(automaton), ti.f64))
         self.parameters = table.structs(numbers)
-        self.conflicts = ConflictResolution(table, self.lattice)
         self.event_counts = EventCounts(table, len(_BY), _BY)
         self.velocity, self.gained = table.field(ti.f64), table.field(ti.i64)
 
@@ -79,7 +77,7 @@ class LatticeDevice:
     def reset(self, s):
         """Particles at rest in their first cells; nothing has happened."""
         self.cells.clear(s)
-        self.conflicts.clear(s)
+        self.cells.conflicts.clear(s)
         self.resting.held[s] = 0
         self.event_counts.clear(s)
         self.placement.fill(s)

@@ -1,6 +1,7 @@
 """Options of the automaton."""
 
 import functools
+import itertools
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -32,12 +33,11 @@ def _refusing_options_of_rules(made: type) -> type:
 
     @functools.wraps(plain_init)
     def init(self, *values, **options):
-        for name in options:
-            owners = [one.__name__ for one in (Place, Paper) if name in one.__dataclass_fields__]
-            if owners:
+        for owner, name in itertools.product((Place, Paper), options):
+            if name in owner.__dataclass_fields__:
                 raise InputError(
                     f"{name} must be an option of the rules, got Automaton({name}="
-                    f"{shown(options[name])}): pass rules={owners[0]}({name}=...)"
+                    f"{shown(options[name])}): pass rules={owner.__name__}({name}=...)"
                 )
         plain_init(self, *values, **options)
 

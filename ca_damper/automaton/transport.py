@@ -7,9 +7,9 @@ pushed along, at least at the wall's velocity. A column always has room for this
 
 import taichi as ti
 
-from ca_damper.automaton.accounting import Uncounted
-from ca_damper.automaton.cells import Cells, OnCells
-from ca_damper.automaton.conflict_resolution import ConflictResolution, rank
+from ca_damper.automaton.accounting import Accounting
+from ca_damper.automaton.cells import OnCells
+from ca_damper.automaton.conflict_resolution import rank
 from ca_damper.automaton.device import PUSHES
 from ca_damper.automaton.lattice import DIRECTIONS, DOWN, EMPTY, HELD, UP, Lattice
 from ca_damper.automaton.static_contact import StaticContact
@@ -76,18 +76,10 @@ class Accumulator:
 class Transport(OnCells):
     """Flight of the particles, and how they follow the lattice."""
 
-    def __init__(
-        self,
-        cells: Cells,
-        resting: StaticContact,
-        accumulator: Accumulator,
-        accounting: Uncounted,
-        conflicts: ConflictResolution,
-        event_counts: EventCounts,
-    ):
-        super().__init__(cells)
-        self.resting, self.accumulator, self.accounting = resting, accumulator, accounting
-        self.conflicts, self.event_counts = conflicts, event_counts
+    def __init__(self, resting: StaticContact, accounting: Accounting, event_counts: EventCounts):
+        super().__init__(resting.cells)
+        self.resting, self.accumulator = resting, resting.accumulator
+        self.accounting, self.event_counts = accounting, event_counts
         table = self.table
         self.touching, self.crossing = table.field(ti.i32, "cells"), table.field(ti.i16, "cells")
         self.touching_count, self.crossing_count = table.field(ti.i32), table.field(ti.i32)

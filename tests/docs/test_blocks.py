@@ -7,7 +7,6 @@ import sys
 import numpy as np
 import pytest
 
-from ca_damper.automaton.accounting import ACCOUNTINGS
 from taichi_dem import CONCRETE, runtime
 from tests.docs.pages import FOLDER, PAGES, blocks, lines
 from tests.processes import users_environment
@@ -36,8 +35,6 @@ def left_by(tmp_path_factory):
             with pytest.MonkeyPatch.context() as patched:
                 patched.chdir(folder)
                 patched.setattr(runtime, "start", lambda *_, **__: None)
-                # One of the pages adds its own to this table.
-                patched.setitem(ACCOUNTINGS, "walls", None)
                 made[page, number] = runpy.run_path("pasted.py", run_name="__main__")
         return made[page, number]
 
@@ -131,3 +128,14 @@ def test_the_integrator_gains_energy_by_its_factor(left_by):
     # Of energies of one time the leapfrog's differ by (w dt)^2 / 4, cos^2(p / 2) at phase p.
     swing = 0.25 * rate2 * step**2 * 1.01
     assert left["leapfrog"] / left["leapfrog"][0] == pytest.approx(1.0, rel=swing)
+
+
+def test_grains_that_stick_go_on_with_half_of_the_velocity(left_by):
+    """The floor gives the first 1 + e times its speed; a half is exact."""
+    left = left_by("docs/add_an_automaton_rule.md")
+    met = left["before"][0.3][0, 1]
+    floor = 3e-3 * 2.0 * np.pi * 6.0
+    assert met == pytest.approx(1.75 * floor, rel=1e-9)
+    assert np.array_equal(left["after"][0.3], [[0.0, 0.5 * met]] * 2)
+    # Faster ones bounce.
+    assert np.diff(left["after"][0.1][:, 1]) > 0.0

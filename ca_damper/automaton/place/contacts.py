@@ -11,9 +11,9 @@ disc sweeps two diameters, as discs do.
 import taichi as ti
 
 from ca_damper.automaton.cells import OnCells
-from ca_damper.automaton.conflict_resolution import SLOTS, ConflictResolution, rank_in_phase
+from ca_damper.automaton.conflict_resolution import SLOTS, rank_in_phase
 from ca_damper.automaton.lattice import HELD, UP, WALL
-from ca_damper.automaton.place.grains import Grains, Heap
+from ca_damper.automaton.place.grains import Heap
 from ca_damper.engine.random_numbers import GLANCE, SIDE, bits, scrambled, unit
 
 #: Kinds of event: at floor or ceiling, at a side wall, coming to rest, in a column, across columns.
@@ -95,9 +95,9 @@ class Contacts(OnCells):
     computing ranks of all cells ahead.
     """
 
-    def __init__(self, grains: Grains, resting: Heap, conflicts: ConflictResolution):
-        super().__init__(grains)
-        self.resting, self.conflicts = resting, conflicts
+    def __init__(self, resting: Heap):
+        super().__init__(resting.cells)
+        self.resting = resting
         self.events = self.table.field(ti.i32, "cells", SLOTS)
         self.ranks = self.table.field(ti.i64, "cells", SLOTS)
         self.shared = self.table.field(ti.u32)

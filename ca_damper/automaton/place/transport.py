@@ -4,7 +4,7 @@ import taichi as ti
 
 from ca_damper.automaton.accounting import quanta
 from ca_damper.automaton.cells import OnCells
-from ca_damper.automaton.conflict_resolution import ConflictResolution, rank_in_phase
+from ca_damper.automaton.conflict_resolution import rank_in_phase
 from ca_damper.automaton.lattice import EMPTY, UP
 from ca_damper.automaton.place.contacts import dragged, most_drag
 from ca_damper.automaton.place.grains import Grains
@@ -19,9 +19,9 @@ _NOWHERE = -1
 class Transport(OnCells):
     """Grains keep their places in the room when the lattice steps, and fly under full gravity."""
 
-    def __init__(self, grains: Grains, conflicts: ConflictResolution, tilted: bool):
+    def __init__(self, grains: Grains, tilted: bool):
         super().__init__(grains)
-        self.conflicts, self.tilted, self.traversal = conflicts, tilted, grains.traversal
+        self.tilted, self.traversal = tilted, grains.traversal
         self.movers = self.table.field(ti.i16, "cells")
         self.targets = self.table.field(ti.i16, "cells")
 

@@ -13,8 +13,9 @@ class Rules(ABC):
 
     #: What carries out the rules, made with an Automaton and the SceneFields of an engine.
     device: ClassVar[type[LatticeDevice]]
-    #: Range in which the rules were checked, in words.
+    #: Range in which the rules were checked, in words, and whether a run beyond it gets a warning.
     checked_in: ClassVar[str]
+    warns: ClassVar[bool] = False
     #: Whether gravity may pull across the columns; whether walls and particles move by whole cells.
     may_tilt: ClassVar[bool] = True
     by_cells: ClassVar[bool] = False
@@ -28,11 +29,6 @@ class Rules(ABC):
     @abstractmethod
     def effects(self) -> tuple[str, ...]:
         """Effects that are computed, in words for the report."""
-
-    @property
-    @abstractmethod
-    def particles_rest(self) -> bool:
-        """Whether particles come to rest on the floor and on the heap there."""
 
     @property
     def order(self) -> int | None:
@@ -55,4 +51,9 @@ class Rules(ABC):
 
     def known_range(self, automaton: Any, driven: Driven) -> CheckedRange:
         """The range in which the rules were checked, and what of the scenes lies outside it."""
-        return CheckedRange(self.checked_in, tuple(self.beyond(automaton, driven)))
+        outside = tuple(self.beyond(automaton, driven))
+        warning = (
+            f"rules '{type(self).__name__.lower()}' of the automaton are known to fail with "
+            f"{'; with '.join(outside)}: use rules=Place(), the default"
+        )
+        return CheckedRange(self.checked_in, outside, warning if outside and self.warns else "")

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 import taichi as ti
 
-from ca_damper.automaton.accounting import ACCOUNTINGS, Uncounted
+from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting
 from ca_damper.automaton.cells import Cells
 from ca_damper.automaton.collisions import Collisions
 from ca_damper.automaton.device import LatticeDevice
@@ -15,7 +15,7 @@ from ca_damper.automaton.lattice import DIRECTIONS, DOWN, EMPTY, HELD, WALL, uni
 from ca_damper.automaton.rules.contract import Rules
 from ca_damper.automaton.static_contact import StaticContact
 from ca_damper.automaton.transport import READINGS, Accumulator, Transport
-from ca_damper.report.certificate import CheckedRange, Driven
+from ca_damper.report.certificate import Driven
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.validation import choice, flag, plain_fields
 
@@ -29,14 +29,13 @@ class PaperDevice(LatticeDevice):
     def __init__(self, automaton: Any, table: SceneFields):
         super().__init__(automaton, table, looks_ahead=True)
         rules = automaton.rules
-        accounting = rules.way_of_counting(table, self.lattice)
+        accounting = Accounting(rules.accounting, table, self.lattice)
         accumulator = Accumulator(rules.accumulator, self.lattice)
         listed = automaton.traversal == "list"
         cells = Cells(table, self.lattice, self.parameters, listed, accounting)
         resting = StaticContact(cells, accumulator, rules.particles_rest)
         self.fill(automaton, cells, resting, DOWN)
-        shared = self.conflicts, self.event_counts
-        self.transport = Transport(cells, resting, accumulator, accounting, *shared)
+        self.transport = Transport(resting, accounting, self.event_counts)
         self.collisions = Collisions(self.transport, rules.pair_rule == "both")
 
     @ti.func
@@ -79,7 +78,7 @@ class Paper(Rules):
     accounting : str, default "all"
         Impulses that act on the container: ``"landing"`` (of particles that hit a wall after a
         change of cell), ``"landing+ejection"`` (also of those that a wall pushes along), ``"all"``,
-        or another key of ``accounting.ACCOUNTINGS``.
+        also what the six directions of the lattice take.
     static_contact : bool, optional
         Whether particles come to rest on the floor and on the heap there, move with the container
         and weigh on it. None: True with accounting ``"all"``, False with the others.
@@ -104,6 +103,7 @@ class Paper(Rules):
     device: ClassVar = PaperDevice
     may_tilt: ClassVar[bool] = False
     by_cells: ClassVar[bool] = True
+    warns: ClassVar[bool] = True
     checked_in: ClassVar[str] = (
         "11 to 50 grains of at most 0.1 of the container's mass, gravity, restitution from 0.5 on, "
         "motions above 1 g and half a cell: peaks at resonance within 3 % of spheres"
@@ -118,26 +118,25 @@ class Paper(Rules):
             flag("static_contact", self.static_contact)
 
     @property
-    def way_of_counting(self) -> type[Uncounted]:
-        """Class of the accounting."""
-        return ACCOUNTINGS[self.accounting]
-
-    @property
     def particles_rest(self) -> bool:
-        """As asked for, or as the accounting has it."""
-        asked = self.static_contact
-        return self.way_of_counting.static_contact if asked is None else asked
+        """As asked for, or where all impulses count."""
+        return self.accounting == "all" if self.static_contact is None else self.static_contact
 
     @property
     def label(self) -> str:
         """By accounting and static contact."""
-        return self.way_of_counting.labels[self.particles_rest]
+        return ACCOUNTINGS[self.accounting][self.particles_rest]
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Effects by accounting and static contact."""
-        resting = ("static contact",) if self.particles_rest else ()
-        return ("pairs", "landing", *self.way_of_counting.effects, *resting)
+        ejection = () if self.accounting == "landing" else ("ejection",)
+        return (
+            "pairs",
+            "landing",
+            *ejection,
+            *(("static contact",) if self.particles_rest else ()),
+        )
 
     @property
     def order(self) -> int | None:
@@ -147,18 +146,7 @@ class Paper(Rules):
     @property
     def compiled(self) -> Hashable:
         """All options."""
-        return self.way_of_counting, self.pair_rule, self.accumulator, self.particles_rest
-
-    def known_range(self, automaton: Any, driven: Driven) -> CheckedRange:
-        """The range, with a warning before a run outside of it."""
-        found = super().known_range(automaton, driven)
-        if not found.outside:
-            return found
-        warning = (
-            f"rules 'paper' of the automaton are known to fail with {'; with '.join(found.outside)}"
-            ": use rules=Place(), the default"
-        )
-        return CheckedRange(found.words, found.outside, warning)
+        return self.accounting, self.pair_rule, self.accumulator, self.particles_rest
 
     def beyond(self, automaton: Any, driven: Driven) -> Iterator[str]:
         """Where the rules are known to fail, with a figure each."""

@@ -30,11 +30,10 @@ class PlaceDevice(LatticeDevice):
         super().__init__(automaton, table, looks_ahead=False)
         tilted = gravity_across(automaton) != 0.0
         grains = Grains(table, self.lattice, self.parameters, automaton.traversal == "list")
-        heap = Heap(grains, None, automaton.rules.particles_rest)
+        heap = Heap(grains, None, automaton.rules.static_contact)
         self.fill(automaton, grains, heap, UP)
-        self.transport = Transport(grains, self.conflicts, tilted)
-        contacts = Contacts(grains, heap, self.conflicts)
-        self.collisions = Collisions(contacts, self.event_counts, tilted)
+        self.transport = Transport(grains, tilted)
+        self.collisions = automaton.rules.collisions(Contacts(heap), self.event_counts, tilted)
 
     @ti.func
     def find_blows(self, s, step, motion):
@@ -104,6 +103,8 @@ class Place(Rules):
     static_contact: bool = True
 
     device: ClassVar = PlaceDevice
+    #: Class that carries out the impacts of a step.
+    collisions: ClassVar = Collisions
     checked_in: ClassVar[str] = (
         "1 to 50 grains, 0.8 to 8 g, restitution up to 0.9: impedance within 20 % of that of "
         "spheres at four of five points, worst at five and ten grains; loss within 4 % in the "
@@ -115,11 +116,6 @@ class Place(Rules):
         for name in ("friction", "wall_friction"):
             positive(name, getattr(self, name), zero_allowed=True)
         flag("static_contact", self.static_contact)
-
-    @property
-    def particles_rest(self) -> bool:
-        """As asked for."""
-        return self.static_contact
 
     @property
     def label(self) -> str:
