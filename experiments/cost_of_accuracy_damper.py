@@ -22,14 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ca_damper import (
-    Automaton,
-    Paper,
-    ProgressBar,
-    SimulationDiverged,
-    Spheres,
-    frequency_response,
-)
+from ca_damper import Automaton, Paper, ProgressBar, Spheres, frequency_response
+from ca_damper.errors import SimulationDiverged
 from ca_damper.report.measures import curve_distance, seed_variance
 from taichi_dem import InputError
 from taichi_dem.kit import study

@@ -3,7 +3,6 @@
 import taichi as ti
 
 from ca_damper.automaton.lattice import Lattice
-from ca_damper.scenes.scene_fields import SceneFields
 
 #: Accountings, and the label of an automaton with each, without and with static contact.
 ACCOUNTINGS = {
@@ -30,11 +29,11 @@ class Accounting:
     impact and push, and losses to the six directions of the lattice.
     """
 
-    def __init__(self, word: str, table: SceneFields, lattice: Lattice):
+    def __init__(self, word: str, lattice: Lattice):
         self.lattice = lattice
         self.counts_pushes, self.counts_all = word != "landing", word == "all"
         if not self.counts_all:
-            self.arrived = table.field(ti.i8, "cells")
+            self.arrived = lattice.table.field(ti.i8, "cells")
 
     @ti.func
     def clear(self, s):

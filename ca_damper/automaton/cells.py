@@ -8,14 +8,14 @@ from ca_damper.automaton.conflict_resolution import ConflictResolution
 from ca_damper.automaton.lattice import EMPTY, WALL, Lattice, geometry_of
 from ca_damper.engine.random_numbers import START, uniform
 from ca_damper.filling import Fillings
-from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented
 class Traversal:
     """Cells visited in a step: those on a list of particles, or all from the first to the last."""
 
-    def __init__(self, table: SceneFields, lattice: Lattice, listed: bool):
+    def __init__(self, lattice: Lattice, listed: bool):
+        table = lattice.table
         self.table, self.lattice, self.listed = table, lattice, listed
         if listed:
             self.cells, self.number = table.field(ti.i16, "cells"), table.field(ti.i16, "cells")
@@ -71,12 +71,11 @@ class Cells:
     stair: displacement of the container in whole cells; offset: what is left of it [m].
     """
 
-    def __init__(
-        self, table: SceneFields, lattice: Lattice, parameters: Any, listed: bool, follower: Any
-    ):
+    def __init__(self, lattice: Lattice, parameters: Any, listed: bool, follower: Any):
+        table = lattice.table
         self.table, self.lattice, self.parameters = table, lattice, parameters
-        self.traversal, self.follower = Traversal(table, lattice, listed), follower
-        self.conflicts = ConflictResolution(table, lattice)
+        self.traversal, self.follower = Traversal(lattice, listed), follower
+        self.conflicts = ConflictResolution(lattice)
         self.kind = table.field(ti.i8, "cells")
         self.speed, self.travelled = table.field(ti.f64, "cells"), table.field(ti.f64, "cells")
         self.stair, self.offset = table.field(ti.i32), table.field(ti.f64)
@@ -143,14 +142,14 @@ def _named_cells(options):
 
 
 @ti.data_oriented
-class Placement:
+class Placement(OnCells):
     """First cells of the particles: named by the user, or drawn from the scene's seed."""
 
-    def __init__(self, table: SceneFields, cells: Cells, way: int, is_named: bool):
-        self.table, self.cells, self.lattice = table, cells, cells.lattice
+    def __init__(self, cells: Cells, way: int, is_named: bool):
+        super().__init__(cells)
         self.way, self.is_named = way, is_named
         if is_named:
-            self.named = table.field(ti.i32, "cells")
+            self.named = self.table.field(ti.i32, "cells")
 
     def load(self, fillings: Fillings) -> None:
         """Take over the user's cells."""

@@ -4,7 +4,6 @@ import taichi as ti
 
 from ca_damper.automaton.lattice import Lattice
 from ca_damper.engine.random_numbers import EVENT, bits, scrambled
-from ca_damper.scenes.scene_fields import SceneFields
 
 #: Room for cell numbers in a rank.
 MOST_CELLS = 1 << 12
@@ -31,8 +30,8 @@ def rank_in_phase(step, shared, phase: ti.template(), cell, slot):
 class ConflictResolution:
     """Largest rank that ever claimed a cell, shape (scenes, cells + 1)."""
 
-    def __init__(self, table: SceneFields, lattice: Lattice):
-        self.lattice, self.claims = lattice, table.field(ti.i64, "cells")
+    def __init__(self, lattice: Lattice):
+        self.lattice, self.claims = lattice, lattice.table.field(ti.i64, "cells")
 
     @ti.func
     def clear(self, s):

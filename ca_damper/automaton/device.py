@@ -65,7 +65,7 @@ class LatticeDevice:
     def fill(self, automaton: Any, cells: Cells, resting: Any, way: int) -> None:
         """Add cells, what rests in them, and how they are filled."""
         self.cells, self.resting = cells, resting
-        self.placement = Placement(self.table, cells, way, automaton.start is not None)
+        self.placement = Placement(cells, way, automaton.start is not None)
 
     def load(self, fillings: Fillings) -> None:
         """Take over the numbers of the automaton of each scene."""

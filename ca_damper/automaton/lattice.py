@@ -111,7 +111,7 @@ class Lattice:
     constant_fields = ("size", "neighbour", "cosine", "level", "bottom")
 
     def __init__(self, table: SceneFields, looks_ahead: bool):
-        self.size, self.looks_ahead = table.structs(LatticeSize), looks_ahead
+        self.table, self.size, self.looks_ahead = table, table.structs(LatticeSize), looks_ahead
         of_cells = table.capacity, table.length("cells")
         self.level, self.bottom = (ti.field(ti.i16, shape=of_cells) for _ in range(2))
         if looks_ahead:

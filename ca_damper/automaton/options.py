@@ -245,8 +245,8 @@ class Automaton:
     @property
     def structure(self) -> Structure:
         """Rules are compiled; numbers, the size of the lattice and the cells of start are not."""
-        rules, tilted = (type(self.rules), self.rules.compiled), gravity_across(self) != 0.0
-        key = (*rules, self.traversal, self.start is None, tilted)
+        tilted = gravity_across(self) != 0.0
+        key = (self.rules.compiled, self.traversal, self.start is None, tilted)
         # One more for the cell beyond the lattice.
         return Structure(key, {"cells": (self.columns + 2) * (self.rows + 2) + 1})
 

@@ -43,14 +43,6 @@ def with_restitution(filling, value, **more):
     return replace(filling, restitution=value, wall_restitution=value, **more)
 
 
-def with_friction(filling, value):
-    """A filling with one friction for grains and walls."""
-    own = {"friction": value, "wall_friction": value}
-    if isinstance(filling, ca.Automaton):
-        own = {"rules": ca.Place(**own)}
-    return replace(filling, **own)
-
-
 def masri(filling, options):
     """One grain between two walls without gravity: RMS off that of the closed form."""
     ratios, found = options.grid[3], []
@@ -119,8 +111,10 @@ def equal_mass(filling, options):
         size = diameter_of(own, DENSITY)
         columns, rows = int(60e-3 / size), int(96e-3 / size)
         box = Grains(count, own, size, columns * size, rows * size)
-        rough = with_friction(box.put_into(filling), friction)
-        made = with_restitution(rough, e)
+        rough = {"friction": friction, "wall_friction": friction}
+        if isinstance(filling, ca.Automaton):
+            rough = {"rules": ca.Place(**rough)}
+        made = with_restitution(box.put_into(filling), e, **rough)
         run = {"transient_cycles": 2 * options.driven, "measured_cycles": options.driven // 2}
         job = {"particles": count, "ratios": EQUAL_RATIOS, "seeds": options.few, **SILENT}
         peaks.append(1e3 * float(ca.frequency_response(made, **job, **run).rms[0].mean(-1).max()))

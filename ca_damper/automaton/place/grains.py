@@ -7,7 +7,6 @@ import taichi as ti
 from ca_damper.automaton.cells import Cells
 from ca_damper.automaton.lattice import HELD, UP, Lattice
 from ca_damper.automaton.static_contact import StaticContact
-from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -18,8 +17,9 @@ class Grains(Cells):
     blows. closing: acceleration of the container towards grains that fly [m/s^2].
     """
 
-    def __init__(self, table: SceneFields, lattice: Lattice, parameters: Any, listed: bool):
-        super().__init__(table, lattice, parameters, listed, self)
+    def __init__(self, lattice: Lattice, parameters: Any, listed: bool):
+        super().__init__(lattice, parameters, listed, self)
+        table = self.table
         self.across = table.field(ti.f64, "cells")
         self.container, self.closing = table.field(ti.f64), table.field(ti.f64)
 

@@ -1,7 +1,7 @@
 """What a rule set of the automaton is: options of a user, and what they decide."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable
 from typing import Any, ClassVar
 
 from ca_damper.automaton.device import LatticeDevice
@@ -13,9 +13,6 @@ class Rules(ABC):
 
     #: What carries out the rules, made with an Automaton and the SceneFields of an engine.
     device: ClassVar[type[LatticeDevice]]
-    #: Range in which the rules were checked, in words, and whether a run beyond it gets a warning.
-    checked_in: ClassVar[str]
-    warns: ClassVar[bool] = False
     #: Whether gravity may pull across the columns; whether walls and particles move by whole cells.
     may_tilt: ClassVar[bool] = True
     by_cells: ClassVar[bool] = False
@@ -36,24 +33,16 @@ class Rules(ABC):
         return 1
 
     @property
-    @abstractmethod
-    def compiled(self) -> Hashable:
-        """Options that decide what is compiled."""
-
-    @property
     def numbers(self) -> dict[str, float]:
         """Options that kernels read as ``self.parameters.NAME[s]``, by name."""
         return {}
 
-    @abstractmethod
-    def beyond(self, automaton: Any, driven: Driven) -> Iterator[str]:
-        """What of the scenes lies outside the range, in words."""
+    @property
+    def compiled(self) -> Hashable:
+        """The class, and all options but the numbers: what decides on the compiled kernels."""
+        numbers = self.numbers
+        return type(self), *(value for name, value in vars(self).items() if name not in numbers)
 
+    @abstractmethod
     def known_range(self, automaton: Any, driven: Driven) -> CheckedRange:
         """The range in which the rules were checked, and what of the scenes lies outside it."""
-        outside = tuple(self.beyond(automaton, driven))
-        warning = (
-            f"rules '{type(self).__name__.lower()}' of the automaton are known to fail with "
-            f"{'; with '.join(outside)}: use rules=Place(), the default"
-        )
-        return CheckedRange(self.checked_in, outside, warning if outside and self.warns else "")

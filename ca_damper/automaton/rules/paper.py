@@ -1,6 +1,5 @@
 """The rules of the paper (Komatsuzaki et al., section 5): options, range, and the device."""
 
-from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -15,11 +14,15 @@ from ca_damper.automaton.lattice import DIRECTIONS, DOWN, EMPTY, HELD, WALL, uni
 from ca_damper.automaton.rules.contract import Rules
 from ca_damper.automaton.static_contact import StaticContact
 from ca_damper.automaton.transport import READINGS, Accumulator, Transport
-from ca_damper.report.certificate import Driven
+from ca_damper.report.certificate import CheckedRange, Driven
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.validation import choice, flag, plain_fields
 
 _G = 9.81
+_CHECKED = (
+    "11 to 50 grains of at most 0.1 of the container's mass, gravity, restitution from 0.5 on, "
+    "motions above 1 g and half a cell: peaks at resonance within 3 % of spheres"
+)
 
 
 @ti.data_oriented
@@ -29,10 +32,10 @@ class PaperDevice(LatticeDevice):
     def __init__(self, automaton: Any, table: SceneFields):
         super().__init__(automaton, table, looks_ahead=True)
         rules = automaton.rules
-        accounting = Accounting(rules.accounting, table, self.lattice)
+        accounting = Accounting(rules.accounting, self.lattice)
         accumulator = Accumulator(rules.accumulator, self.lattice)
         listed = automaton.traversal == "list"
-        cells = Cells(table, self.lattice, self.parameters, listed, accounting)
+        cells = Cells(self.lattice, self.parameters, listed, accounting)
         resting = StaticContact(cells, accumulator, rules.particles_rest)
         self.fill(automaton, cells, resting, DOWN)
         self.transport = Transport(resting, accounting, self.event_counts)
@@ -103,11 +106,6 @@ class Paper(Rules):
     device: ClassVar = PaperDevice
     may_tilt: ClassVar[bool] = False
     by_cells: ClassVar[bool] = True
-    warns: ClassVar[bool] = True
-    checked_in: ClassVar[str] = (
-        "11 to 50 grains of at most 0.1 of the container's mass, gravity, restitution from 0.5 on, "
-        "motions above 1 g and half a cell: peaks at resonance within 3 % of spheres"
-    )
 
     def __post_init__(self) -> None:
         plain_fields(self)
@@ -143,32 +141,37 @@ class Paper(Rules):
         """Without some of the impulses there is none."""
         return 1 if self.accounting == "all" else None
 
-    @property
-    def compiled(self) -> Hashable:
-        """All options."""
-        return self.accounting, self.pair_rule, self.accumulator, self.particles_rest
+    def known_range(self, automaton: Any, driven: Driven) -> CheckedRange:
+        """The range, with a warning before a run outside of it."""
+        outside = tuple(_beyond(automaton, driven))
+        warning = (
+            f"rules 'paper' of the automaton are known to fail with {'; with '.join(outside)}: use "
+            "rules=Place(), the default"
+        )
+        return CheckedRange(_CHECKED, outside, warning if outside else "")
 
-    def beyond(self, automaton: Any, driven: Driven) -> Iterator[str]:
-        """Where the rules are known to fail, with a figure each."""
-        some = driven.particles > 0
-        heaviest = automaton.particle_mass / driven.mass[some].min(initial=np.inf)
-        fewest = driven.particles[some].min(initial=11)
-        if heaviest > 0.1:
-            yield (
-                f"a grain of {heaviest:.3g} of the container's mass, above 0.1 (one of 0.2 makes "
-                "the energy grow 36-fold)"
-            )
-        if fewest <= 10:
-            yield (
-                f"{fewest} grain{'' if fewest == 1 else 's'}, ten or fewer (one is off by up to "
-                "824 % in 76 published cases)"
-            )
-        if some.any() and automaton.gravity == 0.0:
-            yield "no gravity (40 grains at 6 Hz and 20 mm lose eight times too much)"
-        yield from _beyond_motions(automaton, driven, some & (driven.amplitude > 0.0))
-        least = min(automaton.restitution, automaton.wall_restitution)
-        if some.any() and least < 0.5:
-            yield f"restitution {least:g}, below 0.5"
+
+def _beyond(automaton, driven):
+    """Where the rules of the paper are known to fail, with a figure each."""
+    some = driven.particles > 0
+    heaviest = automaton.particle_mass / driven.mass[some].min(initial=np.inf)
+    fewest = driven.particles[some].min(initial=11)
+    if heaviest > 0.1:
+        yield (
+            f"a grain of {heaviest:.3g} of the container's mass, above 0.1 (one of 0.2 makes "
+            "the energy grow 36-fold)"
+        )
+    if fewest <= 10:
+        yield (
+            f"{fewest} grain{'' if fewest == 1 else 's'}, ten or fewer (one is off by up to "
+            "824 % in 76 published cases)"
+        )
+    if some.any() and automaton.gravity == 0.0:
+        yield "no gravity (40 grains at 6 Hz and 20 mm lose eight times too much)"
+    yield from _beyond_motions(automaton, driven, some & (driven.amplitude > 0.0))
+    least = min(automaton.restitution, automaton.wall_restitution)
+    if some.any() and least < 0.5:
+        yield f"restitution {least:g}, below 0.5"
 
 
 def _beyond_motions(automaton, driven, moved):

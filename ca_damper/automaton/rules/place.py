@@ -1,6 +1,5 @@
 """Rules of place: grains collide where their positions meet; options, range, and the device."""
 
-from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -14,12 +13,17 @@ from ca_damper.automaton.place.contacts import Contacts
 from ca_damper.automaton.place.grains import Grains, Heap
 from ca_damper.automaton.place.transport import Transport
 from ca_damper.automaton.rules.contract import Rules
-from ca_damper.report.certificate import Driven
+from ca_damper.report.certificate import CheckedRange, Driven
 from ca_damper.scenes.gravity import gravity_across
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.validation import flag, plain_fields, positive
 
 _G = 9.81
+_CHECKED = (
+    "1 to 50 grains, 0.8 to 8 g, restitution up to 0.9: impedance within 20 % of that of spheres "
+    "at four of five points, worst at five and ten grains; loss within 4 % in the median, 40 % at "
+    "worst"
+)
 
 
 @ti.data_oriented
@@ -29,7 +33,7 @@ class PlaceDevice(LatticeDevice):
     def __init__(self, automaton: Any, table: SceneFields):
         super().__init__(automaton, table, looks_ahead=False)
         tilted = gravity_across(automaton) != 0.0
-        grains = Grains(table, self.lattice, self.parameters, automaton.traversal == "list")
+        grains = Grains(self.lattice, self.parameters, automaton.traversal == "list")
         heap = Heap(grains, None, automaton.rules.static_contact)
         self.fill(automaton, grains, heap, UP)
         self.transport = Transport(grains, tilted)
@@ -105,11 +109,6 @@ class Place(Rules):
     device: ClassVar = PlaceDevice
     #: Class that carries out the impacts of a step.
     collisions: ClassVar = Collisions
-    checked_in: ClassVar[str] = (
-        "1 to 50 grains, 0.8 to 8 g, restitution up to 0.9: impedance within 20 % of that of "
-        "spheres at four of five points, worst at five and ten grains; loss within 4 % in the "
-        "median, 40 % at worst"
-    )
 
     def __post_init__(self) -> None:
         plain_fields(self)
@@ -128,33 +127,33 @@ class Place(Rules):
         return ("pairs", "landing", *(("static contact",) if self.static_contact else ()))
 
     @property
-    def compiled(self) -> Hashable:
-        """Static contact alone."""
-        return self.static_contact
-
-    @property
     def numbers(self) -> dict[str, float]:
         """Both coefficients."""
         return {"friction": self.friction, "wall_friction": self.wall_friction}
 
-    def beyond(self, automaton: Any, driven: Driven) -> Iterator[str]:
-        """What was not checked, or is known to be off."""
-        some = driven.particles > 0
-        most, moved = driven.particles.max(initial=0), some & (driven.amplitude > 0.0)
-        if most > 50:
-            yield f"{most} grains, more than 50"
-        levels = driven.acceleration[moved] / _G
-        for level in {levels.min(initial=0.8), levels.max(initial=8.0)}.difference({0.8, 8.0}):
-            yield f"a motion of {level:.2g} g"
-        if some.any() and gravity_across(automaton):
-            yield (
-                "gravity across the columns (a box on its side: loss within 5 % of that of spheres "
-                "in the median of 135 points, 32 % at nine of ten, 76 % at worst, with beds of "
-                "several layers, which interlock)"
-            )
-        highest = max(automaton.restitution, automaton.wall_restitution)
-        if some.any() and highest > 0.9:
-            yield (
-                f"restitution {highest:g}, above 0.9 (of 1 without friction, two grains keep their "
-                "energy in 3 s, five 0.5 to 0.9 of it, twenty 0.16 to 0.22, spheres 0.999)"
-            )
+    def known_range(self, automaton: Any, driven: Driven) -> CheckedRange:
+        """The range, and what was not checked or is known to be off."""
+        return CheckedRange(_CHECKED, tuple(_beyond(automaton, driven)))
+
+
+def _beyond(automaton, driven):
+    """What was not checked of the rules of place, or is known to be off."""
+    some = driven.particles > 0
+    most, moved = driven.particles.max(initial=0), some & (driven.amplitude > 0.0)
+    if most > 50:
+        yield f"{most} grains, more than 50"
+    levels = driven.acceleration[moved] / _G
+    for level in {levels.min(initial=0.8), levels.max(initial=8.0)}.difference({0.8, 8.0}):
+        yield f"a motion of {level:.2g} g"
+    if some.any() and gravity_across(automaton):
+        yield (
+            "gravity across the columns (a box on its side: loss within 5 % of that of spheres "
+            "in the median of 135 points, 32 % at nine of ten, 76 % at worst, with beds of "
+            "several layers, which interlock)"
+        )
+    highest = max(automaton.restitution, automaton.wall_restitution)
+    if some.any() and highest > 0.9:
+        yield (
+            f"restitution {highest:g}, above 0.9 (of 1 without friction, two grains keep their "
+            "energy in 3 s, five 0.5 to 0.9 of it, twenty 0.16 to 0.22, spheres 0.999)"
+        )
