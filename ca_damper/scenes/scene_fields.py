@@ -25,13 +25,6 @@ class SceneField:
     flat: bool
 
 
-class Part:
-    """Base of a part of a filling on the device: all that its owner has so far is its own too."""
-
-    def __init__(self, owner: Any):
-        vars(self).update(vars(owner))
-
-
 @ti.data_oriented
 class SceneFields:
     """Parameters of each scene of a batch; fields of shape (capacity,)."""

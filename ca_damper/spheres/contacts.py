@@ -1,12 +1,16 @@
 """Numbers of the contacts of two spheres, and of spheres and walls, by the sizes of the spheres."""
 
-from typing import Any
-
 import taichi as ti
 
 from ca_damper.filling import Fillings
-from ca_damper.scenes.scene_fields import Part
-from ca_damper.spheres.contact_law import Contact, contact_members, pair_numbers, wall_numbers
+from ca_damper.spheres.contact_law import (
+    Contact,
+    ContactLaw,
+    contact_members,
+    pair_numbers,
+    wall_numbers,
+)
+from ca_damper.spheres.rotation import Rotation
 
 #: Contacts that are evaluated together.
 LANES = 8
@@ -31,20 +35,27 @@ class Contacts:
     since: ti.f64
 
 
-@ti.data_oriented
-class PairContacts(Part):
-    """Contacts of two spheres; contact: one for each pair of sizes, (scenes, kinds * kinds)."""
+class OfSizes:
+    """Base of contacts that differ by the sizes of the spheres; count: of contacts of a scene."""
 
     constant_fields = ("contact",)
 
-    def __init__(self, spheres: Any):
-        super().__init__(spheres)
-        self.kinds = self.bodies.kinds
-        self.contact = self.table.structs(Contact, self.kinds * self.kinds)
+    def __init__(self, law: ContactLaw, rotation: Rotation, count: int):
+        self.law, self.rotation, self.bodies = law, rotation, rotation.bodies
+        self.table, self.kinds = self.bodies.table, self.bodies.kinds
+        self.contact = self.table.structs(Contact, count)
 
     def load(self, fillings: Fillings) -> None:
         """Take over the numbers of the spheres of each scene."""
         fillings.write(self.contact, self._contacts)
+
+
+@ti.data_oriented
+class PairContacts(OfSizes):
+    """Contacts of two spheres; contact: one for each pair of sizes, (scenes, kinds * kinds)."""
+
+    def __init__(self, law: ContactLaw, rotation: Rotation):
+        super().__init__(law, rotation, rotation.bodies.kinds**2)
 
     def _contacts(self, options):
         pairs = [divmod(k, self.kinds) for k in range(self.kinds * self.kinds)]
@@ -96,19 +107,12 @@ class PairContacts(Part):
 
 
 @ti.data_oriented
-class WallContacts(Part):
+class WallContacts(OfSizes):
     """Contacts of a sphere with the walls, by scene and size of spheres."""
 
-    constant_fields = ("contact",)
-
-    def __init__(self, spheres: Any):
-        super().__init__(spheres)
-        self.contact = self.table.structs(Contact, self.bodies.kinds)
-        self.recoiling = self.table.vector(3, ti.f64, self.bodies.kinds)
-
-    def load(self, fillings: Fillings) -> None:
-        """Take over the numbers of the spheres of each scene."""
-        fillings.write(self.contact, self._contacts)
+    def __init__(self, law: ContactLaw, rotation: Rotation):
+        super().__init__(law, rotation, rotation.bodies.kinds)
+        self.recoiling = self.table.vector(3, ti.f64, self.kinds)
 
     def _contacts(self, options):
         numbers = [wall_numbers(options, k) for k in range(self.bodies.kinds)]

@@ -4,23 +4,39 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.scenes.scene_fields import Part
 from ca_damper.spheres.bodies import vec2
-from ca_damper.spheres.contacts import LANES
-from ca_damper.spheres.effect_activity import FRICTION
+from ca_damper.spheres.contacts import LANES, OfSizes
+from ca_damper.spheres.effect_activity import FRICTION, EffectActivity
+from ca_damper.spheres.friction_history import FrictionHistory
+
+
+class Forces:
+    """Base of the forces in contacts; rubs: whether there is friction."""
+
+    def __init__(
+        self,
+        contacts: OfSizes,
+        search: Any,
+        history: FrictionHistory,
+        activity: EffectActivity,
+        rubs: bool,
+    ):
+        self.contacts, self.search, self.history = contacts, search, history
+        self.bodies, self.law, self.rotation = contacts.bodies, contacts.law, contacts.rotation
+        self.effect_activity, self.rubs = activity, rubs
 
 
 @ti.data_oriented
-class PairForces(Part):
+class PairForces(Forces):
     """Contacts of two spheres in the present step, by scene."""
 
     scratch_fields = ("force_x", "force_y", "torque", "spring", "root")
 
-    def __init__(self, spheres: Any):
-        super().__init__(spheres)
+    def __init__(self, *parts: Any):
+        super().__init__(*parts)
         self.turns = self.rubs and self.rotation.turns
         for name in self.scratch_fields:
-            setattr(self, name, ti.Vector.field(LANES, ti.f64, shape=self.table.capacity))
+            setattr(self, name, ti.Vector.field(LANES, ti.f64, shape=self.bodies.table.capacity))
 
     @ti.func
     def add(self, s, contact, which, count):
@@ -35,7 +51,7 @@ class PairForces(Part):
             ]
             if ti.static(self.history.remembers):
                 self._recall(s, first, count)
-            self._evaluate(s, self.pair_contacts.of_lanes(s, pairs, contact), pairs)
+            self._evaluate(s, self.contacts.of_lanes(s, pairs, contact), pairs)
             for lane in ti.static(range(LANES)):
                 if first + lane < count:
                     self._push(s, pairs[lane], lane)
@@ -117,7 +133,7 @@ class PairForces(Part):
 
 
 @ti.data_oriented
-class WallForces(Part):
+class WallForces(Forces):
     """Contacts of walls and of the spheres that are expected to touch them."""
 
     @ti.func
@@ -130,7 +146,7 @@ class WallForces(Part):
             if (place < low - short).any() or (place > high + short).any():
                 if ti.static(self.history.remembers):
                     self.history.at_walls(s, i)
-                of_sphere = self.wall_contacts.of(s, i, contacts)
+                of_sphere = self.contacts.of(s, i, contacts)
                 above, below = place - low + short, high - place + short
                 force = self._walls(s, i, of_sphere, above, below, speed)
                 self.bodies.push(i, force)

@@ -5,12 +5,10 @@ Cummins and Cleary (2013) a contact that grows keeps its force, and one that shr
 proportion, so that no change of the overlap makes energy.
 """
 
-from typing import Any
-
 import taichi as ti
 
-from ca_damper.scenes.scene_fields import Part
 from ca_damper.spheres.bodies import vec2
+from ca_damper.spheres.contacts import PairContacts
 
 #: Walls of a box: two axes, two sides.
 _WALLS = 4
@@ -18,16 +16,17 @@ _LONG_AGO = -2
 
 
 @ti.data_oriented
-class FrictionHistory(Part):
+class FrictionHistory:
     """Springs of the contacts of the last step: force [N] and root of the overlap [m^(1/2)].
 
     recalled: those of the pairs of the present step, zero for new ones. wall_spring: of a sphere at
     each wall, 2 axis + side.
     """
 
-    def __init__(self, spheres: Any, remembers: bool):
-        super().__init__(spheres)
-        self.remembers, table = remembers, self.table
+    def __init__(self, pair_contacts: PairContacts, remembers: bool):
+        self.pair_contacts, self.law = pair_contacts, pair_contacts.law
+        self.bodies, self.rotation = pair_contacts.bodies, pair_contacts.rotation
+        self.remembers, table = remembers, self.bodies.table
         if remembers:
             self.pair, self.pair_count = table.vector(2, ti.i32, "pairs"), table.field(ti.i32)
             self.pair_spring = table.vector(2, ti.f64, "pairs")
