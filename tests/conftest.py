@@ -49,7 +49,7 @@ def pytest_configure(config):
 
 
 #: Folders of the first worker, whose structures are those of the paper, of bonds and of bodies.
-OF_THE_FIRST = ("verification", "equivalence", "material", "boundaries", "unit")
+OF_THE_FIRST = ("verification", "equivalence", "material", "boundaries")
 
 
 class InHalves(LoadScopeScheduling):
