@@ -185,7 +185,7 @@ def test_heat_that_waits_in_a_pair_is_in_the_account(probe):
     simulation.start()
     probe.state.set_motion(placed(probe, OVERLAP), [1.0, 0.0, 0.0, 0.0])
     simulation.broad_phase.search()
-    taken = {"sphere_dashpot": 1.0, "friction": 2.0, "injected": 4.0}
+    taken = {"sphere_dashpot": 1.0, "friction": 2.0, "injected": 4.0, "hysteresis": 8.0}
     before = simulation.energy_balance.account()
     probe.store.heat[probe.store.near_slot[0]] = list(taken.values())
     after = simulation.energy_balance.account()
