@@ -119,7 +119,7 @@ class Automaton:
         in_unit("particle_mass", self.particle_mass, GRAIN_MASS, self.particle_mass / self.width**3)
         positive("static_threshold", self.static_threshold, zero_allowed=True)
         object.__setattr__(self, "gravity", checked_gravity(self.gravity))
-        if gravity_across(self) and not self.rules.may_tilt:
+        if gravity_across(self) and self.rules.by_cells:
             raise InputError(
                 f"gravity must be one number with rules {type(self.rules).__name__}(), whose "
                 f"lattice stands along it, got {shown(self.gravity)}"

@@ -13,8 +13,7 @@ class Rules(ABC):
 
     #: What carries out the rules, made with an Automaton and the SceneFields of an engine.
     device: ClassVar[type[LatticeDevice]]
-    #: Whether gravity may pull across the columns; whether walls and particles move by whole cells.
-    may_tilt: ClassVar[bool] = True
+    #: Whether walls and particles move by whole cells, which needs gravity along the columns.
     by_cells: ClassVar[bool] = False
 
     @property

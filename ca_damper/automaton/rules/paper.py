@@ -104,7 +104,6 @@ class Paper(Rules):
     accumulator: str = "signed"
 
     device: ClassVar = PaperDevice
-    may_tilt: ClassVar[bool] = False
     by_cells: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
