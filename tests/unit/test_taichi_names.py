@@ -64,11 +64,6 @@ def without(names, version, *works, switch="on"):
     return subprocess.run(line, capture_output=True, text=True, cwd=ROOT, env=environment)
 
 
-def of_the_version(done):
-    """Lines of its errors that say which Taichi is wanted."""
-    return [line for line in done.stderr.splitlines() if "taichi must be 1.7.4" in line]
-
-
 def test_without_patches_the_bits_are_the_same():
     """Nothing is said of it, as it was asked for."""
     done = without(OF_PATCHES, WANTED, "blast", "damper", switch="off")
@@ -80,7 +75,7 @@ def test_without_patches_the_bits_are_the_same():
 def test_another_taichi_runs_without_patches_and_one_sentence_says_it():
     done = without(OF_PATCHES, (1, 7, 5))
     assert done.returncode == 0, done.stderr
-    (sentence,) = of_the_version(done)
+    (sentence,) = [line for line in done.stderr.splitlines() if "taichi must be" in line]
     assert "got 1.7.5" in sentence
 
 
@@ -93,9 +88,8 @@ def test_the_switch_is_on_or_off():
 def test_without_a_name_that_is_needed_a_sentence_says_which_taichi_is():
     done = without(["taichi.lang.util.to_numpy_type"], WANTED)
     assert done.returncode == 1
-    (sentence,) = of_the_version(done)
-    assert sentence == done.stderr.splitlines()[-1]
-    assert "taichi.lang.util.to_numpy_type" in sentence
+    sentence = done.stderr.splitlines()[-1]
+    assert "taichi must be" in sentence and "taichi.lang.util.to_numpy_type" in sentence
 
 
 def test_every_private_name_that_a_module_imports_is_looked_for():
