@@ -52,7 +52,8 @@ def parameters(thing):
 def methods(thing):
     """Names of what users call of an object: methods whose parameters are described."""
     names = {name for name in dir(thing) if not name.startswith("_")} - INSIDE
-    return sorted(name for name in names if parameters(getattr(type(thing), name, None)))
+    own = {name: getattr(type(thing), name, None) for name in names}
+    return sorted(name for name, one in own.items() if inspect.isroutine(one) and parameters(one))
 
 
 def calls(package):
