@@ -39,7 +39,7 @@ class Contacts:
     def __init__(self, tables: Tables, state: State):
         n, capacity = tables.capacity.bodies, tables.capacity
         self.tables, self.state = tables, state
-        self.law, self.geometry, self.friction = tables.contact, tables.geometry, tables.friction
+        self.law, self.geometry = tables.contact, tables.geometry
         self.pace = ti.field(real, shape=2)
         self.store = PairStore(n, capacity.pair_entries, capacity.sphere_entries)
         for effect in tables.effects:
@@ -327,6 +327,8 @@ class Breaks:
             born = ti.max(self.state.exposed_tick[a // size], self.state.exposed_tick[b // size])
             if fresh and (freed or born == tick):
                 overlap = ti.max(0.0, -self.contacts.gap(i, j, a, b))
-                touch = Touch(overlap=overlap, rate=0.0, area=1.0)
-                energy += self.contacts.law.stored(self.tables.pair(i, j), k, touch)
+                touch, m = Touch(overlap=overlap, rate=0.0, area=1.0), self.tables.pair(i, j)
+                # What a law with memory takes of it at once is injected too.
+                energy += self.contacts.law.stored(m, k, touch)
+                energy += self.contacts.law.push(m, k, touch).spent
         return energy
