@@ -238,15 +238,19 @@ class ContactLaw(Effect):
 
     def firmness(self, mesh: Mesh, materials: BodyMaterials) -> Any:
         """Largest stiffness [N/m] of each body in deep contact, (n,) or one; of bodies per area."""
-        deep = DEEP * np.cbrt(volumes(mesh))
-        return materials.largest(lambda one: self.stiffness_at(self.numbers(one), deep))
+        return self._in_deep_contact(self.stiffness_at, mesh, materials)
 
     def strongest(self, mesh: Mesh, materials: BodyMaterials) -> tuple[Any, Any]:
         """Largest stiffness [N/m] and dashpot [N s/m] of a contact of each body with its like."""
-        deep, area = DEEP * np.cbrt(volumes(mesh)), self.geometry.largest_areas(mesh)
-        damping = materials.largest(lambda one: self.damping_at(self.numbers(one), deep))
+        area = self.geometry.largest_areas(mesh)
         weight = self.geometry.weights(materials.density * volumes(mesh), area)
+        damping = self._in_deep_contact(self.damping_at, mesh, materials)
         return area * self.firmness(mesh, materials), area * weight * damping
+
+    def _in_deep_contact(self, find, mesh, materials):
+        """Largest value of each body, by the numbers of its contacts and a deep overlap."""
+        deep = DEEP * np.cbrt(volumes(mesh))
+        return materials.largest(lambda one: find(self.numbers(one), deep))
 
 
 @ti.data_oriented

@@ -83,7 +83,8 @@ def check_effect(effect: Any) -> None:
             f"effect {kind} of the role {role} must derive from taichi_dem.effects."
             f"{contract.__name__}, got {type(effect).__mro__[1].__name__}"
         )
-    lacking = [*_lacking(effect), *_lacking(getattr(effect, "geometry", effect))]
+    parts = (effect, effect.geometry) if role == "contact" else (effect,)
+    lacking = [method for part in parts for method in _lacking(part)]
     if lacking:
         raise InputError(
             f"effect {kind} must have {' and '.join(lacking)}, as its role {role} asks for"

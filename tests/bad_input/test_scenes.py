@@ -71,7 +71,7 @@ CASES = {
     "loads must be left out": lambda: scene(loads=[effects.Gravity()]),
     "that act": lambda: on_demand(effects.Softening().silent()),
     "derive from taichi_dem.effects.Load": lambda: scene(own(Effect, role="load")),
-    "Mine must have wrench(i, motion)": lambda: scene(own(effects.Load)),
+    "Mine must have wrench(i, motion), as": lambda: scene(own(effects.Load)),
     "push(m, k, touch)": lambda: scene(own(effects.ContactLaw, effects.BodyGeometry())),
     "must be one of": lambda: scene(effects.BodyGeometry()),
     "particles must be 0": lambda: ca.Batch(ca.Empty(), TABLE),
