@@ -98,9 +98,15 @@ def overlap_energy(simulation, born_after):
     return 0.5 * CONCRETE.contact_stiffness * (np.maximum(overlap, 0.0) ** 2).sum()
 
 
-def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once():
+def lossy():
+    """A law that takes three quarters of k d^2 / 2 at once and stores the rest."""
+    return effects.WaltonBraun(0.5, geometry=effects.SphereGeometry())
+
+
+@pytest.mark.parametrize("law", [effects.SphereContact, lossy])
+def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(law):
     """Faces that break now bring k d^2 / 2 an overlap; a second search at the tick nothing."""
-    simulation = scattered(2e-4, 0.02)
+    simulation = scattered(2e-4, 0.02, law)
     state, store = simulation.state, simulation.contacts.store
     assert not values(store.heat, near_slots(store)).any()
     exposed = simulation.values(state.exposed_tick)
