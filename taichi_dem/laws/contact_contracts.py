@@ -190,8 +190,6 @@ class ContactLaw(Effect):
     """
 
     role = "contact"
-    #: Whether it keeps columns of the pair store, and may take energy of its own.
-    has_memory = False
     #: Words: option that makes it stiffer, and a value of it; what ends hopping; why no dashpot.
     knob, firmer = "stiffness", "a stiffness of {value:.2g}"
     calmer, undamped = "a dashpot or another restitution", "this contact has none"
@@ -201,6 +199,11 @@ class ContactLaw(Effect):
 
     def __repr__(self):
         return by_arguments(self, self.geometry)
+
+    @property
+    def has_memory(self) -> bool:
+        """Whether it keeps something of each entry, and may take energy of its own."""
+        return type(self).keep is not ContactLaw.keep
 
     @abstractmethod
     def push(self, m, k, touch):
@@ -221,11 +224,11 @@ class ContactLaw(Effect):
 
     @ti.func
     def keep(self, m, k, touch):
-        """Take note of a touch of entry k, once a step; with ``has_memory`` only."""
+        """Take note of a touch of entry k, once a step; a law that has it has a memory."""
 
     @ti.func
     def part(self, m, k):
-        """Forget entry k, whose surfaces have parted; with ``has_memory`` only."""
+        """Forget entry k, whose surfaces have parted, in a law with a memory."""
 
     @ti.func
     def row(self, m):

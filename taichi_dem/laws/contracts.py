@@ -206,13 +206,16 @@ class Load(BodyEffect):
     """Force on bodies."""
 
     role = "load"
+    #: Order of the error that it leaves in the step, which reports tell; None if nobody knows.
+    order: int | None = None
 
     @abstractmethod
     def wrench(self, i, motion):
         """Force [N] (3,) and torque about the centre [N m] (3,) on body i.
 
-        motion: ``state.state.BodyMotion``, with position [m], rotation (3, 3), velocity [m/s], spin
-        [rad/s] and time [s]. Where the load changes, its mean from motion.since to motion.until.
+        motion: ``state.state.BodyMotion``, with position [m], rotation (3, 3), time [s]; velocity
+        [m/s] and spin [rad/s] are those of half a step, motion.step [s], before. Where the load
+        changes, its mean from motion.since to motion.until.
         """
 
     @ti.func

@@ -85,10 +85,17 @@ def check_effect(effect: Any) -> None:
         )
     parts = (effect, effect.geometry) if role == "contact" else (effect,)
     lacking = [method for part in parts for method in _lacking(part)]
+    if role == "contact" and _declares(effect) and not effect.has_memory:
+        lacking.append("keep(m, k, touch), which fills its columns,")
     if lacking:
         raise InputError(
             f"effect {kind} must have {' and '.join(lacking)}, as its role {role} asks for"
         )
+
+
+def _declares(law):
+    """Whether a law declares columns of its contacts."""
+    return type(law).declare_columns is not Effect.declare_columns
 
 
 def _lacking(effect):

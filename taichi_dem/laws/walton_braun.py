@@ -30,7 +30,6 @@ class WaltonBraun(ContactLaw):
         What touches: whole bodies (``BodyGeometry()``, the default) or ``SphereGeometry()``.
     """
 
-    has_memory = True
     calmer, undamped = "a smaller restitution", "this law has none"
 
     def __init__(

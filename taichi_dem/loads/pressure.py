@@ -38,6 +38,8 @@ class Gravity(Load):
         Acceleration along x, y and z [m/s^2].
     """
 
+    order = 2
+
     def __init__(self, acceleration: Sequence[float] = (0.0, -9.81, 0.0)):
         self._acceleration = direction("acceleration", acceleration)
         in_unit("size of acceleration", math.hypot(*self._acceleration), ACCELERATION)
@@ -67,6 +69,8 @@ class FacePressure(Load):
 
     The area stays the mesh's.
     """
+
+    order = 2
 
     @abstractmethod
     def mean_pressure(self, since, until):

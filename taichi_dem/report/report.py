@@ -284,7 +284,9 @@ def known_error(report: Report, scene: Scene, method: Any) -> str:
     if not report.substeps:
         return ""
     varying = report.substeps > round(report.until_s / method.dt0)
-    order = order_of(method, scene.damped(touching=report.pair_evaluations > 0), varying)
+    orders = [order_of(method, scene.damped(touching=report.pair_evaluations > 0), varying)]
+    orders += [load.order for load in scene.effects if load.role == "load"]
+    order = None if None in orders else min(filter(None, orders))
     # Events each fall within a step, whatever the order between them.
     events = {"breaks": report.broken_faces, "contacts": report.pair_evaluations}
     between = " and ".join(name for name, count in events.items() if count)

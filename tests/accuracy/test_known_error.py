@@ -1,13 +1,17 @@
 """A method has the order that it declares, in all that is recorded, and a run says so."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
+import taichi as ti
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Uniform, effects, simulate
+from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.methods import order_of
+from taichi_dem.report.report import known_error
 from tests.scenes import UNTIL, struck_bar
 from tests.structures import filled
 
@@ -61,6 +65,23 @@ def test_a_method_has_the_order_that_it_declares(name):
     assert orders == pytest.approx(order_of(make(step), damping, varying), abs=SEEN)
     word = "steps up to" if varying else "step"
     assert report.known_error.startswith(f"{word} {step:.3g} s, order {round(orders.mean())};")
+
+
+class Drag(effects.Load):
+    """A load that does not say its order."""
+
+    @ti.func
+    def wrench(self, i, motion):
+        return -motion.velocity, vec3(0.0)
+
+
+def test_a_load_that_does_not_say_its_order_leaves_it_unknown():
+    """Velocities are half a step old, so that most that read them are of first order."""
+    method, scene = Uniform(1e-7), struck_bar(damping=False)
+    report = run(method, False).report
+    assert " order 2;" in known_error(report, scene, method)
+    dragged = replace(scene, effects=[*scene.effects, Drag()])
+    assert " order unknown;" in known_error(report, dragged, method)
 
 
 @pytest.mark.parametrize("tension", [(), (effects.Softening(),)], ids=["slip", "slip and breaks"])

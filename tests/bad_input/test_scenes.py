@@ -73,6 +73,7 @@ CASES = {
     "derive from taichi_dem.effects.Load": lambda: scene(own(Effect, role="load")),
     "Mine must have wrench(i, motion), as": lambda: scene(own(effects.Load)),
     "push(m, k, touch)": lambda: scene(own(effects.ContactLaw, effects.BodyGeometry())),
+    "keep(m, k, touch)": lambda: scene(own(effects.BodyContact, declare_columns=print)),
     "must be one of": lambda: scene(effects.BodyGeometry()),
     "particles must be 0": lambda: ca.Batch(ca.Empty(), TABLE),
     "call start() first": lambda: ca.Batch(ca.RigidMass(), TABLE).run(1, 1),
