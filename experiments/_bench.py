@@ -10,7 +10,7 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-from _threads import thread_gains, thread_job
+from backends import whole_steps
 from ca_damper import Automaton, Paper, Spheres
 from cases.blast import METHODS, paper_scene
 from damper_cost import cycle_seconds, scenes
@@ -55,8 +55,8 @@ PROGRAMS = {
     "blast_fracture --no-pictures": (3.0,),
     "demo_damper": (3.5, 5.0),
 }
-#: Boxes along the edges of a block, six tetrahedra each; steps that are timed together, how often.
-SMALL, LARGE, BLOCK_STEPS, REPEATS = (20, 10, 10), (40, 20, 20), 3, 3
+#: Boxes along the width of a bar twice as long; steps that are timed together, how often.
+SMALL, LARGE, BLOCK_STEPS, REPEATS = 10, 20, 3, 3
 
 
 class Figure(NamedTuple):
@@ -211,13 +211,11 @@ def paper_run(method, until):
 
 
 def block(quick):
-    """Yield a block's steps a second by every method, and the gain of a second thread."""
-    if not quick and not on_device():
-        for name, one in thread_gains("", LARGE, [*METHODS], BLOCK_STEPS, 1, REPEATS).items():
-            title = f"block of {one['bodies']}, {name}, two threads over one"
-            yield Figure(title, "1", [one["gain"]], ">= 1.8")
-    methods, cells = (["explicit_limited"], SMALL) if quick else ([*METHODS], LARGE)
-    for name, one in thread_job("", cells, methods, 1, BLOCK_STEPS, REPEATS).items():
+    """Yield a block's steps a second by every method; ``backends.py`` has more threads."""
+    methods, size = (["explicit_limited"], SMALL) if quick else ([*METHODS], LARGE)
+    for name in methods:
+        job = {"size": size, "steps": BLOCK_STEPS, "repeats": REPEATS}
+        one = call_in_process(whole_steps, method=name, **job)
         title = f"block of {one['bodies']}, {name}"
         yield Figure(title, "steps/s of wall", [1.0 / seconds for seconds in one["seconds"]])
 

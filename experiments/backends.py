@@ -14,14 +14,21 @@ Writes backends.png, backends.csv and summary.json to results/backends/.
 """
 
 import sys
+import time
 from functools import partial
 from types import SimpleNamespace
 
-from _threads import thread_job
-from taichi_dem import InputError, runtime
+import numpy as np
+import taichi as ti
+
+from cases.blast import METHODS as BLAST_METHODS
+from cases.blast import paper_effects
+from taichi_dem import CONCRETE, InputError, Scene, Simulation, effects, runtime
 from taichi_dem.kit import backend, study
+from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, RED, picture
 from taichi_dem.kit.progress_bar import ProgressBar
+from taichi_dem.mesh.shapes import bar, in_space_order
 
 NAME = "backends"
 METHODS = {
@@ -52,6 +59,22 @@ TABLE = study.Table(
     floor_per_s=("floor", "by bytes", ".3g"),
 )
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
+#: Edge of a box [m].
+BOX = 0.05
+#: What every step writes of bodies and bonds, and what it reads besides; also the laws of bonds.
+WRITTEN = "slot position orientation velocity spin angular_momentum bond_drag".split()
+READ = (
+    *("bond_frame", "vertex_master", "vertex_slave", "bond_stiffness", "bond_slots", "bond_pair"),
+    *("unit_area", "tables.dashpot.coefficient", "broken_tick"),
+    *("mass_inverse", "inertia_inverse", "level", "last_tick"),
+)
+#: The visit of a bond in a sweep. It reads two numbers of bodies, the symmetric 6x6 block (21
+#: numbers), the branch (3), the twist of the last visit (6), and of both bodies twist (6),
+#: symmetric inverse inertia (6) and inverse mass (1). It writes the twist of the visit (6) and
+#: those of both bodies (12): 74 numbers.
+VISIT_BYTES = 8 + 8 * 74
+#: Numbers of an array far beyond every cache, numbers that one instruction may take, and copies.
+LARGE, LANES, COPIES = 1 << 24, 8, 5
 
 
 def places():
@@ -64,13 +87,72 @@ def places():
 def measured(place, method, size, options):
     """Steps a second of a bar at a place, and as many as the bytes of a step allow."""
     name, arch, threads = place
-    cells = 2 * size, size, size
-    found = thread_job("", cells, [method], threads, options.steps, options.repeats, arch)[method]
+    job = {"method": method, "size": size, "steps": options.steps, "repeats": options.repeats}
+    title = f"on {threads} threads of {arch}"
+    found = study.call_in_process(whole_steps, arch=arch, threads=threads, title=title, **job)
+    rate, bodies = 1.0 / min(found["seconds"]), found["bodies"]
     floor = found["bandwidth"] / found["bytes"]
-    rate = 1.0 / min(found["seconds"])
-    return SimpleNamespace(
-        place=name, method=method, bodies=found["bodies"], rate=rate, floor=floor
-    )
+    return SimpleNamespace(place=name, method=method, bodies=bodies, rate=rate, floor=floor)
+
+
+def whole_steps(method, size, steps, repeats):
+    """Whole steps of a bar by the parallel driver, two of them to warm up; for a JSON file.
+
+    seconds: of a step, one a repeat. bytes: least ones of a step. bandwidth: of memory [B/s].
+    """
+    blown = [e for e in paper_effects() if e.name != "gas_pressure"]
+    mesh = in_space_order(bar(2 * BOX * size, BOX * size, (2 * size, size, size)))
+    scene = Scene(mesh, CONCRETE, [*blown, effects.GasPressure(group="left")])
+    make, step = BLAST_METHODS[method]
+    simulation = Simulation(scene, make(step), "parallel")
+    simulation.advance_to(2)
+    seconds, counts = [], counts_of(simulation)
+    for k in range(repeats):
+        started = time.perf_counter()
+        simulation.advance_to(2 + (k + 1) * steps)
+        seconds.append((time.perf_counter() - started) / steps)
+    bonds, visits = (counts_of(simulation) - counts) / (steps * repeats)
+    # An evaluated bond stands for its share of a step of all bodies.
+    share, model = bytes_a_step(simulation.engine), simulation.model
+    moved = share * bonds / model.bond_count + VISIT_BYTES * visits
+    found = {"seconds": seconds, "bodies": model.body_count, "bytes": moved}
+    return {**found, "bandwidth": bandwidth()}
+
+
+def bytes_a_step(engine):
+    """Least bytes that a step of all bodies and bonds moves, each number once."""
+    parts = FieldMemory(engine.tables, "constant"), FieldMemory(engine.state, "saved")
+    fields = {name: field for part in parts for name, field in part.fields.items()}
+    laws = [name for name in fields if name.startswith("tables.bond.")]
+    moved = [*WRITTEN, *WRITTEN, *READ, *laws]
+    return sum(engine.values(fields[name]).nbytes for name in moved if name in fields)
+
+
+def counts_of(simulation):
+    """Numbers of evaluated bonds, and of visits of bonds in sweeps, since the start."""
+    counts = simulation.values(simulation.schedule.evaluations).tolist()
+    # Those of the third count are both.
+    return np.array([counts[5], counts[2] - counts[5]])
+
+
+def bandwidth():
+    """Bytes a second that copies of a large array by all threads read and write, the best."""
+    entries, lanes = int(min(LARGE, backend.most_entries())), 1 if study.on_device() else LANES
+    a, b = (ti.Vector.field(lanes, ti.f64, shape=entries // lanes) for _ in range(2))
+    seconds = []
+    for _ in range(1 + COPIES):
+        started = time.perf_counter()
+        copy(a, b)
+        ti.sync()
+        seconds.append(time.perf_counter() - started)
+    return 16.0 * entries / min(seconds[1:])
+
+
+@ti.kernel
+def copy(a: ti.template(), b: ti.template()):
+    """Copy a field into another."""
+    for k in a:
+        b[k] = a[k]
 
 
 def draw(path, rows, methods):

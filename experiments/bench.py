@@ -42,7 +42,7 @@ def run(options):
     history, figures = study.begin(options) / "bench.jsonl", []
     for measure in PARTS:
         with ProgressBar(measure.__name__) as bar:
-            bar.at(0.0)
+            bar.count(0, 1)
             for one in measure(options.quick):
                 print(f"  {one.name}: {one.middle:.3g} {one.unit}", flush=True)
                 figures.append(one)

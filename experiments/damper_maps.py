@@ -1,4 +1,4 @@
-"""How much do grains damp over amplitude and gap, what does theory say, and how to use it?
+"""How much do grains damp over amplitude and gap, and how to use it?
 
 A driven container gives loss c / (N m w) and apparent mass / (N m) of the grains, which depend on
 its peak acceleration in g and on the gap by its amplitude: below 1 g grains lie still and only add
@@ -7,16 +7,12 @@ The table for finite-element codes, for every acceleration and gap, has the dash
 these grains, too. As a check they are put into a plain oscillator: expect its peak within 5 % of
 that of the structure with grains, whatever the base's amplitude.
 
-Without gravity the energy is compared with the theory of collect and collide: grains fly as one
-block between floor and lid and lose all relative motion at each wall. Expect the loss to jump at
-A = gap / pi to 4 in units of N m A^2 w^2, and to fall slowly beyond. A quick run leaves out the
-rules of the paper. Where automaton and spheres differ, over frequency too, shows damper_trust.py.
+Where automaton and spheres differ, over frequency and without gravity too, shows damper_trust.py.
 
-    python experiments/damper_maps.py            # four minutes on two cores
+    python experiments/damper_maps.py            # three minutes on one core
     python experiments/damper_maps.py --particles 20
 
-Writes chart.png, collect_and_collide.png, equivalent.csv, check.csv, a CSV of each map without
-gravity and summary.json to results/damper_maps/.
+Writes chart.png, equivalent.csv, check.csv and summary.json to results/damper_maps/.
 """
 
 import sys
@@ -27,13 +23,10 @@ import pandas as pd
 
 import ca_damper as ca
 from taichi_dem.kit import study
-from taichi_dem.kit.plot_style import BLACK, WINE, picture, styles_of
+from taichi_dem.kit.plot_style import BLACK, WINE, picture
 from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "damper_maps"
-#: Spheres, and the automaton by the rules of the paper and of place, without gravity.
-PAPER = ca.Automaton(ca.Paper(), gravity=0.0)
-WEIGHTLESS = ca.Spheres(gravity=0.0), PAPER, ca.Automaton(gravity=0.0)
 SETTINGS = {
     "particles": (30, 30, study.whole(1, 100), "grains of the chart, 30"),
     # Clearances of the chart in diameters; accelerations of the chart and of the check.
@@ -44,19 +37,12 @@ SETTINGS = {
     "response": (np.arange(0.93, 1.0201, 0.005), np.arange(0.94, 1.001, 0.01)),
     "cycles": ((100, 50), (20, 10)),
     "seeds": (2, 1),
-    # Without gravity: seeds, amplitudes by gap / pi, and cycles.
-    "starts": (3, 1, study.whole(1, 100), "seeds of each scene without gravity, default 3"),
-    "ratios": (17, 7),
-    "half": (30, 12),
-    "fillings": (WEIGHTLESS, WEIGHTLESS[::2]),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 FILLING, OWN, GRAVITY = ca.Automaton(), ca.Oscillator(), 9.81
 #: Accelerations of the chart and of the check [g]; mass ratios of the table.
 CHART, CHECK, MASS_RATIOS = (0.7, 10.0), (0.1, 6.0), (0.02, 0.05, 0.1)
 CYCLES = "transient_cycles", "measured_cycles"
-#: Without gravity: grains, motion [Hz], amplitudes by gap / pi, points of a curve of theory.
-BLOCK, WEIGHTLESS_HZ, RATIOS, FINE = 40, 6.0, (0.6, 1.4), 400
 
 
 def driven(options, levels, progress, **box):
@@ -134,51 +120,8 @@ def draw(path, table, checked):
         axes[2].legend()
 
 
-def picture_jump(path, maps):
-    """Energy over amplitude without gravity, with the theory as a line."""
-    first = next(iter(maps.values()))
-    size, gap = np.array(first.amplitudes), float(first.gaps[0, 0])
-    fine = np.linspace(gap / np.pi * (1.0 + 1e-9), max(size.max(), 0.4 * gap), FINE)
-    theory = ca.collect_and_collide(fine, gap).energy
-    with picture(path, size=(6.0, 4.2)) as (_, axis):
-        axis.plot(np.pi * fine / gap, theory, color=BLACK, lw=1.0, label="collect and collide")
-        for filling, style in styles_of(maps).items():
-            values = maps[filling].energy[0, 0, :, 0, :]
-            middle = values.mean(axis=1)
-            bars = [middle - values.min(axis=1), values.max(axis=1) - middle]
-            look = {"color": style.colour, "marker": style.marker, "ms": 4, "lw": 1.0}
-            axis.errorbar(np.pi * size / gap, middle, bars, label=style.label, **look)
-        axis.axvline(1.0, color=BLACK, lw=0.8, ls=":", label="jump of the theory")
-        axis.set(xlabel="π × amplitude / gap [1]", ylim=(0.0, None))
-        axis.set_ylabel("energy taken in a cycle / (N m A² ω²) [1]")
-        axis.legend()
-
-
-def jump_of(ratios, energy):
-    """Where the energy passes half of its largest value for good, from below; None if nowhere."""
-    low = np.flatnonzero(energy < 0.5 * energy.max())
-    if not len(low) or low[-1] == len(energy) - 1:
-        return None
-    k = low[-1]
-    share = (0.5 * energy.max() - energy[k]) / (energy[k + 1] - energy[k])
-    return float(ratios[k] + share * (ratios[k + 1] - ratios[k]))
-
-
-def weightless(options, folder):
-    """Maps without gravity over amplitude, by filling."""
-    gap = 96e-3 - 6e-3 * BLOCK / 10
-    axes = {"amplitudes": gap / np.pi * np.linspace(*RATIOS, options.ratios)}
-    axes |= {"frequencies": WEIGHTLESS_HZ, "particles": BLOCK, "seeds": options.starts}
-    axes, made = {**axes, **dict.fromkeys(CYCLES, options.half)}, {}
-    for filling in options.fillings:
-        with ProgressBar(f"{filling.label}, no gravity") as bar:
-            made[filling.label] = ca.damper_map(filling, **axes, progress=bar)
-        made[filling.label].write_csv(folder / f"weightless_{filling.label}.csv")
-    return made
-
-
 def run(options):
-    """Map, tabulate, check, compare with theory, picture."""
+    """Map, tabulate, check, picture."""
     folder, cell = study.begin(options), FILLING.width
     with ProgressBar("chart") as bar:
         levels = np.geomspace(*CHART, options.levels)
@@ -187,25 +130,17 @@ def run(options):
         own = driven(options, np.geomspace(*CHECK, options.fine), bar)
     with ProgressBar("check") as bar:
         checked = check(options, own, bar)
-    table, jumps = equivalent(chart), weightless(options, folder)
+    table = equivalent(chart)
     table.to_csv(folder / "equivalent.csv", index=False)
     checked.to_csv(folder / "check.csv", index=False)
     print(checked.to_string(index=False, float_format="{:.3g}".format), "\n")
     draw(folder / "chart.png", table, checked)
-    picture_jump(folder / "collect_and_collide.png", jumps)
     best = table.loc[table.loss.idxmax()]
     figures = {"largest_loss": (float(best.loss), "1")}
     figures["largest_loss_at_g"] = float(best.acceleration_g), "g"
     figures["largest_loss_at_gap"] = float(best.gap_over_amplitude), "1"
     figures["largest_error_percent"] = float(checked.error_percent.abs().max()), "%"
-    for label, made in jumps.items():
-        energy = made.energy[0, 0, :, 0].mean(axis=-1)
-        ratios = np.pi * np.array(made.amplitudes) / made.gaps[0, 0]
-        flat = (energy / made.theory.energy[0, 0])[ratios > 1.05]
-        figures[f"jump_ratio_{label}"] = jump_of(ratios, energy), "1"
-        figures[f"plateau_share_{label}"] = float(flat.mean()), "1"
-    reports = [report for one in (chart, own, *jumps.values()) for report in one.reports]
-    study.finish(options, NAME, figures, reports, see="chart.png")
+    study.finish(options, NAME, figures, [*chart.reports, *own.reports], see="chart.png")
 
 
 if __name__ == "__main__":

@@ -94,7 +94,8 @@ def rows_of(found):
             words, source, published, low, high = cases.WANTED[key]
         else:
             words, off, share = cases.NEAR[key]
-            source, published, off = "spheres", f"{of['dem']:.3g}", off + share * abs(of["dem"])
+            # Beside spheres, which have a column of their own.
+            source, published, off = "", "", off + share * abs(of["dem"])
             low, high = of["dem"] - off, of["dem"] + off
         rows[key] = words, source, published, of, low, high
     return rows

@@ -174,13 +174,9 @@ def fill_figures(text, root):
 
 
 def table_of_experiments():
-    """All experiments as a table for a page of the docs, each with its picture if there is one."""
-    lines = ["| question | command | time | with `--quick` | picture |", "|---|---|---|---|---|"]
-    for page in PAGES:
-        small = f"pictures/{page.name}.png"
-        link = f"[picture]({small})" if (HERE.parent / "docs" / small).is_file() else ""
-        times = " | ".join(page.expected_time(quick) for quick in (False, True))
-        lines.append(f"| {page.question} | `{page.command}` | {times} | {link} |")
+    """All experiments as a table for a page of the docs: names, which lead to pictures."""
+    lines = ["| name | question |", "|---|---|"]
+    lines += [f"| [{one.name}](pictures/{one.name}.png) | {one.question} |" for one in PAGES]
     return "\n".join(lines) + "\n"
 
 
@@ -188,7 +184,7 @@ def renew_readme(root):
     """Renew the table of experiments, and in the sentences of all pages the figures."""
     path, table = Path(root, "docs/experiments.md"), table_of_experiments()
     text = path.read_text(encoding="utf-8")
-    text = re.sub(r"\| question \|.*?\n\n", lambda _: f"{table}\n", text, flags=re.DOTALL)
+    text = re.sub(r"\| name \|.*?\n\n", lambda _: f"{table}\n", text, flags=re.DOTALL)
     write_text(path, text)
     for page in (Path(root, "README.md"), *sorted(Path(root, "docs").glob("*.md"))):
         text = page.read_text(encoding="utf-8")

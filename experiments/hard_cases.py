@@ -22,8 +22,15 @@ from functools import partial
 
 from matplotlib.patches import Rectangle
 
-from cases.hard import CASES
-from cases.hard.cases import assess
+from cases.hard import (
+    assess,
+    blast_bonds,
+    blast_contacts,
+    blast_extremes,
+    blast_piles,
+    damper,
+    damper_limits,
+)
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import (
     BLUE,
@@ -40,6 +47,9 @@ from taichi_dem.kit.progress_bar import ProgressBar
 NAME = "hard_cases"
 #: Of a quick run, which compile little; the tests ask all, at quick size.
 OF_QUICK = ("single_cell", "step_above_limit", "flat_element", "step_that_is_no_number")
+#: All cases, in the order of the page.
+OF_BLAST = blast_bonds, blast_contacts, blast_extremes, blast_piles
+CASES = [case for part in (*OF_BLAST, damper, damper_limits) for case in part.CASES]
 NAMES = [case.name for case in CASES]
 SETTINGS = {
     "only": (NAMES, OF_QUICK, study.several(study.one_of(NAMES)), "names of cases; default: all"),

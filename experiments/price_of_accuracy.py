@@ -25,6 +25,7 @@ Seconds are CPU seconds of one thread of stepping, without compiling. Writes pri
 price_of_accuracy.csv, budget.png, budget.csv and summary.json to results/price_of_accuracy/.
 """
 
+import itertools
 import sys
 from functools import partial
 from typing import NamedTuple
@@ -37,7 +38,6 @@ from ca_damper import Automaton, solve_response
 from ca_damper import goals as damper_goals
 from cases.blast import blast_parser, paper_scene, run_costs
 from cases.meshes import with_moved_nodes
-from cost_of_accuracy_damper import Point, cheapest
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLUE, GREY, LIGHT_GREY, picture, seconds, styles_of
 
@@ -92,14 +92,21 @@ def run_of(scene, method, options, title):
 
 def cheapest_run(name, scene, options, true):
     """Price of a method of a fixed step at the cheapest one that reaches what is asked."""
-    points, look = [], styles_of([name])[name]
+    prices, look = [], styles_of([name])[name]
     for step in getattr(options, name):
         value, _, spent = run_of(scene, METHODS[name](step), options, f"{name}, {seconds(step)}")
-        points.append(Point(name, step, seconds(step), spent, abs(value / true - 1.0)))
-    found = cheapest(points, ASKED)
-    best = found or points[-1]
-    words = f"{WORDS[name]}, {best.label}"
-    return Price(name, words, look.colour, best.seconds, best.error, bool(found))
+        words, error = f"{WORDS[name]}, {seconds(step)}", abs(value / true - 1.0)
+        prices.append(Price(name, words, look.colour, spent, error, True))
+    return cheapest(prices, ASKED) or prices[-1]._replace(reached=False)
+
+
+def cheapest(prices, target):
+    """The cheapest price with an error up to a target, or None; prices: with the finest step last.
+
+    All finer steps must be as good: a single lucky run answers nothing. NaN is no error at all.
+    """
+    reached = itertools.takewhile(lambda one: one.error <= target, reversed(prices))
+    return min(reached, key=lambda one: one.seconds, default=None)
 
 
 def answer_of(scene, options, tolerance):

@@ -18,14 +18,19 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from cases.trust import MEASURES
-from cases.trust.cases import Effort
+from cases.trust import Effort, bonds, contacts, cracks, waves
+from cases.trust import blast as blasts
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, picture
 from taichi_dem.kit.progress_bar import ProgressBar
 
 NAME = "trust"
+#: In the order of the page.
+MEASURES = (
+    *(waves.bar_wave, waves.spall, bonds.disc, cracks.crack, cracks.branching),
+    *(bonds.joint, blasts.blast, contacts.slope, contacts.rotation),
+)
 CASES = {measure.__name__: measure for measure in MEASURES}
 QUICK = ("bar_wave", "joint", "rotation")
 SETTINGS = {
@@ -61,9 +66,9 @@ def cells(row):
     """Cells of the printed table."""
     unit = "" if row.unit == "1" else f" {row.unit}"
     spread = f" ± {row.spread:.2g}" if np.size(row.values) > 1 else ""
-    ours, published = f"{row.mean:.4g}{spread}{unit}", f"{row.published:.4g}{unit}"
-    wanted = f"{row.low:.4g} to {row.high:.4g}{unit}"
-    return row.words, row.source, published, ours, wanted, "holds" if row.holds else "misses"
+    ours, published = f"{row.mean:.4g}{spread}", f"{row.published:.4g}{unit}"
+    wanted, verdict = f"{row.low:.4g} to {row.high:.4g}", "holds" if row.holds else "misses"
+    return row.words, row.source, published, ours, wanted, verdict
 
 
 def figures_of(rows):

@@ -37,11 +37,6 @@ def structure_of(method: Any) -> Hashable:
 
     A user-defined method may have a member ``structure``; else any change of its numbers compiles
     anew, as kernels may contain them.
-
-    Parameters
-    ----------
-    method : Method
-        Method.
     """
     if type(method).__module__ != __name__:
         return getattr(method, "structure", (type(method), repr(method)))
@@ -55,15 +50,6 @@ def order_of(method: Any, damped: bool, varying: bool) -> int | None:
     """Order of the error in the step between events; None where the method declares none.
 
     A class derived from a method declares its own order, or none: its ``step`` may have another.
-
-    Parameters
-    ----------
-    method : Method
-        Method.
-    damped : bool
-        Whether a dashpot acts.
-    varying : bool
-        Whether steps differ between bodies or times.
     """
     kind = type(method)
     declared = kind.order if kind.__module__ == __name__ else vars(kind).get("order")

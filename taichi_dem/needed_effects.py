@@ -33,16 +33,6 @@ def needed_effects(result: Result, tolerance: float = ROUNDING) -> EffectTable:
         from 0 to 1; by default that of rounding. With a larger one, effects that took less than
         this share of the energy are tried too.
 
-    Returns
-    -------
-    EffectTable
-        Print it, or read its ``droppable`` and ``missing``.
-
-    Raises
-    ------
-    InputError
-        The result is of another kind, or the tolerance is out of range.
-
     Examples
     --------
     >>> print(needed_effects(result))  # doctest: +SKIP

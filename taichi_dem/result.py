@@ -175,11 +175,6 @@ class Result:
         frame : int
             Number of the frame in which ``aperture_m`` is measured, the last by default; NaN for a
             result without frames.
-
-        Returns
-        -------
-        pandas.DataFrame
-            A row a broken face, the first first.
         """
         unknown = np.full(self.model.bond_count, np.nan)
         apertures = self.apertures(frame) if self.frames else unknown
@@ -201,13 +196,7 @@ class Result:
         return apertures_of(self.model, self.frame(frame))
 
     def crack_area(self) -> Any:
-        """Tabulate the area of all cracks [m^2] at the times of the history.
-
-        Returns
-        -------
-        pandas.DataFrame
-            ``time_s`` and ``crack_area_m2``; one side of a crack counts.
-        """
+        """Tabulate the area of all cracks [m^2] at the times of the history."""
         made, times_s = arrays_of(self.cracks()), self.series["time_s"]
         area = np.concatenate([[0.0], made["crack_area_m2"]])
         upto = np.searchsorted(made["time_s"], times_s, side="right")
@@ -222,11 +211,6 @@ class Result:
             Normal of the plane, towards the viewer.
         sectors : int
             Of a half turn, 2 to 360.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Area and number of faces by sector (``taichi_dem.output.fracture.rose_of``).
         """
         return rose_of(self.model, np.isfinite(self.broken_time), axis, sectors)
 
@@ -258,11 +242,6 @@ class Result:
             Face group of the hole's wall; that under gas pressure, or "hole", by default.
         radius : float, optional
             Of the hole [m]; that of the points of its wall by default.
-
-        Returns
-        -------
-        Attenuation
-            ``.table``, and ``.power_law(nearest)`` for the fit.
         """
         group = next(iter(watched_groups(self.scene)), None) if group is None else group
         if group is None:

@@ -83,13 +83,6 @@ class Scene(Pictured):
     initial_motion : mapping
         Arrays "velocity" and "spin" at the start, (body_count, 3); empty for a scene at rest.
 
-    Raises
-    ------
-    InputError
-        A type is wrong, an effect is listed twice in a role that takes one, friction has no
-        contact, the mesh lacks a group, a body is in groups of different materials, or a number is
-        out of its range.
-
     Examples
     --------
     >>> gas = effects.GasPressure(group="hole", peak=575e6)

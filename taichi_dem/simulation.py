@@ -273,8 +273,6 @@ class Simulation:
 
         Raises
         ------
-        InputError
-            The number is out of range.
         SimulationDiverged
             The run left its bounds; the message names place and reason.
         """

@@ -73,8 +73,6 @@ def solve(
 
     Raises
     ------
-    InputError
-        An argument is out of its range, or the scene lacks what the goal asks for.
     SimulationDiverged
         No step is stable.
 

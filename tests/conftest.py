@@ -22,7 +22,7 @@ from taichi_dem.engine import ENGINES
 from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import field_bytes, tree_count
 from taichi_dem.step.drivers import CPU_ONLY
-from tests import arch
+from tests.processes import choose_arch, chosen_arch
 
 pytest_plugins = ("tests.compiler",)
 
@@ -45,7 +45,7 @@ def pytest_generate_tests(metafunc):
 
 def pytest_configure(config):
     """Hand the choice on."""
-    arch.choose(config.getoption("--arch"))
+    choose_arch(config.getoption("--arch"))
 
 
 #: Folders of the first worker, whose structures are those of the paper, of bonds and of bodies.
@@ -112,16 +112,16 @@ def taichi_session():
     _give_back()
     if runtime.settings() is not None and _is_full():
         _stop()
-    if arch.chosen() != "cpu" and not backend.is_present(arch.chosen()):
-        pytest.skip(f"no {arch.chosen()} device answers here")
+    if chosen_arch() != "cpu" and not backend.is_present(chosen_arch()):
+        pytest.skip(f"no {chosen_arch()} device answers here")
     if runtime.settings() is None:
         _at_start["bytes"] = _resident_bytes()
-    runtime.start(arch.chosen(), threads=2)
+    runtime.start(chosen_arch(), threads=2)
 
 
 def _is_full():
     started = runtime.settings()
-    other = (started.arch, started.threads, started.debug) != (arch.chosen(), 2, False)
+    other = (started.arch, started.threads, started.debug) != (chosen_arch(), 2, False)
     size = _resident_bytes()
     grown = size - _at_start.get("bytes", 0)
     is_full = size > _MOST_BYTES and grown > _LEAST_GROWTH
@@ -185,7 +185,7 @@ def _skipping():
     try:
         return (yield)
     except InputError as error:
-        if arch.chosen() != "cpu" and CPU_ONLY in str(error):
+        if chosen_arch() != "cpu" and CPU_ONLY in str(error):
             pytest.skip(str(error))
         raise
 

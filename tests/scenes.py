@@ -7,7 +7,6 @@ import numpy as np
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, checked_mesh, effects, read_mesh
 from taichi_dem.mesh.shapes import bar, placed_together, single
 from tests.structures import filled
-from tests.turns import matrix
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
@@ -48,6 +47,25 @@ def apart(count, edge=0.05):
     """Single regular bodies in a row, no two of which share a corner."""
     alone = checked_mesh(single(edge).points, single(edge).tetrahedra, {})
     return placed_together({f"body_{k}": (alone, [20.0 * k * edge, 0, 0]) for k in range(count)})
+
+
+def quaternion(axis, angle):
+    """Unit quaternion, scalar first, of a rotation about an axis of any length."""
+    axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    return np.array([np.cos(angle / 2), *(np.sin(angle / 2) * axis)])
+
+
+def matrix(q):
+    """Rotation matrix of a unit quaternion: cos 1 + sin [n x] + (1 - cos) n n^T."""
+    cosine, sine = q[0] ** 2 - q[1:] @ q[1:], 2 * q[0] * q[1:]
+    cross = np.array([[0, -sine[2], sine[1]], [sine[2], 0, -sine[0]], [-sine[1], sine[0], 0]])
+    return cosine * np.eye(3) + cross + 2 * np.outer(q[1:], q[1:])
+
+
+def product(p, q):
+    """Rotation q followed by rotation p."""
+    vector = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
+    return np.array([p[0] * q[0] - p[1:] @ q[1:], *vector])
 
 
 def quaternions(random, count):

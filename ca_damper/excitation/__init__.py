@@ -1,9 +1,6 @@
 """Excitation of the structure: motions of its base and forces on it, over time.
 
-``sines``, ``sweep``, ``random_vibration``, ``from_samples``, ``from_csv`` and ``from_at2`` make a
-Signal, which is a base displacement [m] or a force [N].
-``Batch`` and ``shake`` take a Signal for the motion of the base, or an Excitation for base and
-force.
+``Batch`` and ``shake`` take a Signal for the base [m], or an Excitation for base and force [N].
 """
 
 from ca_damper.excitation.excitation import Excitation

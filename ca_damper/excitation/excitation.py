@@ -66,13 +66,7 @@ class Excitation:
         return identity_of({"base": self.base, "force": self.force, **signals})
 
     def in_words(self) -> tuple[str, ...]:
-        """Motion of the base and force, and the treatment of samples.
-
-        Returns
-        -------
-        tuple of str
-            A part of a sentence for each Signal.
-        """
+        """Motion of the base and force, and the treatment of samples."""
         units = {"base": "m", "force": "N"}
         return tuple(f"{role} {one.in_words(units[role])}" for role, one in self.signals.items())
 

@@ -49,16 +49,6 @@ def sines(
         ``"value"`` or ``"acceleration"``: what the amplitudes belong to. The value has the
         amplitude of the acceleration over -(2 pi frequency)^2.
 
-    Returns
-    -------
-    Signal
-        Sum of the sines.
-
-    Raises
-    ------
-    InputError
-        Numbers do not broadcast, or a number is out of range.
-
     Examples
     --------
     >>> sines([5.0, 8.0], [1e-3, 5e-4], duration=2.0).duration
@@ -109,16 +99,6 @@ def sweep(
     of : str, default "value"
         ``"value"`` or ``"acceleration"``: what keeps its amplitude, the latter but for the slow
         change of the frequency.
-
-    Returns
-    -------
-    Signal
-        The sweep.
-
-    Raises
-    ------
-    InputError
-        A number is out of its range.
     """
     low, high, amplitude = (
         positive("low", low),

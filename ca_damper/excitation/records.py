@@ -54,17 +54,6 @@ def from_csv(
     correct_baseline : bool, default False
         For an acceleration: subtract a straight line so that the motion ends at rest where it
         began, as in ``from_samples``; right for a record with an offset, wrong for a shock.
-
-    Returns
-    -------
-    Signal
-        Displacement [m] or force [N].
-
-    Raises
-    ------
-    InputError
-        The file cannot be read or names no unit; it holds text, empty cells, NaN, gaps or times
-        that run backwards; or its step is too coarse for the spectrum of the motion.
     """
     name = path_name("path", path)
     table = _table(name)
@@ -96,16 +85,6 @@ def from_at2(path: FileName, *, correct_baseline: bool = False) -> Signal:
         AT2 file: four lines of head, of which the last has the number of samples and the step.
     correct_baseline : bool, default False
         As in ``from_csv``.
-
-    Returns
-    -------
-    Signal
-        Displacement [m].
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or holds another number of samples than it says.
     """
     name = path_name("path", path)
     try:

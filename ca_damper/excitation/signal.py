@@ -93,11 +93,6 @@ class Signal:
         ----------
         time_s : ndarray
             Times within the duration [s], any shape.
-
-        Returns
-        -------
-        tuple of (ndarray, ndarray, ndarray)
-            Value, derivative [1/s] and second derivative [1/s^2], in the unit of the signal.
         """
         place = real_numbers("time_s", time_s) / self.step
         k = np.clip(np.floor(place).astype(np.int64), 0, len(self.value) - 2)

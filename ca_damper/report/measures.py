@@ -291,15 +291,3 @@ def vertex(x: ArrayLike, y: ArrayLike) -> tuple[float, float]:
     # Newton's form through the first two: slope left + bend (2 x - x0 - x1) is zero at the top.
     top = 0.5 * (x0 + x1 - left / bend)
     return float(top), float(y1 + (top - x1) * (left + bend * (top - x0)))
-
-
-def curve_distance(curve: ArrayLike, reference: ArrayLike) -> float:
-    """RMS difference of two response curves, as a share of the peak of the second."""
-    true = np.asarray(reference)
-    return float(np.sqrt(((np.asarray(curve) - true) ** 2).mean()) / np.max(true))
-
-
-def seed_variance(responses: ArrayLike) -> float:
-    """Variance from seed to seed as a share of the peak squared, mean over the frequencies."""
-    by_seed = np.asarray(responses)
-    return float(by_seed.var(axis=1, ddof=1).mean() / by_seed.mean(axis=1).max() ** 2)

@@ -123,13 +123,7 @@ class Report:
         return "; ".join(parts)
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file.
-
-        Returns
-        -------
-        dict
-            Figures by name.
-        """
+        """All figures, for a JSON file."""
         figures = asdict(self)
         figures["acted"] = figures.pop("effect_activity")
         if self.certificate is not None:
@@ -174,13 +168,7 @@ class Report:
         }
 
     def details(self) -> str:
-        """All figures.
-
-        Returns
-        -------
-        str
-            A table of about twelve lines, and one for each effect and signal.
-        """
+        """All figures."""
         return in_lines(self._rows())
 
     def __str__(self):
@@ -216,16 +204,6 @@ def needed_effects(result: object, tolerance: float = 1e-3) -> EffectTable:
     tolerance : float, default 0.001
         Share of the energy taken (friction) or in motion (rotation) below which an effect is
         negligible, from 0 to 1.
-
-    Returns
-    -------
-    EffectTable
-        Print it, or read its ``droppable``.
-
-    Raises
-    ------
-    InputError
-        The result is of another kind, or the tolerance is out of range.
 
     Notes
     -----

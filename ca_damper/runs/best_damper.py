@@ -88,10 +88,8 @@ class BestDamper(Tabulated):
         The value after errors of manufacture, by the filling that confirms.
     tried : tuple of (Grains, float)
         Boxes of the first look and their values [m].
-    search_seconds : float
-        CPU time of the search and its bar [s], compiling included.
-    confirmation_seconds : float
-        CPU time of the confirmation and of the errors of manufacture [s].
+    search_seconds, confirmation_seconds : float
+        CPU time of the search and its bar, and of the rest [s], compiling included.
     """
 
     grains: Grains
@@ -203,12 +201,6 @@ def best_damper(
         Filling that confirms; ``Spheres()`` if None, nothing where spheres search.
     progress : callable or str or None, default "auto"
         As in ``frequency_response``.
-
-    Raises
-    ------
-    InputError
-        A number is out of its range, the grains weigh more than the structure, or no box holds
-        them; the structure has no damping, and the motion is a sine.
 
     Examples
     --------

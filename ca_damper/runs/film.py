@@ -109,11 +109,6 @@ def film(
         Steps between frames; None for no frames.
     progress : callable or str or None, default "auto"
         As in ``frequency_response``.
-
-    Raises
-    ------
-    SimulationDiverged
-        All scenes diverged.
     """
     if not hasattr(batch, "sample") or isinstance(batch, type):
         raise InputError(f"batch must be a Batch that has been started, got {shown(batch)}")

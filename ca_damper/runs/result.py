@@ -22,13 +22,7 @@ class Result(Tabulated):
         raise NotImplementedError
 
     def to_xarray(self) -> Any:
-        """Give all values as an xarray Dataset over their axes.
-
-        Returns
-        -------
-        xarray.Dataset
-            Units in the attributes of each variable, the filling in its own.
-        """
+        """Give all values as an xarray Dataset over their axes."""
         return dataset(self._variables(), self._axes(), filling=self.label)
 
 

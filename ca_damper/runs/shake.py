@@ -183,11 +183,6 @@ def shake_structure(
         As in ``frequency_response``.
     resume : path, optional
         As in ``frequency_response``.
-
-    Raises
-    ------
-    SimulationDiverged
-        All scenes diverged. If only some do, a warning names them, and their results are nan.
     """
     progress_option("progress", progress)
     check_filling(filling)

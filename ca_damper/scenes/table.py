@@ -94,12 +94,6 @@ class SceneTable:
         ----------
         **numbers : float or array_like
             Numbers by the name of a column, each a scalar or (scenes,).
-
-        Raises
-        ------
-        InputError
-            A name is no column, or the constructor would refuse the number; the table stays as it
-            was.
         """
         for name in numbers:
             choice("number to change", name, self.COLUMNS)

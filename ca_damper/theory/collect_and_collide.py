@@ -70,11 +70,6 @@ def collect_and_collide(amplitude: ArrayLike, gap: ArrayLike) -> CollectAndColli
     gap : array_like
         Distance that the block can move between floor and lid [m]; broadcast against the amplitude.
 
-    Returns
-    -------
-    CollectAndCollide
-        Dimensionless loss, apparent mass and energy, of the shape of the arguments.
-
     Notes
     -----
     The motion exists for A >= gap / pi. The phase p of the impact follows from p - sin p = gap / A.

@@ -195,14 +195,7 @@ class ImpactDamper:
         return sign * np.array([self.motion(u, t), [self.position(u, t), -u]])
 
     def multipliers(self, u: float) -> np.ndarray:
-        """Factors by which small changes of the motion grow from impact to impact.
-
-        Returns
-        -------
-        ndarray
-            Four complex eigenvalues of the Jacobian of the map from impact to impact, the largest
-            magnitude first.
-        """
+        """Complex factors by which small changes grow between impacts, the largest first."""
         found = np.linalg.eigvals(self._jacobian(u))
         return found[np.argsort(-np.abs(found), kind="stable")]
 

@@ -1,12 +1,18 @@
-"""Changes and sections of meshes that several experiments and tests share."""
+"""Meshes and loose blocks that several experiments and tests share."""
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_dem import Mesh, checked_mesh
+from taichi_dem import CONCRETE, Mesh, checked_mesh, effects
 from taichi_dem.kit.validation import whole
 from taichi_dem.mesh.shapes import bar, single
 from taichi_dem.mesh.tetrahedra import area_vectors
+
+#: Blocks that stand on a plate by weight and friction: acceleration [m/s2], down along x; springs
+#: softer than those of concrete, for long steps: a block sinks in by a micrometre; step [s].
+GRAVITY, SOFT, STEP = 9.81, 0.01, 1e-5
 
 
 def with_moved_nodes(mesh: Mesh, most: ArrayLike, seed: int) -> Mesh:
@@ -102,3 +108,18 @@ def hexahedron(place):
 def brick(size, corner=(0.0, 0.0, 0.0)):
     """A block of six bodies with edges ``size`` [m] from a corner on."""
     return hexahedron(lambda unit: np.asarray(corner) + unit * np.asarray(size, dtype=float))
+
+
+def softened(friction):
+    """Concrete with all springs softer."""
+    names = ("normal_stiffness", "shear_stiffness", "contact_stiffness")
+    dashpots = ("normal_damping", "shear_damping", "contact_damping")
+    values = {name: SOFT * getattr(CONCRETE, name) for name in names}
+    values.update({name: SOFT**0.5 * getattr(CONCRETE, name) for name in dashpots})
+    return replace(CONCRETE, friction=friction, fracture_energy=1e5, **values)
+
+
+def loose(weight=(-GRAVITY, 0.0, 0.0), fixed=("plate_left",), **contact):
+    """Effects of blocks that touch and stick, on plates that are held at groups ``fixed``."""
+    touch = effects.BondDamping(), effects.BodyContact(**contact), effects.StickingFriction()
+    return [*touch, effects.Gravity(tuple(weight)), *map(effects.Fixed, fixed)]

@@ -13,20 +13,18 @@ from taichi_dem.kit.terminal import aligned, lasting_output, show_heading
 from taichi_dem.kit.validation import shown
 from taichi_dem.kit.version import __version__
 
-_ROOT = Path(__file__).resolve().parents[2]
-_IS_CHECKOUT = (_ROOT / "experiments" / "_gallery_pages.txt").is_file()
-
 
 def run(
     package: ModuleType,
     parts: Mapping[str, ModuleType],
     arguments: Sequence[str] | None = None,
 ) -> int:
-    """Print what a package offers, and its experiments."""
+    """Print what a package offers."""
     given = sys.argv[1:] if arguments is None else [*arguments]
     if given[:1] == ["demo"]:
         return import_module(f"{package.__name__}.demo").main(given[1:])
-    demo = _docstring(Path(str(package.__file__)).with_name("demo.py"))
+    script = Path(str(package.__file__)).with_name("demo.py")
+    demo = _first_line(ast.get_docstring(ast.parse(script.read_bytes())))
     parser = argparse.ArgumentParser(
         prog=f"python -m {package.__name__}",
         description=f"List what {package.__name__} offers, with the first line of each docstring. "
@@ -39,8 +37,6 @@ def run(
         for title, module in {**parts, "Scenes, runs and results": package}.items():
             _show(title, _rows(module))
         _show("Demonstration", [(f"python -m {package.__name__} demo", demo)])
-        if _IS_CHECKOUT:
-            _show(f"Experiments, in {_ROOT}", _experiments())
     return 0
 
 
@@ -62,17 +58,6 @@ def _rows(module):
 
 def _is_own(name, thing, module):
     return name[0] != "_" and getattr(thing, "__module__", "") == module.__name__
-
-
-def _experiments():
-    """Rows of the scripts of a checkout; they are read, not run."""
-    for path in sorted((_ROOT / "experiments").glob("[a-z]*.py")):
-        yield f"python experiments/{path.name}", _docstring(path)
-
-
-def _docstring(path):
-    """First line of the docstring of a script."""
-    return _first_line(ast.get_docstring(ast.parse(path.read_bytes())))
 
 
 def _first_line(docstring):

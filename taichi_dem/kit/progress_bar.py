@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from taichi_dem.kit.progress import Listener, Pace, Progress, listening
-from taichi_dem.kit.validation import fraction, instance, progress_option, shown, whole
+from taichi_dem.kit.validation import instance, progress_option, shown, whole
 
 #: Least time between two updates of a cell in Jupyter [s].
 _NOTEBOOK_SECONDS = 0.2
@@ -66,17 +66,6 @@ class ProgressBar:
             raise TypeError(f"a progress bar takes a Progress, got {shown(progress)}")
         if self._show:
             self._show(progress)
-
-    def at(self, share: float) -> None:
-        """Show the progress of a job that knows only its share.
-
-        Parameters
-        ----------
-        share : float
-            Share that is done, from 0 to 1.
-        """
-        fraction("share", share)
-        self(Progress(share, time.perf_counter() - self._started))
 
     def count(self, done: int, total: int) -> None:
         """Show how many runs of a job are done.

@@ -137,13 +137,7 @@ def _free_engines():
 
 
 def when_cleared(forget: Callable[[], object]) -> None:
-    """Have a function called by ``clear`` and ``stop``.
-
-    Parameters
-    ----------
-    forget : callable
-        Function without arguments.
-    """
+    """Have a function called by ``clear`` and ``stop``."""
     _on_clear.append(forget)
 
 
@@ -165,15 +159,7 @@ def _check_process():
 
 
 def check_session(made_in: Session, what: str) -> None:
-    """Refuse a session that is not the present one, intact, and used by its own thread.
-
-    Parameters
-    ----------
-    made_in : Session
-        Session to check.
-    what : str
-        Whose session it is, in words, such as "simulation".
-    """
+    """Refuse a session that is not the present one, intact, and used by its own thread."""
     if made_in.cleared:
         raise InputError(f"the memory of this {what} has been given back by runtime.clear()")
     _check_process()
@@ -188,13 +174,7 @@ def check_session(made_in: Session, what: str) -> None:
 
 
 def check_thread(what: str) -> None:
-    """Refuse another thread than the one that started Taichi.
-
-    Parameters
-    ----------
-    what : str
-        What is made, used or ended there, in words.
-    """
+    """Refuse another thread than the one that started Taichi."""
     if threading.get_ident() != session().thread:
         raise InputError(
             f"a {what} must be made, used and ended on the thread that called runtime.start(): "

@@ -63,17 +63,6 @@ def read_mesh(
         Accept distinct points at one place, and leave the faces on them unbonded, as at a joint or
         a crack (see ``checked_mesh``).
 
-    Returns
-    -------
-    Mesh
-        The checked mesh; ``notes`` lists repairs and unread data.
-
-    Raises
-    ------
-    InputError
-        The file is missing, cannot be read, or holds no solid cells or cells that cannot be cut; or
-        ``checked_mesh`` refuses its mesh.
-
     Notes
     -----
     Groups come from Gmsh's physical surfaces ("physical_TAG" where they have no name); in other

@@ -266,11 +266,6 @@ def checked_mesh(
     body_groups : mapping, optional
         Numbers of tetrahedra (k,) by name.
 
-    Returns
-    -------
-    Mesh
-        The checked mesh; its ``notes`` say what was repaired.
-
     Notes
     -----
     Repaired are negative volumes, points without a tetrahedron, and faces twice in a group.

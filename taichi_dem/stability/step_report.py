@@ -157,11 +157,6 @@ def step_report(scene: Scene) -> StepReport:
     scene : Scene
         Scene to judge.
 
-    Returns
-    -------
-    StepReport
-        Largest stable step of each body by criterion and method. Print it for a table.
-
     Notes
     -----
     Limits hold for a pair of equal bodies that move against each other: no mesh has a smaller

@@ -15,8 +15,7 @@ from taichi_dem import InputError, SimulationDiverged, runtime, simulate
 from taichi_dem.observers import Every
 from taichi_dem.report.energy_balance import unexplained_share
 from tests.attack.scenes import BLASTS, DAMPERS, Draws, blast, damper
-from tests.paper import expected
-from tests.rounding import momentum_rounding
+from tests.damper import expected, momentum_rounding
 
 pytestmark = pytest.mark.attack
 

@@ -13,7 +13,7 @@ from ca_damper import excitation
 from taichi_dem import effects, goals
 from taichi_dem.mesh.mesh import with_inner_group
 from taichi_dem.mesh.shapes import bar, pair, single
-from tests.made_response import response
+from tests.damper import response
 from tests.made_result import made_result
 
 METHOD = td.Uniform(1e-7)

@@ -15,8 +15,7 @@ GIVEN = """goals.Result Answer Branch Progress Received RunView AmplitudeRespons
     BestDamper Certificate CollectAndCollide DamperMap Report Response SimulationDiverged
     StructureHistory Sweep TimeHistory runtime.Settings""".split()
 #: Functions that need more than values to be tried: processes, an STL file, or a session.
-APART = """sweep parameter_grid shapes.from_surface methods.order_of methods.structure_of
-    runtime.check_session runtime.check_thread runtime.when_cleared""".split()
+APART = ("sweep", "parameter_grid", "shapes.from_surface")
 #: Methods that the packages call themselves.
 INSIDE = {"values", "take_up", "checkpointed", "record"}
 

@@ -19,7 +19,7 @@ from ca_damper import (
 from ca_damper.accuracy.estimate import SeedValues, estimate
 from ca_damper.accuracy.runs import SceneKey, SceneRuns
 from ca_damper.report.peak_search import PeakSearch
-from tests.paper import paper
+from tests.damper import paper
 
 PAPER = Oscillator()
 QUIET = {"progress": None}

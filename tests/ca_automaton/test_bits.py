@@ -6,8 +6,8 @@ import taichi as ti
 
 from ca_damper import Automaton
 from tests.ca_automaton.shaken import Shaken
+from tests.damper import paper
 from tests.equivalence.test_digests import digest
-from tests.paper import paper
 
 TRAVERSALS = "list", "scan"
 SHAKEN = {"amplitude": 24e-3, "traced": 1200}

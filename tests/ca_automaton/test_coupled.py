@@ -9,7 +9,7 @@ from ca_damper import Automaton, Batch, Oscillator, SceneTable, needed_effects
 from ca_damper.plot.boxes import Box
 from ca_damper.report.certificate import checked_range
 from taichi_dem.kit.allocation import assign, values
-from tests.paper import expected, paper
+from tests.damper import expected, paper
 
 MASS, WIDTH, GRAVITY, DT = 0.2e-3, 6e-3, 10.0, 1e-4
 OSCILLATOR = Oscillator()

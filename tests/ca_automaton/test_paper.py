@@ -8,7 +8,7 @@ from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.automaton.accounting import QUANTUM
 from ca_damper.automaton.lattice import DOWN, DOWN_LEFT, DOWN_RIGHT, EMPTY, HELD, UP, WALL
 from tests.ca_automaton.shaken import Shaken
-from tests.paper import ejecting, paper
+from tests.damper import ejecting, paper
 
 WIDTH, MASS, GRAVITY, DT, RESTITUTION = 6e-3, 0.2e-3, 10.0, 1e-4, 0.75
 FREQUENCY = 6.0

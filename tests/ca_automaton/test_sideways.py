@@ -9,7 +9,7 @@ from ca_damper import Automaton, damper_map
 from ca_damper.automaton.accounting import QUANTUM
 from ca_damper.errors import InputError
 from tests.ca_automaton.shaken import Shaken
-from tests.paper import paper
+from tests.damper import paper
 
 G, HZ, DT, FRICTION = 9.8, 10.0, 1e-4, 0.5
 LYING = Automaton(gravity=(G, 0.0))

@@ -16,7 +16,7 @@ from ca_damper import (
     sweep_up_and_down,
 )
 from tests.ca_oscillator.kicks import Kicks
-from tests.made_response import response
+from tests.damper import response
 
 PAPER = Oscillator()
 F0 = PAPER.natural_frequency

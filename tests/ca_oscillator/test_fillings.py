@@ -8,7 +8,7 @@ import pytest
 
 from ca_damper import Automaton, Batch, Place, RigidMass, SceneTable, Spheres, film
 from ca_damper.errors import InputError
-from tests.paper import expected, paper
+from tests.damper import expected, paper
 
 DT = {"Spheres": 2e-5}
 SMALL = {"columns": 6, "rows": 9, "width": 4e-3, "particle_mass": 0.08e-3, "restitution": 0.5}

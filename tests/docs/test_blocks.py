@@ -9,14 +9,13 @@ import pytest
 
 from taichi_dem import CONCRETE, runtime
 from tests.docs.pages import FOLDER, PAGES, blocks, lines
-from tests.processes import users_environment
-from tests.terminal import phases_of
+from tests.processes import phases_of, users_environment
 
 pytestmark = pytest.mark.experiment
 
 #: Blocks that a process of their own runs: the first one that a user sees, and those that start
 #: processes themselves. All others share the session, and so the engines, of the tests.
-APART = ("README.md", 0), ("docs/sweeps.md", 0), ("docs/sweeps.md", 1)
+APART = ("README.md", 0), ("docs/sweeps.md", 0)
 BLOCKS = [(page, number) for page in PAGES for number in range(len(blocks(page)))]
 # Those of the damper last: the first engine of the session is then that of the first block, whose
 # process has left its kernels on the disk. They are found only where they are the first there too.

@@ -21,7 +21,7 @@ from taichi_dem.kit.taichi_patches.addresses import LARGE
 from taichi_dem.kit.taichi_patches.names import are_on
 from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.shapes import bar, single
-from tests import arch
+from tests.processes import chosen_arch
 from tests.scenes import struck_bar
 from tests.structures import filled
 
@@ -136,7 +136,7 @@ def test_an_engine_goes_on_to_the_next_when_its_simulation_is_gone_or_closed():
             call()
 
 
-@pytest.mark.skipif(arch.chosen() != "cpu" or not are_on(), reason="it clears by a kernel")
+@pytest.mark.skipif(chosen_arch() != "cpu" or not are_on(), reason="it clears by a kernel")
 def test_cleared_memory_is_zero_to_the_last_byte():
     """That of a list so long that its pages are given back, and of one that begins in a page."""
     for count in (1000, LARGE // 8 + 1000):

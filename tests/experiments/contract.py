@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 
 from gallery import TOOLS
-from tests import arch
-from tests.processes import users_environment
+from tests.processes import chosen_arch, users_environment
 
 READER = Path(__file__).resolve().parents[1] / "figures.py"
 FOLDER = Path(__file__).resolve().parents[2] / "experiments"
@@ -24,7 +23,7 @@ def command(name, *arguments, report=None):
     report: file for what its figures lack, see ``tests.figures``.
     """
     read = [] if report is None else [str(READER), str(report)]
-    everywhere = ["--threads", "2", "--arch", arch.chosen()]
+    everywhere = ["--threads", "2", "--arch", chosen_arch()]
     return [sys.executable, *read, str(FOLDER / f"{name}.py"), *everywhere, *map(str, arguments)]
 
 

@@ -15,7 +15,7 @@ from _bench import Figure
 from taichi_dem.kit import runtime
 from taichi_dem.kit.study.entries import ENTRIES, read_entries
 from tests.experiments.contract import FOLDER, NAMES, rows_of, start
-from tests.terminal import phases_of
+from tests.processes import phases_of
 
 ENTRY = {entry.name: entry for entry in read_entries(FOLDER / ENTRIES)}
 #: Those that the fast suite runs: a damper, a struck bar.

@@ -12,8 +12,7 @@ import pytest
 import blast_fracture
 from taichi_dem.kit import study
 from tests.experiments.contract import command
-from tests.processes import users_environment
-from tests.terminal import phases_of, run_in_terminal
+from tests.processes import phases_of, run_in_terminal, users_environment
 
 pytestmark = pytest.mark.experiment
 

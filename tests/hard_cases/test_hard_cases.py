@@ -9,8 +9,8 @@ import math
 import pytest
 
 from ca_damper import InputError
-from cases.hard import CASES
-from cases.hard.cases import Case, assess
+from cases.hard import Case, assess
+from hard_cases import CASES
 
 pytestmark = pytest.mark.experiment
 

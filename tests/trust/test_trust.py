@@ -5,9 +5,9 @@ At quick size; ``experiments/trust.py`` has them at full size and draws them.
 
 import pytest
 
-from cases.trust import MEASURES
-from cases.trust.cases import Effort
+from cases.trust import Effort
 from crack_direction import ALLOWED, TURN, broken_plate
+from trust import MEASURES
 
 pytestmark = pytest.mark.experiment
 

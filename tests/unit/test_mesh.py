@@ -25,7 +25,7 @@ from taichi_dem.mesh.topology import (
     spheres_of_faces,
     topology_of,
 )
-from tests.turns import matrix, quaternion
+from tests.scenes import matrix, quaternion
 
 # Two tetrahedra on both sides of the triangle 0 1 2, apexes 3 (z > 0) and 4 (z < 0).
 POINTS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, 1], [0.2, 0.2, -1]]

@@ -10,7 +10,7 @@ from taichi_dem import CONCRETE, ProgressBar, Scene, Uniform, simulate
 from taichi_dem.kit import progress_bar
 from taichi_dem.kit.progress import Progress
 from taichi_dem.mesh.shapes import bar
-from tests.terminal import phases_of
+from tests.processes import phases_of
 
 HOUR = 3600.0
 

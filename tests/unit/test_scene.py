@@ -24,9 +24,8 @@ from taichi_dem import (
 from taichi_dem.kit.likely_units import UnitWarning
 from taichi_dem.mesh.shapes import bar, placed_together, single
 from taichi_dem.scene import outer_faces_warnings
-from tests.scenes import beside
+from tests.scenes import beside, matrix, quaternion
 from tests.structures import filled
-from tests.turns import matrix, quaternion
 
 BAR = bar(0.2, 0.05, (4, 1, 1))
 SIDE, FALL, HELD = "base", effects.Gravity(), effects.Fixed("first_left")

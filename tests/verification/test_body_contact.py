@@ -21,7 +21,7 @@ from taichi_dem.kit.allocation import assign, values
 from taichi_dem.mesh.shapes import bar, placed_together, single
 from taichi_dem.physics.rotation import place_in
 from taichi_dem.simulate import run_simulation
-from tests.turns import matrix, quaternion
+from tests.scenes import matrix, quaternion
 
 LOSSLESS = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0, friction=0.0)
 STIFFNESS = CONCRETE.normal_stiffness

@@ -10,8 +10,8 @@ import pytest
 from taichi_dem import CONCRETE, effects
 from taichi_dem.mesh import shapes as mesh_shapes
 from tests.probe import BondProbe
+from tests.scenes import matrix, product, quaternion
 from tests.structures import filled
-from tests.turns import matrix, product, quaternion
 
 EDGE = 0.05
 EPS = np.finfo(float).eps

@@ -24,9 +24,8 @@ from taichi_dem import effects as listed
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, single
 from taichi_dem.state.timeline import MACRO_TICKS
-from tests.scenes import brisk_scene
+from tests.scenes import brisk_scene, matrix, quaternion
 from tests.structures import filled
-from tests.turns import matrix, quaternion
 
 EPS = np.finfo(float).eps
 #: Largest step [s] and distance [m] of explicit runs; half of both in finer ones.

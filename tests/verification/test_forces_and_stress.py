@@ -26,9 +26,8 @@ from taichi_dem.mesh.topology import face_vertices, faces_of_group
 from taichi_dem.output.record import Recorder
 from taichi_dem.state.model import column_of, names_of
 from tests.made_result import made_result
-from tests.scenes import paper_effects
+from tests.scenes import matrix, paper_effects, quaternion
 from tests.structures import POST, filled
-from tests.turns import matrix, quaternion
 
 EPS = np.finfo(float).eps
 #: Relative error of what is in equilibrium, which the damped runs below reach.

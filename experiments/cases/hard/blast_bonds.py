@@ -7,8 +7,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from cases.closed_forms import LinearBonds
+from cases.hard import Cases
 from cases.hard.blast_run import ACCURACY, AREA, EPS, FREE, TOUCHING, Run, X, apart
-from cases.hard.cases import Cases
 from cases.meshes import with_neighbours
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
 from taichi_dem.mesh.mesh import checked_mesh

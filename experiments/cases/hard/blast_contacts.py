@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from cases.closed_forms import damped_opening, velocity_after_impact
+from cases.hard import Cases
 from cases.hard.blast_run import EDGE, FREE, TOUCHING, Run, X
-from cases.hard.cases import Cases
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single

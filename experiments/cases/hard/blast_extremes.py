@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from cases.hard import Cases
 from cases.hard.blast_bonds import free
 from cases.hard.blast_run import AREA, EDGE, FREE, MASS, TOUCHING, Run, X, apart
-from cases.hard.cases import Cases
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Uniform, simulate
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single

@@ -5,10 +5,9 @@ from functools import partial
 import numpy as np
 from scipy.optimize import linprog
 
+from cases.hard import Cases
 from cases.hard.blast_run import Run
-from cases.hard.cases import Cases
-from cases.meshes import brick, hexahedron
-from cases.piles import GRAVITY, STEP, loose, softened
+from cases.meshes import GRAVITY, STEP, brick, hexahedron, loose, softened
 from taichi_dem import ImplicitDashpots
 from taichi_dem.mesh.mesh import with_inner_group
 from taichi_dem.mesh.shapes import bar, placed_together

@@ -4,8 +4,7 @@ import numpy as np
 
 from ca_damper import Batch, SceneTable, SimulationDiverged
 from ca_damper.plot.boxes import Box
-from cases.hard import damper_run
-from cases.hard.cases import Cases
+from cases.hard import Cases, damper_run
 from cases.hard.damper_run import ALL, AUTOMATA, EXACT, SPHERES, drive, fall, filling, spring
 
 case = CASES = Cases("damper")

@@ -3,8 +3,7 @@
 import numpy as np
 
 from ca_damper import Automaton, Batch, Empty, RigidMass, SceneTable, Spheres
-from cases.hard import damper_run
-from cases.hard.cases import Cases
+from cases.hard import Cases, damper_run
 from cases.hard.damper_run import AUTOMATA, EXACT, OSCILLATOR, SPHERES, drive, fall, filling
 
 case = CASES = Cases("damper")

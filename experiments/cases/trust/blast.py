@@ -4,7 +4,7 @@ import numpy as np
 
 from cases.blast import BLOCK_STEP, FROM_RADII, HOLE_RADIUS, paper_effects
 from cases.meshes import mirrored_copies, with_moved_nodes
-from cases.trust.cases import Number
+from cases.trust import Number
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.mesh.shapes import in_space_order
 from taichi_dem.mesh.tetrahedra import all_faces, outer_rows

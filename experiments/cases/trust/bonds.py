@@ -7,7 +7,7 @@ import numpy as np
 
 from cases.strength_tests import TESTS
 from cases.strength_tests import disc as disc_mesh
-from cases.trust.cases import Number
+from cases.trust import Number
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import checked_mesh, with_inner_group

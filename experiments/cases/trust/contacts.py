@@ -5,8 +5,8 @@ from functools import partial
 import numpy as np
 
 from ca_damper import Batch, SceneTable, Spheres
-from cases.piles import GRAVITY, STEP, loose, softened
-from cases.trust.cases import Number
+from cases.meshes import GRAVITY, STEP, loose, softened
+from cases.trust import Number
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, placed_together

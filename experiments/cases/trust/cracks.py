@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cases.trust.cases import Number
+from cases.trust import Number
 from cases.trust.plates import material_of, plate, springs_step
 from taichi_dem import ImplicitDashpots, Scene, Simulation, effects, simulate
 from taichi_dem.kit.errors import InputError

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from cases.trust.cases import Number
+from cases.trust import Number
 from cases.trust.plates import material_of, plate, springs_step
 from taichi_dem import ImplicitDashpots, Scene, Simulation, Uniform, effects, simulate
 

@@ -1,7 +1,7 @@
 """Tools of a study: options, tables, figures of a summary, timings, processes."""
 
+from taichi_dem.kit.children import call_in_process
 from taichi_dem.kit.provenance import processor
-from taichi_dem.kit.study.costly_work import call_in_process
 from taichi_dem.kit.study.program import (
     Parser,
     accuracy_sources,

@@ -92,12 +92,6 @@ def sweep(
         ``version``, ``commit``, ``machine``, ``seconds`` on the wall. All but the last three are
         the same bits wherever a row ran.
 
-    Raises
-    ------
-    InputError
-        For a bad argument, a folder without space, a client that is lost, or
-        where ``distributed`` is not installed; finished rows are kept in ``out``.
-
     Notes
     -----
     A row that fails has the sentence in the column ``error`` and does not stop the others. A row

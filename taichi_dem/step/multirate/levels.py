@@ -70,13 +70,10 @@ class LevelLimit:
 
 @ti.data_oriented
 class AppliedUntil:
-    """Tick up to which each bond and pair has applied its impulse, where bodies may be woken early.
+    """Tick up to which each bond and pair slot has applied its impulse, where bodies may be woken.
 
-    A bond applies its impulse for the coming step of the finer body at once. When that body is
-    woken and takes a shorter step, the bond becomes active although its impulse reaches ahead of
-    the clock: it applies no more until that tick. This is a time of the coarser step and so of any
-    finer one: no impulse is ever applied in part.
-    bond, pair: that tick for every bond, and for every slot of the pair store.
+    A bond applies its impulse for the coming step of the finer body at once. If that body is woken
+    and takes shorter steps, the bond applies no more until that tick, a time of any finer step.
     """
 
     def __init__(self, clock: Clock):
