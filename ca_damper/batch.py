@@ -386,7 +386,7 @@ class Batch(LoadedScenes):
         identity = {**own, **identity}
         arrays = opened(checkpoint, resume, lambda: identity)
         self._compile()
-        saved = RunSnapshot(identity, self.memory, {"batch": self, **dict(owners)})
+        saved = RunSnapshot(identity, lambda: self.memory, {"batch": self, **dict(owners)})
         if arrays:
             saved.restore(arrays, resume)
         with CheckpointWriter(checkpoint, saved, self._now) as self.writer:

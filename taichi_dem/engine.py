@@ -48,10 +48,7 @@ class Structure:
 class BlastEngine(Engine):
     """Tables, state, contact search, schedule, step and drivers of one structure."""
 
-    advice = (
-        "take a smaller mesh, or shorter contact lists (pairs_per_body, spheres_per_body, "
-        "neighbours_per_body)"
-    )
+    advice = "take a smaller mesh"
     counted = "bodies"
 
     def declare(self) -> None:

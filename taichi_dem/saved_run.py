@@ -41,6 +41,10 @@ def writer_of(
         return CheckpointWriter()
     run = saved_run(simulation, recorder)
     if arrays:
+        room = arrays.get("simulation/room")
+        # Any other is refused where it is compared.
+        if np.shape(room) == np.shape(simulation.engine.capacity):
+            simulation.make_room(room.tolist())
         run.restore(arrays, resume)
     return CheckpointWriter(checkpoint, run, lambda: (simulation.macro_step, simulation.time_s))
 
@@ -49,7 +53,7 @@ def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
     """All that a checkpoint holds of a started simulation, a ``restart.RunSnapshot``."""
     parts = {"simulation": simulation, **simulation.followed.kept, "recorder": recorder}
     identity = run_identity(simulation.scene, simulation.method)
-    return RunSnapshot(identity, FieldMemory(simulation.engine), parts)
+    return RunSnapshot(identity, lambda: FieldMemory(simulation.engine), parts)
 
 
 def run_identity(scene: Scene, method: Method) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.progress import compiling
 from taichi_dem.kit.validation import choice, flag, instance, shown, whole
 from taichi_dem.methods import Method
@@ -145,13 +146,16 @@ class Simulation:
 
     def _load(self):
         with self._undivided("its scene was loaded"):
-            numbers = self.scene.max_speed, self.scene.sleep or 0.0
-            self.engine.load(self.model, self.method, *numbers)
+            self._load_engine()
             if self.scene.initial_motion:
                 self.state.set_motion(self.model.centre, **self.scene.initial_motion)
             self._followed: Any = None
             self.run_seconds = self.run_cpu_seconds = 0.0
             self.first_motion: dict[str, np.ndarray] = {}
+
+    def _load_engine(self):
+        numbers = self.scene.max_speed, self.scene.sleep or 0.0
+        self.engine.load(self.model, self.method, *numbers)
 
     @contextlib.contextmanager
     def _undivided(self, what: str) -> Iterator[None]:
@@ -232,7 +236,7 @@ class Simulation:
             compiling("contact search", 3, PARTS)
             self.broad_phase.ask(everywhere=True)
         self.driver.prepare()
-        self._check_capacity()
+        self._find_room()
         if self.schedule.controlled and len(self.readings.near_bodies()):
             # Steps follow the contacts that were found, before velocities are set half a step back.
             self.step.start(0)
@@ -286,9 +290,10 @@ class Simulation:
             with self.readings.held():
                 # A runaway fills the lists: it is named first.
                 self.followed.divergence_check.check(hurried=bool(values(self.state.tick) < end))
-                self._check_capacity()
                 if on_call is not None:
                     on_call()
+            with self._undivided("its contact lists grew"):
+                self._find_room()
 
     @contextlib.contextmanager
     def _timed(self):
@@ -300,9 +305,31 @@ class Simulation:
             self.run_seconds += time.perf_counter() - wall
             self.run_cpu_seconds += time.process_time() - cpu
 
-    def _check_capacity(self):
-        if self.contacts is not None:
-            self.broad_phase.check_capacity()
+    def _find_room(self):
+        """Make a search for which the lists had no room again, with longer ones."""
+        while self.contacts is not None and any(lacking := self.broad_phase.lacking()):
+            started = time.perf_counter()
+            self.broad_phase.ask_again()
+            self.make_room((0, 0, *(n + n // 8 for n in lacking)))
+            self.driver.prepare()
+            self.compile_seconds += time.perf_counter() - started
+
+    def make_room(self, room: Sequence[int]) -> None:
+        """Go on, with the same bits, in an engine with at least so much room (``Capacity``)."""
+        old = self.engine
+        wanted = [max(pair) for pair in zip(old.capacity, room)]
+        if wanted == [*old.capacity]:
+            return
+        compiling("longer contact lists", 3, PARTS)
+        arrays, name = FieldMemory(old).read(), self.driver.name
+        self._engine = ENGINES.borrow(old.structure, wanted, self.model, self)
+        self._load_engine()
+        FieldMemory(self._engine).write(arrays)
+        self.driver = self._engine.drivers[name]
+        self.driver.follow(old.drivers[name])
+        if self._followed is not None:
+            vars(self._followed.run).update(vars(self.parts))
+        ENGINES.free(old)
 
     @property
     def searches(self) -> int:
@@ -311,7 +338,8 @@ class Simulation:
 
     def saved(self) -> dict[str, np.ndarray]:
         """Data for a checkpoint beside the fields, arrays by name."""
-        return {"cost": np.array([self.run_seconds, self.run_cpu_seconds])}
+        cost = np.array([self.run_seconds, self.run_cpu_seconds])
+        return {"cost": cost, "room": np.array(self.engine.capacity)}
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
         """Restore the data that ``saved`` returned."""

@@ -29,8 +29,6 @@ EDGE, STIFFNESS, DAMPING, PEAK = (-2, -1), (-0.3, 0.5), (-1.5, 0.3), (6.5, 8.7)
 LASTS, RISES, TOLERANCE = (0.0, 1.3), (-1.0, 0.5), (-2.5, -1.0)
 #: Shares of the bars that have dashpots, that may break, and that are fixed at one end.
 DAMPED, BREAKING, FIXED = 0.85, 0.6, 0.4
-#: Room in the lists of contacts: a bar that is crushed needs more than a block that is blasted.
-LISTS = {"pairs_per_body": 200, "neighbours_per_body": 500}
 PAPER = ca.Automaton(ca.Paper())
 #: Fillings by how often they are drawn, in tenths.
 FILLINGS = (
@@ -148,7 +146,7 @@ def _effects(random, travel):
         found.append(effects.BondDamping())
     if random.random() < BREAKING:
         found += [effects.Softening(), effects.ShearSlip()]
-        found += [effects.BodyContact(**LISTS), effects.StickingFriction()]
+        found += [effects.BodyContact(), effects.StickingFriction()]
     if random.random() < FIXED:
         found.append(effects.Fixed("right"))
     return found

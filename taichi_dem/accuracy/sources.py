@@ -131,9 +131,8 @@ def finer_law(law: Any) -> tuple[Any, float]:
         parts = min(2 * geometry.parts, MOST_PARTS)
         if parts == geometry.parts:
             return None, math.nan
-        lists = geometry.skin, geometry.neighbours_per_body, geometry.pairs_per_body
         made = copy.copy(law)
-        made.geometry = BodyGeometry(parts, geometry.outer_faces, *lists)
+        made.geometry = BodyGeometry(parts, geometry.outer_faces, geometry.skin)
         return made, 1.0 / (1.0 - (geometry.parts / parts) ** 2)
     if isinstance(law, SphereContact):
         return BodyContact(_FINE, geometry.outer_faces), 1.0

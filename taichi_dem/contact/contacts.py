@@ -14,7 +14,7 @@ from taichi_dem.physics.sphere_pair import DEEPEST_SHARE, SUNK, Nearest
 from taichi_dem.state.model import Model
 from taichi_dem.state.pair_store import PairStore
 from taichi_dem.state.state import State
-from taichi_dem.state.tables import SPARE_PAIRS, SPARE_SPHERES, Tables
+from taichi_dem.state.tables import Tables
 
 #: Largest steps that a fast body makes before it is searched again.
 STEPS = 16.0
@@ -41,7 +41,7 @@ class Contacts:
         self.tables, self.state = tables, state
         self.law, self.geometry = tables.contact, tables.geometry
         self.pace = ti.field(real, shape=2)
-        self.store = PairStore(n, capacity.pair_entries, capacity.sphere_entries)
+        self.store = PairStore(n, capacity.pair_entries, capacity.contact_entries)
         for effect in tables.effects:
             effect.declare_columns(self.store)
         self.free = ti.field(ti.i32, shape=n)
@@ -52,12 +52,10 @@ class Contacts:
 
     def load(self, model: Model, method: Method) -> None:
         """Load the numbers of a scene and a method; no pairs exist yet."""
-        effect, n = model.geometry, model.body_count
+        effect = model.geometry
         assign(self.outer_waits, int(effect.outer_faces == ONCE_BROKEN))
         assign(self.skin, effect.skin * model.spheres.extent)
         assign(self.pace, np.array([method.dt0, method.steps_ahead]))
-        assign(self.store.slot_limit, n * effect.pairs_per_body + SPARE_PAIRS)
-        assign(self.store.sphere_limit, n * effect.spheres_per_body + SPARE_SPHERES)
 
     @ti.func
     def gap(self, i, j, a, b):
@@ -272,9 +270,13 @@ class Breaks:
     def _end(self, one):
         # A second search at the tick of a break must not book its injection again.
         self.fresh[None] = ti.cast(self.latest[None] > self.state.injected_tick[None], ti.i32)
-        self.state.injected_tick[None] = self.latest[None]
         if self.contacts.outer_waits[None] == ENDING:
             self.contacts.outer_waits[None] = 0
+
+    @ti.func
+    def end_search(self):
+        """What these breaks inject has been booked."""
+        self.state.injected_tick[None] = self.latest[None]
 
     @ti.func
     def is_free(self, i):

@@ -11,6 +11,9 @@ Invariants, at any tick between two searches:
 So a search visits the bodies that have come near their horizon or that a break has set free, and
 compares the pairs of which ``until`` lies below the new horizons. Results do not depend on the
 times of searches.
+
+A search that finds no room for what it would list changes no pair and no impulse: made again with
+more room, it gives the same bits.
 """
 
 from typing import Any, Protocol
@@ -21,7 +24,6 @@ from taichi_dem.contact.contacts import Breaks, Contacts
 from taichi_dem.contact.verlet_list import NearPairs, VerletList
 from taichi_dem.kit import backend
 from taichi_dem.kit.allocation import assign, values
-from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.ordered import Once, Phases, RunningSums, Some, tasks
 from taichi_dem.kit.products import norm
 from taichi_dem.kit.types import vec4
@@ -34,7 +36,6 @@ FREE, VISITED, COMPARED = 1, 2, 3
 FAR = 0.6
 #: Skins beyond their margin within which the gap of two bodies is found; others count as farther.
 OUTLOOK = 3.5
-_CAPACITIES = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 
 
 class PairListener(Protocol):
@@ -60,7 +61,7 @@ class BroadPhase:
         self.free_count = ti.field(ti.i32, shape=())
         self.neighbours = VerletList(contacts)
         self.searched = ti.field(ti.i64, shape=())
-        self.everywhere = ti.field(ti.i32, shape=())
+        self.everywhere, self.again = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.breaks = Breaks(contacts)
         self.near_pairs = NearPairs(contacts, self.neighbours)
         self.full = self.near_pairs.full
@@ -74,8 +75,8 @@ class BroadPhase:
         self.tasks = tasks(self.phases, n)
 
     def load(self, model: Model, method: Method) -> None:
-        """Load the limits of the lists; the first search makes all of them."""
-        self.neighbours.load(model, method)
+        """Load a scene; the first search makes all lists."""
+        self.neighbours.forget()
         self.breaks.load(model)
 
     def ask(self, everywhere: bool = False) -> None:
@@ -83,31 +84,35 @@ class BroadPhase:
         assign(self.everywhere, int(everywhere))
         assign(self.contacts.search_requested, 1)
 
-    def renew(self) -> None:
-        """Update the lists, a parallel loop a phase, until no search is requested."""
+    def renew(self) -> bool:
+        """Update the lists, a parallel loop a phase; whether there was room for them."""
         while values(self.contacts.search_requested):
             self._search()
+        return not values(self.full)
 
     def search(self, everywhere: bool = True) -> None:
-        """Renew the lists now. Raises InputError when they exceed their capacity."""
+        """Renew the lists now, as far as there is room (``lacking``)."""
         if everywhere:
             # Bodies may have been moved by hand.
             self.geometry.forget_paths()
         self.ask(everywhere)
         self.renew()
-        self.check_capacity()
 
-    def check_capacity(self) -> None:
-        """Raise InputError when lists exceed the capacity that the scene gave them."""
-        option = _CAPACITIES[int(values(self.full))]
-        if option:
-            law = type(self.contacts.law).__name__
-            if option == "spheres_per_body":
-                option = self.geometry.entries_by
-            raise InputError(
-                f"contact lists are full: give {law} a larger {option}, or move "
-                "overlapping solids apart"
-            )
+    def lacking(self) -> tuple[int, int, int]:
+        """Least lengths of the lists of pairs, contacts and neighbours, where they lack room."""
+        if not values(self.full):
+            return 0, 0, 0
+        pairs, contacts = values(self.near_pairs.lacking).tolist()
+        return pairs, contacts, int(values(self.neighbours.lacking))
+
+    def ask_again(self) -> None:
+        """Request the search again for which there was no room."""
+        if values(self.neighbours.lacking):
+            self.neighbours.forget()
+        else:
+            self.neighbours.renew_all()
+        assign(self.again, 1)
+        assign(self.contacts.search_requested, 1)
 
     def _phases(self, n) -> Phases:
         """Phases of a search in order, for at most n bodies."""
@@ -120,7 +125,7 @@ class BroadPhase:
             (bodies, self._mark_free),
             *self.listing.phases,
             # Which of them have used up their skin, or were set free.
-            (free, self._choose),
+            (Some(self._unchosen, n), self._choose),
             (Once(), self._begin),
             # Rows of neighbours: made anew from a grid of cells, or with escaped bodies added.
             (anew, self.neighbours.list_anew),
@@ -177,6 +182,11 @@ class BroadPhase:
         return self.free_count[None]
 
     @ti.func
+    def _unchosen(self):
+        """Number of free bodies, or 0 in a search that is made again, which has compared them."""
+        return self.free_count[None] * (1 - self.again[None])
+
+    @ti.func
     def _all_amended(self):
         return self.neighbours.amending() * self.tables.body_count[None]
 
@@ -188,16 +198,16 @@ class BroadPhase:
 
     @ti.func
     def _end_pairs(self, one):
-        """Take over the numbers of pairs; no list of them holds any when one is full."""
-        if self.neighbours.full[None] == 1:
-            self.full[None] = 3
+        """Take over the numbers of pairs."""
         self.neighbours.end()
         self.near_pairs.end()
 
     @ti.func
     def _end(self, one):
-        self.everywhere[None] = 0
-        self.searches[None] = self.searches[None] + 1
+        if self.full[None] == 0:
+            self.everywhere[None], self.again[None] = 0, 0
+            self.searches[None] = self.searches[None] + 1
+            self.breaks.end_search()
         # A full row of neighbours requires another search, which rebuilds the list.
         again = self.neighbours.stale[None] != 0 and self.full[None] == 0
         self.contacts.search_requested[None] = ti.cast(again, ti.i32)

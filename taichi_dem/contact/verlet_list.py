@@ -7,9 +7,6 @@ from taichi_dem.contact.contacts import Contacts
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.ordered import Grouping, RunningSums, Some
 from taichi_dem.kit.types import ivec3, real
-from taichi_dem.methods import Method
-from taichi_dem.state.model import Model
-from taichi_dem.state.tables import SPARE_NEIGHBOURS
 
 #: State of the list when it must be rebuilt, and while it is being rebuilt.
 STALE, MAKING = 1, 2
@@ -29,7 +26,6 @@ class VerletList:
         n = contacts.tables.capacity.bodies
         self.tables, self.state, self.contacts = contacts.tables, contacts.state, contacts
         self.store, self.capacity = contacts.store, contacts.tables.capacity.neighbour_entries
-        self.limit = ti.field(ti.i32, shape=())
         self.reach = Reach(contacts)
         self.grid = CellGrid(self.tables, self.reach, self.listed_anew)
         self.first = ti.field(ti.i32, shape=n + 1)
@@ -40,21 +36,23 @@ class VerletList:
             ti.field(ti.i32, shape=self.capacity) for _ in range(4)
         )
         self.stale = ti.field(ti.i32, shape=())
-        self.full = ti.field(ti.i32, shape=())
+        self.lacking = ti.field(ti.i32, shape=())
         self.wanted = ti.field(ti.i32, shape=n)
         allotted = self._wanted, self._allot, self._end_allotting
         self.allotting = RunningSums(Some(self.listed_anew, n), 1, *allotted)
 
-    def load(self, model: Model, method: Method) -> None:
-        """Set the limit of a scene; the next search rebuilds the list."""
+    def forget(self) -> None:
+        """The next search rebuilds the list."""
         assign(self.stale, STALE)
-        each = model.geometry.neighbours_per_body
-        assign(self.limit, model.body_count * each + SPARE_NEIGHBOURS)
+
+    def renew_all(self) -> None:
+        """The next search renews the pairs of all rows."""
+        assign(self.changed, 1)
 
     @ti.func
     def begin(self):
         """Decide whether so many bodies have left their reach that the list is rebuilt."""
-        self.full[None] = 0
+        self.lacking[None] = 0
         if self.reach.escaped_count[None] > ti.min(
             self.tables.body_count[None] // 16, MOST_ESCAPED
         ):
@@ -103,11 +101,11 @@ class VerletList:
 
     @ti.func
     def check_room(self, one):
-        """Empty all rows where they exceed the limit."""
+        """Empty all rows where they exceed the room, and note how long they would be."""
         if self.making() == 1:
             n = self.tables.body_count[None]
-            if self.first[n] > self.limit[None]:
-                self.full[None] = 1
+            if self.first[n] > self.capacity:
+                self.lacking[None] = self.first[n]
                 for i in range(n):
                     self.first[i], self.last[i] = 0, 0
                 self.first[n] = 0
@@ -116,7 +114,7 @@ class VerletList:
     def fill(self, i):
         """List the neighbours of body i, when there is room; near pairs keep their slots."""
         self.changed[i] = 1
-        if self.full[None] == 0:
+        if self.lacking[None] == 0:
             self.last[i] = self.first[i] + self._visit(i, self.first[i], True)
             for a in range(self.store.first_of[i], self.store.first_of[i + 1]):
                 self._list_near(i, self.store.near_slot[a])
@@ -196,7 +194,7 @@ class VerletList:
         """The list serves until a body has left its reach."""
         self.reach.end()
         if self.stale[None] == MAKING:
-            self.stale[None] = ti.select(self.full[None] == 1, STALE, 0)
+            self.stale[None] = ti.select(self.lacking[None] > 0, STALE, 0)
 
     @ti.func
     def _visit(self, i, start, write):
@@ -257,6 +255,7 @@ class NearPairs:
         self.row_is_new = ti.field(ti.i32, shape=n)
         self.wanted = ti.Vector.field(3, ti.i32, shape=n)
         self.total = ti.Vector.field(3, ti.i32, shape=())
+        self.lacking = ti.Vector.field(2, ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
         bodies = Some(self._body_count, n, light=True)
         rows = self._row_sums, self._begin_row, self._end_rows
@@ -309,19 +308,22 @@ class NearPairs:
 
     @ti.func
     def _begin_row(self, i, before, value):
-        self.store.first_of[i] = before[0]
+        if self.neighbours.lacking[None] == 0:
+            self.store.first_of[i] = before[0]
         self.wanted[i] = ivec3(before[2], before[3], before[4])
 
     @ti.func
     def _end_rows(self, total):
         """Take over the numbers of all; find whether there is room for them."""
-        self.store.first_of[self.tables.body_count[None]] = total[0]
-        self.store.near_count[None], self.store.sphere_count[None] = total[0], total[1]
-        self.total[None] = ivec3(total[2], total[3], total[4])
-        if self.store.lacks_slots(total[2], total[4]):
-            self.full[None] = 1
-        if self.store.lacks_places(total[3]):
-            self.full[None] = 2
+        slots, places = self.store.slots_with(total[2], total[4]), self.store.places_with(total[3])
+        self.lacking[None] = [0, 0]
+        self.full[None] = ti.cast(self.neighbours.lacking[None] > 0, ti.i32)
+        if self.full[None] == 0:
+            self.store.first_of[self.tables.body_count[None]] = total[0]
+            self.store.near_count[None], self.store.sphere_count[None] = total[0], total[1]
+            self.total[None] = ivec3(total[2], total[3], total[4])
+            if slots > self.store.slots or places > self.store.spheres:
+                self.lacking[None], self.full[None] = [slots, places], 1
 
     @ti.func
     def release(self, i):
@@ -366,7 +368,8 @@ class NearPairs:
         if self.full[None] == 0:
             total = self.total[None]
             self.store.take(total[0], total[1], total[2])
-        else:
+        elif self.neighbours.lacking[None] == 0:
+            # Rows hold the slots of all pairs; where rows lack room, the lists of before do.
             self.store.near_count[None] = 0
             for i in range(self.tables.body_count[None] + 1):
                 self.store.first_of[i] = 0

@@ -116,6 +116,11 @@ class EnginePool:
         chosen.owner = weakref.ref(owner)
         return chosen
 
+    def free(self, engine: Engine) -> None:
+        """Free an engine that is used no longer."""
+        self._engines[engine.structure].remove(engine)
+        engine.tree.destroy()
+
     @property
     def count(self) -> int:
         """Engines of the present session."""
@@ -127,8 +132,7 @@ class EnginePool:
         idle = [engine for engines in self._engines.values() for engine in engines]
         idle = [engine for engine in idle if engine.is_idle]
         for engine in idle:
-            self._engines[engine.structure].remove(engine)
-            engine.tree.destroy()
+            self.free(engine)
         return len(idle)
 
     def _forget(self):

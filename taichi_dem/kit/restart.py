@@ -22,25 +22,27 @@ from taichi_dem.kit.validation import FileName
 class RunSnapshot:
     """All changing data of a run: fields on the device, and arrays of its owners on the host.
 
-    Arrays must match those of an owner's ``example()``; those named in ``grows`` have any length.
+    memory: gives the present ``FieldMemory``. Arrays must match those of an owner's ``example()``;
+    those named in ``grows`` have any length.
     """
 
-    def __init__(self, identity: Mapping[str, str], memory: Any, owners: Mapping[str, Any]):
+    def __init__(self, identity: Mapping[str, str], memory: Callable, owners: Mapping[str, Any]):
         self.identity, self.memory, self.owners = identity, memory, owners
 
     def write(self, path: FileName) -> None:
         """Save the run as it is, between two steps. Raises InputError."""
-        arrays = {f"field/{name}": array for name, array in self.memory.read().items()}
+        arrays = {f"field/{name}": array for name, array in self.memory().read().items()}
         for part, owner in self.owners.items():
             arrays.update({f"{part}/{name}": array for name, array in owner.saved().items()})
         write_checkpoint(path, self.identity, arrays)
 
     def restore(self, arrays: Mapping[str, np.ndarray], path: FileName) -> None:
         """Restore the run from the arrays that ``opened`` returned for a path."""
-        missing = self.memory.misfit(_under("field", arrays))
+        memory = self.memory()
+        missing = memory.misfit(_under("field", arrays))
         if missing:
             raise InputError(f"checkpoint {path} is of another version: field {missing} differs")
-        self.memory.write(_under("field", arrays))
+        memory.write(_under("field", arrays))
         for part, owner in self.owners.items():
             try:
                 saved = _under(part, arrays)

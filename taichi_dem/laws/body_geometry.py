@@ -51,8 +51,6 @@ class BodyGeometry(Geometry):
     skin : float, default 0.0075
         Gap up to which pairs enter the candidate list, as a share of the radius of a body to its
         corners. It changes time, not results.
-    neighbours_per_body, pairs_per_body : int, default 192, 48
-        Mean capacity of the lists of neighbours and of body pairs.
 
     References
     ----------
@@ -60,7 +58,7 @@ class BodyGeometry(Geometry):
     """
 
     by_face = False
-    entries_by = "pairs_per_body"
+    at_start = 0.5, 0.5, 100.0
     constant_fields = (
         *("corner", "outward", "plane", "incentre", "volume", "face_area", "far"),
         *("ends", "end_count", "least_weight"),
@@ -71,11 +69,9 @@ class BodyGeometry(Geometry):
         parts: int = 3,
         outer_faces: bool | str = True,
         skin: float = 0.0075,
-        neighbours_per_body: int = 192,
-        pairs_per_body: int = 48,
     ):
         self.parts = whole("parts", parts, 2, MOST_PARTS)
-        super().__init__(outer_faces, skin, pairs_per_body, pairs_per_body, neighbours_per_body)
+        super().__init__(outer_faces, skin)
 
     def spheres(self, model: Model) -> ContactSpheres:
         """A body extends to its corners; nothing reads the spheres."""

@@ -74,9 +74,6 @@ class SphereContact(LinearContact):
     skin : float, default 0.015
         Gap up to which spheres enter the candidate list, at least, as a share of the radius of a
         body; more where bodies are fast. It changes time, not results.
-    neighbours_per_body, pairs_per_body, spheres_per_body : int, default 64, 24, 160
-        Mean capacity of the lists of neighbours, of body pairs, and of sphere contacts with those
-        of the next search, before those that they replace are freed.
     """
 
     knob, firmer = "contact_stiffness", "a contact_stiffness of {value:.2g} N/m"
@@ -87,12 +84,8 @@ class SphereContact(LinearContact):
         divisions: int = 5,
         outer_faces: bool | str = True,
         skin: float = 0.015,
-        neighbours_per_body: int = 64,
-        pairs_per_body: int = 24,
-        spheres_per_body: int = 160,
     ):
-        lists = neighbours_per_body, pairs_per_body, spheres_per_body
-        super().__init__(SphereGeometry(divisions, outer_faces, skin, *lists))
+        super().__init__(SphereGeometry(divisions, outer_faces, skin))
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Stiffness [N/m] and damping [N s/m] of a contact."""
@@ -122,10 +115,6 @@ class BodyContact(LinearContact):
     skin : float, default 0.0075
         Gap up to which pairs enter the candidate list, as a share of the radius of a body to its
         corners. It changes time, not results.
-    neighbours_per_body : int, default 192
-        Mean capacity of the list of neighbours.
-    pairs_per_body : int, default 48
-        Mean capacity of the list of body pairs.
 
     Notes
     -----
@@ -153,14 +142,11 @@ class BodyContact(LinearContact):
         restitution: float = 0.1,
         stiffness: float | None = None,
         skin: float = 0.0075,
-        neighbours_per_body: int = 192,
-        pairs_per_body: int = 48,
     ):
         self.restitution = between("restitution", restitution, 0.01, 1.0)
         self.stiffness = None if stiffness is None else positive("stiffness", stiffness)
         self.ratio = damping_ratio(self.restitution)
-        lists = neighbours_per_body, pairs_per_body
-        super().__init__(BodyGeometry(parts, outer_faces, skin, *lists))
+        super().__init__(BodyGeometry(parts, outer_faces, skin))
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Stiffness k [Pa/m] and 2 z sqrt(k), which ``weight`` makes a dashpot [Pa s/m]."""

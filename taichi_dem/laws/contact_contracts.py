@@ -13,7 +13,7 @@ import taichi as ti
 from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import real, vec3
-from taichi_dem.kit.validation import between, flag, instance, shown, whole
+from taichi_dem.kit.validation import between, flag, instance, shown
 from taichi_dem.laws.base import Effect
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials
@@ -22,8 +22,6 @@ from taichi_dem.mesh.topology import ContactSpheres
 from taichi_dem.state.model import Model
 from taichi_dem.state.pair_store import PairStore
 
-#: Entries of a list for each body: a thousand tetrahedra with as many take some GiB.
-_MOST = 100_000
 #: Overlap up to which limits of a step hold, as a share of the size of a body.
 DEEP = 0.05
 #: Value of outer_faces for spheres there from the first break on.
@@ -74,29 +72,19 @@ class Geometry(Effect):
     skin : float
         Gap up to which an entry is listed, as a share of the extent of a body. It changes time, not
         results.
-    pairs, entries, neighbours : int
-        Mean number of each that a body has in the lists of pairs, of entries and of neighbours.
     """
 
     role = "geometry"
     is_null = True
     #: Whether entries belong to faces, and a break brings new ones; else to whole bodies.
     by_face = True
-    #: The option that lengthens the list of entries.
-    entries_by = "spheres_per_body"
+    #: Near pairs, contacts and neighbours that a body has room for at the start, in the mean.
+    at_start = 0.5, 4.0, 64.0
     #: Equal parts of the edges of a face, at whose inner crossings spheres lie; 3 for one sphere.
     divisions = 3
 
-    def __init__(self, outer_faces: Any, skin: float, pairs: int, entries: int, neighbours: int):
+    def __init__(self, outer_faces: Any, skin: float):
         self.outer_faces, self.skin = _outer_faces(outer_faces), between("skin", skin, 1e-6, 1.0)
-        self.pairs_per_body = whole("pairs_per_body", pairs, 1, _MOST)
-        self.spheres_per_body = whole("spheres_per_body", entries, 1, _MOST)
-        self.neighbours_per_body = whole("neighbours_per_body", neighbours, 1, _MOST)
-
-    @property
-    def lengths(self) -> tuple[int, int, int]:
-        """Entries for each body in the lists of pairs, of entries and of neighbours."""
-        return self.pairs_per_body, self.spheres_per_body, self.neighbours_per_body
 
     @property
     def face_spheres(self) -> int:

@@ -25,9 +25,6 @@ class SphereGeometry(Geometry):
     skin : float, default 0.015
         Gap up to which spheres enter the candidate list, at least, as a share of the radius of a
         body; more where bodies are fast. It changes time, not results.
-    neighbours_per_body, pairs_per_body, spheres_per_body : int, default 64, 24, 160
-        Mean capacity of the lists of neighbours, of body pairs, and of sphere contacts with those
-        of the next search, before those that they replace are freed.
     """
 
     def __init__(
@@ -35,12 +32,9 @@ class SphereGeometry(Geometry):
         divisions: int = 5,
         outer_faces: bool | str = True,
         skin: float = 0.015,
-        neighbours_per_body: int = 64,
-        pairs_per_body: int = 24,
-        spheres_per_body: int = 160,
     ):
         self.divisions = whole("divisions", divisions, 3, 20)
-        super().__init__(outer_faces, skin, pairs_per_body, spheres_per_body, neighbours_per_body)
+        super().__init__(outer_faces, skin)
 
     def spheres(self, model: Model) -> ContactSpheres:
         """Spheres of a model, in balls that hold all of a face."""

@@ -2,7 +2,8 @@
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, ClassVar, NamedTuple
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import taichi as ti
@@ -369,8 +370,12 @@ class Readings:
                     ti.atomic_max(taken[i], rate * self.schedule.pair_step(i, j))
 
 
-class Run(NamedTuple):
-    """What a report reads of a simulation; contacts is None without contact."""
+@dataclass
+class Run:
+    """What a report reads of a simulation; contacts is None without contact.
+
+    Its parts are replaced where a simulation moves to an engine with more room.
+    """
 
     model: Model
     state: State

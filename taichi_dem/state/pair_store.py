@@ -66,7 +66,6 @@ class PairStore:
 
     def __init__(self, bodies: int, slots: int, spheres: int):
         self.slots, self.spheres = slots, spheres
-        self.slot_limit, self.sphere_limit = (ti.field(ti.i32, shape=()) for _ in range(2))
         self._allocate_slots(slots)
         self.sphere = ti.Vector.field(2, ti.i32, shape=spheres)
         self.owner = ti.field(ti.i32, shape=spheres)
@@ -120,15 +119,14 @@ class PairStore:
         return place
 
     @ti.func
-    def lacks_slots(self, fresh, freed):
-        """Whether so many new pairs find no slots, once so many have been freed."""
-        spare = self.free_count[None] + freed + self.slot_limit[None] - self.used_end[None]
-        return fresh > spare
+    def slots_with(self, fresh, freed):
+        """Number of slots with so many new pairs, once so many have been freed."""
+        return self.used_end[None] + ti.max(0, fresh - freed - self.free_count[None])
 
     @ti.func
-    def lacks_places(self, spheres):
-        """Whether so many new sphere pairs find no places."""
-        return self.sphere_end[None] + spheres > self.sphere_limit[None]
+    def places_with(self, spheres):
+        """Number of places with so many new sphere pairs."""
+        return self.sphere_end[None] + spheres
 
     @ti.func
     def allocate(self, nth, freed, i, j):
@@ -216,7 +214,7 @@ class PairStore:
     def pack_if_sparse(self):
         """Pack the sphere pairs where too many places are out of use."""
         end, used = self.sphere_end[None], self.sphere_count[None]
-        if end > 2 * used + SLACK or end > self.sphere_limit[None] // 2:
+        if end > 2 * used + SLACK or end > self.spheres // 2:
             self.pack_spheres()
 
     @ti.func

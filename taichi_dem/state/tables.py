@@ -12,22 +12,22 @@ from taichi_dem.kit.types import real
 from taichi_dem.materials.body_materials import MOST
 from taichi_dem.state.model import MANY, ROLES, Model
 
-#: Spare entries of the lists of a contact search, beside those of each body.
-SPARE_PAIRS, SPARE_SPHERES, SPARE_NEIGHBOURS = 64, 4096, 1024
+#: Spare entries of a list of pairs: it must not be as long as a field of bodies, faces or bonds.
+_SPARE = 64
 #: Entries of one list, whose indices are counted in 32 bits.
 _MOST_ENTRIES = 2**31 - 1
 
 
 class Capacity(NamedTuple):
-    """Room of an engine: bodies, and for each of them spheres on a face and entries of lists.
+    """Room of an engine: bodies, contact spheres on a face, entries of the lists of contact.
 
-    pairs, pair_spheres, neighbours: mean entries of a body; 0 without contact.
+    pairs of bodies that are near, contacts: entries of these pairs, neighbours; 0 without contact.
     """
 
     bodies: int
     face_spheres: int = 0
     pairs: int = 0
-    pair_spheres: int = 0
+    contacts: int = 0
     neighbours: int = 0
 
     @property
@@ -52,38 +52,39 @@ class Capacity(NamedTuple):
 
     @property
     def pair_entries(self) -> int:
-        """Pairs of bodies."""
-        return self.bodies * self.pairs + SPARE_PAIRS
+        """Length of a list of pairs."""
+        return self.pairs + _SPARE
 
     @property
-    def sphere_entries(self) -> int:
-        """Pairs of spheres."""
-        return self.bodies * self.pair_spheres + SPARE_SPHERES
+    def contact_entries(self) -> int:
+        """Length of a list of contacts."""
+        return self.contacts + _SPARE
 
     @property
     def neighbour_entries(self) -> int:
-        """Entries of the list of neighbours."""
-        return self.bodies * self.neighbours + SPARE_NEIGHBOURS
+        """Length of a list of neighbours."""
+        return self.neighbours + _SPARE
 
     def check(self) -> None:
         """Raise InputError where a list would have more entries than can be counted."""
-        largest = max(9 * self.bonds, self.spheres, 2 * self.pair_entries, self.sphere_entries)
+        largest = max(9 * self.bonds, self.spheres, 2 * self.pair_entries, self.contact_entries)
         if max(largest, self.neighbour_entries) > _MOST_ENTRIES:
             raise InputError(
                 f"lists must have at most {_MOST_ENTRIES} entries, a mesh of {self.bodies} bodies "
-                "with these options of its contact has more: take a smaller mesh or shorter lists"
+                "with its contacts has more: take a smaller mesh"
             )
 
 
 def capacity_of(model: Model) -> Capacity:
-    """Capacity that a ``Model`` needs."""
+    """Capacity with which a ``Model`` begins; the lists of contact grow (``Simulation``)."""
     if not model.has_contact:
         return Capacity(model.body_count)
-    return Capacity(model.body_count, model.geometry.face_spheres, *model.geometry.lengths)
+    lists = (int(share * model.body_count) for share in model.geometry.at_start)
+    return Capacity(model.body_count, model.geometry.face_spheres, *lists)
 
 
-#: Smallest engine: the paper's block and contact lists of the usual length find room in it.
-LEAST = Capacity(1024, 6, 24, 160, 64)
+#: Smallest engine: in it the paper's block can fall to pieces.
+LEAST = Capacity(1024, 6, 2**14, 2**16, 2**16)
 
 
 @ti.data_oriented

@@ -50,6 +50,10 @@ class Resident:
         self._launch_steps(1, 0, 1)
         self.step.start(1)
 
+    def follow(self, other: "Resident") -> None:
+        """Go on in place of another one."""
+        self.substeps = other.substeps
+
     def prepare(self) -> None:
         """Make a requested search, without a step."""
         self.few(0, 0)
@@ -139,6 +143,10 @@ class Parallel:
         self._groups[-1](0, 0, 1)
         self.step.start(1)
 
+    def follow(self, other: "Parallel") -> None:
+        """Go on in place of another one."""
+        self.sweeps = other.sweeps
+
     def prepare(self) -> None:
         """Make a requested search, without a step; compiles the kernels."""
         for launch in self._groups:
@@ -178,9 +186,8 @@ class Parallel:
             self._finish_sweeps(end_tick)
         if self.state & _CUT_SHORT:
             raise backend.cut_short("of this scene", "a smaller mesh")
-        if self.state & _SEARCH:
-            self.step.search.renew()
-        return self.state & ~_SEARCH
+        lacks_room = bool(self.state & _SEARCH) and not self.step.search.renew()
+        return self.state & ~_SEARCH | lacks_room * _HALTED
 
     def _substep(self, end_tick):
         """Queue all groups of a substep but the last one, which is returned."""

@@ -16,13 +16,16 @@ from taichi_dem import (
     effects,
     simulate,
 )
+from taichi_dem.engine import ENGINES, BlastEngine
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.checkpoint import read_checkpoint, write_checkpoint
 from taichi_dem.kit.field_memory import FieldMemory
+from taichi_dem.laws.contact_contracts import Geometry
 from taichi_dem.mesh.mesh import with_cut
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.record import Recorder
 from taichi_dem.saved_run import saved_run
+from taichi_dem.state.tables import LEAST
 from taichi_dem.state.timeline import MACRO_TICKS
 from tests.scenes import bar_scene
 from tests.structures import filled
@@ -45,8 +48,8 @@ ODD = 5
 class Run:
     """A started simulation of the bar, with all that a checkpoint takes of it."""
 
-    def __init__(self, kind, method):
-        self.simulation = Simulation(bar_scene(kind=kind), method)
+    def __init__(self, kind, method, simulation=None):
+        self.simulation = simulation or Simulation(bar_scene(kind=kind), method)
         self.recorder = Recorder(self.simulation, "left")
         self.simulation.start()
         self.saved = saved_run(self.simulation, self.recorder)
@@ -56,9 +59,11 @@ class Run:
         """Put it where a checkpoint is."""
         self.saved.restore(read_checkpoint(path, self.saved.identity), path)
 
-    def go_odd(self):
-        """A few substeps on, to where neither a largest step nor a search ends."""
+    def go_half(self):
+        """A share of the way, and a few substeps on: there no largest step nor search ends."""
         simulation = self.simulation
+        simulation.advance_to(round(SHARE * self.last))
+        self.recorder.sample()
         simulation.driver.substeps = ODD
         simulation.driver.run(self.last * MACRO_TICKS)
 
@@ -78,7 +83,7 @@ class Run:
             "frames": len(self.recorder.frames),
         }
         arrays = {
-            **self.saved.memory.read(),
+            **self.saved.memory().read(),
             **columns,
             "damage": frame.damage,
             "stress": frame.stress,
@@ -112,9 +117,7 @@ def straight(run, tmp_path_factory):
     """Checkpoint on the way, what the run came to, and what its constant fields were before."""
     constant = FieldMemory(run.simulation, "constant")
     before, path = constant.read(), tmp_path_factory.mktemp("saved") / "run.checkpoint"
-    run.simulation.advance_to(round(SHARE * run.last))
-    run.recorder.sample()
-    run.go_odd()
+    run.go_half()
     run.saved.write(path)
     broken, ticks = run.simulation.report().broken_faces, run.simulation.state.tick[None]
     lagging = (run.simulation.values(run.simulation.state.last_tick) < ticks).any()
@@ -217,3 +220,28 @@ def test_every_array_of_a_checkpoint_must_be_there_and_like_its_own(light, tmp_p
     simulation.close()
     with pytest.raises(InputError, match=r"field state\.tick differs"):
         simulate(light_scene(), resume=forged, until=1e-5, **job)
+
+
+#: Room for pairs, contacts and neighbours that is too short, on the way or at the start.
+SHORT = {"contacts": (2**14, 16, 2**16), "neighbours": (2**14, 2**16, 16)}
+
+
+@pytest.mark.parametrize("case", ["controlled"], indirect=True)
+@pytest.mark.parametrize("lists", ["contacts", pytest.param("neighbours", marks=pytest.mark.slow)])
+def test_lists_that_grow_give_the_bits_of_long_ones(case, run, straight, lists, monkeypatch):
+    """A search that finds no room is made again, in an engine with more."""
+    # The other run's engine is the one with more room.
+    run.simulation._engine.owner = None
+    with monkeypatch.context() as short:
+        short.setattr(Geometry, "at_start", (0.0, 0.0, 0.0))
+        short.setattr(ENGINES, "least", (*LEAST[:2], *SHORT[lists]))
+        short.setattr(BlastEngine, "is_idle", False)
+        simulation = Simulation(bar_scene(kind=case[0]), case[1])
+    assert simulation.engine.capacity[2:] == SHORT[lists]
+    grown = Run(*case, simulation)
+    grown.go_half()
+    end = grown.finish()
+    assert simulation.engine.capacity == LEAST
+    alike = [name for name in end if name.startswith("state.") or "." not in name]
+    first, second = ({name: one[name] for name in alike} for one in (end, straight[2]))
+    assert len(alike) > 30 and differing(first, second) == []

@@ -42,7 +42,7 @@ class Placed:
     def __init__(self, first, second, dt=1e-9, parts=3):
         parts_of = {"first": (first, (0.0,) * 3), "second": (second, (1.0, 0.0, 0.0))}
         mesh = placed_together(parts_of, keep_coincident=True)
-        listed = [effects.BodyContact(parts=parts, pairs_per_body=400, neighbours_per_body=400)]
+        listed = [effects.BodyContact(parts=parts)]
         self.simulation = Simulation(Scene(mesh, LOSSLESS, listed), Uniform(dt))
         self.model, self.state = self.simulation.model, self.simulation.state
         self.moving = np.arange(self.model.body_count) >= first.body_count
