@@ -73,6 +73,8 @@ class Engine:
                 field[entry] = 0
 
 
+#: Times the least room from which on engines are made for eighths of powers of two.
+_MANY = 64
 #: All pools of the process.
 _pools: list["EnginePool"] = []
 
@@ -109,7 +111,7 @@ class EnginePool:
             gc.collect()
         idle = [engine for engine in fitting if engine.is_idle]
         if not idle:
-            capacity = [power_of_two(wanted, low) for wanted, low in zip(size, self.least)]
+            capacity = [room_for(wanted, low) for wanted, low in zip(size, self.least)]
             idle = [_made(self.kind, structure, capacity)]
             engines += idle
         chosen = min(idle, key=lambda engine: engine.tree.bytes)
@@ -155,3 +157,12 @@ def power_of_two(wanted: int, least: int = 1) -> int:
     while size < wanted:
         size *= 2
     return size
+
+
+def room_for(wanted: int, least: int) -> int:
+    """The power of two times ``least``; of many entries an eighth of one, to save memory."""
+    size = power_of_two(wanted, least)
+    if size <= _MANY * least:
+        return size
+    step = size // 16
+    return -(-wanted // step) * step
