@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.engine.activation import activated, certificate_of, effect_uses, periods_of
 from ca_damper.engine.damper_engine import borrow
 from ca_damper.engine.launches import Launches
 from ca_damper.engine.loaded_scenes import LoadedScenes
@@ -17,7 +16,14 @@ from ca_damper.engine.recorder import ROOM
 from ca_damper.excitation.excitation import Excitation
 from ca_damper.filling import Filling, Fillings
 from ca_damper.report import measures
-from ca_damper.report.certificate import EFFECTS, Certificate, Periods, checked_range, warn_outside
+from ca_damper.report.certificate import (
+    EFFECTS,
+    Certificate,
+    Periods,
+    certificate_of,
+    checked_range,
+    periods_of,
+)
 from ca_damper.report.progress import BatchProgress
 from ca_damper.report.report import RK45_STAGES, Report
 from ca_damper.scenes.checks import (
@@ -122,7 +128,9 @@ class Batch(LoadedScenes):
         self.asked_effects = choice("effects", effects, EFFECTS)
         self.count = instance("table", table, SceneTable).count
         given = Fillings(filling, self.count)
-        self.fillings, self.estimates = activated(given, table, effects)
+        self.most_particles = int(table.column("particles").max())
+        found = given.activated(self.most_particles) if effects == "auto" else (given, ())
+        self.fillings, self.estimates = found
         runtime.session()
         self.if_diverged = choice("if_diverged", if_diverged, ("nan", "raise"))
         self.mount, self.modal = checked_mount(mount, structure)
@@ -207,7 +215,9 @@ class Batch(LoadedScenes):
         more = for_all("displacement", displacement, self.count)
         initial = self.numbers.initial(start)
         initial += np.column_stack([more, for_all("velocity", velocity, self.count)])
-        warn_outside(self)
+        checked = checked_range(self)
+        if checked is not None and checked.warning:
+            warnings.warn(checked.warning, stacklevel=2)
         for words in self.too_few:
             warnings.warn(words, stacklevel=2)
         self._tell_compiling("placing", 2)
@@ -437,7 +447,6 @@ class Batch(LoadedScenes):
             method=kind.label,
             mount=self.mount,
             effects=kind.effects,
-            effect_activity=effect_uses(self),
             scenes=self.count,
             particles=(int(particles.min()), int(particles.max())),
             dt_s=(float(dt.min()), float(dt.max())),
@@ -453,7 +462,6 @@ class Batch(LoadedScenes):
             certificate=self.certificate,
             diverged=tuple(map(str, self.divergences())),
             excitation=(*self.excitation.in_words(), *self.too_few),
-            checked=checked_range(self),
         )
 
     def _bound_of_step(self) -> dict[str, Any]:

@@ -119,8 +119,7 @@ def let_go(options: Namespace, name: str) -> None:
     study.show_report(options, report)
     draw = partial(picture, decays, (rigid, shown), options)
     study.finish(options, name, figures_of(decays, options), reports.values(), draw=draw)
-    if report.certificate is not None:
-        study.add_to_summary(options.out, certificate=report.certificate.as_dict())
+    study.add_to_summary(options.out, certificate=report.certificate.as_dict())
 
 
 def picture(decays: Mapping[str, Decay], fillings: Sequence[Any], options: Namespace) -> None:

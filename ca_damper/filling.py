@@ -17,7 +17,7 @@ from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.checkpoint import identity_of
 from taichi_dem.kit.display import counted
-from taichi_dem.kit.effect_table import EffectUse
+from taichi_dem.kit.effect_table import EffectUse, Estimate
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.field_memory import shape_of
 from taichi_dem.kit.validation import shown
@@ -131,6 +131,23 @@ class Fillings:
         most = {name: max(one[name] for one in sizes) for name in sizes[0]}
         return Structure(self.kinds[0].structure.key, most)
 
+    def activated(self, particles: int) -> tuple["Fillings", tuple[Estimate, ...]]:
+        """The fillings with the effects that are needed, and estimates of those decided on."""
+        if not hasattr(self.kinds[0], "activated"):
+            return self, ()
+        chosen, estimates = zip(*(one.activated(particles) for one in self.kinds))
+        if len({one.structure.key for one in chosen}) > 1:
+            raise InputError(
+                'effects must be "listed" where "auto" finds other effects in some fillings of a '
+                "batch than in others, got 'auto'"
+            )
+        return Fillings([chosen[k] for k in self.which], len(self.which)), _largest(estimates)
+
+    def left_out(self, particles: int) -> tuple[Estimate, ...]:
+        """Estimates of the effects that are not computed."""
+        kinds = [one for one in self.kinds if hasattr(one, "left_out")]
+        return _largest([one.left_out(particles) for one in kinds])
+
     @property
     def one(self) -> Any:
         """The filling of all scenes; InputError where they differ."""
@@ -172,6 +189,11 @@ class Fillings:
         assign(field, rows[self.which])
 
 
+def _largest(estimates):
+    """Of the estimates of each filling, in one order of the effects, the largest of each effect."""
+    return tuple(max(of_one, key=lambda one: one.group) for of_one in zip(*estimates))
+
+
 def _difference(one, other):
     """Two fillings in words, those of one class by the options in which they differ."""
     if type(one) is not type(other):
@@ -185,7 +207,9 @@ def _difference(one, other):
 class Filling(Protocol):
     """Interface of a filling of the container: options of a user, checked when they are made.
 
-    Optional members: ``order``, that of the error in the step; those of ``activation.py``;
+    Optional members: ``order``, that of the error in the step; ``activated(particles)``, the
+    filling with the effects that at most so many particles call for and an Estimate of each that it
+    decided on, and ``left_out(particles)``, an Estimate of each effect that it does not compute;
     ``clearance(particles)`` [m] and ``with_clearance(particles, clearance)``, for ``damper_map``;
     ``checked_range(driven)``, for the report and the warning before a run.
     """
@@ -252,7 +276,8 @@ class DeviceFilling(Protocol):
 
     Of its members ``load``, ``uses`` and ``snapshot`` are Python, the others ti.funcs. ``table.dt``
     may change between two steps, when a sweep goes on to its next frequency. It may have one
-    further member for a certificate, in Python: see ``activation.py``.
+    further member, in Python: ``first_steps(effects)``, the step in which each effect first acted
+    in each scene, infinite if never, as of ``recorder.EventCounts``.
 
     A filling whose impacts depend on the recoil of the container splits ``advance``, so that boxes
     on one structure resolve their impacts together: ``find_blows(s, step, motion)`` returns Blows,

@@ -38,11 +38,9 @@ def needed_effects(result: Result, tolerance: float = ROUNDING) -> EffectTable:
     >>> print(needed_effects(result))  # doctest: +SKIP
     """
     report, tolerance = instance("result", result, Result).report, fraction("tolerance", tolerance)
-    uses = report.effect_activity
-    tried = [use.effect for use in uses if use.minor(tolerance)]
-    if tried and not result.diverged:
-        return report.advice(tolerance, _differences(result, tried, tolerance))
-    return report.advice(tolerance)
+    tried = [use.effect for use in report.effect_activity if use.minor(tolerance)]
+    shown = _differences(result, tried, tolerance) if tried and not result.diverged else {}
+    return report.advice(tolerance, shown)
 
 
 def _differences(result, names, tolerance):
@@ -51,11 +49,11 @@ def _differences(result, names, tolerance):
     if together <= tolerance or len(names) == 1:
         return dict.fromkeys(names, together)
     effects = result.scene.effects
-    roles = {name: effect.role for name, effect in zip(names_of(effects), effects)}
     found: dict[str, float] = {}
     left_out: list[str] = []
+    rubs = {name for name, effect in zip(names_of(effects), effects) if effect.role == "friction"}
     # Friction first: contact can be left out only with it.
-    for name in sorted(names, key=lambda name: roles[name] != "friction"):
+    for name in sorted(names, key=lambda name: name not in rubs):
         found[name] = _difference(result, [*left_out, name])
         if found[name] <= tolerance:
             left_out.append(name)
@@ -64,15 +62,15 @@ def _differences(result, names, tolerance):
 
 def _difference(result, names):
     """Largest relative difference of a run without some effects; infinite where it fails."""
-    scene = result.scene
+    scene, report = result.scene, result.report
     kept = _without(scene.effects, names, may_be_silent=not scene.on_demand)
     try:
         scene = replace(scene, effects=ChosenEffects(kept, scene.effects.word), loads=())
-        simulation = Simulation(scene, result.method, result.report.driver.split("+")[0])
+        simulation = Simulation(scene, result.method, report.driver.split("+")[0])
         if result.start is not None:
             simulation.state.set_motion(**result.start)
-        until, samples = result.report.until_s, len(result.series["time_s"]) - 1
-        again = run_simulation(simulation, until=until, samples=samples, progress=None)
+        samples = len(result.series["time_s"]) - 1
+        again = run_simulation(simulation, until=report.until_s, samples=samples, progress=None)
     except (InputError, SimulationDiverged):
         return np.inf
     return recorded_difference(result, again)

@@ -1,17 +1,20 @@
 """Certificate of a run: what acted, was left out or is periodic, and the range that was checked."""
 
-import warnings
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ca_damper.report.measures import Cycles
+from ca_damper.report.steady_state import period
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.effect_table import BaseCertificate, Estimate
 
 #: Words for which effects of a filling are computed: those that its options list, or those that an
 #: estimate before the run calls for.
 EFFECTS = ("listed", "auto")
+#: Difference of cycles up to which they are alike, as a share of the first harmonic.
+ALIKE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -42,49 +45,6 @@ class Periods:
         return f"{', '.join(found) or 'none'}, {self.others} not periodic ({test})"
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Certificate(BaseCertificate):
-    """Effects computed and left out in a run, with estimates.
-
-    Parameters
-    ----------
-    acting : tuple of EffectUse, default ()
-        Activity of each effect that was computed, and from when, as far as the filling counts it.
-    left_out : tuple of Estimate, default ()
-        Estimated size of each effect that was not computed.
-    warnings : tuple of str, default ()
-        What lies outside of the checked range, and scenes that diverged.
-    effects : str
-        ``"listed"`` or ``"auto"``, as asked for.
-    estimates : tuple of Estimate, default ()
-        Estimates of the effects that ``"auto"`` decided on.
-    periods : Periods, optional
-        Periodicity of the motion; None where fewer than two cycles were measured.
-    """
-
-    effects: str
-    estimates: tuple[Estimate, ...] = ()
-    periods: Periods | None = None
-
-    def left_out_lines(self) -> list[str]:
-        """What was left out, and what is periodic, in lines."""
-        lines = [f"estimated: {estimate}" for estimate in self.estimates]
-        skipped = [
-            f"{one.effect}: {one.skipped:,} tests skipped" for one in self.acting if one.skipped
-        ]
-        periodic = [f"periodic: {self.periods}"] if self.periods is not None else []
-        return [*lines, *super().left_out_lines(), *skipped, *periodic]
-
-    def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file."""
-        return {
-            "effects": self.effects,
-            **super().as_dict(),
-            "estimates": [one.as_dict() for one in self.estimates],
-            "periods": self.periods and asdict(self.periods),
-        }
-
-
 @dataclass(frozen=True)
 class CheckedRange:
     """Range in which the numbers of a filling were compared, and whether a run is inside.
@@ -112,6 +72,54 @@ class CheckedRange:
         found = f"outside: {'; '.join(self.outside)}" if self.outside else "inside"
         open_part = "" if self.knows_motion else ", except the motion, which was not checked"
         return f"{found}{open_part}"
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Certificate(BaseCertificate):
+    """Effects computed and left out in a run, with estimates.
+
+    Parameters
+    ----------
+    acting : tuple of EffectUse, default ()
+        Activity of each effect that was computed, and from when, as far as the filling counts it.
+    left_out : tuple of Estimate, default ()
+        Estimated size of each effect that was not computed.
+    warnings : tuple of str, default ()
+        What lies outside of the checked range, and scenes that diverged.
+    effects : str
+        ``"listed"`` or ``"auto"``, as asked for.
+    estimates : tuple of Estimate, default ()
+        Estimates of the effects that ``"auto"`` decided on.
+    periods : Periods, optional
+        Periodicity of the motion; None where fewer than two cycles were measured.
+    checked : CheckedRange, optional
+        Range in which the filling was checked, and what of the run lies outside; None where the
+        filling names none.
+    """
+
+    effects: str
+    estimates: tuple[Estimate, ...] = ()
+    periods: Periods | None = None
+    checked: CheckedRange | None = None
+
+    def left_out_lines(self) -> list[str]:
+        """What was left out, and what is periodic, in lines."""
+        skipping = (one for one in self.acting if one.skipped)
+        return [
+            *(f"estimated: {estimate}" for estimate in self.estimates),
+            *super().left_out_lines(),
+            *(f"{one.effect}: {one.skipped:,} tests skipped" for one in skipping),
+            *([] if self.periods is None else [f"periodic: {self.periods}"]),
+        ]
+
+    def as_dict(self) -> dict[str, Any]:
+        """All figures, for a JSON file."""
+        return {
+            "effects": self.effects,
+            **super().as_dict(),
+            "estimates": [one.as_dict() for one in self.estimates],
+            "periods": self.periods and asdict(self.periods),
+        }
 
 
 class Driven(NamedTuple):
@@ -155,8 +163,41 @@ def checked_range(batch: Any) -> CheckedRange | None:
     return CheckedRange(found[0].words, outside, warning, bool((size > 0.0).all()))
 
 
-def warn_outside(batch: Any) -> None:
-    """A UserWarning where the fillings of a batch are known to fail on its scenes."""
-    found = checked_range(batch)
-    if found is not None and found.warning:
-        warnings.warn(found.warning, stacklevel=3)
+def certificate_of(batch: Any) -> Certificate:
+    """Certificate of a batch since its start: the table of its effects."""
+    checked, diverged = checked_range(batch), len(batch.divergences())
+    outside = () if checked is None else checked.outside
+    gone = (f"{counted(diverged, 'scene')} diverged",) if diverged else ()
+    return Certificate(
+        effects=batch.asked_effects,
+        acting=tuple(_uses(batch)),
+        left_out=batch.fillings.left_out(batch.most_particles),
+        estimates=batch.estimates,
+        periods=batch.periods,
+        checked=checked,
+        warnings=(*(f"outside of the checked range, {one}" for one in outside), *gone),
+    )
+
+
+def _uses(batch):
+    """Activity of each effect, and when [s] and where it began as far as the filling notes it."""
+    device, effects = batch.device, batch.fillings.kinds[0].effects
+    first = device.first_steps(effects) if hasattr(device, "first_steps") else {}
+    for use in device.uses(effects):
+        steps = first.get(use.effect, np.full(batch.count, np.inf))
+        times = batch.time_origin + steps * batch.table.column("dt")
+        scene = int(times.argmin())
+        begun = {"since_s": float(times[scene]), "where": f"scene {scene}"}
+        yield replace(use, **begun) if np.isfinite(times[scene]) else use
+
+
+def periods_of(cycles: Cycles) -> Periods | None:
+    """Which scenes are periodic over the measured cycles; None for fewer than two."""
+    measured = cycles.record.shape[1]
+    if measured < 2:
+        return None
+    series = cycles.harmonic_by_cycle("x")
+    found = [period(one, ALIKE) for one in series if np.isfinite(one).all()]
+    lengths, counts = np.unique([one for one in found if one], return_counts=True)
+    pairs = tuple(zip(map(int, lengths), map(int, counts)))
+    return Periods(measured, ALIKE, pairs, len(found) - int(counts.sum()))

@@ -26,8 +26,6 @@ class Report:
         ``"spring"``, ``"base"``, ``"floor"`` or ``"structure"``.
     effects : tuple of str
         Effects that the filling was asked to compute.
-    effect_activity : tuple of EffectUse
-        Activity of each effect that can be counted, since the start.
     scenes : int
         Number of scenes.
     particles : tuple of (int, int)
@@ -52,22 +50,19 @@ class Report:
         Time spent on compiling [s].
     run_seconds : float
         Time spent on stepping [s].
+    certificate : Certificate
+        Table of the effects: which acted, since when, and what was left out.
     order : int, optional
         Order of the error in the step; None where the filling declares none.
     sampling : tuple of (int, float), optional
         Number of measured cycles, and half-width of the mean of the highest RMS as a share of it,
         with a confidence of 95 %; None where unknown, as for a mean that still changes.
-    certificate : Certificate, optional
-        When effects first acted, and what was left out.
     diverged : tuple of str
         A sentence for each scene that diverged, the first in time first; its results are nan.
     excitation : tuple of str, default ()
         Excitation beside the sine of the base, and treatment of samples, in words.
     transient : str, default ""
         Why the mean of the highest RMS is not known, in words.
-    checked : CheckedRange, optional
-        Range in which the filling was checked, and what of the run lies outside; None where the
-        filling names none.
     bound_taken : float, default 0.0
         Step of that scene, as a share of ``step_bound``.
     """
@@ -75,7 +70,6 @@ class Report:
     method: str
     mount: str
     effects: tuple[str, ...]
-    effect_activity: tuple[EffectUse, ...]
     scenes: int
     particles: tuple[int, int]
     dt_s: tuple[float, float]
@@ -87,13 +81,12 @@ class Report:
     container_evaluations: int
     compile_seconds: float
     run_seconds: float
+    certificate: Certificate
     order: int | None = None
     sampling: tuple[int, float] | None = None
-    certificate: Certificate | None = None
     diverged: tuple[str, ...] = ()
     excitation: tuple[str, ...] = ()
     transient: str = ""
-    checked: CheckedRange | None = None
     bound_taken: float = 0.0
 
     def __repr__(self):
@@ -102,6 +95,16 @@ class Report:
 
     def _scenes(self):
         return f"{counted(self.scenes, 'scene')} with {_range(self.particles)} particles"
+
+    @property
+    def effect_activity(self) -> tuple[EffectUse, ...]:
+        """Activity of each effect that can be counted, since the start."""
+        return self.certificate.acting
+
+    @property
+    def checked(self) -> CheckedRange | None:
+        """Range in which the filling was checked, and what of the run lies outside."""
+        return self.certificate.checked
 
     @property
     def particle_steps_per_second(self) -> float:
@@ -125,9 +128,9 @@ class Report:
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file."""
         figures = asdict(self)
-        figures["acted"] = figures.pop("effect_activity")
-        if self.certificate is not None:
-            figures["certificate"] = self.certificate.as_dict()
+        table = figures.pop("certificate")
+        figures.update(acted=table["acting"], checked=table["checked"])
+        figures["certificate"] = self.certificate.as_dict()
         derived = ("particle_steps_per_second", "known_error")
         return {**figures, **{name: getattr(self, name) for name in derived}}
 
@@ -147,7 +150,7 @@ class Report:
         gone = f"{len(self.diverged):,} of them; nan for these and all on one structure with them"
         checked = self.checked
         acted = [f"{use.effect}: {use}" for use in self.effect_activity]
-        acted += self.certificate.left_out_lines() if self.certificate else []
+        acted += self.certificate.left_out_lines()
         return {
             "method": f"{self.method}, container on the {self.mount}",
             "excitation": "\n".join(self.excitation),
@@ -184,7 +187,7 @@ class Report:
             "diverged": rows["diverged"],
             "step bound by": rows["step bound by"],
             "checked range": self.checked.finding if self.checked is not None else "",
-            "certificate": self.certificate.verdict if self.certificate else "",
+            "certificate": self.certificate.verdict,
         }
         return in_lines(brief, (), BRIEF)
 
@@ -215,7 +218,4 @@ def needed_effects(result: object, tolerance: float = 1e-3) -> EffectTable:
     """
     report: Report = instance("result", getattr(result, "report", result), Report)
     share = fraction("tolerance", tolerance)
-    left_out = report.certificate.left_out if report.certificate else ()
-    return EffectTable(
-        acting=report.effect_activity, left_out=left_out, tolerance=share, shown=None
-    )
+    return report.certificate.advised(share)

@@ -1,8 +1,8 @@
 """One table of the effects of a run, and two views of it: advice on them, and a certificate."""
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from numpy import nan_to_num
@@ -143,23 +143,11 @@ class EffectUse:
         """Whether it may be left out for a try: its influence is at most a share."""
         return not self.kept and self.influence is not None and self.influence <= most
 
-    def negligible(self, tolerance: float) -> bool:
-        """Whether it acted, but with less than a share of the energy, or only round-off."""
-        if self.rounding:
-            return not self.kept
-        if self.share is None or self.steers:
-            return False
-        return self.is_active and self.share < tolerance
-
     def __str__(self):
         """One line without the name."""
-        if self.idle:
-            return f"never acted (0 {self.what})"
-        if self.rounding:
-            return f"never acted beyond round-off (0 {self.what}, {self.energy_J:.3g} J)"
         energy = f", {self.energy_J:.3g} J" if self.energy_J is not None else ""
         share = f", {100 * self.share:.3g} % of {self.whole}" if self.share is not None else ""
-        return f"{self.acted}{energy}{share}"
+        return f"{self.acted}{energy}{', which is round-off' if self.rounding else share}"
 
     @property
     def acted(self) -> str:
@@ -181,6 +169,8 @@ class EffectTable:
         Findings about effects that were left out, with how often and where.
     left_out : tuple of Estimate, default ()
         Estimates of effects that nothing serves; like the findings, each with a ``row``.
+    warnings : tuple of str, default ()
+        Sentences of the report about the run, all but those about missing effects.
     tolerance : float, default 0.0
         Share of the energy below which an effect counts as negligible.
     shown : mapping, optional
@@ -191,8 +181,17 @@ class EffectTable:
     acting: tuple[EffectUse, ...] = ()
     missing: tuple = ()
     left_out: tuple[Estimate, ...] = ()
+    warnings: tuple[str, ...] = ()
     tolerance: float = 0.0
     shown: Mapping[str, float] | None = field(default_factory=dict)
+
+    def advised(
+        self, tolerance: float, shown: Mapping[str, float] | None = None, found: Iterable[Any] = ()
+    ) -> "EffectTable":
+        """The table as advice; shown: by runs without some effects, found: more that is missing."""
+        missing = *self.missing, *found
+        table = EffectTable(acting=self.acting, missing=missing, left_out=self.left_out)
+        return replace(table, tolerance=tolerance, shown=shown)
 
     @property
     def inactive(self) -> tuple[str, ...]:
@@ -202,10 +201,10 @@ class EffectTable:
     @property
     def droppable(self) -> tuple[str, ...]:
         """Names of the effects that the scene could do without."""
-        if self.shown is None:
-            small = (use.effect for use in self.acting if use.negligible(self.tolerance))
-            return self.inactive + tuple(small)
-        return tuple(name for name, found in self.shown.items() if found <= self.tolerance)
+        if self.shown is not None:
+            return tuple(name for name, found in self.shown.items() if found <= self.tolerance)
+        acted = (use for use in self.acting if not use.idle and use.minor(self.tolerance))
+        return *self.inactive, *(use.effect for use in acted if use.rounding or not use.steers)
 
     @property
     def in_order(self) -> tuple[EffectUse, ...]:
@@ -220,72 +219,6 @@ class EffectTable:
         """Difference of a run without an effect, else its own influence; NaN if not known."""
         own = math.nan if use.influence is None else use.influence
         return (self.shown or {}).get(use.effect, own)
-
-    def table(self) -> Any:
-        """Give all that is known of the effects, a row for each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Name, whether listed, number and first time and place of its events, energy [J] and its
-            share, evaluations made and skipped, estimated size of what was left out, as a share of
-            what it acts beside; advice and its reason. ``influence``: what an answer would lose
-            without the effect, the difference of a run without it where one was made, else its
-            share of the energy; NaN where neither tells. Rows are in its order, the largest first.
-        """
-        rows = [self._row(use) for use in self.in_order]
-        rows += [finding.row for finding in (*self.missing, *self.left_out)]
-        known = [{n: value for n, value in row.items() if value is not None} for row in rows]
-        return data_frame({n: [row.get(n, e) for row in known] for n, e in _COLUMNS.items()})
-
-    def _row(self, use) -> dict[str, Any]:
-        told = {"listed": True, "influence": self._influence(use), "energy_share": use.share}
-        reason = f"{use}{self._reason(use)}"
-        return {**vars(use), **told, "advice": self._advice(use), "reason": reason}
-
-    def _advice(self, use):
-        if use.effect in self.droppable:
-            return "drop"
-        untried = use.effect not in (self.shown or {})
-        return TRY if untried and use.minor(max(SMALL, self.tolerance)) else "keep"
-
-    def _reason(self, use):
-        """Why it is kept, or what an answer would lose without it, in words."""
-        found = (self.shown or {}).get(use.effect)
-        if use.kept:
-            return f"; {use.kept}"
-        if found == 0.0:
-            same = "the same up to rounding" if use.rounding else "the same"
-            return f"; a run without it is {same}"
-        if found is not None:
-            differs = f"differs by {100.0 * found:.2g} %"
-            broke = "breaks elsewhere or fails"
-            return f"; a run without it {differs if found < math.inf else broke}"
-        if self._advice(use) != TRY:
-            return ""
-        more = "" if use.idle or not use.steers else ", and may change more than its energy"
-        return f"; no run without it was made{more}"
-
-    def __str__(self):
-        """A line for every effect in order, then one for every missing effect."""
-        lines = [
-            f"{self._advice(use):11s} {use.effect:16s} {use}{self._reason(use)}"
-            for use in self.in_order
-        ]
-        return "\n".join([*lines, *(f"{'missed':11s} {finding}" for finding in self.missing)])
-
-    def __repr__(self):
-        return str(self)
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class BaseCertificate(EffectTable):
-    """The table as what the certificates of both packages have in common.
-
-    warnings: sentences of the report about the run.
-    """
-
-    warnings: tuple[str, ...] = ()
 
     @property
     def faults(self) -> tuple[str, ...]:
@@ -307,26 +240,70 @@ class BaseCertificate(EffectTable):
     @property
     def grade(self) -> str:
         """``"holds"``, ``"holds but for"`` (see ``but_for``) or ``"does not hold"``."""
-        if not self.holds:
-            return FAILS
-        return HOLDS_BUT if self.but_for else HOLDS
+        return (HOLDS_BUT if self.but_for else HOLDS) if self.holds else FAILS
 
     @property
     def failure(self) -> str:
         """Why the certificate does not hold, and a remedy; ``""`` where it holds."""
-        if self.holds:
-            return ""
-        remedy = "run the scene with effects='all'"
-        if self.missing:
-            remedy = f"list {', '.join(one.effect for one in self.missing)}"
-        return f"{', and '.join(self.faults)}: {remedy}"
+        lacked = ", ".join(one.effect for one in self.missing)
+        remedy = f"list {lacked}" if lacked else "run the scene with effects='all'"
+        return "" if self.holds else f"{', and '.join(self.faults)}: {remedy}"
 
     @property
     def verdict(self) -> str:
         """Whether it holds, in words."""
-        if not self.holds:
-            return f"{FAILS}, as {self.failure}"
-        return f"{self.grade} {'; '.join(self.but_for)}".strip()
+        words = "; ".join(self.but_for) if self.holds else f"as {self.failure}"
+        return f"{self.grade}{'' if self.holds else ','} {words}".strip()
+
+    def table(self) -> Any:
+        """Give all that is known of the effects, a row for each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Name, whether listed, number and first time and place of its events, energy [J] and its
+            share, evaluations made and skipped, estimated size of what was left out, as a share of
+            what it acts beside; advice and its reason. ``influence``: what an answer would lose
+            without the effect, the difference of a run without it where one was made, else its
+            share of the energy; NaN where neither tells. Rows are in its order, the largest first.
+        """
+        rows = [*self._rows(), *(one.row for one in (*self.missing, *self.left_out))]
+        known = [{n: value for n, value in row.items() if value is not None} for row in rows]
+        return data_frame({n: [row.get(n, e) for row in known] for n, e in _COLUMNS.items()})
+
+    def _rows(self) -> Iterator[dict[str, Any]]:
+        """A row of each listed effect, in order."""
+        for use in self.in_order:
+            advice, why = self._advice(use)
+            told = {"listed": True, "influence": self._influence(use), "energy_share": use.share}
+            yield {**vars(use), **told, "advice": advice, "reason": f"{use}{why}"}
+
+    def _advice(self, use):
+        """What to do about an effect, and why, or what an answer would lose without it."""
+        found = (self.shown or {}).get(use.effect)
+        advice = "drop" if use.effect in self.droppable else "keep"
+        if use.kept:
+            return advice, f"; {use.kept}"
+        if found is not None:
+            differs = f"differs by {100.0 * found:.2g} %"
+            fails = "breaks elsewhere or fails"
+            return advice, f"; a run without it {differs if found < math.inf else fails}"
+        if advice == "drop" or not use.minor(max(SMALL, self.tolerance)):
+            return advice, ""
+        more = "" if use.idle or not use.steers else ", and may change more than its energy"
+        return TRY, f"; no run without it was made{more}"
+
+    def __str__(self):
+        """A line for every effect in order, then one for every missing effect."""
+        lines = [f"{row['advice']:11s} {row['effect']:16s} {row['reason']}" for row in self._rows()]
+        return "\n".join([*lines, *(f"{'missed':11s} {finding}" for finding in self.missing)])
+
+    def __repr__(self):
+        return str(self)
+
+
+class BaseCertificate(EffectTable):
+    """The table as a certificate, which says when effects acted and what was left out."""
 
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file.
@@ -344,17 +321,12 @@ class BaseCertificate(EffectTable):
             "left_out": [estimate.as_dict() for estimate in self.left_out],
         }
 
-    def acted(self) -> Iterator[str]:
-        """A line for each effect: what it did, and since when."""
-        for use in self.acting:
-            yield f"{use.effect}: {'never' if use.idle else use.acted}"
-
     def left_out_lines(self) -> list[str]:
         """What was left out, in lines."""
         lines = [f"left out: {estimate}" for estimate in self.left_out]
-        lines += [] if self.grade == HOLDS else [f"this certificate {self.verdict}"]
-        return lines
+        return [*lines, *([] if self.grade == HOLDS else [f"this certificate {self.verdict}"])]
 
     def __str__(self):
-        """A line for every kind of thing."""
-        return "\n".join([*self.acted(), *self.left_out_lines()])
+        """A line for each effect, what it did and since when; then what was left out."""
+        acted = (f"{use.effect}: {use.acted}" for use in self.acting)
+        return "\n".join([*acted, *self.left_out_lines()])

@@ -2,7 +2,7 @@
 
 import copy
 import re
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import taichi as ti
@@ -23,6 +23,18 @@ from taichi_dem.state.tables import Capacity, Tables
 NEAR = 1.0 - 1e-9
 
 
+class Reported(NamedTuple):
+    """What reports tell of an effect, beside what its methods say.
+
+    events: what is counted of it, of "bonds" or "bodies". terms: those of the energy account that
+    it books. since: name of its times in ``Simulation.acting_since``.
+    """
+
+    events: str = ""
+    terms: tuple[str, ...] = ()
+    since: str = ""
+
+
 class Effect:
     """Base of all effects.
 
@@ -35,6 +47,7 @@ class Effect:
 
     role = ""
     name = ""
+    reported: ClassVar[Reported] = Reported()
     law: ti.Field
     tables: Tables
     _count: int

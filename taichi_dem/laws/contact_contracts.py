@@ -14,7 +14,7 @@ from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import between, flag, instance, shown
-from taichi_dem.laws.base import Effect
+from taichi_dem.laws.base import Effect, Reported
 from taichi_dem.materials import Material
 from taichi_dem.materials.body_materials import BodyMaterials
 from taichi_dem.mesh.mesh import Mesh, volumes
@@ -178,6 +178,9 @@ class ContactLaw(Effect):
     """
 
     role = "contact"
+    reported = Reported(
+        "bodies touched", ("sphere_dashpot", "sphere_strain", "hysteresis"), "contact"
+    )
     #: Words: option that makes it stiffer, and a value of it; what ends hopping; why no dashpot.
     knob, firmer = "stiffness", "a stiffness of {value:.2g}"
     calmer, undamped = "a dashpot or another restitution", "this contact has none"
@@ -253,6 +256,7 @@ class FrictionLaw(Effect):
     """
 
     role = "friction"
+    reported = Reported("bodies rubbed", ("friction",), "friction")
     #: Whether it keeps a spring of each entry.
     remembers = False
 

@@ -12,7 +12,7 @@ import taichi as ti
 
 from taichi_dem.kit.products import dot
 from taichi_dem.kit.types import vec2, vec3
-from taichi_dem.laws.base import Effect
+from taichi_dem.laws.base import Effect, Reported
 from taichi_dem.materials import Material
 
 #: Lowest and highest displacement along x, y and z [m].
@@ -69,6 +69,7 @@ class BondLaw(UnitLaw):
     """
 
     role = "bond"
+    reported = Reported("bonds damaged", ("softening", "release", "slip"), "damage")
 
     @abstractmethod
     def traction(self, m, u, stiffness, jump):
@@ -84,6 +85,7 @@ class TensionLaw(UnitLaw):
     """Normal law of the contact units of bonds, for itself."""
 
     role = "tension"
+    reported = Reported("bonds softened", ("softening", "release"), "softening")
 
     @abstractmethod
     def traction(self, m, u, stiffness, opening):
@@ -104,6 +106,7 @@ class ShearLaw(UnitLaw):
     """
 
     role = "shear"
+    reported = Reported("bonds slipped", ("slip",), "slip")
 
     @abstractmethod
     def traction(self, m, u, stiffness, sliding, pressure):
@@ -125,6 +128,7 @@ class Dashpot(Effect):
     """Damping of the contact units of bonds."""
 
     role = "dashpot"
+    reported = Reported("bonds damped", ("bond_dashpot",))
 
     @abstractmethod
     def traction(self, m, b, velocity):
@@ -208,6 +212,7 @@ class Load(BodyEffect):
     role = "load"
     #: Order of the error that it leaves in the step, which reports tell; None if nobody knows.
     order: int | None = None
+    reported = Reported("bodies loaded")
 
     @abstractmethod
     def wrench(self, i, motion):
@@ -228,6 +233,7 @@ class Support(BodyEffect):
     """Constraint of bodies."""
 
     role = "support"
+    reported = Reported("bodies held")
 
     @abstractmethod
     def held(self, i, t, step, rotation, velocity, angular_momentum):
@@ -245,6 +251,7 @@ class Ground(BodyEffect):
     """
 
     role = "ground"
+    reported = Reported("bodies braked")
 
     @abstractmethod
     def resistance(self, i):

@@ -131,10 +131,7 @@ def chosen_effects(
         )
     given = tuple(given)
     taken = {getattr(effect, "role", "") for effect in given}
-    laws = _laws(mesh, material, taken)
-    if "bond" in taken:
-        taken |= {*PARTS_OF_BOND}
-    by_role = {effect.role: effect for effect in laws if effect.role not in taken}
+    by_role = {law.role: law for law in usual_laws(mesh, material, taken)}
     chosen = [by_role[role] for role in SINGLE if role in by_role]
     effects = ChosenEffects((*chosen, *given), word)
     if word == AUTO:
@@ -143,8 +140,12 @@ def chosen_effects(
     return effects
 
 
-def _laws(mesh, material, taken):
-    """The laws that a material has numbers for; coefficients of zero need none."""
+def usual_laws(mesh: Mesh, material: BodyMaterials, taken: Iterable[str]) -> list[Effect]:
+    """The laws that a material has numbers for, but for roles that are taken.
+
+    Coefficients of zero need no law.
+    """
+    taken = {*taken, *(PARTS_OF_BOND if "bond" in taken else ())}
     laws: list[Effect] = [Softening(), ShearSlip()]
     if material.has_bond_damping:
         laws.append(BondDamping())
@@ -154,4 +155,4 @@ def _laws(mesh, material, taken):
         laws.append(BodyContact(outer_faces=True if meets else ONCE_BROKEN))
     if material.friction > 0.0:
         laws.append(StickingFriction())
-    return laws
+    return [law for law in laws if law.role not in taken]

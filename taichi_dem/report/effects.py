@@ -1,4 +1,4 @@
-"""Effects of a run: which acted, since when, and with what share of the energy."""
+"""The table of effects of a run: which acted, since when and where, and what was left out."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,29 +7,21 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.allocation import values
-from taichi_dem.kit.effect_table import BaseCertificate, EffectUse
+from taichi_dem.kit.effect_table import BaseCertificate, EffectTable, EffectUse
+from taichi_dem.laws.contracts import BondLaw, ShearLaw, TensionLaw, UnitLaw
+from taichi_dem.mesh.topology import parts_of
 from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.report.energy_balance import EnergyBalance, energy_put_in
+from taichi_dem.report.estimates import PartScales, not_served
 from taichi_dem.report.missing_effects import bond_rounding
 from taichi_dem.report.readings import Run
-from taichi_dem.state.model import names_of
+from taichi_dem.state.model import MANY, SINGLE, names_of
 from taichi_dem.state.state import LATER
 from taichi_dem.state.timeline import NEVER
+from taichi_dem.step.sleeping import ROUNDINGS
 
-_EPSILON = np.finfo(np.float64).eps
 #: Terms of the account that pass through bonds; dashpots are compared with their sum.
 _THROUGH_BONDS = ("bond_strain", "bond_dashpot", "softening", "release", "slip")
-#: By role of each law: its events in words, the terms of the account that it books, and the name
-#: of the times at which it began on bodies.
-_LAWS = {
-    "bond": ("bonds damaged", ("softening", "release", "slip"), "damage"),
-    "tension": ("bonds softened", ("softening", "release"), "softening"),
-    "shear": ("bonds slipped", ("slip",), "slip"),
-    "dashpot": ("bonds damped", ("bond_dashpot",), ""),
-    "contact": ("bodies touched", ("sphere_dashpot", "sphere_strain", "hysteresis"), "contact"),
-    "friction": ("bodies rubbed", ("friction",), "friction"),
-}
-_WITHOUT_WORK = ", and holds without doing work"
 _OWN = "the energy balance may not show what an effect of your own does"
 
 
@@ -44,7 +36,8 @@ def on_demand(run: Run) -> tuple[dict[str, np.ndarray], int, int]:
     first = np.fmin.reduce(own, axis=1, initial=np.nan)
     touched = _times(values(activity.touched, slice(n)), LATER, seconds)
     awake = _times(values(schedule.sleeping.since, slice(n)), NEVER, seconds)
-    laws = ("damage",) if model.by_role["bond"] else ("softening", "slip")
+    kinds = (BondLaw,) if model.by_role["bond"] else (TensionLaw, ShearLaw)
+    laws = [kind.reported.since for kind in kinds]
     times = dict(zip((*laws, "contact", "friction"), (*first.T[: len(laws)], *touched.T)))
     evaluated = int(values(activity.evaluated, slice(bonds)).sum())
     units = 3 * (int(values(schedule.evaluations)[5]) + bonds)
@@ -68,25 +61,20 @@ class _Uses:
     """Makes the EffectUse of an effect."""
 
     def __init__(self, run, balance, account):
-        self.run, self.account, self.works = run, account, balance.works()
+        self.run, self.account, self.works = run, account, np.abs(balance.works())
         self.given = energy_put_in(account)
         self.bits = values(run.state.active_effects, slice(run.model.body_count))
         self.since, self.evaluated, self.skipped = on_demand(run)
-        marks = run.readings.active_bonds()
-        self.marks = {
-            "bond": marks.any(axis=1),
-            "tension": marks[:, 0],
-            "shear": marks[:, 1],
-            "dashpot": run.readings.bonds()[:, 1] > bond_rounding(run),
-            "contact": self.bits & np.int64(CONTACT),
-            "friction": self.bits & np.int64(RUBBED),
-        }
+        parts, damped = run.readings.active_bonds(), run.readings.bonds()[:, 1] > bond_rounding(run)
+        rubbed, touched = (self.bits & np.int64(bit) for bit in (RUBBED, CONTACT))
+        # In the order of SINGLE.
+        marks = parts.any(axis=1), parts[:, 0], parts[:, 1], damped, rubbed, touched
+        self.marks = dict(zip(SINGLE, marks))
 
     def of(self, effect, name):
         """The use of one effect, by its name among all."""
-        find = self._law if effect.role in _LAWS else self._drive
-        what, marks, energy, kept = find(effect)
-        whole, total, events = "the energy put in", self.given, int(np.count_nonzero(marks))
+        what, marks, energy, kept = (self._drive if effect.role in MANY else self._law)(effect)
+        whole, total, events = EffectUse.whole, self.given, int(np.count_nonzero(marks))
         if effect.role == "dashpot":
             # Of all the energy put in, a fall takes most: its vibration may be damped all the same.
             whole, total = "what bonds took and hold", self._sum(_THROUGH_BONDS)
@@ -103,7 +91,7 @@ class _Uses:
             steers=effect.role not in ("dashpot", "load"),
             kept=kept,
             rounding=effect.role == "dashpot" and energy > 0.0 and not events,
-            **self._demanded(effect.role, events),
+            **self._demanded(effect, events),
         )
 
     def _sum(self, terms):
@@ -111,42 +99,35 @@ class _Uses:
 
     def _law(self, effect):
         """Events in words, where they were, the energy booked, and why it is kept in any case."""
-        what, terms, _ = _LAWS[effect.role]
-        roles = {one.role for one in self.run.model.effects if one.name}
-        if effect.role == "shear" and "tension" not in roles:
+        terms = effect.reported.terms
+        if effect.role == "shear" and not any(e.name for e in self.run.model.by_role["tension"]):
             # A shear law may release bonds where no law of tension is listed.
             terms = *terms, "release"
         # Counts show all that laws of the package do; derived classes may act differently.
         ours = type(effect).__module__.startswith(("taichi_dem.laws.", "taichi_dem.loads."))
         kept = "" if ours or effect.role in ("contact", "friction") else _OWN
-        return what, self.marks[effect.role], self._sum(terms), kept
+        return effect.reported.events, self.marks[effect.role], self._sum(terms), kept
 
     def _drive(self, effect):
         """The same of a load, support or ground, kept whatever work it did."""
-        model, article = self.run.model, "the" if effect.role == "ground" else "a"
-        kept = f"{article} {effect.role} defines the problem"
-        drives = *model.loads, *model.supports, *model.ground
-        place = drives.index(effect)
+        model, what = self.run.model, effect.reported.events
+        kept = f"{'the' if effect.role == 'ground' else 'a'} {effect.role} defines the problem"
+        place = (*model.loads, *model.supports, *model.ground).index(effect)
         marks, loads = self.bits & np.int64(1 << place), len(model.loads)
         accounts = {"load": place, "support": loads, "ground": place + 1 - len(model.supports)}
-        works = np.abs(self.works[:, accounts[effect.role]])
+        works = self.works[:, accounts[effect.role]]
         if effect.role != "support":
-            what = "bodies loaded" if effect.role == "load" else "bodies braked"
             return what, marks, works.sum(), kept
-        done = np.where(marks != 0, works, 0.0).sum()
-        rounds = done <= int(values(self.run.schedule.evaluations)[0]) * _EPSILON * self.given
-        is_driven = not rounds and np.any(effect.travel())
-        kept += _WITHOUT_WORK if rounds else ""
-        return f"bodies {'driven' if is_driven else 'held'}", marks, done, kept
+        what = "bodies driven" if np.any(effect.travel()) else what
+        return what, marks, np.where(marks != 0, works, 0.0).sum(), kept
 
-    def _demanded(self, role, events):
+    def _demanded(self, effect, events):
         """When and where an effect that acted on demand began, and its evaluations."""
-        found, name = {}, _LAWS[role][2] if role in _LAWS else ""
-        times = self.since.get(name, np.zeros(0))
+        found, times = {}, self.since.get(effect.reported.since, np.zeros(0))
         if events and np.isfinite(times).any():
             first = int(np.nanargmin(times))
             found = {"since_s": float(times[first]), "where": f"body {first}"}
-        if role in ("bond", "tension", "shear"):
+        if isinstance(effect, UnitLaw):
             found.update(evaluations=self.evaluated, skipped=self.skipped)
         return found
 
@@ -212,23 +193,59 @@ class Certificate(BaseCertificate):
         dict
             Figures by name.
         """
-        laws = "law_evaluations", "all_law_evaluations", "law_ratio"
-        return {
-            **super().as_dict(),
-            **{name: getattr(self, name) for name in (*laws, "sleep", "asleep")},
-            "left_out_impulse": self.impulse,
-            "left_out_energy": self.energy,
-        }
+        names = "law_evaluations", "all_law_evaluations", "law_ratio", "sleep", "asleep"
+        figures = {name: getattr(self, name) for name in names}
+        left = {"left_out_impulse": self.impulse, "left_out_energy": self.energy}
+        return {**super().as_dict(), **figures, **left}
 
     def left_out_lines(self) -> list[str]:
         """What was left out, in lines."""
         skipped = 100.0 * (1.0 - self.law_evaluations / max(1, self.all_law_evaluations))
-        asleep = "asleep: no body, as sleep is 0"
+        asleep = "no body, as sleep is 0"
         if self.sleep:
             asleep = (
-                f"asleep: {100.0 * self.asleep:.3g} % of body-steps (left out: at most "
+                f"{100.0 * self.asleep:.3g} % of body-steps (left out: at most "
                 f"{self.impulse:.1g} of the impulse, {self.energy:.1g} of the energy of a part; "
                 f"{self.sleep:g} asked)"
             )
         law = f"law of bonds: {skipped:.3g} % of its evaluations skipped"
-        return [law, asleep, *super().left_out_lines()]
+        return [law, f"asleep: {asleep}", *super().left_out_lines()]
+
+
+def certificate_of(
+    run: Run, balance: EnergyBalance, table: EffectTable, way: np.ndarray
+) -> Certificate:
+    """The table of a run so far as its certificate; way: of each body since the start [m], (n,)."""
+    now = run.schedule.time_s
+    awake = np.nan_to_num(on_demand(run)[0]["awake"], nan=now)
+    scales = PartScales(run.model, parts_of(run.model.mesh))
+    energy = _energy(run, balance, scales)
+    impulse, left = _slept(run, balance, scales, energy)
+    share = float(values(run.schedule.sleeping.share))
+    asleep = float(awake.mean() / now) if now > 0.0 else 0.0
+    slept = {"sleep": share, "asleep": asleep, "impulse": impulse, "energy": left}
+    left_out = not_served(run, scales, energy, way)
+    return Certificate(**{**vars(table), **slept, "left_out": left_out})
+
+
+def _energy(run, balance, scales):
+    """Energy that each part got [J]: from loads and supports, or what it has and took if more."""
+    body, bond, _ = balance.tables()
+    given = sum(np.abs(scales.sum(column)) for column in body[:, 1:3].T)
+    taken = scales.sum(body[:, 0]) + scales.sum_of_bonds(bond.sum(axis=1))
+    energy = np.maximum(given, taken)
+    return np.where(energy > scales.sum_of_bonds(bond_rounding(run)), energy, 0.0)
+
+
+def _slept(run, balance, scales, energy):
+    """Largest shares of impulse and energy of a part that sleep left out there."""
+    table = np.zeros((max(1, run.model.bond_count), 2))
+    run.readings.left_out(table)
+    lightest = np.full(scales.count, np.inf)
+    np.minimum.at(lightest, scales.part, run.model.body_mass)
+    had = np.sqrt(2.0 * lightest * energy)
+    wholes = np.maximum(had, balance.momentum_exchanged(scales.sum)), energy
+    moves = energy > ROUNDINGS**2 * scales.sum_of_bonds(bond_rounding(run))
+    left = (scales.sum_of_bonds(column) for column in table[: run.model.bond_count].T)
+    shares = (np.where(moves, part, 0.0) / np.maximum(w, 1e-300) for part, w in zip(left, wholes))
+    return [float(share.max()) for share in shares]

@@ -1,4 +1,4 @@
-"""Is an effect needed? Estimates from the numbers of a scene, before a run and after it."""
+"""Estimates of effects that a scene may need, from its numbers, before a run and after it."""
 
 import math
 from collections.abc import Iterable
@@ -6,17 +6,22 @@ from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.kit.effect_table import LIMITS, Estimate
 from taichi_dem.kit.validation import instance, positive
+from taichi_dem.loads.pressure import Gravity
 from taichi_dem.mesh.topology import may_meet, part_boxes, parts_of, parts_under
+from taichi_dem.physics.sphere_pair import CONTACT
+from taichi_dem.report.readings import Run
 from taichi_dem.scene import Scene
 from taichi_dem.state.model import Model, centres, sums
 
 #: Density of air [kg/m^3], and standard weight [m/s^2].
-AIR, WEIGHT = 1.2, 9.80665
+_AIR, _WEIGHT = 1.2, 9.80665
 #: Groups in words.
 _OPENS = "stress over strength, as contact needs free faces"
-BENDS = "stress of the weight over tensile strength, at most"
+_BENDS = "stress of the weight over tensile strength, at most"
+_SHARE = "share of the energy put in, at most"
 
 
 class PartScales:
@@ -48,7 +53,11 @@ class PartScales:
         model = self.model
         self.is_bonded = np.bincount(self.of_bonds, minlength=self.count) > 0
         stiffness, damping = model.bond_stiffness[:, 0], model.bond_damping[:, 0]
-        normal, self.damping = np.full(self.count, self._stiffness_of_all()), np.zeros(self.count)
+        # The stiffness per area [Pa/m] where a part has no bond; NaN where only bonds have one.
+        given = model.material.normal_stiffness
+        usual = given if isinstance(given, (int, float)) else math.nan
+        normal = np.full(self.count, np.median(stiffness) if model.bond_count else float(usual))
+        self.damping = np.zeros(self.count)
         area, pair = 3.0 * model.bonds["area"], 0.5 * self.mass / self.bodies
         order = np.argsort(self.of_bonds, kind="stable")
         parts, begin = np.unique(self.of_bonds[order], return_index=True)
@@ -57,13 +66,6 @@ class PartScales:
             rate = float(area[own].mean()) / (normal[p] * pair[p])
             self.damping[p] = 2.0 * math.pi * np.median(damping[own]) * math.sqrt(rate)
         self.wave = np.sqrt(normal * self.spacing / self.density)
-
-    def _stiffness_of_all(self):
-        """Normal stiffness per area [Pa/m] where a part has no bond; NaN where only bonds have."""
-        if self.model.bond_count:
-            return float(np.median(self.model.bond_stiffness[:, 0]))
-        given = self.model.material.normal_stiffness
-        return float(given) if isinstance(given, (int, float)) else math.nan
 
     def of_materials(self, name: str, choose: Any) -> np.ndarray:
         """A constant of each part: the least or largest of its bodies, as ``choose`` says."""
@@ -94,8 +96,8 @@ class PartScales:
     def bent(self, until: float, borne: np.ndarray) -> np.ndarray:
         """Largest stress of weight in bonded parts that are borne, over the tensile strength."""
         long, thin = self._extents()
-        bent = 6.0 * WEIGHT * long**2 / thin
-        most = self.density * np.minimum(bent, math.sqrt(3.0) * self.wave * WEIGHT * until)
+        bent = 6.0 * _WEIGHT * long**2 / thin
+        most = self.density * np.minimum(bent, math.sqrt(3.0) * self.wave * _WEIGHT * until)
         stress = np.where(borne & self.is_bonded, most, 0.0)
         return stress / self.of_materials("tensile_strength", np.minimum)
 
@@ -174,10 +176,10 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
         contact = Estimate("contact", float(scales.count), "number of parts that may meet")
     # A part that is borne does not fall; what may hit one at rest is not known.
     borne = scales.under((*model.supports, *model.ground))
-    fall = WEIGHT * until / np.maximum(speed, 1e-300)
+    fall = _WEIGHT * until / np.maximum(speed, 1e-300)
     fall = np.where(speed == 0.0, np.where(borne, 0.0, np.nan if meet else fall), fall)
-    bends = scales.bent(until, borne | meet), BENDS
-    drag = AIR * speed * until / (scales.density * scales.spacing)
+    bends = scales.bent(until, borne | meet), _BENDS
+    drag = _AIR * speed * until / (scales.density * scales.spacing)
     return (
         worst("softening", (softening, "stress over tensile strength")),
         worst("slip", (shear, "stress over cohesion")),
@@ -207,3 +209,30 @@ def _speeds(model, velocity, group):
     # Rounding of a rigid motion strains nothing.
     found[0][found[0] <= 1e-9 * found[2]] = 0.0
     return found
+
+
+def not_served(
+    run: Run, scales: PartScales, energy: np.ndarray, way: np.ndarray
+) -> tuple[Estimate, ...]:
+    """Estimates of what no law serves, from the ways [m] and energies [J] of bodies and parts."""
+    model, found, until = run.model, [], run.schedule.time_s
+    speed = np.linalg.norm(run.readings.motion()[:, :3], axis=1)
+    if not any(isinstance(effect, Gravity) for effect in model.loads):
+        active = values(run.state.active_effects, slice(model.body_count))
+        borne = scales.under((*model.supports, *model.ground))
+        borne |= scales.sum(active & np.int64(CONTACT)) > 0
+        fall = _WEIGHT * until
+        work = model.body_mass * (_WEIGHT * way + fall * speed + 0.5 * fall**2)
+        share = _share(scales.sum(work), energy)
+        # What is borne and not moved at all does not fall.
+        share = np.where(borne & (energy == 0.0), 0.0, share)
+        groups = (share, _SHARE), (scales.bent(until, borne), _BENDS)
+        found.append(scales.worst("gravity", *groups))
+    drag = 0.5 * _AIR * math.pi * model.body_radius**2 * speed**2
+    return (*found, scales.worst("air drag", (_share(scales.sum(drag * way), energy), _SHARE)))
+
+
+def _share(work, energy):
+    """Share of an energy; not known where there is none."""
+    none = np.where(work > 0.0, np.nan, 0.0)
+    return np.where(energy > 0.0, work / np.where(energy > 0.0, energy, 1.0), none)

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.effect_table import EffectTable
 from taichi_dem.loads.history import unresolved_histories
 from taichi_dem.methods import Method
 from taichi_dem.report.divergence import DivergenceCheck
-from taichi_dem.report.effects import effect_uses
+from taichi_dem.report.effects import certificate_of, effect_uses
 from taichi_dem.report.energy_balance import EnergyBalance, open_account
 from taichi_dem.report.hops import Hops
-from taichi_dem.report.left_out import certificate_of
 from taichi_dem.report.missing_effects import MissingEffects
 from taichi_dem.report.readings import Kept, Run
 from taichi_dem.report.report import Report, known_error
@@ -42,13 +42,8 @@ class Followed:
     @property
     def kept(self) -> dict[str, Kept]:
         """What a checkpoint holds of it, by name."""
-        return {
-            "energy balance": self.energy_balance,
-            "missing effects": self.missing_effects,
-            "shared volume": self.shared_volume,
-            "step resolution": self.step_resolution,
-            "hops": self.hops,
-        }
+        names = "energy_balance", "missing_effects", "shared_volume", "step_resolution", "hops"
+        return {name.replace("_", " "): getattr(self, name) for name in names}
 
     def at_start(self) -> tuple[str, ...]:
         """What is wrong before the first step, in sentences."""
@@ -78,6 +73,10 @@ class Followed:
         account = self.energy_balance.account()
         bound = np.bincount(values(state.bound, here), minlength=len(CRITERIA))
         unconverged, worst = self.step_resolution.unconverged
+        missing = () if brief else self.missing_effects.findings(shared_volume)
+        slip = self.step_resolution.bond_slip()
+        slipped = (one for one in slip if one.count)
+        unresolved = self._unresolved(scene, method, shared_volume, account)
         report = Report(
             method=method.name,
             effects=tuple(filter(None, names_of(model.effects))),
@@ -93,20 +92,25 @@ class Followed:
             energy_balance=account,
             linear_momentum_error=float(linear),
             angular_momentum_error=float(angular),
-            effect_activity=effect_uses(run, self.energy_balance, account),
-            missing_effects=() if brief else self.missing_effects.findings(shared_volume),
-            unresolved=self._unresolved(scene, method, shared_volume, account),
+            effect_table=self._table(scene, account, missing, (*map(str, slipped), *unresolved)),
+            unresolved=unresolved,
             interpenetration=shared_volume.worst if shared_volume.has_looked else None,
             bound_by={name: n for name, n in zip(CRITERIA, bound.tolist()) if n},
-            bond_slip=self.step_resolution.bond_slip(),
+            bond_slip=slip,
             round_off_J=self.divergence_check.round_off(),
         )
-        report = replace(report, known_error=known_error(report, scene, method))
-        if scene.on_demand:
-            way = np.linalg.norm(values(state.position, here) - self.first, axis=1)
-            certificate = certificate_of(run, self.energy_balance, report, way)
-            report = replace(report, certificate=certificate)
-        return report
+        return replace(report, known_error=known_error(report, scene, method))
+
+    def _table(self, scene, account, missing, warnings):
+        """The table of effects; with effects="auto" as a certificate."""
+        run, balance = self.run, self.energy_balance
+        acting = effect_uses(run, balance, account)
+        table = EffectTable(acting=acting, missing=missing, warnings=warnings)
+        if not scene.on_demand:
+            return table
+        place = values(run.state.position, slice(run.model.body_count))
+        way = np.linalg.norm(place - self.first, axis=1)
+        return certificate_of(run, balance, table, way)
 
     def _unresolved(self, scene, method, shared_volume, account):
         return (

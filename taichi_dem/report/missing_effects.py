@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.allocation import values
+from taichi_dem.laws.roles import usual_laws
 from taichi_dem.mesh.tetrahedra import penetration
 from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.report.readings import Kept, Run
@@ -16,6 +17,15 @@ from taichi_dem.state.timeline import NEVER
 _EPSILON = np.finfo(np.float64).eps
 #: Roundings of a coordinate by which two bodies side by side may seem to overlap.
 _ROUNDINGS = 16.0
+_WITHIN = "pairs of bodies are within each other"
+#: By role, why a scene needs the usual law that it lacks.
+_FOUND = {
+    "tension": "bonds are stretched past their tensile strength",
+    "shear": "bonds are sheared past their Coulomb limit",
+    "dashpot": "the material has damping and bonds are strained",
+    "contact": "bodies overlap where a bond has been released",
+    "friction": "the material has friction and bodies press on each other",
+}
 
 
 def bond_rounding(run: Run) -> np.ndarray:
@@ -67,25 +77,20 @@ class MissingEffect:
 
 
 def unserved(model: Model) -> dict[str, MissingEffect]:
-    """By name, all effects that a model leaves out, with nothing found yet."""
+    """Usual laws that a model leaves out, by role, with nothing found yet; "bodies" beside them.
+
+    Without contact, pairs of bodies may be within each other wherever they are.
+    """
     roles = {effect.role for effect in model.effects if effect.name}
-    material, touch = model.materials, "contact" in roles
-    rubs, damps = material.friction > 0.0, material.has_bond_damping
-    stretched = "bonds are stretched past their tensile strength"
-    sheared = "bonds are sheared past their Coulomb limit"
-    strained = "the material has damping and bonds are strained"
-    overlap = "bodies overlap where a bond has been released"
-    press = "the material has friction and bodies press on each other"
-    within = "pairs of bodies are within each other"
-    needs: dict[str, tuple[Any, ...]] = {
-        "tension": (roles.isdisjoint(("bond", "tension")), "Softening", stretched),
-        "shear": (roles.isdisjoint(("bond", "shear")), "ShearSlip", sheared),
-        "dashpot": (damps and "dashpot" not in roles, "BondDamping", strained),
-        "contact": (not touch, "BodyContact", overlap),
-        "friction": (touch and rubs and "friction" not in roles, "StickingFriction", press, "body"),
-        "bodies": (not touch, "BodyContact", within, "body"),
-    }
-    return {name: MissingEffect(*need) for name, (missed, *need) in needs.items() if missed}
+    laws = {law.role: law for law in usual_laws(model.mesh, model.materials, roles)}
+    if "contact" in laws:
+        laws.pop("friction", None)
+    needs = {role: MissingEffect(type(law).__name__, _FOUND[role]) for role, law in laws.items()}
+    if "contact" in needs:
+        needs["bodies"] = replace(needs["contact"], what=_WITHIN, unit="body")
+    elif "friction" in needs:
+        needs["friction"] = replace(needs["friction"], unit="body")
+    return needs
 
 
 class MissingEffects(Kept):
@@ -153,32 +158,27 @@ class MissingEffects(Kept):
     def findings(self, volume: SharedVolume) -> tuple[MissingEffect, ...]:
         """A ``MissingEffect`` for each effect that would have acted; a tuple, empty for none."""
         found, schedule, model = self.found.copy(), self.run.schedule, self.run.model
-        now_s = schedule.time_s
         ticks = values(self.run.state.passed, slice(model.bond_count))
         looks = {
-            "bodies": (self._within(volume), now_s),
+            "bodies": (self._within(volume), schedule.time_s),
             "tension": _passed(ticks[:, 0], schedule),
             "shear": _passed(ticks[:, 1], schedule),
             "dashpot": (np.flatnonzero(self.strain > bond_rounding(self.run)), self.last_s),
         }
         for name in looks.keys() & self.needs.keys():
             self._see(found, name, *looks[name])
-        return tuple(
-            self._told(need, *row)
-            for need, row in zip(self.needs.values(), found.tolist())
-            if row[0]
-        )
-
-    def _told(self, need, count, where, first_s):
-        model, where = self.run.model, int(where)
-        place = model.centre[where] if need.unit == "body" else middle_of_bond(model, where)
-        figures = {"count": int(count), "where": where, "first_s": first_s}
-        return replace(need, place_m=tuple(place.tolist()), **figures)
+        rows = zip(self.needs.values(), found.tolist())
+        return tuple(placed(need, model, *row) for need, row in rows if row[0])
 
 
-def middle_of_bond(model: Model, bond: int) -> np.ndarray:
-    """Middle of a bond's face in the mesh [m], (3,)."""
-    return model.mesh.points[model.topology.vertices[bond]].mean(axis=0)
+def placed(found: Any, model: Model, count: float, where: float, first_s: float) -> Any:
+    """A ``MissingEffect`` with how often, where and when [s] it was found."""
+    if found.unit == "body":
+        place = model.centre[int(where)]
+    else:
+        place = model.mesh.points[model.topology.vertices[int(where)]].mean(axis=0)
+    figures = {"count": int(count), "where": int(where), "first_s": first_s}
+    return replace(found, place_m=tuple(place.tolist()), **figures)
 
 
 def _passed(ticks, schedule):

@@ -1,14 +1,15 @@
 """The short report at the end of a run."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from taichi_dem.kit.display import BRIEF, counted, in_brief, in_lines
-from taichi_dem.kit.effect_table import EffectTable
+from taichi_dem.kit.effect_table import EffectTable, EffectUse
 from taichi_dem.methods import order_of
 from taichi_dem.report.effects import Certificate
 from taichi_dem.report.energy_balance import given_and_held, injected_words, put_in_words
+from taichi_dem.report.missing_effects import MissingEffect
 from taichi_dem.report.shared_volume import Interpenetration
 from taichi_dem.scene import Scene
 
@@ -61,10 +62,8 @@ class Report:
         Wall time spent stepping [s].
     run_cpu_seconds : float
         CPU time spent stepping [s].
-    effect_activity : tuple of EffectUse
-        Activity of each effect.
-    missing_effects : tuple of MissingEffect
-        Effects that were left out and needed.
+    effect_table : EffectTable
+        Effects that acted, are missing or were left out; a ``Certificate`` with effects="auto".
     unresolved : tuple of str
         Sentences about bonds and contacts for which the step was too long.
     bound_by : dict
@@ -82,8 +81,6 @@ class Report:
         The bond that slipped farthest; empty where none slipped.
     known_error : str, default ""
         What is known of the error, in words.
-    certificate : Certificate, optional
-        What acted and what was left out, with effects="auto".
     """
 
     method: str
@@ -107,8 +104,7 @@ class Report:
     compile_seconds: float
     run_seconds: float
     run_cpu_seconds: float
-    effect_activity: tuple
-    missing_effects: tuple
+    effect_table: EffectTable
     unresolved: tuple
     bound_by: dict
     round_off_J: float = 0.0
@@ -117,7 +113,6 @@ class Report:
     interpenetration: Interpenetration | None = None
     bond_slip: tuple = ()
     known_error: str = ""
-    certificate: Certificate | None = None
 
     def __repr__(self):
         took = f"{self.run_seconds:.3g} s run"
@@ -134,6 +129,21 @@ class Report:
         """Sentences about missed effects, slip of bonds, and too long a step."""
         slipped = (slip for slip in self.bond_slip if slip.count)
         return (*map(str, (*self.missing_effects, *slipped)), *self.unresolved)
+
+    @property
+    def effect_activity(self) -> tuple[EffectUse, ...]:
+        """Activity of each effect."""
+        return self.effect_table.acting
+
+    @property
+    def missing_effects(self) -> tuple[MissingEffect, ...]:
+        """Effects that were left out and needed."""
+        return self.effect_table.missing
+
+    @property
+    def certificate(self) -> Certificate | None:
+        """What acted and what was left out, with effects="auto"; else None."""
+        return self.effect_table if isinstance(self.effect_table, Certificate) else None
 
     @property
     def contact_evaluations(self) -> int:
@@ -186,15 +196,7 @@ class Report:
             Print it, or read its ``table()``.
         """
         slipped = (slip for slip in self.bond_slip if slip.count and not slip.weakens)
-        missing = *self.missing_effects, *slipped
-        left_out = self.certificate.left_out if self.certificate else ()
-        return EffectTable(
-            acting=self.effect_activity,
-            missing=missing,
-            left_out=left_out,
-            tolerance=tolerance,
-            shown=shown or {},
-        )
+        return self.effect_table.advised(tolerance, shown or {}, slipped)
 
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file.
@@ -204,9 +206,9 @@ class Report:
         dict
             Figures by name.
         """
-        figures = asdict(replace(self, certificate=None))
-        figures["acted"] = figures.pop("effect_activity")
-        figures["missed"] = figures.pop("missing_effects")
+        figures = asdict(self)
+        table = figures.pop("effect_table")
+        figures.update(acted=table["acting"], missed=table["missing"])
         figures["certificate"] = self.certificate and self.certificate.as_dict()
         derived = "contact_evaluations ideal_gain boundary_gain energy_residual_fraction needs"
         return {**figures, **{name: getattr(self, name) for name in derived.split()}}
@@ -258,25 +260,18 @@ class Report:
     def __str__(self):
         """At most fifteen lines: what came out, how sure, how long; how, and what was missed."""
         rows = self.rows()
+        acted = (f"{use.effect} ({use.events:,})" for use in self.effect_activity)
         brief = {
             "result": f"{counted(self.body_count, 'body')} for {rows['simulated']}",
             "error": self.known_error,
             "time": rows["time"],
             "method": f"{self.method}, smallest step {rows['smallest step']}",
-            "effects": self._acted() or "none",
+            "effects": ", ".join(acted) or "none",
             "energy put in": rows["energy put in"],
             "injected": rows["injected"],
             "certificate": self.certificate.verdict if self.certificate else "",
         }
         return in_lines(brief, self.needs, BRIEF)
-
-    def _acted(self):
-        """Which effects acted, which never did, and of which no event was counted or could be."""
-        said: dict[str, list[str]] = {"acted": [], "not counted": [], "never acted": []}
-        for use in self.effect_activity:
-            words = "acted" if use.is_active else "never acted" if use.idle else "not counted"
-            said[words].append(use.effect)
-        return "; ".join(f"{', '.join(names)} {words}" for words, names in said.items() if names)
 
 
 def known_error(report: Report, scene: Scene, method: Any) -> str:

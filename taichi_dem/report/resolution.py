@@ -8,7 +8,7 @@ from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import counted
 from taichi_dem.laws.contracts import ShearLaw
 from taichi_dem.physics.sphere_pair import CONTACT
-from taichi_dem.report.missing_effects import MissingEffect, middle_of_bond
+from taichi_dem.report.missing_effects import MissingEffect, placed
 from taichi_dem.report.readings import Kept, Run
 from taichi_dem.stability.step_report import stable_steps, step_limits
 from taichi_dem.state.timeline import MAX_LEVEL
@@ -173,9 +173,8 @@ class StepResolution(Kept):
         share, bond, time_s, count = self.slip.tolist()
         if bond < 0:
             return ()
-        place = tuple(middle_of_bond(self.run.model, int(bond)).tolist())
-        found = "SlipWeakening", _SLIPPED, "bond", int(count), int(bond), time_s, place
-        return (BondSlip(*found, share, self.weakens),)
+        found = BondSlip("SlipWeakening", _SLIPPED, share=share, weakens=self.weakens)
+        return (placed(found, self.run.model, count, bond, time_s),)
 
     def _note_partners(self, contacts):
         """Remember steps and light partners: few contacts last until a recording."""

@@ -36,6 +36,13 @@ def test_bodies_soften_before_their_bonds_break_and_the_first_of_them_tells_the_
         assert (result.acting_since["softening"][side[broken]] < result.broken_time[broken]).all()
 
 
+def test_evaluations_made_and_skipped_are_those_of_all_laws_in_every_step():
+    """Three units a bond, at the start and in each step; where nothing acts, all are skipped."""
+    made = simulate(pulled(peak=1e4, sleep=0.0), until=UNTIL, method=METHOD, samples=1)
+    found, every = made.certificate, 3 * made.model.bond_count * (1 + made.report.substeps)
+    assert (found.law_evaluations, found.all_law_evaluations) == (0, every)
+
+
 def test_a_resumed_run_has_the_bits_and_the_certificate_of_a_straight_one(result, tmp_path):
     """Stopped when the wave has gone through half of the bar, and the rest still sleeps."""
     path, job = tmp_path / "run.checkpoint", {"method": METHOD, "samples": 4, "frames": 4}
@@ -72,6 +79,19 @@ def test_a_certificate_names_what_it_holds_but_for(left_out, warnings, impulse, 
     assert made.but_for == tuple(made.as_dict()["but_for"]) == named
     assert made.holds == (impulse == 0.0) and made.verdict.startswith(grade)
     assert impulse or all(words in made.verdict and words in str(made) for words in named)
+
+
+def test_weight_and_air_are_judged_by_how_far_a_flight_has_gone():
+    """Of m v^2 / 2, weight gives at most m g (v t + v t + g t^2 / 2), and air takes its drag."""
+    speed, until, g, air = 3.0, 2e-4, 9.80665, 1.2
+    flying = Scene(bar(0.05, 0.05, (1, 1, 1)), CONCRETE, "auto", velocity=(speed, 0.0, 0.0))
+    made = simulate(flying, method=METHOD, until=until, samples=1)
+    found = {one.effect: one.group for one in made.certificate.left_out}
+    until, held = made.report.until_s, 0.5 * speed**2
+    weight = g * (2.0 * speed * until + 0.5 * g * until**2) / held
+    drag = 0.5 * air * np.pi * (made.model.body_radius**2).sum() * speed**3 * until
+    assert found["gravity"] == pytest.approx(weight, rel=1e-9)
+    assert found["air drag"] == pytest.approx(drag / held / made.model.body_mass.sum(), rel=1e-9)
 
 
 def test_what_sleep_leaves_out_of_rounding_is_nothing():

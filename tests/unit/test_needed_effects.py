@@ -24,9 +24,10 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem.engine import ENGINES
-from taichi_dem.kit.effect_table import NEEDED
+from taichi_dem.kit.effect_table import NEEDED, EffectTable, EffectUse
 from taichi_dem.mesh.shapes import bar, pair
 from taichi_dem.report.energy_balance import energy_put_in
+from taichi_dem.report.missing_effects import unserved
 from taichi_dem.state.model import Model
 from taichi_dem.state.timeline import NEVER
 from tests.structures import filled
@@ -108,6 +109,41 @@ def test_what_steers_is_judged_by_a_run_without_it(result):
     assert use.share < 0.9
     advice = needed_effects(result, 0.9)
     assert advice.shown["softening"] == np.inf and "softening" not in advice.droppable
+
+
+@pytest.mark.parametrize("shown", [None, {}])
+def test_what_defines_the_problem_is_kept_however_little_it_did(shown):
+    """Beside an effect of the same share that may be left out, where counts decide."""
+    slight = EffectUse("friction", "bodies rubbed", 3, energy_J=1e-9, share=1e-9)
+    drive = replace(slight, effect="gravity", kept="a load defines the problem")
+    table = EffectTable(acting=(slight, drive), tolerance=1e-3, shown=shown)
+    assert table.droppable == (() if shown == {} else ("friction",))
+    advice = dict(zip(table.table()["effect"], table.table()["advice"]))
+    assert advice["gravity"] == "keep" != advice["friction"]
+
+
+BOTH = effects.BodyContact(), effects.StickingFriction()
+LISTED = {
+    "nothing": (),
+    "one part of the law of bonds": (effects.ShearSlip(),),
+    "a law of bonds as a whole": (effects.MixedMode(1e3), effects.BondDamping()),
+    "contact": BOTH[:1],
+    "contact and friction": BOTH,
+}
+
+
+@pytest.mark.parametrize("listed", LISTED.values(), ids=LISTED)
+@pytest.mark.parametrize(
+    "material", [CONCRETE, replace(CONCRETE, friction=0.0)], ids=["", "smooth"]
+)
+def test_a_scene_lacks_what_auto_would_add_to_it(listed, material):
+    """But friction without contact, which then cannot rub; a silent law is lacking, too."""
+    mesh, touches = bar(0.2, 0.1, (2, 1, 1)), BOTH[0] in listed
+    added = {*Scene(mesh, material, "auto", loads=listed).effects} - {*listed}
+    wanted = {type(one).__name__ for one in added if touches or one.role != "friction"}
+    silent = [effects.Softening().silent()] * ("Softening" in wanted)
+    model = Model(mesh, material, [*listed, *silent])
+    assert {need.effect for need in unserved(model).values()} == wanted
 
 
 def strained(*listed):
