@@ -7,6 +7,7 @@
 
 from taichi_dem.laws.body_geometry import BodyGeometry
 from taichi_dem.laws.bond import BondDamping, ShearSlip, SlipWeakening, Softening
+from taichi_dem.laws.cohesive_crack import CohesiveCrack
 from taichi_dem.laws.contact import BodyContact, SphereContact
 from taichi_dem.laws.contact_contracts import ContactLaw, FrictionLaw
 from taichi_dem.laws.contracts import BondLaw, Dashpot, Ground, Load, ShearLaw, Support, TensionLaw
@@ -22,6 +23,7 @@ __all__ = [
     "BodyGeometry",
     "BondDamping",
     "BondLaw",
+    "CohesiveCrack",
     "ContactLaw",
     "Dashpot",
     "ExpandingGas",

@@ -6,7 +6,7 @@ import numpy as np
 
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.display import counted
-from taichi_dem.laws.contracts import ShearLaw
+from taichi_dem.laws.contracts import UnitLaw
 from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.report.missing_effects import MissingEffect, placed
 from taichi_dem.report.readings import Kept, Run
@@ -118,7 +118,7 @@ class StepResolution(Kept):
         by_role = run.model.by_role
         self.shortest, (law,) = edges.min(axis=1), by_role["bond"] or by_role["shear"] or (None,)
         self.slips = len(edges) > 0 and law is not None
-        self.weakens = isinstance(law, ShearLaw) and type(law).failed is not ShearLaw.failed
+        self.weakens = law is not None and type(law).failed is not UnitLaw.failed
 
     def sample(self, time_s: float) -> None:
         """Update the figures at a recording time [s]; not those of dashpots that are solved."""

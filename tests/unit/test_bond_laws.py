@@ -9,7 +9,7 @@ import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform
-from taichi_dem.effects import MixedMode, ShearSlip, SlipWeakening, Softening
+from taichi_dem.effects import CohesiveCrack, MixedMode, ShearSlip, SlipWeakening, Softening
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.laws.base import NEAR
 from taichi_dem.mesh.shapes import pair
@@ -18,6 +18,7 @@ LAWS = {
     "paper": [Softening(), ShearSlip()],
     "weakening": [Softening(), SlipWeakening(500.0)],
     "mixed": [MixedMode(500.0, 1.75)],
+    "crack": [CohesiveCrack()],
 }
 #: Units of the smallest engine.
 UNITS = 6000
