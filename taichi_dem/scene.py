@@ -271,8 +271,9 @@ def _check_roles(effects):
 
 
 def scene_warnings(scene: Any) -> tuple[str, ...]:
-    """Warnings before a run: effects that a scene lists or leaves out in vain."""
-    return (*outer_faces_warnings(scene), *_friction_warnings(scene))
+    """Warnings before a run: effects listed or left out in vain, strengths that were lowered."""
+    weakened = scene.body_materials.weakened
+    return (*outer_faces_warnings(scene), *_friction_warnings(scene), *weakened)
 
 
 def _friction_warnings(scene):

@@ -8,6 +8,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
 from taichi_dem.laws.base import Effect
 from taichi_dem.laws.bond import BondDamping, ShearSlip, Softening
+from taichi_dem.laws.cohesive_crack import CohesiveCrack
 from taichi_dem.laws.contact import BodyContact
 from taichi_dem.laws.contact_contracts import ONCE_BROKEN, ContactLaw, FrictionLaw
 from taichi_dem.laws.contracts import (
@@ -146,7 +147,8 @@ def usual_laws(mesh: Mesh, material: BodyMaterials, taken: Iterable[str]) -> lis
     Coefficients of zero need no law.
     """
     taken = {*taken, *(PARTS_OF_BOND if "bond" in taken else ())}
-    laws: list[Effect] = [Softening(), ShearSlip()]
+    whole = material.is_elastic and taken.isdisjoint(PARTS_OF_BOND)
+    laws: list[Effect] = [CohesiveCrack()] if whole else [Softening(), ShearSlip()]
     if material.has_bond_damping:
         laws.append(BondDamping())
     if "contact" not in taken:

@@ -18,11 +18,20 @@ from taichi_dem.materials.bond_rules import (
     ContactRule,
     Density,
     bond_geometry,
+    evaluated,
     joined_constants,
     per_bond,
 )
-from taichi_dem.materials.material import RULES, Material, check_energy, unchecked
-from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.materials.material import (
+    REFUSE,
+    RULES,
+    SPARE,
+    Material,
+    check_energy,
+    kept_energy,
+    unchecked,
+)
+from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.topology import topology_of
 
 #: Most different materials of a scene: tables on the device have a row for each ordered pair.
@@ -82,7 +91,28 @@ class BodyMaterials:
                 numbers[name] = rule.of_mesh(*on_mesh)
             elif isinstance(rule, BondRule):
                 numbers[name] = rule.on_mesh(*on_mesh)
-        return replace(material, **numbers) if numbers else material
+        made = replace(material, **numbers) if numbers else material
+        return made if material.coarse == REFUSE else self._weakened(made, bodies)
+
+    def _weakened(self, material, bodies):
+        """The material with a strength at which all bonds of some bodies keep their energy."""
+        bonds = bond_geometry(self.mesh, topology_of(self.mesh), self.density)
+        stiffness = evaluated((material.normal_stiffness,) * 2, bonds)[:, 0]
+        stiffness = stiffness[bodies[bonds.bodies].any(axis=1)]
+        return kept_energy(material, float(stiffness.min())) if len(stiffness) else material
+
+    @property
+    def weakened(self) -> tuple[str, ...]:
+        """A sentence for each material whose strength was lowered for large elements."""
+        own = [(self.materials[k], row[k]) for k, row in enumerate(self.pairs)]
+        return tuple(
+            f"the tensile strength of {given.tensile_strength:.4g} Pa is lowered to "
+            f"{one.tensile_strength:.3g} Pa, with which cracks through elements of up to "
+            f"{largest(self.mesh, self.of_body == k):.3g} m keep the fracture energy of "
+            f"{given.fracture_energy:.4g} J/m2"
+            for k, (given, one) in enumerate(own)
+            if one.tensile_strength < given.tensile_strength
+        )
 
     @property
     def density(self) -> Density:
@@ -100,6 +130,11 @@ class BodyMaterials:
     def has_bond_damping(self) -> bool:
         """Whether bonds of any material have dashpots."""
         return any(material.has_bond_damping for material in self.materials)
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether bonds of all materials follow from moduli, as ``from_elastic`` makes them."""
+        return all(isinstance(one.normal_stiffness, BondRule) for one in self.materials)
 
     @property
     def friction(self) -> float:
@@ -145,8 +180,23 @@ class BodyMaterials:
         where = f" at bond {bond}, whose bodies are {distance:.4g} m apart"
         if mixed:
             where += " and of two materials, with the lesser strength and energy of both"
-        check_energy(made, where)
+        check_energy(made, where, self._remedy(made))
         return made
+
+    def _remedy(self, softest):
+        """Size of elements, and their number, with which a bond reaches its strength, in words."""
+        share = softest.failure_opening / softest.onset_opening / SPARE
+        size = share * largest(self.mesh, slice(None))
+        count = self.mesh.body_count / share**3
+        return (
+            f": elements of at most {size:.2g} m would do, about {count:.2g} of them, or coarse="
+            "'weaken' of Material.from_elastic, which lowers the strength"
+        )
+
+
+def largest(mesh: Mesh, bodies: Any) -> float:
+    """Longest edge [m] of regular tetrahedra with the volumes of some bodies."""
+    return float(np.cbrt(6.0 * np.sqrt(2.0) * volumes(mesh)[bodies].max()))
 
 
 #: One material for all bodies, or those of each.

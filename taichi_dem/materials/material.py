@@ -25,7 +25,7 @@ import numpy as np
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.likely_units import ANGLE, DENSITY, MODULUS, STRENGTH, in_unit
-from taichi_dem.kit.validation import between, plain_fields, positive, told_apart
+from taichi_dem.kit.validation import between, plain_fields, positive, shown, told_apart
 from taichi_dem.materials.bond_rules import (
     BondRule,
     Constant,
@@ -77,6 +77,11 @@ RULES: dict[str, type] = {
 _BEYOND = 2.0**40
 #: Largest angle of friction [degrees].
 _STEEPEST = 89.9
+#: What to do where elements are too large for strength and energy.
+REFUSE, WEAKEN = "refuse", "weaken"
+#: What bonds of a lowered strength may spend over what they hold when they reach it: above 1, so
+#: that faces inclined by up to 45 degrees, which hold more and spend less, do not fail at once.
+SPARE = 1.25
 
 
 def bond_moduli(young: float, poisson: float) -> tuple[float, float]:
@@ -144,6 +149,9 @@ class Material:
         Stiffness of one contact of spheres [N/m], for ``SphereContact`` alone.
     contact_damping : float or rule
         Dashpot of one contact of spheres [N s/m], likewise.
+    coarse : {"refuse", "weaken"}, default "refuse"
+        What a scene does where elements are too large for strength and energy, see
+        ``from_elastic``.
 
     Raises
     ------
@@ -163,10 +171,13 @@ class Material:
     fracture_energy: float
     contact_stiffness: Constant
     contact_damping: Constant
+    coarse: str = REFUSE
 
     def __post_init__(self):
         plain_fields(self)
-        for field in dataclasses.fields(self):
+        if self.coarse not in (REFUSE, WEAKEN):
+            raise InputError(f"coarse must be {REFUSE!r} or {WEAKEN!r}, got {shown(self.coarse)}")
+        for field in dataclasses.fields(self)[:-1]:
             value = getattr(self, field.name)
             if not isinstance(value, RULES.get(field.name, ())):
                 positive(field.name, value, zero_allowed=field.name in _MAY_BE_ZERO)
@@ -187,6 +198,7 @@ class Material:
         friction_angle: float,
         cohesion: float,
         damping_ratio: float = 0.05,
+        coarse: str = REFUSE,
     ) -> Material:
         """Make a material from measured values; shorter bonds are stiffer.
 
@@ -214,12 +226,20 @@ class Material:
         damping_ratio : float, default 0.05
             Share of the critical damping of a bond between its two bodies, and of contacts; 0 for
             none.
+        coarse : {"refuse", "weaken"}, default "refuse"
+            What a scene does with elements so large that a bond at its tensile strength holds more
+            than the fracture energy: refuse them, with the size that would do, or lower the
+            strength of all bonds until cracks keep their energy (Bazant and Oh), and say so.
 
         Raises
         ------
         InputError
             A value is out of its range. Whether the fracture energy suffices for the largest
             elements is checked by the scene, which has the mesh.
+
+        References
+        ----------
+        Bazant and Oh, Mater. Struct. 16 (1983) 155.
 
         Examples
         --------
@@ -247,6 +267,7 @@ class Material:
             fracture_energy=fracture_energy,
             contact_stiffness=FaceStiffness(normal),
             contact_damping=ContactShareOfCritical(ratio, normal) if ratio else 0.0,
+            coarse=coarse,
         )
 
     @property
@@ -271,7 +292,7 @@ class Material:
         return self.tensile_strength / (self.failure_opening - self.onset_opening)
 
 
-def check_energy(material: Material, where: str = "") -> None:
+def check_energy(material: Material, where: str = "", remedy: str = "") -> None:
     """Raise InputError where a bond would fail before it reaches its strength."""
     if material.failure_opening <= material.onset_opening:
         least = material.tensile_strength**2 / (2.0 * float(material.normal_stiffness))
@@ -279,7 +300,16 @@ def check_energy(material: Material, where: str = "") -> None:
         raise InputError(
             f"fracture_energy must be larger than tensile_strength^2 / (2 normal_stiffness) = "
             f"{bound} J/m2{where}, or the bond would fail before it reaches its strength, got {got}"
+            f"{remedy}"
         )
+
+
+def kept_energy(material: Material, stiffness: float) -> Material:
+    """A material whose bonds, of a least normal stiffness [Pa/m], keep its fracture energy."""
+    strength = math.sqrt(2.0 * material.fracture_energy * stiffness / SPARE)
+    if material.coarse == REFUSE or material.tensile_strength <= strength:
+        return material
+    return replace(material, tensile_strength=strength)
 
 
 def unchecked(material: Material, **values: Any) -> Material:

@@ -290,4 +290,5 @@ def known_error(report: Report, scene: Scene, method: Any) -> str:
     closes = f"energy balance: {report.unexplained.replace('; ', ', ')}"
     if "%" in closes:
         closes = closes.replace(":", " closes to").removesuffix(" of the energy put in")
-    return f"{'steps up to' if varying else 'step'} {method.dt0:.3g} s, {words}; {closes}"
+    words = f"{'steps up to' if varying else 'step'} {method.dt0:.3g} s, {words}; {closes}"
+    return "; ".join((words, *scene.body_materials.weakened))

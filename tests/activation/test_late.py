@@ -3,7 +3,7 @@
 A part beside another of any scale has the bits that it has alone.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -11,6 +11,7 @@ import pytest
 
 from cases.meshes import with_moved_nodes
 from taichi_dem import CONCRETE, Scene, Uniform, checked_mesh, effects, simulate
+from taichi_dem.materials.bond_rules import ModulusOverDistance
 from taichi_dem.mesh.shapes import bar, placed_together
 
 STEP, UNTIL, START = 4e-7, 2.4e-4, 6e-5
@@ -44,13 +45,14 @@ class Late:
     """What one effect alone is needed for, in the bodies of a group "weak", and not before START.
 
     effect: its name. pressure: of a pulse [Pa]; none: a bar flies to another. weak: material of
-    one body. needed: whether it is weak, or the other bar near enough.
+    one body. needed: whether it is weak, or the other bar near enough. rules: of the bonds.
     """
 
     effect: str
     pressure: float
     weak: object = None
     needed: bool = True
+    rules: dict = field(default_factory=dict)
 
     def scene(self, word, **options):
         """The scene with effects "auto" or "all"."""
@@ -64,16 +66,19 @@ class Late:
         place = mesh.points[mesh.tetrahedra].mean(axis=1)
         at = np.abs(place - [5.1 * WIDE if self.pressure else 1.5 * WIDE, 0.5 * WIDE, 0.5 * WIDE])
         mesh = mesh.body_group("weak", lambda x: np.arange(len(x)) == at.sum(axis=1).argmin())
-        weak = {"weak": self.weak} if self.weak and self.needed else {}
+        weak = {"weak": replace(self.weak, **self.rules)} if self.weak and self.needed else {}
         options |= {"materials": weak, "velocity": moves}
-        return Scene(mesh, limited(), word, loads=loads, **options)
+        return Scene(mesh, replace(limited(), **self.rules), word, loads=loads, **options)
 
 
+#: Bonds about as stiff as those of SOFT, of a material from moduli.
+MODULI = {"normal_stiffness": ModulusOverDistance(4e9), "shear_stiffness": ModulusOverDistance(2e9)}
 #: Bonds soften, slip while they are pulled or pressed, or break behind a blow that begins to rub.
 SCENES = {
     "pulled": Late("softening", -1e7, limited(tension=2e6)),
     "pulled across": Late("shear_slip", -1e7, limited(cohesion=1e6)),
     "pressed across": Late("shear_slip", 1e7, replace(limited(cohesion=5e5), friction=0.1)),
+    "cracked": Late("cohesive_crack", -1e7, limited(2e6, 6e6), rules=MODULI),
     "hit": Late("body_contact", 0.0, limited(tension=2e6)),
 }
 
@@ -121,7 +126,7 @@ def test_the_effect_acts_late_in_its_place_and_nowhere_where_it_is_not_needed(na
     top, weak = auto.model.topology, auto.scene.mesh.body_groups["weak"]
     mine = np.isin(top.master, weak) | np.isin(top.slave, weak)
     near = np.union1d(top.master[mine], top.slave[mine])
-    for key in {"softening", "slip"} & {*auto.acting_since}:
+    for key in {"softening", "slip", "damage"} & {*auto.acting_since}:
         acted = np.flatnonzero(np.isfinite(auto.acting_since[key]))
         assert {*acted} <= {*near}
     assert not np.isfinite(auto.broken_time[~mine]).any()
