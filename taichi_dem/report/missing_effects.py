@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.allocation import values
+from taichi_dem.laws.contracts import PARTS_OF_BOND
 from taichi_dem.laws.roles import usual_laws
 from taichi_dem.mesh.tetrahedra import penetration
 from taichi_dem.physics.sphere_pair import CONTACT
@@ -83,6 +84,9 @@ def unserved(model: Model) -> dict[str, MissingEffect]:
     """
     roles = {effect.role for effect in model.effects if effect.name}
     laws = {law.role: law for law in usual_laws(model.mesh, model.materials, roles)}
+    if "bond" in laws:
+        # Its limits are watched apart.
+        laws |= dict.fromkeys(PARTS_OF_BOND, laws.pop("bond"))
     if "contact" in laws:
         laws.pop("friction", None)
     needs = {role: MissingEffect(type(law).__name__, _FOUND[role]) for role, law in laws.items()}

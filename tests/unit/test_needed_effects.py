@@ -30,6 +30,7 @@ from taichi_dem.report.energy_balance import energy_put_in
 from taichi_dem.report.missing_effects import unserved
 from taichi_dem.state.model import Model
 from taichi_dem.state.timeline import NEVER
+from tests.material.blocks import rock
 from tests.structures import filled
 
 LAWS = effects.Softening, effects.ShearSlip, effects.BondDamping
@@ -134,7 +135,7 @@ LISTED = {
 
 @pytest.mark.parametrize("listed", LISTED.values(), ids=LISTED)
 @pytest.mark.parametrize(
-    "material", [CONCRETE, replace(CONCRETE, friction=0.0)], ids=["", "smooth"]
+    "material", [CONCRETE, replace(CONCRETE, friction=0.0), rock()], ids=["", "smooth", "rock"]
 )
 def test_a_scene_lacks_what_auto_would_add_to_it(listed, material):
     """But friction without contact, which then cannot rub; a silent law is lacking, too."""
