@@ -18,8 +18,11 @@ PYTHONS ?=
 
 BIN := $(if $(filter Windows_NT,$(OS)),.venv/Scripts,.venv/bin)
 STAMP := .venv/stamp
-QUADRANTS := $(subst .venv,.venv-quadrants,$(BIN))
-QUADRANTS_STAMP := .venv-quadrants/stamp
+# Forks of Taichi, and what is run on them.
+FORKS := quadrants forge
+FORK_TESTS ?= tests/equivalence/test_digests.py
+quadrants := quadrants>=1.3.3,<2
+forge := taichi-forge>=0.7,<0.8
 MESH_STAMP := .venv/stamp-mesh
 DOCS_STAMP := .venv/stamp-docs
 VULKAN_PACKAGES := mesa-vulkan-drivers libvulkan1
@@ -30,7 +33,7 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-all test-experiments test-slow test-quadrants test-gpu attack fuzz lint bench coverage \
+.PHONY: help venv demo test test-all test-experiments test-slow test-forks test-gpu attack fuzz lint bench coverage \
   gallery docs mesh wheel release-check clean
 
 help: ## print this list
@@ -69,10 +72,12 @@ test-gpu: $(STAMP) ## compare each device here with the CPU (as root on Debian o
 fuzz: $(STAMP) ## run random scenes, also with every access to a field checked (FUZZ_OPTIONS="--attack-seed 7")
 	$(BIN)/python -m pytest -q -n 2 -m attack $(FUZZ) --attacks 20 $(FUZZ_OPTIONS)
 
-test-quadrants: $(QUADRANTS_STAMP) ## run the tests on Quadrants, Taichi's successor; list what differs
+test-forks: $(FORKS:%=.venv-%/stamp) ## run FORK_TESTS on forks of Taichi, Quadrants and Forge; list what differs
 	@mkdir -p results
-	$(QUADRANTS)/python $(TEST) --tb line -rfE $(TEST_OPTIONS) >results/quadrants.txt || test -s results/quadrants.txt
-	@tail -n 1 results/quadrants.txt; echo "What differs is listed in results/quadrants.txt"
+	@for fork in $(FORKS); do echo "$$fork:"; \
+	  $(subst .venv,.venv-$$fork,$(BIN))/python -m pytest -q --tb line -rfE $(FORK_TESTS) $(TEST_OPTIONS) \
+	  >results/$$fork.txt 2>&1; tail -n 1 results/$$fork.txt; done
+	@echo "What differs is listed in results/quadrants.txt and results/forge.txt"
 
 wheel: $(STAMP) ## build the wheel into dist/ and run it in an empty environment (PYTHONS="python3.12 ...": in several)
 	@rm -rf build dist
@@ -105,7 +110,7 @@ mesh: $(MESH_STAMP) ## make the meshes again (installs gmsh; the others do not n
 	$(BIN)/python experiments/make_meshes.py $(MESH_OPTIONS)
 
 clean: ## remove .venv, caches and build leftovers; results/ stays
-	rm -rf .venv .venv-quadrants build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf .venv .venv-quadrants .venv-forge build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(STAMP): requirements.txt pyproject.toml
@@ -123,13 +128,14 @@ $(DOCS_STAMP): $(STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[docs]"
 	@touch $@
 
-$(QUADRANTS_STAMP): $(STAMP) tests/quadrants/alias/taichi.py
-	@echo "Setting up .venv-quadrants: about 100 MB to download."
-	@$(BIN)/python -m venv --clear .venv-quadrants
-	@grep -v -e '^taichi==' -e '^-e ' requirements.txt >.venv-quadrants/requirements.txt
-	@$(QUADRANTS)/python -m pip install --quiet --disable-pip-version-check -r .venv-quadrants/requirements.txt \
-	  "quadrants>=1.3.3,<2"
-	@$(QUADRANTS)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
-	@$(QUADRANTS)/python -c "import pathlib, site; \
-	  pathlib.Path(site.getsitepackages()[0], 'taichi-alias.pth').write_text('$(CURDIR)/tests/quadrants/alias')"
+.venv-%/stamp: $(STAMP) tests/forks/alias/taichi.py
+	@echo "Setting up .venv-$*: about 100 MB to download."
+	@$(BIN)/python -m venv --clear .venv-$*
+	@grep -v -e '^taichi==' -e '^-e ' requirements.txt >.venv-$*/requirements.txt
+	@$(subst .venv,.venv-$*,$(BIN))/python -m pip install --quiet --disable-pip-version-check \
+	  -r .venv-$*/requirements.txt "$($*)"
+	@$(subst .venv,.venv-$*,$(BIN))/python -m pip install --quiet --disable-pip-version-check --no-deps \
+	  --no-build-isolation -e .
+	@$(subst .venv,.venv-$*,$(BIN))/python -c "import pathlib, site; \
+	  pathlib.Path(site.getsitepackages()[0], 'taichi-alias.pth').write_text('$(CURDIR)/tests/forks/alias')"
 	@touch $@
