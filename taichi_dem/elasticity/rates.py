@@ -132,8 +132,11 @@ def contact_eigenvalues(
 
 def point_blocks(arms: np.ndarray, law: np.ndarray, multiply: Any = product) -> np.ndarray:
     """Sum over points of J^T law J, J the map from (velocity, spin) to the point's velocity."""
-    lever = levers(arms)
-    return multiply(transposed(lever), multiply(law[:, None], lever)).sum(axis=1)
+    blocks = np.empty((len(arms), 6, 6))
+    for part in parts_in_cache(len(arms)):
+        lever = levers(arms[part])
+        blocks[part] = multiply(transposed(lever), multiply(law[part, None], lever)).sum(axis=1)
+    return blocks
 
 
 def levers(arms: np.ndarray) -> np.ndarray:
